@@ -1,0 +1,1 @@
+"""Layout engines: each takes a LayoutProblem and gives back a Layout."""

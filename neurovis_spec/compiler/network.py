@@ -1,0 +1,388 @@
+"""The Network: frozen arrays and an update program; what a spec becomes.
+
+In: nothing; this is the value that ``compiler`` makes and that ``runtime``, ``layout`` and ``scene`` read. Neurons and
+connections are structures of arrays; all arrays are read-only. What a step does is a list of operations
+(``program``), each of which says what it reads and what it writes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.language.expressions.tree import Tree
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+IntArray: TypeAlias = npt.NDArray[np.int64]
+Combine = Literal["sum", "product", "distance"]
+Role = Literal["input", "hidden", "output"]
+
+
+def frozen(array: npt.NDArray[np.generic]) -> None:
+    """Make an array read-only."""
+    array.flags.writeable = False
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Neurons declared together: ``count`` of them from index ``start`` on."""
+
+    name: str
+    start: int
+    count: int
+    activation: str
+    model: str
+    combine: Combine
+    activation_parameters: Mapping[str, tuple[float, ...]]
+    model_parameters: Mapping[str, tuple[float, ...]]
+    input: str | None = None
+    box: str | None = None
+    role: Role | None = None
+    description: str | None = None
+
+    @property
+    def indices(self) -> range:
+        """The indices of its neurons."""
+        return range(self.start, self.start + self.count)
+
+
+@dataclass(frozen=True, slots=True)
+class Neurons:
+    """All neurons, in the order of the spec (structure of arrays, n long)."""
+
+    names: tuple[str, ...]
+    labels: tuple[str, ...]
+    groups: tuple[Group, ...]
+    bias: FloatArray
+    #: the activity at step 0, NaN where it is computed like any other
+    initial: FloatArray
+    #: index into the vector of all inputs, −1 without one
+    input: IntArray
+    #: (n, 2), NaN without a position
+    position: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+
+@dataclass(frozen=True, slots=True)
+class Connections:
+    """All connections, in the order written, a matrix or pattern row by row (structure of arrays, m long)."""
+
+    sources: IntArray
+    targets: IntArray
+    #: w[0]
+    weights: FloatArray
+    #: c of a target that combines by distance, else 0
+    centres: FloatArray
+    #: steps
+    delays: IntArray
+    #: index into ``Network.plasticity``, −1 where fixed
+    rules: IntArray
+    #: index into ``entries``
+    entry: IntArray
+    #: bounds of a plastic weight, ±inf without
+    low: FloatArray
+    high: FloatArray
+    #: the names of the entries of ``connections`` (``K -> O``, the second with the same ends ``K -> O (2)``)
+    entries: tuple[str, ...]
+    #: what the spec says of each entry
+    descriptions: tuple[str | None, ...]
+
+    def __len__(self) -> int:
+        return len(self.sources)
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """A signal from outside, ``size`` numbers a step, from ``start`` on in the vector of all inputs.
+
+    ``expression`` (of k, t, dt, pi, e and parameters), or ``table`` (one row a step; past its end the last row
+    stays), or neither: supplied by the caller, else 0.
+    """
+
+    name: str
+    start: int
+    size: int
+    expression: Tree | None = None
+    table: FloatArray | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """A name for neurons whose activity leaves the network; ``scalar`` where it refers to a single neuron."""
+
+    name: str
+    neurons: IntArray
+    scalar: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A state of a model or rule; the expressions see the definition's names. Without ``each_step`` it stays."""
+
+    name: str
+    initial: Tree
+    each_step: Tree | None = None
+    each_episode: Tree | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Activation:
+    """``value`` is an expression of ``x``, the combined input, and the parameters."""
+
+    name: str
+    parameters: tuple[str, ...]
+    value: Tree
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """How the activity follows from ``drive`` (u[t]); ``f`` in ``activity`` is the neuron's activation (a Call of
+    ``f`` with one argument)."""
+
+    name: str
+    parameters: tuple[str, ...]
+    let: tuple[tuple[str, Tree], ...]
+    state: tuple[Quantity, ...]
+    activity: Tree
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """How a weight changes. The expressions see pre, sent, post, weight, k, t, dt, parameters, state, let, signals."""
+
+    name: str
+    parameters: tuple[str, ...]
+    signals: tuple[str, ...]
+    let: tuple[tuple[str, Tree], ...]
+    state: tuple[Quantity, ...]
+    each_step: Tree | None
+    each_episode: Tree | None
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Neurons that are updated together: the same activation, model, combination and level.
+
+    ``members`` are neuron indices, ascending. ``incoming`` are the connections into them, in the order of the
+    connections, and ``slots`` says which member (position in ``members``) each of them goes to.
+    Parameters are arrays as long as ``members``.
+    """
+
+    level: int
+    members: IntArray
+    combine: Combine
+    activation: Activation
+    activation_parameters: Mapping[str, FloatArray]
+    model: Model
+    model_parameters: Mapping[str, FloatArray]
+    incoming: IntArray
+    slots: IntArray
+
+
+@dataclass(frozen=True, slots=True)
+class Plasticity:
+    """Connections that learn by one rule. ``signals`` gives, for each signal of the rule, one index a
+    connection into the activities of all neurons followed by the vector of all inputs. Parameters are as long as ``members``."""
+
+    rule: Rule
+    members: IntArray
+    parameters: Mapping[str, FloatArray]
+    signals: Mapping[str, IntArray]
+    #: how the author wrote it, for display: ``delta(rate=0.01)``
+    title: str
+
+
+# The update program. Names in ``reads`` and ``writes``: inputs, activity, weights, signals (w·a under way), history
+# (past activities), drive[b], cells[b] (states of block b), traces[p] (states of plasticity p).
+
+
+@dataclass(frozen=True, slots=True)
+class ReadInputs:
+    """s[t]: expressions, tables and what the caller supplied, into the vector of all inputs."""
+
+    reads: frozenset[str] = frozenset()
+    writes: frozenset[str] = frozenset({"inputs"})
+
+
+@dataclass(frozen=True, slots=True)
+class Gather:
+    """u[t] of a block: what arrives, combined, + bias + input (§5.2)."""
+
+    block: int
+
+    @property
+    def reads(self) -> frozenset[str]:
+        """Delay 0 reads activities of this step, the rest the signals under way."""
+        return frozenset({"inputs", "activity", "weights", "signals"})
+
+    @property
+    def writes(self) -> frozenset[str]:
+        """The drive of the block."""
+        return frozenset({f"drive[{self.block}]"})
+
+
+@dataclass(frozen=True, slots=True)
+class Update:
+    """The states and the activity of a block; at step 0 neurons with ``initial`` take it instead."""
+
+    block: int
+
+    @property
+    def reads(self) -> frozenset[str]:
+        """The drive and the states of the block."""
+        return frozenset({f"drive[{self.block}]", f"cells[{self.block}]"})
+
+    @property
+    def writes(self) -> frozenset[str]:
+        """The states of the block and its activities."""
+        return frozenset({f"cells[{self.block}]", "activity"})
+
+
+@dataclass(frozen=True, slots=True)
+class Send:
+    """w[t]·a[t] of every delayed connection leaves its source; a[t] is remembered for ``pre``."""
+
+    reads: frozenset[str] = frozenset({"activity", "weights"})
+    writes: frozenset[str] = frozenset({"signals", "history"})
+
+
+@dataclass(frozen=True, slots=True)
+class Learn:
+    """The rule of a plasticity, step and (where it has them) episode: w[t+1] and its states, from old values."""
+
+    plasticity: int
+
+    @property
+    def reads(self) -> frozenset[str]:
+        """Everything that a rule may name."""
+        return frozenset({"inputs", "activity", "history", "weights", f"traces[{self.plasticity}]"})
+
+    @property
+    def writes(self) -> frozenset[str]:
+        """The weights of its connections and their states."""
+        return frozenset({"weights", f"traces[{self.plasticity}]"})
+
+
+Operation: TypeAlias = ReadInputs | Gather | Update | Send | Learn
+
+
+@dataclass(frozen=True, slots=True)
+class LayoutSettings:
+    """The ``layout`` section, references resolved. Pins by neuron index, units of the layout."""
+
+    engine: str = "auto"
+    direction: Literal["down", "up", "right", "left"] = "down"
+    positions: Mapping[int, tuple[float, float]] = field(default_factory=dict)
+    #: neuron indices → row, column, grid, ring, arc
+    arrange: tuple[tuple[tuple[int, ...], str], ...] = ()
+    boxes: tuple[tuple[str, tuple[int, ...]], ...] = ()
+    neuron_spacing: float = 1.0
+    rank_spacing: float = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class RenderSettings:
+    """The ``render`` section. A gain of None is chosen from the network's range."""
+
+    activity: float | None = None
+    signal: float | None = None
+    thickness: float | None = None
+    change: float | None = None
+    theme: str = "default"
+    size: tuple[int, int] | None = None
+    labels: bool = True
+    legend: bool = True
+    title: bool | str = True
+
+
+@dataclass(frozen=True, eq=False)
+class Network:
+    """A compiled network. ``hash`` is the SHA-256 of its canonical content (§12, inspect)."""
+
+    name: str
+    title: str
+    description: str
+    #: seconds a step
+    dt: float
+    #: whether the spec writes ``time.dt``
+    dt_given: bool
+    #: default run length
+    steps: int
+    #: steps of an episode, None without
+    episode: int | None
+    seed: int
+    parameters: Mapping[str, float]
+    #: parameters on which something of the structure depends: these cannot be set in a run
+    structural: frozenset[str]
+    neurons: Neurons
+    connections: Connections
+    inputs: tuple[Input, ...]
+    outputs: tuple[Output, ...]
+    blocks: tuple[Block, ...]
+    plasticity: tuple[Plasticity, ...]
+    program: tuple[Operation, ...]
+    layout: LayoutSettings
+    render: RenderSettings
+    hash: str
+
+    @cached_property
+    def neuron_index(self) -> Mapping[str, int]:
+        """Name to index."""
+        return {name: index for index, name in enumerate(self.neurons.names)}
+
+    @cached_property
+    def input_size(self) -> int:
+        """Length of the vector of all inputs."""
+        return sum(entry.size for entry in self.inputs)
+
+    @cached_property
+    def changing(self) -> IntArray:
+        """Indices of the connections whose weight can change in a run."""
+        result = np.flatnonzero(self.connections.rules >= 0).astype(np.int64)
+        frozen(result)
+        return result
+
+    @cached_property
+    def connection_names(self) -> tuple[str, ...]:
+        """``C1 -> K1``; where several share both ends ``C1 -> K1 (2)`` …, ordered by delay, rule, weight, place."""
+        connections, names = self.connections, self.neurons.names
+        plain = [
+            f"{names[s]} -> {names[t]}"
+            for s, t in zip(connections.sources.tolist(), connections.targets.tolist(), strict=True)
+        ]
+        places: dict[str, list[int]] = {}
+        for index, name in enumerate(plain):
+            places.setdefault(name, []).append(index)
+        for name, members in places.items():
+            if len(members) > 1:
+                for rank, index in enumerate(sorted(members, key=self._parallel_key)):
+                    plain[index] = name if rank == 0 else f"{name} ({rank + 1})"
+        return tuple(plain)
+
+    def _parallel_key(self, index: int) -> tuple[int, str, float, int]:
+        connections = self.connections
+        rule = int(connections.rules[index])
+        name = self.plasticity[rule].rule.name if rule >= 0 else ""
+        return (int(connections.delays[index]), name, float(connections.weights[index]), index)
+
+    @cached_property
+    def connection_index(self) -> Mapping[str, int]:
+        """Connection name to index."""
+        return {name: index for index, name in enumerate(self.connection_names)}
+
+    @cached_property
+    def group_index(self) -> Mapping[str, Group]:
+        """Group name to group."""
+        return {group.name: group for group in self.neurons.groups}
+
+    @cached_property
+    def input_index(self) -> Mapping[str, Input]:
+        """Input name to input."""
+        return {entry.name: entry for entry in self.inputs}

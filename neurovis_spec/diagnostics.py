@@ -1,0 +1,127 @@
+"""Findings: where they are, what they say, and how several are collected.
+
+In: facts that a stage noticed (a code, a place, a sentence). Out: an ordered tuple of Diagnostics, or a
+SpecError that holds them. Nothing is raised at the first mistake: a stage goes on and collects. How findings
+are shown (text, JSON) is in ``neurovis_spec.findings_text``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from difflib import SequenceMatcher
+from typing import Literal
+
+Severity = Literal["error", "warning"]
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Span:
+    """A stretch of a file. Lines and columns count from 1, columns in code points; the end is exclusive."""
+
+    file: str
+    line: int
+    column: int
+    end_line: int
+    end_column: int
+
+    def within(self, start: int, end: int) -> Span:
+        """The part from ``start`` to ``end`` (0-based, exclusive) of a span that lies on one line."""
+        return Span(self.file, self.line, self.column + start, self.line, self.column + max(end, start + 1))
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnostic:
+    """One finding: a stable code, a sentence in the author's words, its place and a suggestion, if any."""
+
+    code: str
+    message: str
+    span: Span
+    severity: Severity = "error"
+    hint: str | None = None
+
+
+class SpecError(Exception):
+    """The input is at fault. ``diagnostics`` holds every finding, sorted by place; ``sources`` the texts read."""
+
+    def __init__(self, diagnostics: Iterable[Diagnostic], sources: Mapping[str, str] | None = None) -> None:
+        self.diagnostics: tuple[Diagnostic, ...] = tuple(diagnostics)
+        self.sources: Mapping[str, str] = dict(sources or {})
+        super().__init__("\n".join(headline(d) for d in self.diagnostics))
+
+
+@dataclass(slots=True)
+class Findings:
+    """Collects findings while the stages go on; ``sources`` maps each file read to its text."""
+
+    sources: dict[str, str] = field(default_factory=dict)
+    _items: list[Diagnostic] = field(default_factory=list)
+
+    def error(self, code: str, span: Span, message: str, hint: str | None = None) -> None:
+        """Note a mistake."""
+        self._items.append(Diagnostic(code, message, span, "error", hint))
+
+    def warning(self, code: str, span: Span, message: str, hint: str | None = None) -> None:
+        """Note something legal that is surely not meant."""
+        self._items.append(Diagnostic(code, message, span, "warning", hint))
+
+    @property
+    def failed(self) -> bool:
+        """Whether there is an error among the findings."""
+        return any(item.severity == "error" for item in self._items)
+
+    @property
+    def errors(self) -> int:
+        """How many errors there are so far: a stage compares it before and after."""
+        return sum(item.severity == "error" for item in self._items)
+
+    def sorted(self) -> tuple[Diagnostic, ...]:
+        """All findings by place, each once."""
+        unique = dict.fromkeys(self._items)
+        return tuple(sorted(unique, key=lambda d: (d.span, d.severity, d.code, d.message)))
+
+    def check(self) -> None:
+        """Raise SpecError if there is an error."""
+        if self.failed:
+            raise SpecError(self.sorted(), self.sources)
+
+
+def headline(diagnostic: Diagnostic) -> str:
+    """The first line of a finding: ``FILE:LINE:COLUMN: error[CODE]: MESSAGE``."""
+    span = diagnostic.span
+    place = f"{span.file}:{span.line}:{span.column}"
+    return f"{place}: {diagnostic.severity}[{diagnostic.code}]: {diagnostic.message}"
+
+
+def nearest(name: str, known: Iterable[str], most: int = 3) -> tuple[str, ...]:
+    """The known names that are most like ``name``, best first; none that is too far off.
+
+    >>> nearest("tahn", ["tanh", "sigmoid", "atan"])
+    ('tanh', 'atan')
+    """
+    folded = name.casefold()
+    scored: list[tuple[float, str]] = []
+    for candidate in dict.fromkeys(known):
+        other = candidate.casefold()
+        score = SequenceMatcher(None, folded, other, autojunk=False).ratio()
+        if folded and other and (other.startswith(folded) or folded.startswith(other)):
+            score = max(score, 0.75)
+        if score >= 0.6:
+            scored.append((-score, candidate))
+    return tuple(candidate for _, candidate in sorted(scored)[:most])
+
+
+def suggest(name: str, known: Iterable[str], what: str = "known") -> str | None:
+    """A help line for an unknown name: the nearest known ones, else all of a short list.
+
+    >>> suggest("tahn", ["tanh", "sigmoid"])
+    "did you mean 'tanh'?"
+    """
+    names = tuple(dict.fromkeys(known))
+    close = nearest(name, names)
+    if close:
+        return "did you mean " + " or ".join(f"'{c}'" for c in close) + "?"
+    if not names:
+        return None
+    shown = ", ".join(names[:12]) + (", …" if len(names) > 12 else "")
+    return f"{what}: {shown}"

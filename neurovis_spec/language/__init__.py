@@ -1,0 +1,1 @@
+"""The language: YAML with spans, the shape of a spec, expressions, data files."""

@@ -1,0 +1,33 @@
+"""Layouts: the problem an engine is given, the Layout it gives back, layout files and metrics."""
+
+from neurovis_spec.layout.model import (
+    GRID,
+    RADIUS,
+    Arrangement,
+    Capabilities,
+    Direction,
+    Layout,
+    LayoutEdge,
+    LayoutEngine,
+    LayoutGroup,
+    LayoutProblem,
+    LayoutRefusalError,
+    Point,
+    Route,
+)
+
+__all__ = [
+    "GRID",
+    "RADIUS",
+    "Arrangement",
+    "Capabilities",
+    "Direction",
+    "Layout",
+    "LayoutEdge",
+    "LayoutEngine",
+    "LayoutGroup",
+    "LayoutProblem",
+    "LayoutRefusalError",
+    "Point",
+    "Route",
+]

@@ -1,0 +1,109 @@
+"""What a layout engine is given and what it gives back.
+
+In: nothing; these are the values of the seam. Out: LayoutProblem (structure alone: no activation, no weight's value),
+Layout (a position for every neuron, a route for every connection), Capabilities (what an engine says it can
+do) and the LayoutEngine protocol. x grows right, y grows down; one unit is the distance between neighbours of a rank;
+a neuron's disc is 0.6 across.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal, Protocol, TypeAlias
+
+Point: TypeAlias = tuple[float, float]
+#: A cubic Bézier spline: 1 + 3k points from the centre of the source to the centre of the target.
+Route: TypeAlias = tuple[Point, ...]
+Direction = Literal["down", "up", "right", "left"]
+Arrangement = Literal["row", "column", "grid", "ring", "arc"]
+
+#: Radius of a neuron's disc.
+RADIUS = 0.3
+#: Coordinates that no pin gives are multiples of this.
+GRID = 1 / 1024
+
+
+@dataclass(frozen=True, slots=True)
+class LayoutEdge:
+    """A connection. ``name`` is its name in the layout file (``C1 -> K1``, ``C1 -> K1 (2)``)."""
+
+    name: str
+    source: int
+    target: int
+    delay: int
+
+
+@dataclass(frozen=True, slots=True)
+class LayoutGroup:
+    """Neurons declared together, in the order of their numbers."""
+
+    name: str
+    members: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class LayoutProblem:
+    """What is to be laid out, in canonical order: neurons in the natural order of their names (K2 before K10), edges by
+    the natural order of their names, so that the order of the spec cannot show in the result."""
+
+    network: str
+    neurons: tuple[str, ...]
+    groups: tuple[LayoutGroup, ...]
+    edges: tuple[LayoutEdge, ...]
+    #: pinned neurons: index to exact position
+    pins: Mapping[int, Point] = field(default_factory=dict)
+    direction: Direction = "down"
+    #: members and how they are to be arranged
+    arrange: tuple[tuple[tuple[int, ...], Arrangement], ...] = ()
+    #: named frames and their members
+    boxes: tuple[tuple[str, tuple[int, ...]], ...] = ()
+    neuron_spacing: float = 1.0
+    rank_spacing: float = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Where everything is: positions by neuron name, routes by connection name, neurons in natural order."""
+
+    network: str
+    engine: str
+    positions: Mapping[str, Point]
+    routes: Mapping[str, Route]
+
+
+@dataclass(frozen=True, slots=True)
+class Capabilities:
+    """What an engine can do. What a spec asks for beyond it is refused before the engine starts."""
+
+    pins: bool = False
+    #: lays out what is not pinned (an engine without it needs every position)
+    free: bool = True
+    arrange: bool = False
+    boxes: bool = False
+    direction: bool = False
+    #: most neurons and most connections
+    neurons: int = 1_000_000
+    edges: int = 10_000_000
+
+
+class LayoutEngine(Protocol):
+    """An engine, found through the entry point group ``neurovis.layouts`` (the entry point names a class that is called
+    without arguments)."""
+
+    name: str
+    capabilities: Capabilities
+
+    def lay_out(self, problem: LayoutProblem) -> Layout:
+        """Place every neuron once and route every edge. Deterministic. Raises ``LayoutRefusalError`` for a problem that cannot
+        be solved as asked."""
+        ...
+
+
+class LayoutRefusalError(Exception):
+    """An engine cannot do what is asked. ``code`` is a finding's code, the text is for the author."""
+
+    def __init__(self, code: str, message: str, hint: str | None = None) -> None:
+        self.code = code
+        self.hint = hint
+        super().__init__(message)

@@ -1,0 +1,1 @@
+"""The runtime: the reference interpreter, backends, simulation, recording."""

@@ -1,0 +1,1 @@
+"""Renderers: each takes a Scene (or a Film) and gives back bytes."""
