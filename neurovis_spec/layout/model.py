@@ -60,6 +60,9 @@ class LayoutProblem:
     boxes: tuple[tuple[str, tuple[int, ...]], ...] = ()
     neuron_spacing: float = 1.0
     rank_spacing: float = 2.0
+    #: where signals enter and leave the network: a hint on what comes first in a loop
+    entries: tuple[int, ...] = ()
+    exits: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,47 @@
+"""Components: what is not connected is laid out on its own, and stands side by side.
+
+In: a problem and its units. Out: components as lists of units, and, for finished ones, where each goes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import networkx as nx
+
+from neurovis_layouts.layered.units import Unit
+from neurovis_spec.layout.model import LayoutProblem, Point
+
+_APART = 1.5
+
+
+def components_of(problem: LayoutProblem, units: Sequence[Unit]) -> tuple[list[list[int]], list[int]]:
+    """Components of several connected units or of one that has connections, as unit indices; and units without any."""
+    owner = {member: i for i, unit in enumerate(units) for member in unit.members}
+    graph: nx.Graph[int] = nx.Graph()
+    graph.add_nodes_from(range(len(units)))
+    graph.add_edges_from((owner[edge.source], owner[edge.target]) for edge in problem.edges)
+    connected: list[list[int]] = []
+    alone: list[int] = []
+    for component in sorted(sorted(part) for part in nx.connected_components(graph)):
+        if len(component) == 1 and units[component[0]].places is None:
+            alone += component
+        else:
+            connected.append(component)
+    return connected, alone
+
+
+def packed(extents: Sequence[tuple[Point, Point]]) -> list[Point]:
+    """Shifts that put boxes (low corner, high corner) side by side, in rows about as wide as the whole is high."""
+    sizes = [(high[0] - low[0] + _APART, high[1] - low[1] + _APART) for low, high in extents]
+    area = sum((w + 0.6) * (h + 0.6) for w, h in sizes)
+    limit = max([16.0, 1.3 * math.sqrt(area), *(w for w, _ in sizes)])
+    shifts: list[Point] = []
+    x = y = row = 0.0
+    for (low, _), (width, height) in zip(extents, sizes, strict=True):
+        if x > 0 and x + width > limit + _APART:
+            x, y, row = 0.0, y + row, 0.0
+        shifts.append((x - low[0], y - low[1]))
+        x, row = x + width, max(row, height)
+    return shifts

@@ -1,0 +1,111 @@
+"""Levels: the units of one component, rank by rank, with a passage through every rank that a connection crosses.
+
+In: a problem, units, ranks. Out: Levels: nodes (a neuron, a block, or a passage), which rank they are in, and the
+segments between neighbouring ranks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from neurovis_layouts.layered.units import Unit
+from neurovis_spec.layout.model import LayoutProblem
+
+#: Passages in all; beyond it the longest connections get none.
+_MOST_PASSAGES = 60_000
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """Something in a rank. ``members`` with their offsets; none for a passage. ``reach`` is how far centres lie from its
+    middle, across and along; ``kin`` is shared by neurons of a group that keep their order."""
+
+    rank: int
+    members: tuple[tuple[int, float, float], ...] = ()
+    reach: tuple[float, float] = (0.0, 0.0)
+    kin: int = -1
+    box: int = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """A piece of a connection from a node to one in the next rank; ``a`` and ``b`` are offsets at its ends."""
+
+    upper: int
+    a: float
+    lower: int
+    b: float
+    weight: float
+
+
+@dataclass(slots=True)
+class Levels:
+    """Nodes by index, node indices by rank, segments below each rank, and the passages of each edge, from above to below."""
+
+    nodes: list[Node] = field(default_factory=list)
+    ranks: list[list[int]] = field(default_factory=list)
+    segments: list[list[Segment]] = field(default_factory=list)
+    passages: dict[int, list[int]] = field(default_factory=dict)
+
+
+def levels_of(problem: LayoutProblem, units: Sequence[Unit], rank: Sequence[int], edges: Sequence[int]) -> Levels:
+    """Levels of these units; ``rank`` is by position in ``units``; ``edges`` are the indices of theirs."""
+    levels = Levels()
+    height = max(rank, default=-1) + 1
+    levels.ranks = [[] for _ in range(height)]
+    levels.segments = [[] for _ in range(max(0, height - 1))]
+    where: dict[int, tuple[int, float]] = {}
+    boxes = {m: number for number, (_, members) in enumerate(problem.boxes) for m in reversed(members)}
+    groups = {m: number for number, group in enumerate(problem.groups) for m in group.members}
+    for unit, level in sorted(zip(units, rank, strict=True), key=lambda pair: min(pair[0].members)):
+        for node in _nodes(unit, level, boxes, groups):
+            index = _add(levels, node)
+            where.update({member: (index, dx) for member, dx, _ in node.members})
+    spans: list[tuple[int, int]] = []
+    for i in edges:
+        edge = problem.edges[i]
+        span = abs(levels.nodes[where[edge.source][0]].rank - levels.nodes[where[edge.target][0]].rank)
+        if span:
+            spans.append((span, i))
+    budget = _MOST_PASSAGES
+    with_passages: set[int] = set()
+    for span, i in sorted(spans):
+        budget -= span - 1
+        if budget >= 0:
+            with_passages.add(i)
+    for _, i in sorted(spans, key=lambda item: item[1]):
+        if i in with_passages:
+            _connect(levels, problem, i, where)
+    return levels
+
+
+def _nodes(unit: Unit, rank: int, boxes: dict[int, int], groups: dict[int, int]) -> list[Node]:
+    if unit.places is None:
+        return [Node(rank, ((m, 0.0, 0.0),), (0.0, 0.0), groups.get(m, -1), boxes.get(m, -1)) for m in unit.members]
+    members = tuple((m, dx, dy) for m, (dx, dy) in zip(unit.members, unit.places, strict=True))
+    reach = (max(abs(dx) for _, dx, _ in members), max(abs(dy) for _, _, dy in members))
+    shared = {boxes.get(m, -1) for m in unit.members}
+    return [Node(rank, members, reach, -1, shared.pop() if len(shared) == 1 else -1)]
+
+
+def _add(levels: Levels, node: Node) -> int:
+    levels.nodes.append(node)
+    levels.ranks[node.rank].append(len(levels.nodes) - 1)
+    return len(levels.nodes) - 1
+
+
+def _connect(levels: Levels, problem: LayoutProblem, i: int, where: dict[int, tuple[int, float]]) -> None:
+    """Segments for one edge, through passages where it crosses ranks; a line of passages is pulled straight."""
+    edge = problem.edges[i]
+    upper, lower = where[edge.source], where[edge.target]
+    if levels.nodes[upper[0]].rank > levels.nodes[lower[0]].rank:
+        upper, lower = lower, upper
+    top, bottom = levels.nodes[upper[0]].rank, levels.nodes[lower[0]].rank
+    passages = [_add(levels, Node(rank)) for rank in range(top + 1, bottom)]
+    if passages:
+        levels.passages[i] = passages
+    line = [upper, *((node, 0.0) for node in passages), lower]
+    for step, ((a, offset_a), (b, offset_b)) in enumerate(zip(line, line[1:], strict=False)):
+        ends = (step == 0) + (step == len(line) - 2)
+        levels.segments[top + step].append(Segment(a, offset_a, b, offset_b, (8.0, 2.0, 1.0)[ends]))

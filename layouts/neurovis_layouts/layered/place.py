@@ -1,0 +1,117 @@
+"""Places: coordinates across and along for nodes that have their ranks and order.
+
+In: Levels and the order. Out: x and y of every node. Across, each rank is moved to the weighted mean of what its nodes are
+connected to, in sweeps; within a rank that is an isotonic regression, so that what is symmetric stays symmetric. Along, ranks are as far
+apart as asked, farther where blocks are high or the ranks so wide that lines would run flat over discs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from neurovis_layouts.isotonic import spread
+from neurovis_layouts.layered.levels import Levels
+from neurovis_spec.layout.geometry import snap
+from neurovis_spec.layout.model import Point
+
+_BESIDE_DISC = 0.6
+_BESIDE_PASSAGE = 0.25
+_BETWEEN_BOXES = 0.6
+_MOST_STRETCH = 2.0
+_NARROW = 0.4
+_FLAT = 14.0
+_HARDLY = 1e-7
+
+
+def placed(levels: Levels, order: Sequence[Sequence[int]], neuron_spacing: float, rank_spacing: float) -> list[Point]:
+    """x across (the middle of the whole is 0) and y along (the first rank is at 0) of every node."""
+    neuron_spacing = max(neuron_spacing, 0.65)
+    gaps = _gaps(levels, order, neuron_spacing)
+    across = _across(levels, order, gaps)
+    along = _along(levels, order, across, rank_spacing)
+    if not across:
+        return []
+    xs = [across[i] for i, node in enumerate(levels.nodes) if node.members]
+    middle = (min(xs) + max(xs)) / 2
+    return [(snap(x - middle), along[node.rank]) for x, node in zip(across, levels.nodes, strict=True)]
+
+
+def _gaps(levels: Levels, order: Sequence[Sequence[int]], spacing: float) -> list[list[float]]:
+    """Least distances between neighbours; a rank much narrower than its neighbours is stretched."""
+    plain = [[_gap(levels, a, b, spacing) for a, b in zip(rank, rank[1:], strict=False)] for rank in order]
+    widths = [sum(gaps) for gaps in plain]
+    result: list[list[float]] = []
+    for r, gaps in enumerate(plain):
+        beside = max((widths[i] for i in (r - 1, r + 1) if 0 <= i < len(widths)), default=0.0)
+        stretch = min(_MOST_STRETCH, _NARROW * beside / widths[r]) if widths[r] > 0 else 1.0
+        result.append([gap * max(1.0, stretch) for gap in gaps])
+    return result
+
+
+def _gap(levels: Levels, a: int, b: int, spacing: float) -> float:
+    first, second = levels.nodes[a], levels.nodes[b]
+    between = first.reach[0] + second.reach[0]
+    if not first.members and not second.members:
+        return _BESIDE_PASSAGE
+    if not first.members or not second.members:
+        return between + _BESIDE_DISC
+    if first.reach[0] or second.reach[0]:
+        between += 0.5 * spacing
+    return between + spacing + (_BETWEEN_BOXES if first.box != second.box else 0.0)
+
+
+def _across(levels: Levels, order: Sequence[Sequence[int]], gaps: Sequence[Sequence[float]]) -> list[float]:
+    count = len(levels.nodes)
+    above: list[list[tuple[int, float, float]]] = [[] for _ in range(count)]
+    below: list[list[tuple[int, float, float]]] = [[] for _ in range(count)]
+    for segment in (segment for gap in levels.segments for segment in gap):
+        shift = segment.a - segment.b
+        below[segment.upper].append((segment.lower, -shift, segment.weight))
+        above[segment.lower].append((segment.upper, shift, segment.weight))
+    x = [0.0] * count
+    for rank, distances in zip(order, gaps, strict=True):
+        for node, place in zip(rank, spread([0.0] * len(rank), [1.0] * len(rank), distances), strict=True):
+            x[node] = place
+    height = len(order)
+    rounds = 10 if count < 5000 else 4
+    for turn in range(rounds):
+        both = turn >= rounds // 2
+        for r in range(height):
+            _pull(x, order[r], gaps[r], (above, below) if both else (above,))
+        for r in range(height - 1, -1, -1):
+            _pull(x, order[r], gaps[r], (above, below) if both else (below,))
+    return x
+
+
+def _pull(
+    x: list[float],
+    rank: Sequence[int],
+    gaps: Sequence[float],
+    sides: Sequence[Sequence[Sequence[tuple[int, float, float]]]],
+) -> None:
+    """Move one rank to where its connections to these sides want it."""
+    wishes: list[float] = []
+    weights: list[float] = []
+    for node in rank:
+        total, mass = 0.0, 0.0
+        for side in sides:
+            for other, shift, weight in side[node]:
+                total += weight * (x[other] + shift)
+                mass += weight
+        wishes.append(total / mass if mass else x[node])
+        weights.append(mass or _HARDLY)
+    for node, place in zip(rank, spread(wishes, weights, gaps), strict=True):
+        x[node] = place
+
+
+def _along(levels: Levels, order: Sequence[Sequence[int]], x: Sequence[float], spacing: float) -> list[float]:
+    heights = [max((levels.nodes[node].reach[1] for node in rank), default=0.0) for rank in order]
+    result: list[float] = []
+    for r in range(len(order)):
+        if r == 0:
+            result.append(0.0)
+            continue
+        longest = max((abs(x[s.upper] + s.a - x[s.lower] - s.b) for s in levels.segments[r - 1]), default=0.0)
+        wide = max(1.0, min(2.5, longest / _FLAT))
+        result.append(snap(result[-1] + heights[r - 1] + heights[r] + max(spacing, 0.75) * wide))
+    return result

@@ -1,0 +1,144 @@
+"""Units: neurons that share a rank, and blocks: units that are placed as one piece.
+
+In: a LayoutProblem. Out: units in canonical order, each neuron in exactly one. A group shares a rank, unless connections
+within it run forward (a chain): then each of its neurons finds its own. Neurons that drive each other in a loop (a half-centre
+oscillator, a ring, a reservoir) are one block: a row where they are a line, else a ring.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import networkx as nx
+
+from neurovis_layouts.formations import offsets
+from neurovis_layouts.frame import from_picture
+from neurovis_spec.layout.model import Arrangement, LayoutProblem, LayoutRefusalError, Point
+
+#: Loops of more neurons than this are unrolled along the direction instead of drawn as a ring.
+_MOST_IN_A_RING = 32
+_PAIR = 2.0
+_LINE = 1.6
+_RING = 1.2
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """Neurons of one rank; with ``places`` (offsets from its middle, x across, y along) a rigid block."""
+
+    members: tuple[int, ...]
+    places: tuple[Point, ...] | None = None
+
+
+def units_of(problem: LayoutProblem) -> tuple[Unit, ...]:
+    """The units, ordered by their first neuron. Raises LayoutRefusalError where a neuron is arranged twice."""
+    found = _arranged(problem)
+    taken = {member for unit in found for member in unit.members}
+    lone: list[int] = []
+    for group in problem.groups:
+        members = [member for member in group.members if member not in taken]
+        taken.update(members)
+        if len(members) == 1:
+            lone += members
+        elif members:
+            found += _of_group(problem, members)
+    lone += [i for i in range(len(problem.neurons)) if i not in taken]
+    found += _of_lone(problem, sorted(lone))
+    found = _without_needless_loops(problem, found)
+    return tuple(sorted(found, key=lambda unit: min(unit.members)))
+
+
+def _arranged(problem: LayoutProblem) -> list[Unit]:
+    spacing = max(problem.neuron_spacing, 0.65)
+    found: list[Unit] = []
+    taken: set[int] = set()
+    for members, how in problem.arrange:
+        twice = [m for m in members if m in taken]
+        if twice:
+            name = problem.neurons[twice[0]]
+            raise LayoutRefusalError("arranged-twice", f"'{name}' is arranged twice", "arrange it once")
+        taken.update(members)
+        wide = spacing * (1.5 if _graph(problem, members).size() else 1.0)
+        places = offsets(how, len(members), wide)
+        found.append(Unit(members, tuple(from_picture(place, problem.direction) for place in places)))
+    return found
+
+
+def _graph(problem: LayoutProblem, members: Iterable[int]) -> nx.DiGraph[int]:
+    """The connections among these neurons, loops of one neuron to itself left out; nodes and edges in canonical order."""
+    graph: nx.DiGraph[int] = nx.DiGraph()
+    graph.add_nodes_from(sorted(members))
+    for edge in problem.edges:
+        if edge.source != edge.target and edge.source in graph and edge.target in graph:
+            graph.add_edge(edge.source, edge.target)
+    return graph
+
+
+def _of_group(problem: LayoutProblem, members: Sequence[int]) -> list[Unit]:
+    graph = _graph(problem, members)
+    if not graph.size():
+        return [Unit(tuple(members))]
+    loops = [sorted(loop) for loop in nx.strongly_connected_components(graph) if len(loop) > 1]
+    if not loops:
+        return [Unit((member,)) for member in members]
+    if len(members) <= _MOST_IN_A_RING and 2 * sum(len(loop) for loop in loops) >= len(members):
+        return [_block(problem, members)]
+    small = sorted(loop for loop in loops if len(loop) <= _MOST_IN_A_RING)
+    inside = {member for loop in small for member in loop}
+    return [_block(problem, loop) for loop in small] + [Unit((m,)) for m in members if m not in inside]
+
+
+def _of_lone(problem: LayoutProblem, lone: Sequence[int]) -> list[Unit]:
+    """Neurons declared singly: those that drive each other both ways, by delays of the same kind, are one block."""
+    kinds: dict[tuple[int, int], set[bool]] = {}
+    inside = set(lone)
+    for edge in problem.edges:
+        if edge.source in inside and edge.target in inside and edge.source != edge.target:
+            kinds.setdefault((edge.source, edge.target), set()).add(edge.delay == 0)
+    pairs: nx.Graph[int] = nx.Graph()
+    pairs.add_nodes_from(lone)
+    pairs.add_edges_from((a, b) for (a, b), kind in kinds.items() if a < b and kinds.get((b, a)) == kind)
+    found: list[Unit] = []
+    for component in sorted(sorted(part) for part in nx.connected_components(pairs)):
+        if 1 < len(component) <= _MOST_IN_A_RING:
+            found.append(_block(problem, component))
+        else:
+            found += [Unit((member,)) for member in component]
+    return found
+
+
+def _block(problem: LayoutProblem, members: Sequence[int]) -> Unit:
+    """A row where the connections are a line of neighbours, else a ring; along a line or circle in its own order."""
+    spacing = max(problem.neuron_spacing, 0.65)
+    graph = _graph(problem, members).to_undirected()
+    degrees = [degree for _, degree in graph.degree()]
+    how: Arrangement = "ring"
+    order, wide = list(members), _RING
+    ends = [node for node in graph if graph.degree(node) == 1]
+    if max(degrees) <= 2 and nx.is_connected(graph):
+        order = list(nx.dfs_preorder_nodes(graph, min(ends) if ends else min(members), sort_neighbors=sorted))
+        if ends:
+            how, wide = "row", _PAIR if len(members) == 2 else _LINE
+    return Unit(tuple(order), tuple(offsets(how, len(order), spacing * wide)))
+
+
+def _without_needless_loops(problem: LayoutProblem, found: list[Unit]) -> list[Unit]:
+    """Split groups that would make a loop of ranks only because their neurons share one."""
+    owner = {member: i for i, unit in enumerate(found) for member in unit.members}
+    quotient: nx.DiGraph[int] = nx.DiGraph()
+    quotient.add_nodes_from(range(len(found)))
+    for edge in problem.edges:
+        if owner[edge.source] != owner[edge.target]:
+            quotient.add_edge(owner[edge.source], owner[edge.target])
+    split: set[int] = set()
+    for loop in nx.strongly_connected_components(quotient):
+        loose = [i for i in loop if found[i].places is None and len(found[i].members) > 1]
+        if len(loop) > 1 and loose:
+            members = [member for i in loop for member in found[i].members]
+            if nx.is_directed_acyclic_graph(_graph(problem, members)):
+                split.update(loose)
+    result: list[Unit] = []
+    for i, unit in enumerate(found):
+        result += [Unit((member,)) for member in unit.members] if i in split else [unit]
+    return result

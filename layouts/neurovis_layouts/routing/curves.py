@@ -1,0 +1,76 @@
+"""Curves along the direction: down from the source, through gaps in the ranks between, spread into the target.
+
+In: both centres, the waypoints between, how the ends lean. Out: a route.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from neurovis_spec.layout.model import Point, Route
+
+_SLOPE = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Waypoint:
+    """A gap through which a route passes: straight, from ``half`` before ``y`` to ``half`` behind it."""
+
+    x: float
+    y: float
+    half: float = 0.0
+
+
+def handle(across: float, along: float) -> float:
+    """How much of the way along an end keeps its direction: more where the way across is long, so that the curve gets
+    clear of the neighbours first."""
+    return 0.5 + 0.4 * min(1.0, abs(across) / (6 * abs(along)))
+
+
+def curve(start: Point, end: Point, ways: Sequence[Waypoint], lean: tuple[float, float], grip: float = 0.0) -> Route:
+    """The route. ``lean`` are the sideways shares at both ends; ``grip`` sets the handles, 0 chooses them."""
+    sign = 1.0 if end[1] > start[1] else -1.0
+    knots = [start]
+    slopes = [0.0]
+    passing = _slopes(start, end, ways)
+    for way, slope in zip(ways, passing, strict=True):
+        if way.half > 0:
+            knots += [(way.x, way.y - sign * way.half), (way.x, way.y + sign * way.half)]
+            slopes += [0.0, 0.0]
+        else:
+            knots.append((way.x, way.y))
+            slopes.append(slope)
+    knots.append(end)
+    slopes.append(0.0)
+    points: list[Point] = [start]
+    for i in range(len(knots) - 1):
+        (ax, ay), (bx, by) = knots[i], knots[i + 1]
+        along = by - ay
+        share = grip or handle(bx - ax, along)
+        first = _leaning(ax, ay, lean[0], sign, share * abs(along))
+        if i > 0:
+            reach = min(share, 0.5) * along
+            first = (ax + slopes[i] * reach, ay + reach)
+        second = _leaning(bx, by, lean[1], -sign, share * abs(along))
+        if i < len(knots) - 2:
+            reach = min(share, 0.5) * along
+            second = (bx - slopes[i + 1] * reach, by - reach)
+        points += [first, second, (bx, by)]
+    return tuple(points)
+
+
+def _leaning(x: float, y: float, lean: float, sign: float, length: float) -> Point:
+    return x + lean * length, y + sign * math.sqrt(1 - lean * lean) * length
+
+
+def _slopes(start: Point, end: Point, ways: Sequence[Waypoint]) -> list[float]:
+    """Slopes (across by along) at waypoints: monotone (Fritsch and Butland 1984), so that nothing overshoots."""
+    line = [start, *((way.x, way.y) for way in ways), end]
+    secants = [(b[0] - a[0]) / (b[1] - a[1]) if b[1] != a[1] else 0.0 for a, b in zip(line, line[1:], strict=False)]
+    result: list[float] = []
+    for before, after in zip(secants, secants[1:], strict=False):
+        slope = 2 * before * after / (before + after) if before * after > 0 else 0.0
+        result.append(max(-_SLOPE, min(_SLOPE, slope)))
+    return result

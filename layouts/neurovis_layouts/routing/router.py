@@ -1,0 +1,167 @@
+"""The router: a route for every edge of a problem whose neurons have their places.
+
+In: the problem, centres in the engine's frame (x across, y along), waypoints. Out: routes in that frame, by edge index.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
+
+from neurovis_layouts.routing.bows import clear_bow
+from neurovis_layouts.routing.curves import Waypoint, curve
+from neurovis_layouts.routing.loops import best_loop
+from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
+from neurovis_layouts.routing.ports import Port, leanings
+from neurovis_spec.layout.geometry import distance
+from neurovis_spec.layout.model import LayoutEdge, Point, Route
+
+__all__ = ["Waypoint", "route_all"]
+
+_NEAR = 3.0
+_STEEP_ENOUGH = 0.75
+
+
+def route_all(
+    edges: Sequence[LayoutEdge],
+    centres: Sequence[Point],
+    waypoints: Mapping[int, Sequence[Waypoint]] | None = None,
+    bowed: AbstractSet[int] = frozenset(),
+) -> list[Route]:
+    """Routes by edge index.
+
+    Without ``waypoints`` every edge runs from anywhere to anywhere; with them, edges not in ``bowed`` run along the
+    direction (through their waypoints, if they have any).
+    """
+    obstacles = Obstacles(centres)
+    routes: dict[int, Route] = {}
+    if waypoints is not None:
+        along = [i for i, edge in enumerate(edges) if i not in bowed and _runs_along(edge, centres)]
+        routes.update(_curves(edges, centres, along, waypoints, obstacles))
+    rest = [i for i, edge in enumerate(edges) if i not in routes and edge.source != edge.target]
+    routes.update(_bows(edges, centres, rest, obstacles))
+    routes.update(_loops(edges, centres, routes, obstacles))
+    return [routes[i] for i in range(len(edges))]
+
+
+def _runs_along(edge: LayoutEdge, centres: Sequence[Point]) -> bool:
+    (ax, ay), (bx, by) = centres[edge.source], centres[edge.target]
+    return abs(by - ay) >= max(_STEEP_ENOUGH, abs(bx - ax) / 40)
+
+
+def _curves(
+    edges: Sequence[LayoutEdge],
+    centres: Sequence[Point],
+    chosen: Sequence[int],
+    waypoints: Mapping[int, Sequence[Waypoint]],
+    obstacles: Obstacles,
+) -> dict[int, Route]:
+    lean = _lean(edges, centres, chosen, waypoints)
+    routes: dict[int, Route] = {}
+    for i in chosen:
+        start, end = centres[edges[i].source], centres[edges[i].target]
+        own = (edges[i].source, edges[i].target)
+        ends = (lean[i, True], lean[i, False])
+        best, clearance = curve(start, end, waypoints.get(i, ()), ends), -1.0
+        clearance = obstacles.clearance(best, own)
+        for grip, share in ((0.75, 1.0), (0.95, 1.0), (0.75, 0.4), (0.95, 0.4)) if clearance < REACH - 0.1 else ():
+            other = curve(start, end, waypoints.get(i, ()), (ends[0] * share, ends[1] * share), grip)
+            found = obstacles.clearance(other, own)
+            if found > clearance + 0.02:
+                best, clearance = other, found
+        if clearance < TOUCH + 0.02:
+            other, found = clear_bow(start, end, own, obstacles, 0.3, False)
+            if found > clearance + 0.02:
+                best = other
+        routes[i] = best
+    return routes
+
+
+def _lean(
+    edges: Sequence[LayoutEdge],
+    centres: Sequence[Point],
+    chosen: Sequence[int],
+    waypoints: Mapping[int, Sequence[Waypoint]],
+) -> dict[tuple[int, bool], float]:
+    """How each end of each edge leans: ports by disc and side."""
+    sides: dict[tuple[int, bool], list[Port]] = {}
+    for i in chosen:
+        edge = edges[i]
+        ways = [(way.x, way.y) for way in waypoints.get(i, ())]
+        start, end = centres[edge.source], centres[edge.target]
+        line = [start, *ways, end]
+        backward = end[1] < start[1]
+        for own, other, partner, at_source in (
+            (start, line[1], edge.target, True),
+            (end, line[-2], edge.source, False),
+        ):
+            below = other[1] > own[1]
+            port = Port(other[0] - own[0], partner, backward, i, at_source, other[1] - own[1])
+            sides.setdefault((edge.source if at_source else edge.target, below), []).append(port)
+    lean: dict[tuple[int, bool], float] = {}
+    for ports in sides.values():
+        lean.update(leanings(ports))
+    return lean
+
+
+def _bows(
+    edges: Sequence[LayoutEdge], centres: Sequence[Point], chosen: Sequence[int], obstacles: Obstacles
+) -> dict[int, Route]:
+    """Straight where alone and clear; both of a reciprocal pair bow to their own left; equal edges fan out."""
+    between: dict[tuple[int, int], list[int]] = {}
+    for i in chosen:
+        between.setdefault((edges[i].source, edges[i].target), []).append(i)
+    routes: dict[int, Route] = {}
+    for (source, target), equal in between.items():
+        start, end = centres[source], centres[target]
+        reciprocal = (target, source) in between
+        base = 0.2 + 0.05 * distance(start, end)
+        for place, i in enumerate(equal):
+            if reciprocal:
+                height = base + 0.3 * place
+            else:
+                height = 0.3 * (place - (len(equal) - 1) / 2)
+            sided = reciprocal or len(equal) > 1
+            routes[i] = clear_bow(start, end, (source, target), obstacles, height, sided)[0]
+    return routes
+
+
+def _loops(
+    edges: Sequence[LayoutEdge], centres: Sequence[Point], routes: Mapping[int, Route], obstacles: Obstacles
+) -> dict[int, Route]:
+    looping = [i for i, edge in enumerate(edges) if edge.source == edge.target]
+    tangents: dict[int, list[Point]] = {edges[i].source: [] for i in looping}
+    for i, route in sorted(routes.items()):
+        if edges[i].source in tangents:
+            tangents[edges[i].source].append(_unit(route[0], route[1]))
+        if edges[i].target in tangents:
+            tangents[edges[i].target].append(_unit(route[-1], route[-2]))
+    near = _neighbours(centres, tangents)
+    turns: dict[int, int] = {}
+    result: dict[int, Route] = {}
+    for i in looping:
+        neuron = edges[i].source
+        turn = turns.get(neuron, 0)
+        turns[neuron] = turn + 1
+        result[i] = best_loop(centres[neuron], neuron, turn, near[neuron], tangents[neuron], obstacles)
+    return result
+
+
+def _neighbours(centres: Sequence[Point], of: Mapping[int, object]) -> dict[int, list[Point]]:
+    """Centres within ``_NEAR`` of each of these neurons, by cells of that width."""
+    cells: dict[tuple[int, int], list[int]] = {}
+    for index, (x, y) in enumerate(centres):
+        cells.setdefault((int(x // _NEAR), int(y // _NEAR)), []).append(index)
+    result: dict[int, list[Point]] = {}
+    for neuron in of:
+        column, row = int(centres[neuron][0] // _NEAR), int(centres[neuron][1] // _NEAR)
+        around = [k for i in (-1, 0, 1) for j in (-1, 0, 1) for k in cells.get((column + i, row + j), ())]
+        result[neuron] = [
+            centres[k] for k in around if k != neuron and distance(centres[k], centres[neuron]) <= _NEAR
+        ]
+    return result
+
+
+def _unit(origin: Point, towards: Point) -> Point:
+    length = distance(origin, towards) or 1.0
+    return (towards[0] - origin[0]) / length, (towards[1] - origin[1]) / length

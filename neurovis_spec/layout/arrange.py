@@ -1,0 +1,155 @@
+"""From a network to its layout: choose an engine, hold it to what it declares, check and tidy what it gives back.
+
+In: a Network or a LayoutProblem, and perhaps an engine's name. Out: a Layout. What an engine cannot do is refused
+before it starts; what it gives back is checked, put on the grid of 1/1024 and moved to the origin.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from neurovis_spec import plugins
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.diagnostics import suggest
+from neurovis_spec.layout.geometry import distance, snap
+from neurovis_spec.layout.model import (
+    RADIUS,
+    Capabilities,
+    Layout,
+    LayoutEngine,
+    LayoutProblem,
+    LayoutRefusalError,
+    Point,
+    Route,
+)
+from neurovis_spec.layout.problem import problem_of
+
+#: Rounding in the last bit does not make two pins overlap.
+_SLACK = 1e-9
+
+
+def lay_out(network: Network, engine: str | None = None) -> Layout:
+    """The layout of a network, by the engine named here, else by the spec's. Raises LayoutRefusalError."""
+    return lay_out_problem(problem_of(network), engine or network.layout.engine)
+
+
+def lay_out_problem(problem: LayoutProblem, engine: str = "auto") -> Layout:
+    """The layout of a problem: positions on the grid (pins exact), one route for every edge.
+
+    Raises LayoutRefusalError where the engine is unknown, or cannot do what the problem asks for.
+    """
+    name = choose_engine(problem)[0] if engine == "auto" else engine
+    chosen = _engine(name)
+    refuse_what_it_cannot(problem, name, chosen.capabilities)
+    _refuse_close_pins(problem)
+    result = chosen.lay_out(problem)
+    _check(problem, name, result)
+    return _tidy(problem, name, result)
+
+
+def choose_engine(problem: LayoutProblem) -> tuple[str, str]:
+    """The engine that ``auto`` stands for, and why, in words for ``inspect``."""
+    if problem.neurons and len(problem.pins) == len(problem.neurons):
+        return "manual", "every neuron has a position"
+    return "layered", "the default for networks whose positions are not all given"
+
+
+def _engine(name: str) -> LayoutEngine:
+    try:
+        made: object = plugins.load(plugins.LAYOUTS, name)
+    except KeyError:
+        known = plugins.names(plugins.LAYOUTS)
+        hint = suggest(name, ("auto", *known), "known engines")
+        raise LayoutRefusalError("unknown-engine", f"there is no layout engine '{name}' here", hint) from None
+    if not (hasattr(made, "lay_out") and isinstance(getattr(made, "capabilities", None), Capabilities)):
+        raise LayoutRefusalError("broken-engine", f"what is installed as layout engine '{name}' is none")
+    engine: LayoutEngine = made  # type: ignore[assignment]
+    return engine
+
+
+def refuse_what_it_cannot(problem: LayoutProblem, name: str, can: Capabilities) -> None:
+    """Raise LayoutRefusalError for the first thing that the problem asks for beyond the capabilities."""
+    neurons, edges = len(problem.neurons), len(problem.edges)
+    if neurons > can.neurons or edges > can.edges:
+        raise LayoutRefusalError(
+            "layout-too-large",
+            f"the engine '{name}' draws at most {can.neurons} neurons and {can.edges} connections; "
+            f"this network has {neurons} and {edges}",
+        )
+    if not can.free and len(problem.pins) < neurons:
+        free = [n for i, n in enumerate(problem.neurons) if i not in problem.pins]
+        more = f" and {len(free) - 1} more" if len(free) > 1 else ""
+        raise LayoutRefusalError(
+            "position-missing",
+            f"the engine '{name}' needs a position for every neuron; '{free[0]}'{more} has none",
+            "give it one in layout.positions, or choose another engine: the layered one arranges the rest around the pins",
+        )
+    asked: Mapping[str, tuple[bool, bool, str]] = {
+        "layout-pins-unsupported": (bool(problem.pins), can.pins, "keep pinned positions (layout.positions)"),
+        "layout-arrange-unsupported": (bool(problem.arrange), can.arrange, "arrange groups (layout.arrange)"),
+        "layout-boxes-unsupported": (bool(problem.boxes), can.boxes, "keep the members of a box together"),
+        "layout-direction-unsupported": (problem.direction != "down", can.direction, "draw in another direction"),
+    }
+    for code, (wanted, possible, what) in asked.items():
+        if wanted and not possible:
+            raise LayoutRefusalError(code, f"the engine '{name}' cannot {what}", "the engine 'layered' can")
+
+
+def _refuse_close_pins(problem: LayoutProblem) -> None:
+    """Two pins whose discs would overlap, found through cells as wide as a disc."""
+    cells: dict[tuple[int, int], list[int]] = {}
+    for index, (x, y) in sorted(problem.pins.items()):
+        if not (math.isfinite(x) and math.isfinite(y)):
+            raise LayoutRefusalError("pin-not-finite", f"the pin of '{problem.neurons[index]}' is not finite")
+        column, row = math.floor(x / (2 * RADIUS)), math.floor(y / (2 * RADIUS))
+        for near in ((column + i, row + j) for i in (-1, 0, 1) for j in (-1, 0, 1)):
+            for other in cells.get(near, ()):
+                if distance(problem.pins[other], (x, y)) < 2 * RADIUS - _SLACK:
+                    raise LayoutRefusalError(
+                        "pins-too-close",
+                        f"the pins of '{problem.neurons[other]}' and '{problem.neurons[index]}' are closer than "
+                        f"{2 * RADIUS:g}: their discs would overlap",
+                    )
+        cells.setdefault((column, row), []).append(index)
+
+
+def _check(problem: LayoutProblem, name: str, result: Layout) -> None:
+    """Hold an engine, ours or anybody's, to its promise."""
+
+    def fault(what: str) -> LayoutRefusalError:
+        return LayoutRefusalError("broken-engine", f"the engine '{name}' {what}")
+
+    if set(result.positions) != set(problem.neurons):
+        raise fault("did not place every neuron of the network, and no other, once")
+    if set(result.routes) != {edge.name for edge in problem.edges}:
+        raise fault("did not route every connection of the network, and no other, once")
+    for neuron, point in result.positions.items():
+        if not all(math.isfinite(c) for c in point):
+            raise fault(f"gave '{neuron}' a position that is not finite")
+    for edge, route in result.routes.items():
+        if len(route) < 4 or len(route) % 3 != 1 or not all(math.isfinite(c) for point in route for c in point):
+            raise fault(f"gave '{edge}' a route that is no cubic spline")
+
+
+def _tidy(problem: LayoutProblem, name: str, result: Layout) -> Layout:
+    """On the grid, at the origin where nothing is pinned, neurons in natural order, ends exactly at centres."""
+    shift = (0.0, 0.0)
+    if not problem.pins and problem.neurons:
+        shift = (
+            min(snap(x) for x, _ in result.positions.values()),
+            min(snap(y) for _, y in result.positions.values()),
+        )
+
+    def moved(point: Point) -> Point:
+        return snap(point[0]) - shift[0] + 0.0, snap(point[1]) - shift[1] + 0.0
+
+    positions = {
+        neuron: problem.pins[i] if i in problem.pins else moved(result.positions[neuron])
+        for i, neuron in enumerate(problem.neurons)
+    }
+    routes: dict[str, Route] = {}
+    for edge in problem.edges:
+        start, end = positions[problem.neurons[edge.source]], positions[problem.neurons[edge.target]]
+        routes[edge.name] = (start, *(moved(point) for point in result.routes[edge.name][1:-1]), end)
+    return Layout(problem.network, name, positions, routes)

@@ -1,0 +1,219 @@
+"""What a layout is worth: crossings, overlaps, routes over discs, flow, area.
+
+In: a layout and its problem. Out: the numbers of ``neurovis layout --metrics`` (§12), computed from the routes as drawn:
+splines flattened to short segments, which meet only in the cells of a grid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import networkx as nx
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.layout.geometry import cubics, distance
+from neurovis_spec.layout.model import RADIUS, Direction, Layout, LayoutProblem, Point, Route
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+#: Crossings this close to a neuron that both routes have are how edges meet, not how they cross.
+_MEETING = 0.35
+_OVER = 0.3
+_SLACK = 1e-9
+_STEP = 0.25
+#: The most segments that a cubic piece is flattened to.
+_FINEST = 64
+_ALONG: dict[Direction, Point] = {"down": (0, 1), "up": (0, -1), "right": (1, 0), "left": (-1, 0)}
+
+
+def metrics(layout: Layout, problem: LayoutProblem) -> dict[str, float | int]:
+    """The measures of a complete layout of this problem; ``seconds`` is for whoever measured it."""
+    centres = np.array([layout.positions[name] for name in problem.neurons], dtype=np.float64).reshape(-1, 2)
+    segments = _Segments([layout.routes[edge.name] for edge in problem.edges])
+    ends = np.array([(edge.source, edge.target) for edge in problem.edges], dtype=np.int64).reshape(-1, 2)
+    return {
+        "neurons": len(problem.neurons),
+        "edges": len(problem.edges),
+        "crossings": _crossings(segments, ends, centres),
+        "overlaps": _overlaps(centres),
+        "edges_over_neurons": _edges_over_neurons(segments, ends, centres),
+        "flow": _flow(layout, problem),
+        "symmetry": 1,
+        "area": _area(centres),
+        "pins_moved": sum(layout.positions[problem.neurons[i]] != point for i, point in problem.pins.items()),
+    }
+
+
+class _Segments:
+    """All routes as short straight segments: ``a``, ``b`` (m, 2) and the edge of each."""
+
+    def __init__(self, routes: list[Route]) -> None:
+        pieces = [(i, piece) for i, route in enumerate(routes) for piece in cubics(route)]
+        a: list[FloatArray] = [np.zeros((0, 2))]
+        b: list[FloatArray] = [np.zeros((0, 2))]
+        edge: list[IntArray] = [np.zeros(0, dtype=np.int64)]
+        points = np.array([piece for _, piece in pieces], dtype=np.float64).reshape(-1, 4, 2)
+        owner = np.array([i for i, _ in pieces], dtype=np.int64)
+        length = np.sqrt((np.diff(points, axis=1) ** 2).sum(axis=2)).sum(axis=1)
+        parts = np.clip(np.ceil(length / _STEP), 8, _FINEST).astype(np.int64)
+        for count in np.unique(parts).tolist():
+            chosen = parts == count
+            line = _flatten(points[chosen], int(count))
+            a.append(line[:, :-1].reshape(-1, 2))
+            b.append(line[:, 1:].reshape(-1, 2))
+            edge.append(np.repeat(owner[chosen], count))
+        self.a, self.b, self.edge = np.concatenate(a), np.concatenate(b), np.concatenate(edge)
+        lengths = np.sqrt(((self.b - self.a) ** 2).sum(axis=1))
+        self.longest = float(lengths.max()) if len(lengths) else 0.0
+
+
+def _flatten(points: FloatArray, parts: int) -> FloatArray:
+    """Cubic pieces (p, 4, 2) as polylines (p, parts + 1, 2)."""
+    t = np.linspace(0.0, 1.0, parts + 1)[None, :, None]
+    s = 1 - t
+    p = points[:, :, None, :]
+    line: FloatArray = s**3 * p[:, 0] + 3 * s * s * t * p[:, 1] + 3 * s * t * t * p[:, 2] + t**3 * p[:, 3]
+    return line
+
+
+def _in_cells(low: FloatArray, high: FloatArray, cell: float) -> tuple[IntArray, IntArray]:
+    """For boxes no larger than a cell: (item, cell key) for each of the up to four cells that a box touches."""
+    first, last = np.floor(low / cell).astype(np.int64), np.floor(high / cell).astype(np.int64)
+    items: list[IntArray] = []
+    keys: list[IntArray] = []
+    index = np.arange(len(low), dtype=np.int64)
+    for i in (0, 1):
+        for j in (0, 1):
+            ok = (first[:, 0] + i <= last[:, 0]) & (first[:, 1] + j <= last[:, 1])
+            items.append(index[ok])
+            keys.append(_key(first[ok, 0] + i, first[ok, 1] + j))
+    return np.concatenate(items), np.concatenate(keys)
+
+
+def _key(column: IntArray, row: IntArray) -> IntArray:
+    return column * np.int64(1 << 31) + row
+
+
+def _pairs(items: IntArray, keys: IntArray) -> Iterator[tuple[IntArray, IntArray, IntArray]]:
+    """All pairs of items that share a cell, in batches: first, second, key."""
+    order = np.argsort(keys, kind="stable")
+    items, keys = items[order], keys[order]
+    at = np.arange(len(items), dtype=np.int64)
+    step = 1
+    while True:
+        at = at[at + step < len(items)]
+        at = at[keys[at] == keys[at + step]]
+        if not len(at):
+            return
+        yield items[at], items[at + step], keys[at]
+        step += 1
+
+
+def _crossings(segments: _Segments, ends: IntArray, centres: FloatArray) -> int:
+    if not len(segments.a):
+        return 0
+    cell = max(segments.longest, _STEP) * (1 + 1e-9)
+    low, high = np.minimum(segments.a, segments.b), np.maximum(segments.a, segments.b)
+    items, keys = _in_cells(low, high, cell)
+    total = 0
+    for first, second, key in _pairs(items, keys):
+        other = segments.edge[first] != segments.edge[second]
+        i, j, k = first[other], second[other], key[other]
+        where, hit = _meet(segments.a[i], segments.b[i], segments.a[j], segments.b[j])
+        i, j, k, where = i[hit], j[hit], k[hit], where[hit]
+        # a pair may share several cells: it counts in the one that the point lies in
+        column, row = np.floor(where[:, 0] / cell).astype(np.int64), np.floor(where[:, 1] / cell).astype(np.int64)
+        once = _key(column, row) == k
+        total += int(_outside(where[once], ends[segments.edge[i[once]]], ends[segments.edge[j[once]]], centres).sum())
+    return total
+
+
+def _meet(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+    """Where segments ab and cd cross, and whether (half-open, so that a corner counts once; parallel ones never do)."""
+    u, v, w = b - a, d - c, c - a
+    cross = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        s = (w[:, 0] * v[:, 1] - w[:, 1] * v[:, 0]) / cross
+        t = (w[:, 0] * u[:, 1] - w[:, 1] * u[:, 0]) / cross
+        hit = (cross != 0) & (s >= 0) & (s < 1) & (t >= 0) & (t < 1)
+        where = a + np.where(hit, s, 0.0)[:, None] * u
+    return where, hit
+
+
+def _outside(where: FloatArray, one: IntArray, two: IntArray, centres: FloatArray) -> npt.NDArray[np.bool_]:
+    """Whether a point is not near a neuron that both edges have."""
+    result = np.ones(len(where), dtype=np.bool_)
+    for i in (0, 1):
+        shared = (one[:, i] == two[:, 0]) | (one[:, i] == two[:, 1])
+        far = ((where - centres[one[:, i]]) ** 2).sum(axis=1) > _MEETING**2
+        result &= ~shared | far
+    return result
+
+
+def _overlaps(centres: FloatArray) -> int:
+    cells: dict[tuple[int, int], list[Point]] = {}
+    width, total = 2 * RADIUS, 0
+    for x, y in centres.tolist():
+        column, row = int(np.floor(x / width)), int(np.floor(y / width))
+        near = [p for i in (-1, 0, 1) for j in (-1, 0, 1) for p in cells.get((column + i, row + j), ())]
+        total += sum(distance(p, (x, y)) < width - _SLACK for p in near)
+        cells.setdefault((column, row), []).append((x, y))
+    return total
+
+
+def _edges_over_neurons(segments: _Segments, ends: IntArray, centres: FloatArray) -> int:
+    """Routes closer than 0.3 to a centre that is not theirs: segments against the centres in the cells around them."""
+    if not len(segments.a) or not len(centres):
+        return 0
+    cell = segments.longest + 2 * _OVER
+    column, row = np.floor(centres / cell).astype(np.int64).T
+    order = np.argsort(_key(column, row), kind="stable")
+    sorted_keys = _key(column, row)[order]
+    middle = (segments.a + segments.b) / 2
+    at = np.floor(middle / cell).astype(np.int64)
+    over: set[int] = set()
+    for i in (-1, 0, 1):
+        for j in (-1, 0, 1):
+            wanted = _key(at[:, 0] + i, at[:, 1] + j)
+            begin, end = np.searchsorted(sorted_keys, wanted), np.searchsorted(sorted_keys, wanted, side="right")
+            for offset in range(int((end - begin).max())):
+                chosen = np.flatnonzero(begin + offset < end)
+                neuron = order[begin[chosen] + offset]
+                edge = segments.edge[chosen]
+                foreign = (ends[edge, 0] != neuron) & (ends[edge, 1] != neuron)
+                near = _near(centres[neuron], segments.a[chosen], segments.b[chosen])
+                over.update(edge[foreign & near].tolist())
+    return len(over)
+
+
+def _near(p: FloatArray, a: FloatArray, b: FloatArray) -> npt.NDArray[np.bool_]:
+    u = b - a
+    squared = np.maximum((u**2).sum(axis=1), 1e-300)
+    t = np.clip(((p - a) * u).sum(axis=1) / squared, 0.0, 1.0)
+    result: npt.NDArray[np.bool_] = ((a + t[:, None] * u - p) ** 2).sum(axis=1) < (_OVER - _SLACK) ** 2
+    return result
+
+
+def _flow(layout: Layout, problem: LayoutProblem) -> float:
+    """Share of the edges outside strongly connected components whose target lies further along the direction; 1 for none."""
+    graph: nx.DiGraph[int] = nx.DiGraph()
+    graph.add_nodes_from(range(len(problem.neurons)))
+    graph.add_edges_from((edge.source, edge.target) for edge in problem.edges)
+    component = {
+        node: number for number, part in enumerate(nx.strongly_connected_components(graph)) for node in part
+    }
+    dx, dy = _ALONG[problem.direction]
+    along = [dx * x + dy * y for x, y in (layout.positions[name] for name in problem.neurons)]
+    open_edges = [edge for edge in problem.edges if component[edge.source] != component[edge.target]]
+    forward = sum(along[edge.target] > along[edge.source] for edge in open_edges)
+    return forward / len(open_edges) if open_edges else 1.0
+
+
+def _area(centres: FloatArray) -> float:
+    """Of the smallest upright rectangle that holds every disc."""
+    if not len(centres):
+        return 0.0
+    width, height = (centres.max(axis=0) - centres.min(axis=0) + 2 * RADIUS).tolist()
+    return float(width * height)
