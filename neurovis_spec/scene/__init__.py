@@ -1,11 +1,15 @@
-"""The Scene: what is drawn, in plain units; themes; and how a network becomes one (Eqs. 2–5)."""
+"""The Scene: what is drawn, in plain units; themes; and how a network becomes one (Eqs. 2–5).
 
+Renderers use what stands here; ``encode``, ``film`` and ``choose_gains`` are in the modules of these names.
+"""
+
+from neurovis_spec.scene.film import still
 from neurovis_spec.scene.model import (
+    Arrowhead,
     Disc,
     Film,
     Group,
     Point,
-    Polygon,
     Progress,
     Ramp,
     Rectangle,
@@ -16,14 +20,21 @@ from neurovis_spec.scene.model import (
     Spline,
     Text,
     Theme,
+    head_half_width,
 )
+from neurovis_spec.scene.texts import FAMILIES, SUBSCRIPT_DROP, SUBSCRIPT_SIZE
+from neurovis_spec.scene.themes import THEMES, blend, channels, colours, readable
 
 __all__ = [
+    "FAMILIES",
+    "SUBSCRIPT_DROP",
+    "SUBSCRIPT_SIZE",
+    "THEMES",
+    "Arrowhead",
     "Disc",
     "Film",
     "Group",
     "Point",
-    "Polygon",
     "Progress",
     "Ramp",
     "Rectangle",
@@ -34,4 +45,10 @@ __all__ = [
     "Spline",
     "Text",
     "Theme",
+    "blend",
+    "channels",
+    "colours",
+    "head_half_width",
+    "readable",
+    "still",
 ]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, Protocol, TypeAlias
+from typing import ClassVar, Literal, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -32,9 +32,11 @@ class Theme:
     muted: str
     box_fill: str
     box_line: str
-    #: ring around a disc, and the text on it
+    #: ring around a disc
     ring: str
-    on_disc: str
+    #: text on a disc: the one that is easier to read on the disc's colour
+    light: str
+    dark: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,24 +52,45 @@ class Disc:
 
 @dataclass(frozen=True, slots=True)
 class Spline:
-    """A cubic Bézier spline (1 + 3k points), stroked with round joins and butt caps."""
+    """A cubic Bézier spline (1 + 3k points), stroked with round joins, and caps that are butt, where dashed round."""
 
     points: tuple[Point, ...]
     stroke: str
     width: float
     #: lengths of dashes and gaps; empty: solid
     dash: tuple[float, ...] = ()
-    #: a glow is drawn beneath all that is no glow; renderers mark it with the class ``glow``
+    #: drawn beneath the line of its group; renderers mark it with the class ``glow``
     glow: bool = False
     opacity: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Polygon:
-    """A filled polygon: an arrowhead."""
+class Arrowhead:
+    """A filled head that points at ``tip`` along the unit vector ``direction``; its back is notched."""
 
-    points: tuple[Point, ...]
+    tip: Point
+    direction: Point
+    length: float
+    half_width: float
     fill: str
+
+    #: how far along the head, from the tip, the notch lies
+    NOTCH: ClassVar[float] = 0.78
+
+    @property
+    def points(self) -> tuple[Point, Point, Point, Point]:
+        """The corners: tip, one barb, notch, the other barb."""
+        (x, y), (dx, dy) = self.tip, self.direction
+        back = (x - self.length * dx, y - self.length * dy)
+        notch = (x - self.NOTCH * self.length * dx, y - self.NOTCH * self.length * dy)
+        across = (-self.half_width * dy, self.half_width * dx)
+        left, right = (back[0] + across[0], back[1] + across[1]), (back[0] - across[0], back[1] - across[1])
+        return self.tip, left, notch, right
+
+
+def head_half_width(width: float, length: float) -> float:
+    """Half the width of the head on a line of this width: it grows slower than the line, but always covers its end."""
+    return max(0.28 * length + 0.42 * width, 0.5 * width / Arrowhead.NOTCH + 0.6)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,13 +108,12 @@ class Rectangle:
 
 @dataclass(frozen=True, slots=True)
 class Ramp:
-    """A rectangle filled from left to right through three colours (the legend)."""
+    """Stripes of equal width from left to right, without seams (the legend's scale of colours)."""
 
     corner: Point
     width: float
     height: float
-    radius: float
-    colours: tuple[str, str, str]
+    colours: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,9 +127,11 @@ class Text:
     anchor: Literal["start", "middle", "end"] = "start"
     weight: int = 400
     subscript: str = ""
+    #: it stands on the disc of its group: the colour is the theme's that can be read on the disc's
+    on_disc: bool = False
 
 
-Shape: TypeAlias = Disc | Spline | Polygon | Rectangle | Ramp | Text
+Shape: TypeAlias = Disc | Spline | Arrowhead | Rectangle | Ramp | Text
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,9 +169,11 @@ class Film:
     """A scene that changes: ``scene`` is frame 0, and the arrays say how groups differ, frame by frame.
 
     For group ``discs[i]`` (an id) the disc has the colour value ``disc_values[f, i]`` in −1…1 at frame f. For group
-    ``lines[j]`` the line and its arrowhead have the colour value ``line_values[f, j]``, the width ``line_widths[f, j]``
-    (user units) and a glow of the width ``glow_widths[f, j]`` (0 for none). ``captions[f]`` is the text of the shape in group ``caption``.
-    Colours are linear in sRGB between the theme's anchors.
+    ``lines[j]`` the line and its arrowhead have the colour value ``line_values[f, j]``, the line the width
+    ``line_widths[f, j]`` (user units; the head follows by ``head_half_width``), and its glow the width
+    ``glow_widths[f, j]`` (0 for none; a group that glows at any time has a glow in ``scene``, of width 0 where it
+    does not glow in frame 0). ``captions[f]`` is the text in group ``caption``. Colours are linear in sRGB between the
+    theme's anchors; ``still(f)`` is frame f as a scene.
     """
 
     scene: Scene
@@ -165,6 +191,13 @@ class Film:
     def frames(self) -> int:
         """How many frames there are."""
         return len(self.disc_values)
+
+    @property
+    def changing(self) -> npt.NDArray[np.bool_]:
+        """Which lines change their width or their glow."""
+        widths, glows = self.line_widths, self.glow_widths
+        result: npt.NDArray[np.bool_] = (widths != widths[:1]).any(axis=0) | (glows != glows[:1]).any(axis=0)
+        return result
 
 
 @dataclass(frozen=True, slots=True)

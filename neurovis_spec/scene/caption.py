@@ -1,0 +1,51 @@
+"""The line under the title: the step, the time where the spec gives a time step, the error where a rule has a target.
+
+In: a network and activities. Out: texts such as ``step 160 · 4.00 s · error +0.28``.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.scene.geometry import FloatArray
+
+
+def caption(network: Network, step: int, activity: FloatArray) -> str:
+    """What is said of a step; ``activity`` (n,)."""
+    parts = [f"step {step}"]
+    if network.dt_given:
+        parts.append(f"{step * network.dt:.{_decimals(network.dt)}f} s")
+    error = _error(network, activity)
+    if error is not None:
+        parts.append(f"error {error}")
+    return " · ".join(parts)
+
+
+def _decimals(dt: float) -> int:
+    """As many as tell steps apart, at most four."""
+    if dt <= 0 or not math.isfinite(dt):
+        return 2
+    return min(4, max(0 if dt >= 1 and dt == round(dt) else 2, math.ceil(-math.log10(dt))))
+
+
+def _error(network: Network, activity: FloatArray) -> str | None:
+    """target − post where exactly one rule has a signal ``target``; the root mean square where they are several."""
+    aims = [plasticity for plasticity in network.plasticity if "target" in plasticity.signals]
+    if len(aims) != 1:
+        return None
+    sources, targets = aims[0].signals["target"], network.connections.targets[aims[0].members]
+    pairs = sorted({(int(s), int(t)) for s, t in zip(sources.tolist(), targets.tolist(), strict=True)})
+    if not pairs or any(source >= len(activity) for source, _ in pairs):
+        return None
+    errors = np.array([activity[source] - activity[target] for source, target in pairs])
+    if len(errors) == 1:
+        return _signed(float(errors[0]))
+    return f"{float(np.sqrt(np.mean(errors**2))):.2f} (RMS)"
+
+
+def _signed(value: float) -> str:
+    text = f"{value:+.2f}".replace("-", "−")
+    return "0.00" if text in ("+0.00", "−0.00") else text

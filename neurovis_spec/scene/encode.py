@@ -1,0 +1,164 @@
+"""Encode: a network's activities and weights at a step become a Scene (Eqs. 2–5).
+
+In: a network, its layout, a Snapshot, gains and settings. Out: a Scene, or what ``film`` starts from.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.compiler.network import Network, RenderSettings
+from neurovis_spec.layout.model import Layout
+from neurovis_spec.scene import encoding, texts
+from neurovis_spec.scene.caption import caption
+from neurovis_spec.scene.gains import Gains
+from neurovis_spec.scene.geometry import FloatArray
+from neurovis_spec.scene.model import Arrowhead, Disc, Group, Scene, Shape, Spline, head_half_width
+from neurovis_spec.scene.plan import Plan, plan
+from neurovis_spec.scene.themes import colours, readable
+
+if TYPE_CHECKING:
+    from neurovis_spec.runtime.recording import Snapshot
+
+CAPTION = "caption"
+
+
+@dataclass(frozen=True, slots=True)
+class Looks:
+    """Eqs. 2–5 at one step: colour values (n,) and (m,) in −1…1, widths and glow widths (m,) in user units."""
+
+    discs: FloatArray
+    lines: FloatArray
+    widths: FloatArray
+    glows: FloatArray
+
+
+def encode(network: Network, layout: Layout, snapshot: Snapshot, gains: Gains, settings: RenderSettings) -> Scene:
+    """The picture of one step. Raises KeyError for an unknown theme or a neuron without a position."""
+    planned = plan(network, layout, gains, settings)
+    seen = looks(network, snapshot, gains)
+    words = tooltips(network, snapshot.activity[None], snapshot.weights[None])
+    return paint(planned, seen, seen.glows > 0, caption(network, snapshot.step, snapshot.activity), words)
+
+
+def looks(network: Network, snapshot: Snapshot, gains: Gains) -> Looks:
+    """What a step looks like."""
+    connections = network.connections
+    widths = encoding.line_width(snapshot.weights, gains.thickness)
+    changes = encoding.glow(snapshot.weights, snapshot.previous_weights, gains.change)
+    sent = snapshot.activity[connections.sources]
+    return Looks(
+        discs=encoding.neuron_colour(snapshot.activity, gains.activity),
+        lines=encoding.connection_colour(sent, snapshot.weights, gains.signal),
+        widths=widths,
+        glows=encoding.glow_width(widths, changes),
+    )
+
+
+def paint(
+    planned: Plan,
+    seen: Looks,
+    glowing: npt.NDArray[np.bool_],
+    words: str,
+    titles: tuple[list[str], list[str]],
+) -> Scene:
+    """A plan with colours and widths; connections that are ``glowing`` (m,) have a glow, if only of width 0."""
+    caption_shape = planned.caption_shape(words)
+    said = (Group((caption_shape,), id=CAPTION),) if caption_shape else ()
+    return Scene(
+        width=planned.frame.width,
+        height=planned.frame.height,
+        theme=planned.theme,
+        title=f"{planned.title}, {words}",
+        groups=(
+            *planned.back,
+            *_connections(planned, seen, glowing, titles[1]),
+            *_neurons(planned, seen, titles[0]),
+            *planned.front,
+            *said,
+        ),
+    )
+
+
+def _neurons(planned: Plan, seen: Looks, titles: list[str]) -> list[Group]:
+    theme = planned.theme
+    fills = colours(theme, seen.discs)
+    groups = []
+    for index, name in enumerate(planned.network.neurons.names):
+        disc = Disc(planned.centres[index], planned.radius, fills[index], theme.ring, planned.ring)
+        label = planned.labels[index]
+        shapes: tuple[Shape, ...] = (disc,)
+        if label is not None:
+            shapes = (disc, label.shape(readable(theme, fills[index]) if label.on_disc else theme.ink))
+        groups.append(Group(shapes, f"n{index}", {"neuron": name}, titles[index]))
+    return groups
+
+
+def _connections(planned: Plan, seen: Looks, glowing: npt.NDArray[np.bool_], titles: list[str]) -> list[Group]:
+    strokes = colours(planned.theme, seen.lines)
+    widths, glows = seen.widths.tolist(), seen.glows.tolist()
+    attributes = data_attributes(planned.network)
+    groups = []
+    for index in planned.order:
+        line, width = planned.lines[index], widths[index]
+        head = Arrowhead(line.tip, line.direction, line.head, head_half_width(width, line.head), strokes[index])
+        shapes: tuple[Shape, ...] = (Spline(line.points, strokes[index], width), head)
+        if glowing[index]:
+            shapes = (Spline(line.points, planned.theme.glow, glows[index], glow=True), *shapes)
+        groups.append(Group(shapes, f"c{index}", attributes[index], titles[index]))
+    return groups
+
+
+def data_attributes(network: Network) -> list[dict[str, str]]:
+    """``connection``, ``from`` and ``to`` of every connection; ``index`` where several share both ends."""
+    names, connections = network.neurons.names, network.connections
+    ends = list(zip(connections.sources.tolist(), connections.targets.tolist(), strict=True))
+    sharing = Counter(ends)
+    result = []
+    for full, (source, target) in zip(network.connection_names, ends, strict=True):
+        plain = f"{names[source]} -> {names[target]}"
+        data = {"connection": plain, "from": names[source], "to": names[target]}
+        if sharing[source, target] > 1:
+            data["index"] = full[len(plain) + 2 : -1] or "1"
+        result.append(data)
+    return result
+
+
+def tooltips(network: Network, activity: FloatArray, weights: FloatArray) -> tuple[list[str], list[str]]:
+    """What a pointer shows of neurons and connections: name, activity or weight (from … to where there are several
+    steps), rule. ``activity`` (steps, n), ``weights`` (steps, m)."""
+    neurons, connections = network.neurons, network.connections
+    of_neurons = [""] * len(neurons)
+    lows, highs = activity.min(axis=0).tolist(), activity.max(axis=0).tolist()
+    for group in neurons.groups:
+        kind = group.activation if group.model == "static" else f"{group.model}, {group.activation}"
+        for index in group.indices:
+            name, label = neurons.names[index], neurons.labels[index]
+            first = name if label in (name, name.rsplit(".", 1)[-1]) else f"{name}: {label}"
+            parts = [first, f"activity {_range(lows[index], highs[index])}", kind, group.description or ""]
+            of_neurons[index] = "\n".join(part for part in parts if part)
+    of_connections = []
+    lows, highs = weights.min(axis=0).tolist(), weights.max(axis=0).tolist()
+    rows = zip(connections.rules.tolist(), connections.delays.tolist(), connections.entry.tolist(), strict=True)
+    for index, (rule, delay, entry) in enumerate(rows):
+        learns = network.plasticity[rule].title if rule >= 0 else ""
+        parts = [
+            network.connection_names[index].replace("->", "→"),
+            f"weight {_range(lows[index], highs[index])}",
+            learns,
+            f"delay {delay}" if delay != 1 else "",
+            connections.descriptions[entry] or "",
+        ]
+        of_connections.append("\n".join(part for part in parts if part))
+    return of_neurons, of_connections
+
+
+def _range(low: float, high: float) -> str:
+    if low == high or not (np.isfinite(low) and np.isfinite(high)):
+        return texts.number(low, 4)
+    return f"{texts.number(low, 4)} … {texts.number(high, 4)}"

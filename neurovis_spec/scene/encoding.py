@@ -1,0 +1,60 @@
+"""Eqs. 2–5: what activities and weights look like, as pure functions of arrays.
+
+In: activities, weights and gains. Out: colour values in −1…1, widths in user units. The paper prints Eq. 5 as
+|γ·w[t] − w[t−1]|, which would glow for ever when γ ≠ 1; the difference is meant.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+#: The thinnest line, in user units.
+THINNEST = 0.6
+#: A change that glows less than this is not drawn.
+FAINTEST = 1e-3
+#: How far a glow can reach beyond its line, on either side, in user units.
+GLOW_REACH = 8.0
+
+
+def neuron_colour(activity: FloatArray, gain: float) -> FloatArray:
+    """Eq. 2: NC_i[t] = clip(−1, γ_NC · a_i[t], 1)."""
+    result: FloatArray = np.clip(gain * activity, -1.0, 1.0)
+    return result
+
+
+def connection_colour(sent: FloatArray, weight: FloatArray, gain: float) -> FloatArray:
+    """Eq. 3: CC_ij[t] = clip(−1, γ_CC · a_i[t] · w_ij[t], 1); ``sent`` is the activity of the source of each."""
+    result: FloatArray = np.clip(gain * sent * weight, -1.0, 1.0)
+    return result
+
+
+def thickness(weight: FloatArray, gain: float) -> FloatArray:
+    """Eq. 4: CT_ij[t] = |γ_CT · w_ij[t]|."""
+    result: FloatArray = np.abs(gain * weight)
+    return result
+
+
+def line_width(weight: FloatArray, gain: float) -> FloatArray:
+    """The width of a line: Eq. 4, and never thinner than ``THINNEST``. Weights that are no number are drawn so."""
+    drawn = thickness(weight, gain)
+    result: FloatArray = np.where(np.isfinite(drawn), np.maximum(THINNEST, drawn), THINNEST)
+    return result
+
+
+def glow(weight: FloatArray, previous: FloatArray | None, gain: float) -> FloatArray:
+    """Eq. 5: LI_ij[t] = |γ_LI · (w_ij[t] − w_ij[t−1])|, none where there is no step before."""
+    if previous is None:
+        return np.zeros_like(weight)
+    result: FloatArray = np.abs(gain * (weight - previous))
+    return result
+
+
+def glow_width(width: FloatArray, intensity: FloatArray) -> FloatArray:
+    """The width of a glow around a line of ``width``: it reaches further the more the weight changes, at an intensity
+    of 1 by half of ``GLOW_REACH`` on either side; 0 (none) below ``FAINTEST``."""
+    light = np.nan_to_num(intensity, nan=0.0, posinf=1e12)
+    result: FloatArray = np.where(light < FAINTEST, 0.0, width + 2 * GLOW_REACH * light / (1 + light))
+    return result

@@ -1,0 +1,104 @@
+"""Film: the steps of a run as a scene whose colours and widths change; and each frame as a scene of its own.
+
+In: a network, its layout, the snapshots of the frames, gains and settings. Out: a Film; ``still(film, f)``, the scene
+of one frame, the same picture as ``encode`` makes of that step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.compiler.network import Network, RenderSettings
+from neurovis_spec.layout.model import Layout
+from neurovis_spec.scene.caption import caption
+from neurovis_spec.scene.encode import CAPTION, looks, paint, tooltips
+from neurovis_spec.scene.gains import Gains
+from neurovis_spec.scene.model import Arrowhead, Disc, Film, Group, Scene, Shape, Spline, Text, head_half_width
+from neurovis_spec.scene.plan import plan
+from neurovis_spec.scene.themes import colours, readable
+
+if TYPE_CHECKING:
+    from neurovis_spec.runtime.recording import Snapshot
+
+
+def film(
+    network: Network,
+    layout: Layout,
+    snapshots: Iterable[Snapshot],
+    gains: Gains,
+    settings: RenderSettings,
+    fps: float,
+) -> Film:
+    """One frame a snapshot, ``fps`` frames a second. Raises ValueError without a snapshot."""
+    planned = plan(network, layout, gains, settings)
+    seen, captions, low, high = [], [], None, None
+    for snapshot in snapshots:
+        seen.append(looks(network, snapshot, gains))
+        words = caption(network, snapshot.step, snapshot.activity)
+        shape = planned.caption_shape(words)
+        captions.append(shape.text if shape else words)
+        now = (snapshot.activity, snapshot.weights)
+        low = now if low is None else (np.minimum(low[0], now[0]), np.minimum(low[1], now[1]))
+        high = now if high is None else (np.maximum(high[0], now[0]), np.maximum(high[1], now[1]))
+    if low is None or high is None:
+        raise ValueError("a film has at least one frame")
+    glows = np.stack([look.glows for look in seen])
+    glowing: npt.NDArray[np.bool_] = np.max(glows > 0, axis=0)
+    titles = tooltips(network, np.stack([low[0], high[0]]), np.stack([low[1], high[1]]))
+    return Film(
+        scene=paint(planned, seen[0], glowing, captions[0], titles),
+        fps=fps,
+        discs=tuple(f"n{index}" for index in range(len(network.neurons))),
+        lines=tuple(f"c{index}" for index in range(len(network.connections))),
+        disc_values=np.stack([look.discs for look in seen]),
+        line_values=np.stack([look.lines for look in seen]),
+        line_widths=np.stack([look.widths for look in seen]),
+        glow_widths=glows,
+        caption=CAPTION,
+        captions=tuple(captions),
+    )
+
+
+def still(film: Film, frame: int) -> Scene:
+    """One frame as a scene; a connection that does not glow in it has no glow. Raises IndexError beyond the end."""
+    theme = film.scene.theme
+    discs = dict(zip(film.discs, colours(theme, film.disc_values[frame]), strict=True))
+    lines = {
+        name: (colour, width, glow)
+        for name, colour, width, glow in zip(
+            film.lines,
+            colours(theme, film.line_values[frame]),
+            film.line_widths[frame].tolist(),
+            film.glow_widths[frame].tolist(),
+            strict=True,
+        )
+    }
+
+    def repaint(group: Group) -> Group:
+        shapes: list[Shape] = []
+        for shape in group.shapes:
+            match shape:
+                case Disc() if group.id in discs:
+                    shapes.append(replace(shape, fill=discs[group.id]))
+                case Text() if shape.on_disc and group.id in discs:
+                    shapes.append(replace(shape, fill=readable(theme, discs[group.id])))
+                case Text() if group.id == film.caption:
+                    shapes.append(replace(shape, text=film.captions[frame]))
+                case Spline(glow=True) if group.id in lines:
+                    if lines[group.id][2] > 0:
+                        shapes.append(replace(shape, width=lines[group.id][2]))
+                case Spline() if group.id in lines:
+                    shapes.append(replace(shape, stroke=lines[group.id][0], width=lines[group.id][1]))
+                case Arrowhead() if group.id in lines:
+                    half = head_half_width(lines[group.id][1], shape.length)
+                    shapes.append(replace(shape, fill=lines[group.id][0], half_width=half))
+                case _:
+                    shapes.append(shape)
+        return replace(group, shapes=tuple(shapes))
+
+    return replace(film.scene, groups=tuple(repaint(group) for group in film.scene.groups))

@@ -1,0 +1,102 @@
+"""Neuron labels: on the disc, else beside it where there is room, else shortened, else left out.
+
+In: labels, discs and what is in the way. Out: for every neuron a Label or None. Labels do not move neurons; in dense
+pictures they are left out rather than drawn over each other or over discs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.scene import texts
+from neurovis_spec.scene.geometry import Point, Rect
+from neurovis_spec.scene.model import Text
+from neurovis_spec.scene.obstacles import Obstacles
+
+_WEIGHT = 600
+#: on the disc: never smaller, never larger; beside it
+_SMALLEST, _LARGEST, _BESIDE = 9.0, 14.0, 11.0
+#: a disc smaller than this has no label
+_SMALLEST_DISC = 7.0
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """A text for a neuron; on the disc its colour follows the disc's."""
+
+    text: str
+    subscript: str
+    size: float
+    point: Point
+    anchor: Literal["start", "middle", "end"]
+    on_disc: bool
+
+    def shape(self, fill: str) -> Text:
+        """The text in a colour."""
+        return Text(self.point, self.text, self.size, fill, self.anchor, _WEIGHT, self.subscript, self.on_disc)
+
+
+def labels_of(
+    network: Network, centres: list[Point], radius: float, obstacles: Obstacles, picture: Rect
+) -> list[Label | None]:
+    """A label for every neuron, or None where there is no room for any of it. ``picture``: where texts may be."""
+    neurons = network.neurons
+    if radius < _SMALLEST_DISC:
+        return [None] * len(neurons)
+    result: list[Label | None] = []
+    outside = 0
+    for label, name, centre in zip(neurons.labels, neurons.names, centres, strict=True):
+        numbered = label == name.rsplit(".", 1)[-1]
+        base, subscript = texts.with_subscript(label) if numbered else (label, "")
+        found = _on_disc(base, subscript, centre, radius)
+        if found is None and outside < 400:  # beyond that a picture is dense anyway
+            outside += 1
+            found = _beside(label, centre, radius, obstacles, picture)
+        result.append(found if found is not None else _shortened(label, centre, radius))
+    return result
+
+
+def _on_disc(base: str, subscript: str, centre: Point, radius: float) -> Label | None:
+    size = min(_LARGEST, 0.76 * radius)
+    while size > _SMALLEST and texts.width(base, size, _WEIGHT, subscript) > _chord(radius, size):
+        size -= 0.5
+    if size < _SMALLEST - 1e-9 and texts.width(base, size, _WEIGHT, subscript) > _chord(radius, size):
+        return None
+    if texts.width(base, size, _WEIGHT, subscript) > _chord(radius, size):
+        return None
+    drop = 0.36 if not subscript else 0.32
+    return Label(base, subscript, size, (centre[0], centre[1] + drop * size), "middle", True)
+
+
+def _chord(radius: float, size: float) -> float:
+    """How wide a text of this size may be on a disc."""
+    return float(2 * (max(radius * radius - (0.4 * size) ** 2, 0.0)) ** 0.5 - 3)
+
+
+def _beside(label: str, centre: Point, radius: float, obstacles: Obstacles, picture: Rect) -> Label | None:
+    size, (x, y) = _BESIDE, centre
+    width = texts.width(label, size, _WEIGHT)
+    places: tuple[tuple[Literal["start", "middle", "end"], float, float], ...] = (
+        ("middle", x, y + radius + 4 + 0.8 * size),
+        ("middle", x, y - radius - 6),
+        ("start", x + radius + 5, y + 0.36 * size),
+        ("end", x - radius - 5, y + 0.36 * size),
+    )
+    for anchor, at, baseline in places:
+        left = at - {"start": 0.0, "middle": width / 2, "end": width}[anchor]
+        rect = (left - 2, baseline - 0.8 * size, left + width + 2, baseline + 0.25 * size)
+        inside = rect[0] >= picture[0] and rect[1] >= picture[1] and rect[2] <= picture[2] and rect[3] <= picture[3]
+        if inside and obstacles.hits(rect) == 0:
+            obstacles.add_text(rect)
+            return Label(label, "", size, (at, baseline), anchor, False)
+    return None
+
+
+def _shortened(label: str, centre: Point, radius: float) -> Label | None:
+    size = max(_SMALLEST, min(10.0, 0.5 * radius))
+    text = texts.shorten(label, size, _chord(radius, size), _WEIGHT)
+    if len(text) < 2:
+        return None
+    return Label(text, "", size, (centre[0], centre[1] + 0.36 * size), "middle", True)

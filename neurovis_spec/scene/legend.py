@@ -1,0 +1,193 @@
+"""The legend: what colour, thickness, glow and dotted lines mean, with their scales.
+
+In: gains, a theme and what the picture holds. Out: entries, which flow into rows at the foot of a picture. An entry is
+a heading, a sample and two lines of text.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from neurovis_spec.scene import texts
+from neurovis_spec.scene.encoding import glow_width
+from neurovis_spec.scene.gains import Gains
+from neurovis_spec.scene.geometry import Point
+from neurovis_spec.scene.model import Group, Ramp, Shape, Spline, Text, Theme
+from neurovis_spec.scene.teachers import dash
+from neurovis_spec.scene.themes import colours
+
+_HEADING, _SMALL = 11.5, 11.0
+_ENTRY_HEIGHT, _ROW_GAP, _ENTRY_GAP = 58.0, 10.0, 24.0
+_SAMPLE_Y, _FIRST_Y, _SECOND_Y = 20.0, 41.0, 55.0
+_RAMP, _STRIPES = 150.0, 75
+_STROKE, _STROKE_GAP = 36.0, 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """Shapes with their corner at the origin, and how wide they are."""
+
+    shapes: tuple[Shape, ...]
+    width: float
+
+
+@dataclass(frozen=True, slots=True)
+class Contents:
+    """What a picture holds that needs to be explained."""
+
+    lines: bool
+    learns: bool
+    #: what the dotted lines are, '' without any
+    teaches: str
+
+
+def entries(contents: Contents, gains: Gains, theme: Theme) -> list[Entry]:
+    """The entries that this picture needs."""
+    result = [_colour(contents, gains, theme)]
+    if contents.lines and gains.thickness:
+        result.append(_thickness(gains, theme))
+    if contents.learns and gains.change:
+        result.append(_glow(gains, theme))
+    if contents.teaches:
+        result.append(_dotted(contents.teaches, theme))
+    return result
+
+
+def row_width(items: Sequence[Entry]) -> float:
+    """How wide the entries are side by side."""
+    return sum(item.width for item in items) + _ENTRY_GAP * max(len(items) - 1, 0)
+
+
+def height(items: Sequence[Entry], width: float) -> float:
+    """How high the entries are when they flow into rows of this width; 0 without entries."""
+    rows = len(_rows(items, width))
+    return rows * _ENTRY_HEIGHT + (rows - 1) * _ROW_GAP if rows else 0.0
+
+
+def flow(items: Sequence[Entry], width: float, left: float, top: float) -> Group:
+    """The entries in rows of at most ``width``, from the corner (left, top) on."""
+    shapes: list[Shape] = []
+    for row, members in enumerate(_rows(items, width)):
+        x, y = left, top + row * (_ENTRY_HEIGHT + _ROW_GAP)
+        for entry in members:
+            shapes += [_moved(shape, x, y) for shape in entry.shapes]
+            x += entry.width + _ENTRY_GAP
+    return Group(tuple(shapes), id="legend")
+
+
+def _rows(items: Sequence[Entry], width: float) -> list[list[Entry]]:
+    rows: list[list[Entry]] = []
+    used = 0.0
+    for entry in items:
+        if rows and used + _ENTRY_GAP + entry.width <= width:
+            rows[-1].append(entry)
+            used += _ENTRY_GAP + entry.width
+        else:
+            rows.append([entry])
+            used = entry.width
+    return rows
+
+
+def _moved(shape: Shape, x: float, y: float) -> Shape:
+    def move(point: Point) -> Point:
+        return point[0] + x, point[1] + y
+
+    match shape:
+        case Text():
+            return Text(move(shape.point), shape.text, shape.size, shape.fill, shape.anchor, shape.weight)
+        case Ramp():
+            return Ramp(move(shape.corner), shape.width, shape.height, shape.colours)
+        case Spline():
+            points = tuple(move(point) for point in shape.points)
+            return Spline(points, shape.stroke, shape.width, shape.dash, shape.glow, shape.opacity)
+        case _:
+            raise TypeError(f"no {type(shape).__name__} in a legend")
+
+
+def _colour(contents: Contents, gains: Gains, theme: Theme) -> Entry:
+    shapes: list[Shape] = [
+        _heading("Colour", theme),
+        Ramp((0, _SAMPLE_Y - 5), _RAMP, 10, tuple(colours(theme, np.linspace(-1, 1, _STRIPES)))),
+    ]
+    rows = [("neuron: activity", gains.activity, _FIRST_Y)]
+    if contents.lines:
+        rows.append(("line: signal w·a", gains.signal, _SECOND_Y))
+    for words, gain, y in rows:
+        full = texts.number(1 / abs(gain)) if gain else "∞"
+        less, more = ("−", "+") if gain >= 0 else ("+", "−")
+        shapes += [
+            Text((0, y), less + full, _SMALL, theme.muted),
+            Text((_RAMP / 2, y), words, _SMALL, theme.muted, "middle"),
+            Text((_RAMP, y), more + full, _SMALL, theme.muted, "end"),
+        ]
+    return Entry(tuple(shapes), _RAMP)
+
+
+def _thickness(gains: Gains, theme: Theme) -> Entry:
+    shapes: list[Shape] = [_heading("Thickness", theme)]
+    values = nice_weights(gains.thickness)
+    for place, value in enumerate(values):
+        x = place * (_STROKE + _STROKE_GAP)
+        shapes.append(_stroke(x, _STROKE, theme.muted, abs(gains.thickness) * value))
+        shapes.append(Text((x + _STROKE / 2, _FIRST_Y), texts.number(value), _SMALL, theme.muted, "middle"))
+    across = len(values) * (_STROKE + _STROKE_GAP) - _STROKE_GAP
+    shapes.append(Text((across / 2, _SECOND_Y), "line: weight |w|", _SMALL, theme.muted, "middle"))
+    return Entry(tuple(shapes), across)
+
+
+def nice_weights(gain: float) -> list[float]:
+    """Weights that are 1, 2 or 5 times a power of ten, whose lines are thin, middling and thick with this gain.
+
+    >>> nice_weights(4.0), nice_weights(15.0)
+    ([0.2, 1.0, 2.0], [0.1, 0.2, 0.5])
+    """
+    thin, middling, thick = (_nice_below(width / abs(gain)) for width in (1.7, 4.0, 8.6))
+    return sorted({thin, middling, thick})
+
+
+def _nice_below(value: float) -> float:
+    exponent = math.floor(math.log10(value))
+    factor = next((factor for factor in (5, 2) if factor * 10.0**exponent <= value * (1 + 1e-9)), 1)
+    return float(f"{factor}e{exponent}")
+
+
+def _glow(gains: Gains, theme: Theme) -> Entry:
+    change = 1 / abs(gains.change)
+    width = 3.0
+    lit = float(glow_width(np.array(width), np.array(1.0)))
+    first, second = "weight is changing", f"|Δw| {texts.number(change)} a step"
+    across = max(texts.width(first, _SMALL), texts.width(second, _SMALL))
+    shapes = (
+        _heading("Glow", theme),
+        _stroke(0, 64, theme.glow, lit),
+        _stroke(0, 64, theme.muted, width),
+        Text((0, _FIRST_Y), first, _SMALL, theme.muted),
+        Text((0, _SECOND_Y), second, _SMALL, theme.muted),
+    )
+    return Entry(shapes, across)
+
+
+def _dotted(words: str, theme: Theme) -> Entry:
+    first, second = "guides learning", words
+    across = max(texts.width(first, _SMALL), texts.width(second, _SMALL))
+    line = Spline(((0, _SAMPLE_Y), (21, _SAMPLE_Y), (43, _SAMPLE_Y), (64, _SAMPLE_Y)), theme.muted, 1.6, dash(1.6))
+    shapes = (
+        _heading("Dotted", theme),
+        line,
+        Text((0, _FIRST_Y), first, _SMALL, theme.muted),
+        Text((0, _SECOND_Y), second, _SMALL, theme.muted),
+    )
+    return Entry(shapes, across)
+
+
+def _heading(words: str, theme: Theme) -> Text:
+    return Text((0, 9), words, _HEADING, theme.ink, weight=600)
+
+
+def _stroke(x: float, length: float, colour: str, width: float) -> Spline:
+    y = _SAMPLE_Y
+    return Spline(((x, y), (x + length / 3, y), (x + length * 2 / 3, y), (x + length, y)), colour, width)

@@ -1,0 +1,71 @@
+"""Routes of a layout become lines: in user units, trimmed to the discs, with an arrowhead.
+
+In: routes by connection, from centre to centre. Out: a Line for each: the spline from the rim of the source to the back
+of the head, and where the head points. The head's length does not depend on the weight, so that a line keeps
+its shape while it learns; only its width does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from neurovis_spec.layout.model import Layout
+from neurovis_spec.scene.geometry import FloatArray, Point, between, leaving, point_at
+from neurovis_spec.scene.model import Arrowhead
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A connection as it is drawn: ``points`` end in the notch of the head at ``tip``."""
+
+    points: tuple[Point, ...]
+    tip: Point
+    direction: Point
+    head: float
+
+
+def routes_of(names: Sequence[str], ends: Sequence[tuple[str, str]], layout: Layout) -> list[FloatArray]:
+    """The route of every connection in layout units; a straight one where the layout has none."""
+    routes = []
+    for name, (source, target) in zip(names, ends, strict=True):
+        route = layout.routes.get(name)
+        if route is None:
+            (x0, y0), (x1, y1) = layout.positions[source], layout.positions[target]
+            route = tuple((x0 + (x1 - x0) * t, y0 + (y1 - y0) * t) for t in (0, 1 / 3, 2 / 3, 1))
+        routes.append(np.asarray(route, float))
+    return routes
+
+
+def trimmed(routes: Sequence[FloatArray], radius: float, gap: float, head: float) -> list[Line]:
+    """Lines for routes (user units) between discs of ``radius``: ``gap`` is left free, a head is ``head`` long."""
+    lines: list[Line | None] = [None] * len(routes)
+    for size in sorted({len(route) for route in routes}):
+        members = [index for index, route in enumerate(routes) if len(route) == size]
+        batch = np.stack([routes[index] for index in members])
+        backward = batch[:, ::-1]
+        k = (size - 1) // 3
+        starts = leaving(batch, radius + gap)
+        tips = k - leaving(backward, radius + gap)
+        notches = k - leaving(backward, radius + gap + Arrowhead.NOTCH * head)
+        for index, start, tip, notch in zip(members, starts.tolist(), tips.tolist(), notches.tolist(), strict=True):
+            lines[index] = _line([(x, y) for x, y in routes[index].tolist()], start, notch, tip, head)
+    return [line for line in lines if line is not None]
+
+
+def _line(route: list[Point], start: float, notch: float, tip: float, head: float) -> Line:
+    """Discs that touch leave no room: there a stub and a head are squeezed into the middle."""
+    k = (len(route) - 1) / 3
+    if tip <= start:
+        start, tip = min(start, tip), max(start, tip)
+        start, tip = max(0.0, start - 0.02 * k), min(k, tip + 0.02 * k)
+    if notch <= start:
+        notch = start + 0.3 * (tip - start)
+    points = between(route, start, notch)
+    (x0, y0), (x1, y1) = points[-1], point_at(route, tip)
+    length = math.hypot(x1 - x0, y1 - y0)
+    direction = ((x1 - x0) / length, (y1 - y0) / length) if length > 0 else (1.0, 0.0)
+    return Line(points, (x1, y1), direction, min(head, length / Arrowhead.NOTCH))

@@ -1,0 +1,215 @@
+"""The plan of a picture: all that does not change from step to step.
+
+In: a network, its layout, gains and settings. Out: a Plan: the frame, discs, lines, boxes, labels, title and legend, in
+user units (pixels at scale 1). ``encode`` and ``film`` paint activities and weights on it, so every step of a network has
+the same geometry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from neurovis_spec.compiler.network import Network, RenderSettings
+from neurovis_spec.layout.model import RADIUS, Layout
+from neurovis_spec.scene import legend, texts
+from neurovis_spec.scene.boxes import Box, box_title, boxes_of
+from neurovis_spec.scene.frame import MARGIN, MOST, Frame, fit
+from neurovis_spec.scene.gains import Gains
+from neurovis_spec.scene.geometry import FloatArray, Point, Rect, bounds, sample
+from neurovis_spec.scene.labels import Label, labels_of
+from neurovis_spec.scene.lines import Line, routes_of, trimmed
+from neurovis_spec.scene.model import Arrowhead, Group, Rectangle, Spline, Text, Theme, head_half_width
+from neurovis_spec.scene.obstacles import Obstacles
+from neurovis_spec.scene.teachers import Teacher, dash, dotted, label_of, teachers_of
+from neurovis_spec.scene.themes import THEMES
+
+_TITLE, _CAPTION = 17.0, 11.5
+_TITLE_Y, _CAPTION_Y, _HEADER = 35.0, 54.0, 58.0
+#: a picture is made so wide at most to have its legend in one row
+_LEGEND_ROOM = 640.0
+#: more dotted lines than this would not be quiet
+_MOST_TEACHERS = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """The unchanging part of a picture. ``order``: connection indices from back to front."""
+
+    network: Network
+    gains: Gains
+    theme: Theme
+    title: str
+    frame: Frame
+    radius: float
+    ring: float
+    centres: tuple[Point, ...]
+    lines: tuple[Line, ...]
+    order: tuple[int, ...]
+    labels: tuple[Label | None, ...]
+    #: beneath the lines, and above the discs
+    back: tuple[Group, ...]
+    front: tuple[Group, ...]
+    caption: Point | None
+    caption_room: float
+
+    def caption_shape(self, words: str) -> Text | None:
+        """The line under the title, if there is one."""
+        if self.caption is None:
+            return None
+        return Text(self.caption, texts.shorten(words, _CAPTION, self.caption_room), _CAPTION, self.theme.muted)
+
+
+def plan(network: Network, layout: Layout, gains: Gains, settings: RenderSettings) -> Plan:
+    """Arrange everything that stays the same. Raises KeyError for a theme that does not exist."""
+    theme = THEMES[settings.theme]
+    positions, routes = _in_units(network, layout)
+    boxes = boxes_of(network, positions, routes)
+    teachers = teachers_of(network)[:_MOST_TEACHERS]
+    title, items, frame = _frame(network, gains, settings, theme, teachers, _extent(positions, routes, boxes))
+    centres = frame.map(positions)
+    radius = RADIUS * frame.scale
+    gap, head = min(1.5, 0.1 * radius), min(8.5, 0.45 * radius)
+    lines = trimmed([frame.map(route) for route in routes], radius, gap, head)
+    obstacles = Obstacles([_dots(line) for line in lines], centres, radius, 2.5)
+    dots = [(teacher, dotted(teacher, centres, radius, gap, head, obstacles)) for teacher in teachers]
+    for _, line in dots:
+        obstacles.add_line(_dots(line))
+    header = _header(title, frame, theme) if title is not None else None
+    top = _HEADER if header else 4.0
+    bottom = frame.height - legend.height(items, frame.width - 2 * MARGIN) - (MARGIN if items else 4.0)
+    picture = (6.0, top, frame.width - 6.0, bottom)
+    spots: list[Point] = [(x, y) for x, y in centres.tolist()]
+    labels = labels_of(network, spots, radius, obstacles, picture) if settings.labels else [None] * len(spots)
+    titles = _box_titles(boxes, frame, obstacles, theme, picture)
+    front = [*titles, *([header] if header else [])]
+    if items:
+        front.append(legend.flow(items, frame.width - 2 * MARGIN, MARGIN, bottom))
+    ring = min(2.5, 0.12 * radius)
+    return Plan(
+        network=network,
+        gains=gains,
+        theme=theme,
+        title=network.title or network.name,
+        frame=frame,
+        radius=radius - ring / 2,
+        ring=ring,
+        centres=tuple(spots),
+        lines=tuple(lines),
+        order=_order(network),
+        labels=tuple(labels),
+        back=(*_box_frames(boxes, frame, theme), *_dotted_groups(network, dots, theme)),
+        front=tuple(front),
+        caption=(MARGIN, _CAPTION_Y) if header else None,
+        caption_room=frame.width - 2 * MARGIN,
+    )
+
+
+def _in_units(network: Network, layout: Layout) -> tuple[FloatArray, list[FloatArray]]:
+    names, connections = network.neurons.names, network.connections
+    positions = np.array([layout.positions[name] for name in names], float).reshape(-1, 2)
+    ends = [
+        (names[source], names[target])
+        for source, target in zip(connections.sources.tolist(), connections.targets.tolist(), strict=True)
+    ]
+    return positions, routes_of(network.connection_names, ends, layout)
+
+
+def _extent(positions: FloatArray, routes: Sequence[FloatArray], boxes: Sequence[Box]) -> Rect:
+    """What the layout takes up, in its units."""
+    corners = [np.array([box.rect[:2], box.rect[2:]]) for box in boxes]
+    per_segment = 12 if len(routes) < 5000 else 4
+    around = bounds([positions - RADIUS, positions + RADIUS, *corners, *(sample(r, per_segment) for r in routes)])
+    return around if around is not None else (0.0, 0.0, 1.0, 1.0)
+
+
+def _frame(
+    network: Network,
+    gains: Gains,
+    settings: RenderSettings,
+    theme: Theme,
+    teachers: list[Teacher],
+    extent: Rect,
+) -> tuple[str | None, list[legend.Entry], Frame]:
+    """The title (None: no header), the legend's entries, and the frame. In a picture too small for them both go."""
+    words = settings.title if isinstance(settings.title, str) else network.title or network.name
+    title = words if settings.title is not False and words else None
+    wide, high = MOST if settings.size is None else settings.size
+    items: list[legend.Entry] = []
+    if settings.legend:
+        contents = legend.Contents(
+            lines=len(network.connections) > 0,
+            learns=len(network.changing) > 0,
+            teaches=label_of(teachers) if teachers else "",
+        )
+        items = legend.entries(contents, gains, theme)
+        widest = max(item.width for item in items)
+        if widest > wide - 2 * MARGIN or legend.height(items, wide - 2 * MARGIN) > 0.4 * high:
+            items = []
+    if title is not None and high < 4 * _HEADER:
+        title = None
+    header = (texts.width(title, _TITLE, 600), _HEADER) if title is not None else (0.0, 0.0)
+
+    def footer(width: float) -> float:
+        return legend.height(items, width - 2 * MARGIN) + (0.9 * MARGIN if items else 0.0)
+
+    narrowest = legend.row_width(items) + 2 * MARGIN
+    return (
+        title,
+        items,
+        fit(
+            extent, (min(header[0], 560.0), header[1]), footer, min(max(narrowest, 120.0), _LEGEND_ROOM), settings.size
+        ),
+    )
+
+
+def _header(title: str, frame: Frame, theme: Theme) -> Group:
+    text = texts.shorten(title, _TITLE, frame.width - 2 * MARGIN, 600)
+    return Group((Text((MARGIN, _TITLE_Y), text, _TITLE, theme.ink, weight=600),), id="title")
+
+
+def _order(network: Network) -> tuple[int, ...]:
+    """Lines that can glow come first, so that their glow lies beneath all others; else as in the network."""
+    changing = set(network.changing.tolist())
+    return tuple(sorted(range(len(network.connections)), key=lambda index: (index not in changing, index)))
+
+
+def _dots(line: Line) -> FloatArray:
+    return np.concatenate([sample(line.points, 24), np.array([line.tip])])
+
+
+def _box_frames(boxes: Sequence[Box], frame: Frame, theme: Theme) -> list[Group]:
+    groups = []
+    for box in boxes:
+        x0, y0, x1, y1 = _mapped(box.rect, frame)
+        radius = min(10.0, 0.2 * frame.scale)
+        shape = Rectangle((x0, y0), x1 - x0, y1 - y0, radius, theme.box_fill, theme.box_line, 1.0)
+        groups.append(Group((shape,), id=f"box:{box.name}", title=box.name))
+    return groups
+
+
+def _box_titles(boxes: Sequence[Box], frame: Frame, obstacles: Obstacles, theme: Theme, picture: Rect) -> list[Group]:
+    if frame.scale < 12:  # the boxes are smaller than their titles
+        return []
+    found = [box_title(box, _mapped(box.rect, frame), obstacles, theme, picture) for box in boxes]
+    return [Group((text,), id=f"title:{box.name}") for box, text in zip(boxes, found, strict=True) if text is not None]
+
+
+def _mapped(rect: Rect, frame: Frame) -> Rect:
+    (x0, y0), (x1, y1) = frame.map(np.array([rect[:2], rect[2:]])).tolist()
+    return x0, y0, x1, y1
+
+
+def _dotted_groups(network: Network, dots: Sequence[tuple[Teacher, Line]], theme: Theme) -> list[Group]:
+    names = network.neurons.names
+    groups = []
+    for teacher, line in dots:
+        source, target = names[teacher.source], names[teacher.target]
+        words = f"{source} ⇢ {target}\n{source} is the {teacher.signal} of {teacher.rule}"
+        width = 1.6 if line.head > 5 else 0.9
+        head = Arrowhead(line.tip, line.direction, 0.8 * line.head, head_half_width(0.6, 0.8 * line.head), theme.muted)
+        dots_ = Spline(line.points, theme.muted, width, dash(width))
+        groups.append(Group((dots_, head), f"signal:{source} -> {target}", {"signal": f"{source} -> {target}"}, words))
+    return groups

@@ -1,0 +1,57 @@
+"""The probe: a run whose only purpose is to see how far the values of a network go.
+
+In: a network. Out: Gains. The run is the network's own (its inputs, its default length, within a bound), never somebody's recording, so that
+a picture of a step is the same wherever the step comes from.
+"""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+
+from neurovis_spec.compiler.network import FloatArray, Network
+from neurovis_spec.runtime.record import Progress, record
+from neurovis_spec.runtime.recording import Recording
+from neurovis_spec.scene.gains import Gains, choose_gains
+
+#: Most numbers that a probe records: 32 MB of activities and weights.
+BUDGET = 4_000_000
+#: Rows looked at together.
+_CHUNK = 256
+
+
+def probe(network: Network, progress: Progress | None = None) -> Gains:
+    """The gains of a network: what its spec states, else from the peaks of its default run."""
+    settings = network.render
+    if None not in (settings.activity, settings.signal, settings.thickness, settings.change):
+        none = np.zeros(len(network.connections))
+        return choose_gains(network, settings, np.zeros(len(network.neurons)), none, none, none)
+    width = len(network.neurons) + len(network.changing) + 1
+    steps = max(1, min(network.steps, BUDGET // width))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # the run that the author asks for warns
+        recording = record(network, steps, progress=progress)
+    return choose_gains(network, settings, *peaks(network, recording))
+
+
+def peaks(network: Network, recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Largest magnitudes over a recording: of a (n,), of w, of w·a and of w[t] − w[t−1] (m,)."""
+    connections = network.connections
+    activity = np.abs(recording.activity).max(axis=0, initial=0.0)
+    weights = np.abs(connections.weights).astype(np.float64)
+    changes = np.zeros(len(connections))
+    signals = weights * activity[connections.sources]
+    changing = network.changing
+    if len(changing):
+        sources = connections.sources[changing]
+        weights[changing] = np.abs(recording.weights).max(axis=0, initial=0.0)
+        signals[changing] = 0.0
+        for first in range(0, len(recording.weights), _CHUNK):
+            rows = slice(first, first + _CHUNK)
+            w = recording.weights[rows]
+            sent = np.abs(w * recording.activity[rows][:, sources]).max(axis=0, initial=0.0)
+            signals[changing] = np.fmax(signals[changing], sent)
+            step = np.abs(np.diff(recording.weights[first : first + _CHUNK + 1], axis=0)).max(axis=0, initial=0.0)
+            changes[changing] = np.fmax(changes[changing], step)
+    return activity, weights, signals, changes

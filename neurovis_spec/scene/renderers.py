@@ -1,0 +1,36 @@
+"""Which renderer makes a file: found by the suffix, among what is installed.
+
+In: a suffix, and whether the picture moves. Out: the Renderer that declares it, or RendererError with what there is.
+"""
+
+from __future__ import annotations
+
+from neurovis_spec import plugins
+from neurovis_spec.diagnostics import suggest
+from neurovis_spec.scene.model import Renderer, RendererCapabilities
+
+
+class RendererError(ValueError):
+    """Nobody makes files of this kind. ``hint`` says what there is."""
+
+    def __init__(self, message: str, hint: str | None = None) -> None:
+        self.hint = hint
+        super().__init__(message)
+
+
+def renderer_for(suffix: str, *, moving: bool) -> Renderer:
+    """The first renderer, by name, that declares this suffix for stills or for films."""
+    known: list[str] = []
+    for name in plugins.names(plugins.RENDERERS):
+        made = plugins.load(plugins.RENDERERS, name)
+        capabilities = getattr(made, "capabilities", None)
+        if not isinstance(capabilities, RendererCapabilities):
+            raise RendererError(f"what is installed as renderer '{name}' is none")
+        suffixes = capabilities.films if moving else capabilities.stills
+        if suffix.lower() in suffixes:
+            renderer: Renderer = made  # type: ignore[assignment]
+            return renderer
+        known += sorted(suffixes)
+    what = "films" if moving else "pictures"
+    message = f"no renderer makes {what} of the kind '{suffix}'" if suffix else f"the file of {what} needs a suffix"
+    raise RendererError(message, suggest(suffix, known, f"kinds of {what}"))

@@ -1,0 +1,75 @@
+"""Who teaches whom: the signals of plasticity rules, as quiet dotted lines.
+
+In: a network's rules and where its neurons are. Out: a dotted spline from each neuron that is a signal of a rule to
+the neuron whose connections learn by it. Signals that come from inputs alone have no neuron to start from.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.scene.geometry import FloatArray, Point, sample
+from neurovis_spec.scene.lines import Line, trimmed
+from neurovis_spec.scene.obstacles import Obstacles
+
+_BENDS = (0.0, 0.18, -0.18, 0.36, -0.36, 0.6, -0.6)
+
+
+@dataclass(frozen=True, slots=True)
+class Teacher:
+    """``source`` is the ``signal`` of the rule by which connections to ``target`` learn (neuron indices)."""
+
+    source: int
+    target: int
+    signal: str
+    rule: str
+
+
+def teachers_of(network: Network) -> list[Teacher]:
+    """Every pair once, in the order of the rules; none from a neuron to itself."""
+    found: dict[tuple[int, int], Teacher] = {}
+    for plasticity in network.plasticity:
+        for signal, sources in plasticity.signals.items():
+            for source, target in zip(sources.tolist(), network.connections.targets[plasticity.members], strict=True):
+                if source < len(network.neurons) and source != target:
+                    pair = (int(source), int(target))
+                    found.setdefault(pair, Teacher(*pair, signal, plasticity.rule.name))
+    return list(found.values())
+
+
+def dotted(teacher: Teacher, centres: FloatArray, radius: float, gap: float, head: float, obstacles: Obstacles) -> Line:
+    """The dotted line of a pair: straight, or bent where it would run over a disc or along other lines."""
+    start, end = centres[teacher.source], centres[teacher.target]
+    best: tuple[float, Line] | None = None
+    for bend in _BENDS:
+        (line,) = trimmed([_bent(start, end, bend)], radius, gap + 1, head)
+        dots = sample(line.points, max(8, int(math.dist(start, end) / 6)))
+        cost = obstacles.path_hits(dots[2:-2], (teacher.source, teacher.target)) + 4 * abs(bend)
+        if best is None or cost < best[0]:
+            best = (cost, line)
+    assert best is not None
+    return best[1]
+
+
+def _bent(start: FloatArray, end: FloatArray, bend: float) -> FloatArray:
+    along = end - start
+    aside = np.array([along[1], -along[0]]) * bend
+    return np.array([start, start + along / 3 + aside, start + along * 2 / 3 + aside, end])
+
+
+def dash(width: float) -> tuple[float, float]:
+    """Round dots, three widths apart."""
+    return 0.01, 3.2 * width
+
+
+def label_of(teachers: list[Teacher]) -> str:
+    """What the legend says of them: ``target of delta``."""
+    told = dict.fromkeys(f"{teacher.signal} of {teacher.rule}" for teacher in teachers)
+    return next(iter(told)) if len(told) == 1 else f"{len(told)} signals of rules"
+
+
+__all__ = ["Point", "Teacher", "dash", "dotted", "label_of", "teachers_of"]

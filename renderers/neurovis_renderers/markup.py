@@ -1,0 +1,166 @@
+"""Shapes as SVG elements: escaping and numbers in one place, for stills and films.
+
+In: shapes and groups of a Scene. Out: well-formed XML. Lengths are rounded to hundredths of a unit; the widths of
+lines, which state a value (Eq. 4), are written so that they read back exactly.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+from neurovis_spec.scene import (
+    FAMILIES,
+    SUBSCRIPT_DROP,
+    SUBSCRIPT_SIZE,
+    Arrowhead,
+    Disc,
+    Group,
+    Point,
+    Ramp,
+    Rectangle,
+    Scene,
+    Shape,
+    Spline,
+    Text,
+)
+
+# What XML 1.0 allows: a character outside cannot be written, not even as a reference.
+_FORBIDDEN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_REFERENCES = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"}
+_BREAKS = {"\t": "&#9;", "\n": "&#10;", "\r": "&#13;"}
+
+
+def escape(text: str) -> str:
+    """Text as XML; what XML forbids becomes the replacement character.
+
+    >>> escape('<a & b>\\x00')
+    '&lt;a &amp; b&gt;\ufffd'
+    """
+    return "".join(_REFERENCES.get(c, c) for c in _FORBIDDEN.sub("\ufffd", text)).replace("\r", "&#13;")
+
+
+def quoted(text: str) -> str:
+    """Text as the value of an attribute, with its quotes."""
+    return '"' + "".join(_BREAKS.get(c, c) for c in escape(text)) + '"'
+
+
+def num(value: float) -> str:
+    """A length, to hundredths, as short as it gets.
+
+    >>> num(12.0), num(0.504), num(-0.001)
+    ('12', '.5', '0')
+    """
+    text = f"{value:.2f}".rstrip("0").rstrip(".")
+    if text in ("-0", ""):
+        return "0"
+    return text.replace("0.", ".", 1) if text.startswith(("0.", "-0.")) else text
+
+
+def exact(value: float) -> str:
+    """A number that reads back exactly."""
+    return str(int(value)) if value == int(value) else repr(float(value))
+
+
+def pairs(points: Sequence[Point]) -> str:
+    """Coordinates, as short as a path allows."""
+    result = ""
+    for value in (v for point in points for v in point):
+        text = num(value)
+        result += text if not result or text.startswith("-") else " " + text
+    return result
+
+
+def path(points: Sequence[Point]) -> str:
+    """A cubic spline as path data."""
+    return f"M{pairs(points[:1])}C{pairs(points[1:])}"
+
+
+def element(shape: Shape, attributes: str = "", content: str = "") -> str:
+    """A shape; ``attributes`` (with a blank before) and ``content`` are added as they are."""
+    match shape:
+        case Disc():
+            return _close(
+                f'<circle cx="{num(shape.centre[0])}" cy="{num(shape.centre[1])}" r="{num(shape.radius)}" '
+                f'fill="{shape.fill}" stroke="{shape.stroke}" stroke-width="{num(shape.stroke_width)}"{attributes}',
+                "circle",
+                content,
+            )
+        case Spline():
+            return _close(f"<path{_spline(shape)}{attributes}", "path", content)
+        case Arrowhead():
+            return _close(
+                f'<polygon points="{pairs(shape.points)}" fill="{shape.fill}"{attributes}', "polygon", content
+            )
+        case Rectangle():
+            return _close(
+                f'<rect x="{num(shape.corner[0])}" y="{num(shape.corner[1])}" width="{num(shape.width)}" '
+                f'height="{num(shape.height)}" rx="{num(shape.radius)}" fill="{shape.fill}" '
+                f'stroke="{shape.stroke}" stroke-width="{num(shape.stroke_width)}"{attributes}',
+                "rect",
+                content,
+            )
+        case Ramp():
+            return _ramp(shape)
+        case Text():
+            return _text(shape, attributes, content)
+
+
+def _close(start: str, name: str, content: str) -> str:
+    return f"{start}>{content}</{name}>" if content else f"{start}/>"
+
+
+def _spline(shape: Spline) -> str:
+    kind = ' class="glow"' if shape.glow else ""
+    dash = ""
+    if shape.dash:
+        dash = f' stroke-linecap="round" stroke-dasharray="{" ".join(num(d) for d in shape.dash)}"'
+    opacity = f' stroke-opacity="{num(shape.opacity)}"' if shape.opacity != 1 else ""
+    width = exact(shape.width)
+    return f'{kind} d="{path(shape.points)}" stroke="{shape.stroke}" stroke-width="{width}"{dash}{opacity}'
+
+
+def _ramp(shape: Ramp) -> str:
+    """Slices rather than a gradient: a gradient needs an id, and two pictures in one page would share it."""
+    (x, y), step = shape.corner, shape.width / len(shape.colours)
+    return (
+        '<g shape-rendering="crispEdges">'
+        + "".join(
+            f'<path d="M{num(x + place * step)} {num(y)}h{num(step)}v{num(shape.height)}h{num(-step)}z" fill="{fill}"/>'
+            for place, fill in enumerate(shape.colours)
+        )
+        + "</g>"
+    )
+
+
+def _text(shape: Text, attributes: str, content: str) -> str:
+    anchor = "" if shape.anchor == "start" else f' text-anchor="{shape.anchor}"'
+    weight = "" if shape.weight == 400 else f' font-weight="{shape.weight}"'
+    inner = escape(shape.text)
+    if shape.subscript:
+        drop, size = num(SUBSCRIPT_DROP * shape.size), num(SUBSCRIPT_SIZE * shape.size)
+        inner += f'<tspan dy="{drop}" font-size="{size}">{escape(shape.subscript)}</tspan>'
+    return (
+        f'<text x="{num(shape.point[0])}" y="{num(shape.point[1])}" font-size="{num(shape.size)}" '
+        f'fill="{shape.fill}"{weight}{anchor}{attributes}>{inner}{content}</text>'
+    )
+
+
+def open_group(group: Group, attributes: str = "") -> str:
+    """The start of a group, with its data attributes and its title."""
+    data = "".join(f" data-{key}={quoted(value)}" for key, value in group.data.items())
+    title = f"<title>{escape(group.title)}</title>" if group.title else ""
+    return f"<g{data}{attributes}>{title}"
+
+
+def document(scene: Scene, body: str, style: str = "", attributes: Mapping[str, str] | None = None) -> bytes:
+    """A whole file around ``body``."""
+    width, height = num(scene.width), num(scene.height)
+    families = ",".join(f"'{name}'" if " " in name else name for name in FAMILIES)
+    more = "".join(f" {key}={quoted(value)}" for key, value in (attributes or {}).items())
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" '
+        f'role="img" fill="none" font-family="{families}"{more}>\n'
+        f"<title>{escape(scene.title)}</title>\n{style}"
+        f'<rect width="{width}" height="{height}" fill="{scene.theme.background}"/>\n{body}</svg>\n'
+    ).encode()

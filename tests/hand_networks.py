@@ -1,0 +1,227 @@
+"""Networks, layouts and runs made by hand, for tests of scenes and pictures.
+
+``use_case_1()`` is the paper's function approximation (two rhythm neurons, eight kernels, an output that learns a
+target), with its real dynamics; ``network()`` builds anything small from names and connections.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from neurovis_spec.compiler.network import (
+    Connections,
+    FloatArray,
+    Group,
+    IntArray,
+    LayoutSettings,
+    Network,
+    Neurons,
+    Plasticity,
+    RenderSettings,
+    Rule,
+)
+from neurovis_spec.layout.model import Layout, Point, Route
+from neurovis_spec.runtime.recording import Snapshot
+
+
+@dataclass(frozen=True)
+class G:
+    """A group: its name, its neurons' names, and what it looks like."""
+
+    name: str
+    names: tuple[str, ...]
+    activation: str = "identity"
+    parameters: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    box: str | None = None
+    labels: tuple[str, ...] | None = None
+
+
+@dataclass(frozen=True)
+class C:
+    """A connection by names."""
+
+    source: str
+    target: str
+    weight: float = 1.0
+    delay: int = 1
+    rule: int = -1
+    entry: int = 0
+
+
+def numbered(name: str, count: int, **more: object) -> G:
+    return replace(G(name, tuple(f"{name}{i + 1}" for i in range(count))), **more)  # type: ignore[arg-type]
+
+
+def network(
+    groups: Sequence[G],
+    connections: Sequence[C],
+    *,
+    name: str = "made_by_hand",
+    title: str = "",
+    entries: Sequence[str] = ("all",),
+    rules: Sequence[tuple[str, Mapping[str, str]]] = (),
+    boxes: Sequence[tuple[str, tuple[int, ...]]] = (),
+    dt: float | None = None,
+) -> Network:
+    """A Network without a program: what a picture needs. ``rules``: the rule's name and its signals' neurons."""
+    names = [neuron for group in groups for neuron in group.names]
+    labels = [label for group in groups for label in (group.labels or group.names)]
+    index = {neuron: place for place, neuron in enumerate(names)}
+    made, start = [], 0
+    for group in groups:
+        made.append(
+            Group(group.name, start, len(group.names), group.activation, "static", "sum", group.parameters, {},
+                  box=group.box)
+        )  # fmt: skip
+        start += len(group.names)
+    n, m = len(names), len(connections)
+    wires = Connections(
+        sources=np.array([index[c.source] for c in connections], np.int64),
+        targets=np.array([index[c.target] for c in connections], np.int64),
+        weights=np.array([c.weight for c in connections], float),
+        centres=np.zeros(m),
+        delays=np.array([c.delay for c in connections], np.int64),
+        rules=np.array([c.rule for c in connections], np.int64),
+        entry=np.array([c.entry for c in connections], np.int64),
+        low=np.full(m, -np.inf),
+        high=np.full(m, np.inf),
+        entries=tuple(entries),
+        descriptions=(None,) * len(entries),
+    )
+    plasticity = []
+    for number, (rule, signals) in enumerate(rules):
+        members = np.flatnonzero(wires.rules == number).astype(np.int64)
+        sources: dict[str, IntArray] = {k: np.full(len(members), index[v], np.int64) for k, v in signals.items()}
+        plain = Rule(rule, (), tuple(signals), (), (), None, None)
+        plasticity.append(Plasticity(plain, members, {}, sources, f"{rule}(rate=0.01)"))
+    return Network(
+        name=name, title=title, description="", dt=1.0 if dt is None else dt, dt_given=dt is not None, steps=1000,
+        episode=None, seed=0, parameters={}, structural=frozenset(),
+        neurons=Neurons(tuple(names), tuple(labels), tuple(made), np.zeros(n), np.full(n, np.nan),
+                        np.full(n, -1, np.int64), np.full((n, 2), np.nan)),
+        connections=wires, inputs=(), outputs=(), blocks=(), plasticity=tuple(plasticity), program=(),
+        layout=LayoutSettings(boxes=tuple(boxes)), render=RenderSettings(), hash="0" * 64,
+    )  # fmt: skip
+
+
+def downward(start: Point, end: Point, spread: float = 0.0) -> Route:
+    """A route that leaves downward and arrives from above, a little from its own side."""
+    (x0, y0), (x1, y1) = start, end
+    reach = 0.5 * (y1 - y0)
+    lean = 0.35 * (x1 - x0)
+    return start, (x0 + 0.12 * (x1 - x0), y0 + reach), (x1 - lean, y1 - 0.9 * reach + 0.16 * abs(lean)), end
+
+
+def straight(start: Point, end: Point, bend: float = 0.0) -> Route:
+    (x0, y0), (x1, y1) = start, end
+    dx, dy = x1 - x0, y1 - y0
+    aside = (dy * bend, -dx * bend)
+    one = (x0 + dx / 3 + aside[0], y0 + dy / 3 + aside[1])
+    two = (x0 + 2 * dx / 3 + aside[0], y0 + 2 * dy / 3 + aside[1])
+    return start, one, two, end
+
+
+def loop(centre: Point, side: float) -> Route:
+    x, y = centre
+    return (x, y), (x + side * 1.35, y - 0.75), (x + side * 1.35, y + 0.75), (x, y)
+
+
+def straight_layout(made: Network, positions: Mapping[str, Point]) -> Layout:
+    """Straight routes; loops to the right; the second of a pair bends."""
+    routes: dict[str, Route] = {}
+    names = made.neurons.names
+    for name, s, t in zip(
+        made.connection_names, made.connections.sources.tolist(), made.connections.targets.tolist(), strict=True
+    ):
+        start, end = positions[names[s]], positions[names[t]]
+        bend = 0.12 * (1 + name.count("(")) if name.count("(") else 0.08
+        routes[name] = loop(start, 1.0) if s == t else straight(start, end, bend)
+    return Layout(made.name, "by hand", dict(positions), routes)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A network, its layout, and a run: ``activity`` (steps, n), ``weights`` (steps, m)."""
+
+    network: Network
+    layout: Layout
+    activity: FloatArray
+    weights: FloatArray
+
+    def snapshot(self, step: int) -> Snapshot:
+        previous = self.weights[step - 1] if step else None
+        return Snapshot(step, self.activity[step], self.weights[step], previous)
+
+    @property
+    def peaks(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        sent = self.activity[:, self.network.connections.sources] * self.weights
+        change = np.abs(np.diff(self.weights, axis=0)).max(axis=0) if len(self.weights) > 1 else 0 * self.weights[0]
+        return np.abs(self.activity).max(axis=0), np.abs(self.weights).max(axis=0), np.abs(sent).max(axis=0), change
+
+
+ALPHA, PHI, PERIOD, RATE, SIGMA = 1.01, 0.049, 128.67, 0.01, 40.0
+
+
+def use_case_1(steps: int = 1300) -> Case:
+    """Paper, section 3.1: Eqs. 8–10 with a target of two harmonics."""
+    groups = [
+        numbered("C", 2, activation="tanh", box="rhythm"),
+        numbered("K", 8, activation="gaussian", parameters={"sigma": (SIGMA,) * 8}, box="kernels"),
+        G("O", ("O",)),
+        G("T", ("T",)),
+    ]
+    matrix = [
+        [ALPHA * math.cos(PHI), -ALPHA * math.sin(PHI)],
+        [ALPHA * math.sin(PHI), ALPHA * math.cos(PHI)],
+    ]
+    wires = [C(f"C{i + 1}", f"C{j + 1}", matrix[i][j], entry=0) for i in range(2) for j in range(2)]
+    wires += [C(f"C{i + 1}", f"K{j + 1}", 1.0, 0, entry=1) for i in range(2) for j in range(8)]
+    wires += [C(f"K{j + 1}", "O", 0.0, 0, rule=0, entry=2) for j in range(8)]
+    made = network(
+        groups, wires, name="cpg_rbf", title="Function approximation", dt=0.025,
+        entries=("C -> C", "C -> K", "K -> O"), rules=[("delta", {"target": "T"})],
+    )  # fmt: skip
+    activity, weights = _run(np.array(matrix), made.connections.weights, steps)
+    return Case(made, _layout_1(made), activity, weights)
+
+
+def _run(matrix: FloatArray, initial: FloatArray, steps: int) -> tuple[FloatArray, FloatArray]:
+    rhythm = np.array([0.1, 0.0])
+    orbit = []
+    for _ in range(3000):
+        rhythm = np.tanh(rhythm @ matrix)
+        orbit.append(rhythm)
+    round_ = np.array(orbit[-129:])
+    centres = round_[(np.arange(8) * 128.67 / 8).astype(int)]
+    activity, weights = np.zeros((steps, 12)), np.tile(initial, (steps, 1))
+    rhythm, learned = np.array([0.1, 0.0]), np.zeros(8)
+    for k in range(steps):
+        rhythm = np.array([0.1, 0.0]) if k == 0 else np.tanh(rhythm @ matrix)
+        kernels = np.exp(-SIGMA * ((rhythm - centres) ** 2).sum(axis=1))
+        aim = 0.5 * math.sin(2 * math.pi * k / PERIOD) + 0.2 * math.sin(4 * math.pi * k / PERIOD)
+        out = float(kernels @ learned)
+        activity[k] = [*rhythm, *kernels, out, aim]
+        weights[k, 20:] = learned
+        learned = learned + RATE * kernels * (aim - out)
+    return activity, weights
+
+
+def _layout_1(made: Network) -> Layout:
+    positions: dict[str, Point] = {"C1": (2.5, 0.0), "C2": (4.5, 0.0), "O": (3.5, 4.3), "T": (5.6, 4.3)}
+    positions |= {f"K{i + 1}": (float(i), 2.1) for i in range(8)}
+    routes: dict[str, Route] = {
+        "C1 -> C1": loop(positions["C1"], -1.0),
+        "C2 -> C2": loop(positions["C2"], 1.0),
+        "C1 -> C2": straight(positions["C1"], positions["C2"], 0.13),
+        "C2 -> C1": straight(positions["C2"], positions["C1"], 0.13),
+    }
+    for i in range(8):
+        kernel = f"K{i + 1}"
+        for rhythm in ("C1", "C2"):
+            routes[f"{rhythm} -> {kernel}"] = downward(positions[rhythm], positions[kernel])
+        routes[f"{kernel} -> O"] = downward(positions[kernel], positions["O"])
+    return Layout(made.name, "by hand", positions, routes)
