@@ -1,0 +1,44 @@
+"""Files written as a whole or not at all.
+
+In: a path. Out: an open file beside it, which takes its place when all is written. So a reader never sees half a
+file, and an interrupted run leaves what was there before.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+from uuid import uuid4
+
+
+@contextmanager
+def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
+    """A file to write that replaces ``path`` at the end; after an exception nothing has changed.
+
+    A link is followed. Raises OSError where the folder cannot be written or the path is no regular file.
+    """
+    target = Path(os.path.realpath(path))
+    if target.exists() and not target.is_file():
+        raise OSError(f"{path} is not a regular file")
+    beside = target.with_name(f".{target.name[:100]}.{uuid4().hex[:12]}.part")
+    try:
+        with beside.open("xb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        beside.replace(target)
+    except BaseException:
+        beside.unlink(missing_ok=True)
+        raise
+
+
+def regular_size(path: str | os.PathLike[str]) -> int:
+    """The size of a regular file in bytes. Raises OSError for a pipe, device or folder, which is never opened."""
+    found = Path(path).stat()
+    if not stat.S_ISREG(found.st_mode):
+        raise OSError("not a regular file")
+    return found.st_size

@@ -1,0 +1,121 @@
+"""Inputs: s[t] as one vector, from expressions, tables and what the caller supplies.
+
+In: a Network and the caller's values. Out: for each step the vector of all inputs. Rows are made a stretch of steps
+at a time, the same stretches however one runs, so that stepping and running give the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.compiler.network import FloatArray, Input, Network
+from neurovis_spec.diagnostics import suggest
+from neurovis_spec.language.expressions.arrays import evaluate_array
+from neurovis_spec.runtime.state import constants
+
+#: steps of a stretch
+STRETCH = 256
+
+
+class InputError(ValueError):
+    """A value for an input that does not exist, has another size, or is no finite number."""
+
+
+class InputReader:
+    """The inputs of a network, step by step.
+
+    ``supplied`` maps names to whole arrays that replace their sources: (steps, size), (steps,) for size 1, or one
+    number or (size,) for all steps; past its end the last row stays. Raises InputError.
+    """
+
+    def __init__(self, network: Network, supplied: Mapping[str, npt.ArrayLike] | None = None) -> None:
+        self.network = network
+        self._supplied = {name: _whole(_entry(network, name), value) for name, value in (supplied or {}).items()}
+        self._first = -1
+        self._rows: FloatArray = np.zeros((0, network.input_size))
+
+    def rows(self, first: int, stop: int) -> FloatArray:
+        """The vectors of steps ``first`` … ``stop`` − 1, in one stretch: (stop − first, inputs), read-only."""
+        if not self._first <= first < self._first + len(self._rows):
+            self._make(first - first % STRETCH)
+        return self._rows[first - self._first : stop - self._first]
+
+    def at(self, k: int, values: Mapping[str, npt.ArrayLike] | None = None) -> FloatArray:
+        """The vector of step k; ``values`` replace the sources for this step only."""
+        row: FloatArray = self.rows(k, k + 1)[0]
+        if values:
+            row = row.copy()
+            for name, value in values.items():
+                entry = _entry(self.network, name)
+                row[entry.start : entry.start + entry.size] = _single(entry, value)
+        return row
+
+    def _make(self, first: int) -> None:
+        steps = np.arange(first, first + STRETCH)
+        rows = np.zeros((STRETCH, self.network.input_size))
+        for entry in self.network.inputs:
+            rows[:, entry.start : entry.start + entry.size] = self._source(entry, steps)
+        rows.flags.writeable = False
+        self._first, self._rows = first, rows
+
+    def _source(self, entry: Input, steps: npt.NDArray[np.int64]) -> FloatArray | float:
+        table = self._supplied.get(entry.name, entry.table)
+        if table is not None:
+            chosen: FloatArray = table[np.minimum(steps, len(table) - 1)]
+            return chosen.reshape(len(steps), -1)
+        if entry.expression is None:
+            return 0.0
+        k = steps.astype(np.float64)
+        dt = self.network.dt
+        known: dict[str, float | FloatArray] = {**constants(dt), **self.network.parameters, "k": k, "t": k * dt}
+        values = np.broadcast_to(evaluate_array(entry.expression, known), (len(steps),))
+        return np.asarray(values, dtype=np.float64).reshape(-1, 1)
+
+
+def _entry(network: Network, name: str) -> Input:
+    found = network.input_index.get(name)
+    if found is None:
+        hint = suggest(name, network.input_index, "the inputs are")
+        raise InputError(f"no input '{name}'" + (f"; {hint}" if hint else "; the network has no inputs"))
+    return found
+
+
+def _numbers(entry: Input, value: npt.ArrayLike) -> FloatArray:
+    try:
+        given = np.asarray(value)
+        if given.dtype.kind not in "fiub":
+            raise TypeError
+        array = given.astype(np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"input '{entry.name}': not an array of numbers") from None
+    if not np.isfinite(array).all():
+        where = np.argwhere(~np.isfinite(array))[0].tolist()
+        place = f" at row {where[0]}" if where else ""
+        raise InputError(f"input '{entry.name}': NaN or infinity{place}")
+    return array
+
+
+def _single(entry: Input, value: npt.ArrayLike) -> FloatArray:
+    array = _numbers(entry, value)
+    if array.size == entry.size and array.ndim <= 1:
+        return array
+    raise InputError(f"input '{entry.name}' takes {_sized(entry.size)} a step, not shape {array.shape}")
+
+
+def _whole(entry: Input, value: npt.ArrayLike) -> FloatArray:
+    array = _numbers(entry, value)
+    if array.ndim == 1 and entry.size == 1:
+        array = array.reshape(-1, 1)
+    elif array.ndim <= 1:
+        array = array.reshape(1, -1)
+    if array.ndim != 2 or array.shape[1] != entry.size or not len(array):
+        wanted = f"(steps, {entry.size})" + (" or (steps,)" if entry.size == 1 else "")
+        raise InputError(f"input '{entry.name}' takes an array of shape {wanted}, not {np.shape(value)}")
+    return array
+
+
+def _sized(size: int) -> str:
+    return "one number" if size == 1 else f"{size} numbers"

@@ -1,0 +1,204 @@
+"""Recordings as ``.npz``: written in one go, read with suspicion.
+
+In: a Recording and a path, or a path. Out: a file, or a Recording. A file is believed in nothing: headers are read
+before memory is taken, sizes must agree with each other and with the archive, and pickles are never loaded. Beside the
+arrays of §12 ours hold ``about``, a JSON text with what arrays do not say (names of groups and outputs, the network's hash,
+ranks of parallel connections); a file without it is read as well.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import IO, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.compiler.network import IntArray
+from neurovis_spec.runtime.files import regular_size, replacing
+from neurovis_spec.runtime.recording import Recording, RecordingError
+
+Array: TypeAlias = npt.NDArray[np.generic]
+
+#: kinds of dtype and dimensions of the arrays that a recording must hold
+REQUIRED: Mapping[str, tuple[str, int]] = {
+    "activity": ("fiu", 2),
+    "neurons": ("U", 1),
+    "weights": ("fiu", 2),
+    "weights_static": ("fiu", 1),
+    "plastic": ("iu", 1),
+    "sources": ("iu", 1),
+    "targets": ("iu", 1),
+    "delays": ("iu", 1),
+    "dt": ("fiu", 0),
+    "step": ("iu", 1),
+}
+#: an archive may always grow to this many bytes, and beyond that to a hundred times its size
+ROOM = 256 * 2**20
+RATIO = 100
+
+
+def write_npz(recording: Recording, path: Path) -> None:
+    """Write a recording; what was there stays until all is written."""
+    parallel = np.flatnonzero(recording.ranks > 1)
+    about = {
+        "network": recording.network,
+        "hash": recording.hash,
+        "views": {name: [list(members), single] for name, (members, single) in recording.views.items()},
+        "parallel": [[int(index), int(recording.ranks[index])] for index in parallel],
+    }
+    with replacing(path) as file:
+        np.savez(
+            file,
+            activity=recording.activity,
+            neurons=np.array(recording.neurons, dtype=np.str_),
+            weights=recording.weights,
+            weights_static=recording.weights_static,
+            plastic=recording.plastic,
+            sources=recording.sources,
+            targets=recording.targets,
+            delays=recording.delays,
+            dt=np.float64(recording.dt),
+            step=recording.step,
+            about=np.array(json.dumps(about)),
+        )
+
+
+def read_npz(path: Path) -> Recording:
+    """Read a recording. Raises RecordingError."""
+    try:
+        return _recording(_arrays(path))
+    except RecordingError as error:
+        raise RecordingError(f"{path}: {error}") from None
+    except OSError as error:
+        raise RecordingError(f"{path}: {error.strerror or error}") from None
+    except Exception as error:
+        # zipfile, zlib, NumPy's header parser and json have errors of their own for every way to be malformed
+        raise RecordingError(f"{path}: not a recording ({type(error).__name__}: {str(error)[:200]})") from None
+
+
+def _arrays(path: Path) -> dict[str, Array]:
+    room = max(ROOM, RATIO * regular_size(path))
+    arrays: dict[str, Array] = {}
+    with zipfile.ZipFile(path) as archive:
+        present = set(archive.namelist())
+        for name, (kinds, dimensions) in {**REQUIRED, "about": ("U", 0)}.items():
+            if f"{name}.npy" not in present:
+                if name == "about":
+                    continue
+                raise RecordingError(f"not a recording: it holds no '{name}'")
+            member = archive.getinfo(f"{name}.npy")
+            room -= member.file_size
+            if room < 0:
+                raise RecordingError("not a recording: it grows out of all proportion")
+            with archive.open(member) as file:
+                arrays[name] = _array(file, name, member.file_size, kinds, dimensions)
+    return arrays
+
+
+def _array(file: IO[bytes], name: str, size: int, kinds: str, dimensions: int) -> Array:
+    """One array, its header checked before its data is read."""
+    version = np.lib.format.read_magic(file)
+    read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}.get(version)
+    if read is None:
+        raise RecordingError(f"'{name}': version {version} of the array format")
+    shape, fortran, dtype = read(file)
+    if dtype.hasobject or dtype.kind not in kinds or len(shape) != dimensions or min(shape, default=0) < 0:
+        raise RecordingError(f"'{name}' is of another type or shape: {dtype}, {shape}")
+    count = math.prod(shape)
+    if count * dtype.itemsize != size - file.tell():
+        raise RecordingError(f"'{name}' is shorter or longer than it says")
+    if not count or not dtype.itemsize:
+        return np.zeros(shape, dtype)
+    data: Array = np.frombuffer(file.read(count * dtype.itemsize), dtype=dtype, count=count)
+    return data.reshape(shape, order="F" if fortran else "C")
+
+
+def _recording(arrays: Mapping[str, Array]) -> Recording:
+    rows, n = arrays["activity"].shape
+    m, p = len(arrays["sources"]), len(arrays["plastic"])
+    shapes = {
+        "neurons": (n,),
+        "weights": (rows, p),
+        "weights_static": (m - p,),
+        "targets": (m,),
+        "delays": (m,),
+        "step": (rows,),
+    }
+    for name, shape in shapes.items():
+        if arrays[name].shape != shape:
+            raise RecordingError(f"'{name}' has the shape {arrays[name].shape}, where the others ask for {shape}")
+    neurons = tuple(str(name) for name in arrays["neurons"].tolist())
+    dt = float(arrays["dt"].astype(np.float64))
+    if len(set(neurons)) != n:
+        raise RecordingError("'neurons' holds a name twice")
+    if not (math.isfinite(dt) and dt > 0):
+        raise RecordingError(f"'dt' is {dt}")
+    about = _about(arrays)
+    return Recording(
+        activity=arrays["activity"].astype(np.float64),
+        neurons=neurons,
+        weights=arrays["weights"].astype(np.float64),
+        weights_static=arrays["weights_static"].astype(np.float64),
+        plastic=_integers(arrays, "plastic", 0, m, ascending=True),
+        sources=_integers(arrays, "sources", 0, n),
+        targets=_integers(arrays, "targets", 0, n),
+        delays=_integers(arrays, "delays", 0, 2**31),
+        dt=dt,
+        step=_integers(arrays, "step", 0, 2**62, ascending=True),
+        ranks=_ranks(about, arrays["sources"].astype(np.int64), arrays["targets"].astype(np.int64)),
+        views=_views(about, n),
+        network=str(about.get("network", "")),
+        hash=str(about.get("hash", "")),
+    )
+
+
+def _integers(arrays: Mapping[str, Array], name: str, low: int, high: int, ascending: bool = False) -> IntArray:
+    values = arrays[name]
+    if len(values) and (int(values.min()) < low or int(values.max()) >= high):
+        raise RecordingError(f"'{name}' holds a number outside {low} … {high - 1}")
+    array: IntArray = values.astype(np.int64)
+    if ascending and (np.diff(array) <= 0).any():
+        raise RecordingError(f"'{name}' does not ascend")
+    return array
+
+
+def _about(arrays: Mapping[str, Array]) -> dict[str, object]:
+    about = json.loads(str(arrays["about"])) if "about" in arrays else {}
+    if not isinstance(about, dict):
+        raise RecordingError("'about' is no mapping")
+    return about
+
+
+def _views(about: Mapping[str, object], n: int) -> dict[str, tuple[tuple[int, ...], bool]]:
+    views = about.get("views", {})
+    if not isinstance(views, dict):
+        raise RecordingError("'about' names no views")
+    checked = {}
+    for name, (members, single) in views.items():
+        if not members or not all(type(index) is int and 0 <= index < n for index in members):
+            raise RecordingError(f"'about': '{name}' names neurons that are not there")
+        checked[str(name)] = (tuple(members), bool(single))
+    return checked
+
+
+def _ranks(about: Mapping[str, object], sources: IntArray, targets: IntArray) -> IntArray:
+    """Ranks as ``about`` gives them; without it, among connections that share both ends, in their order."""
+    ranks = np.ones(len(sources), dtype=np.int64)
+    if "parallel" not in about:
+        seen: dict[tuple[int, int], int] = {}
+        for index, ends in enumerate(zip(sources.tolist(), targets.tolist(), strict=True)):
+            ranks[index] = seen[ends] = seen.get(ends, 0) + 1
+        return ranks
+    parallel = about["parallel"]
+    if not isinstance(parallel, list):
+        raise RecordingError("'about' lists no parallel connections")
+    for index, rank in parallel:
+        if type(index) is not int or type(rank) is not int or not 0 <= index < len(ranks) or not 1 < rank <= len(ranks):
+            raise RecordingError("'about' ranks a connection that is not there")
+        ranks[index] = rank
+    return ranks

@@ -1,0 +1,179 @@
+"""NumPy code for a block of neurons: its drive, its states, its activities; and for the signals that leave.
+
+In: a Block. Out: lines in a ``Code``. Sums are made by ``bincount``, which adds in the order of the connections from
+0.0 on, and products by ``multiply.reduceat``, which multiplies from left to right: the order of the reference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from neurovis_spec.compiler.network import Block, Gather, Network, Update
+from neurovis_spec.language.expressions.tree import Tree, names
+from neurovis_spec.runtime.numpy_code import Code, all_names, any_given
+from neurovis_spec.runtime.signals import SignalLayout
+
+FIRST = "k == 0 and not state.continued"
+
+
+def emit_gather(code: Code, network: Network, layout: SignalLayout, operation: Gather) -> str:
+    """u[t] of a block: what arrives, combined, + bias + input. Gives the identifier of the drive."""
+    block = network.blocks[operation.block]
+    bias = network.neurons.bias[block.members]
+    if len(block.incoming):
+        drive = code.let("u", _combined(code, block, network, _signals(code, network, layout, operation.block)))
+        # a sum that begins with 0.0 is never −0.0, so adding 0.0 changes nothing; a product may be
+        if any_given(bias) or block.combine == "product":
+            drive = code.let("u", f"{drive} + {code.constant(bias.copy())}")
+    else:
+        drive = code.constant((1.0 if block.combine == "product" else 0.0) + bias)
+    return _with_input(code, network, block, drive)
+
+
+def _with_input(code: Code, network: Network, block: Block, drive: str) -> str:
+    fed = network.neurons.input[block.members]
+    given = np.flatnonzero(fed >= 0)
+    if not len(given):
+        return drive
+    values = code.select("s", fed[given], network.input_size, broadcast=True)
+    if len(given) == len(fed):
+        return code.let("u", f"{drive} + {values}")
+    drive = code.let("u", f"np.array({drive})")
+    code.line(f"{drive}{code.position(given, len(fed))} += {values}")
+    return drive
+
+
+def _signals(code: Code, network: Network, layout: SignalLayout, number: int) -> str:
+    """What arrives at a block, in the order of its connections."""
+    connections, block = network.connections, network.blocks[number]
+    delays = connections.delays[block.incoming]
+    parts: dict[int, str] = {}
+    now = block.incoming[delays == 0]
+    if len(now):
+        weights = code.select("weights", now, len(connections))
+        parts[0] = f"{weights} * {code.select('activity', connections.sources[now], len(network.neurons))}"
+    for kind in layout.classes:
+        inside = np.flatnonzero(kind.blocks == number)
+        if len(inside):
+            start, stop = (kind.start + kind.delay * int(i) for i in (inside[0], inside[-1] + 1))
+            parts[kind.delay] = _slots(code, start, stop, kind.delay)
+    if len(parts) == 1:
+        return code.let("g", next(iter(parts.values())))
+    signals = code.let("g", f"np.empty({len(delays)})")
+    for delay, part in parts.items():
+        code.line(f"{signals}{code.position(np.flatnonzero(delays == delay), len(delays))} = {part}")
+    return signals
+
+
+def _slots(code: Code, start: int, stop: int, delay: int) -> str:
+    """The slots of this step of connections that are stored next to each other."""
+    if delay == 1:
+        return f"signals[{start}:{stop}]"
+    return f"signals[{start} + {code.slot(delay)}:{stop}:{delay}]"
+
+
+def _combined(code: Code, block: Block, network: Network, signals: str) -> str:
+    count = len(block.members)
+    if block.combine == "product":
+        return _product(code, block, signals)
+    slots = code.constant(np.ascontiguousarray(block.slots, dtype=np.intp))
+    if block.combine == "sum":
+        return f"bincount({slots}, {signals}, {count})"
+    centres = network.connections.centres[block.incoming]
+    if any_given(centres):
+        signals = code.let("g", f"{signals} - {code.constant(centres.copy())}")
+    return f"np.sqrt(bincount({slots}, {signals} * {signals}, {count}))"
+
+
+def _product(code: Code, block: Block, signals: str) -> str:
+    order = np.argsort(block.slots, kind="stable")
+    filled, starts = np.unique(block.slots[order], return_index=True)
+    sorted_signals = code.select(signals, order, len(order))
+    product = f"multiply.reduceat({sorted_signals}, {code.constant(starts.astype(np.intp))})"
+    if len(filled) == len(block.members):
+        return product
+    whole = code.let("u", f"np.ones({len(block.members)})")
+    code.line(f"{whole}{code.position(filled, len(block.members))} = {product}")
+    return whole
+
+
+def emit_update(code: Code, network: Network, operation: Update, drive: str) -> None:
+    """The states of a block from old states and the drive; activities from the new ones; the episode's end."""
+    block, number = network.blocks[operation.block], operation.block
+    model = block.model
+    own = code.parameters(block.model_parameters) | {"drive": drive}
+    functions = {"f": _activation(code, block)}
+    old = {q.name: code.let("v", f"cells[{number}][{i}]") for i, q in enumerate(model.state)}
+    known = emit_let(code, model.let, own | old, [q.each_step for q in model.state] + [model.activity])
+    steps = {q.name: q.each_step for q in model.state}
+    new = {name: code.fresh("n", tree, known) for name, tree in steps.items() if tree is not None}
+    activity = code.let("y", code.expression(model.activity, known | new, functions))
+    _take_initial(code, network, block, activity, {old[name]: value for name, value in new.items()})
+    for name, value in new.items():
+        code.line(f"{old[name]}[:] = {value}")
+    code.line(f"activity{code.position(block.members, len(network.neurons))} = {activity}")
+    ends = {q.name: q.each_episode for q in model.state if q.each_episode is not None}
+    if network.episode is not None and ends:
+        _end_episode(code, network, block, own | old, ends)
+
+
+def _take_initial(code: Code, network: Network, block: Block, activity: str, states: dict[str, str]) -> None:
+    """At step 0, neurons with ``initial`` take it, and their states stay."""
+    initial = network.neurons.initial[block.members]
+    given = ~np.isnan(initial)
+    if not given.any():
+        return
+    mask = code.constant(given)
+    code.line(f"if {FIRST}:")
+    code.line(f"    {activity} = np.where({mask}, {code.constant(initial.copy())}, {activity})")
+    for old, new in states.items():
+        code.line(f"    {new} = np.where({mask}, {old}, {new})")
+
+
+def _end_episode(code: Code, network: Network, block: Block, known: dict[str, str], ends: dict[str, Tree]) -> None:
+    given = ~np.isnan(network.neurons.initial[block.members])
+    code.line(f"if (k + 1) % {network.episode} == 0:")
+    code.indent += 1
+    known = emit_let(code, block.model.let, known, list(ends.values()))
+    new = {name: code.fresh("n", tree, known) for name, tree in ends.items()}
+    if given.any():
+        mask = code.constant(given)
+        code.line(f"if {FIRST}:")
+        for name in new:
+            code.line(f"    {new[name]} = np.where({mask}, {known[name]}, {new[name]})")
+    for name, value in new.items():
+        code.line(f"{known[name]}[:] = {value}")
+    code.indent -= 1
+
+
+def emit_let(
+    code: Code, let: tuple[tuple[str, Tree], ...], known: dict[str, str], readers: list[Tree | None]
+) -> dict[str, str]:
+    """The intermediate values that somebody reads, in order, beside the names known."""
+    wanted = all_names([*readers, *(tree for _, tree in let)])
+    known = dict(known)
+    for name, tree in let:
+        if name in wanted:
+            known[name] = code.fresh("m", tree, known)
+    return known
+
+
+def _activation(code: Code, block: Block) -> Callable[[str], str]:
+    """f as a function of its own, so that its argument is computed once."""
+    name = code.name("f")
+    known = code.parameters(block.activation_parameters) | {"x": "x"}
+    value = code.expression(block.activation.value, known)
+    code.helpers.append(f"def {name}(x, k_, t_): return {value}")
+    clock = "k_, t_" if names(block.activation.value) & {"k", "t"} else "0, 0"
+    return lambda argument: f"{name}({argument}, {clock})"
+
+
+def emit_send(code: Code, network: Network, layout: SignalLayout) -> None:
+    """w[t]·a[t] of every delayed connection leaves its source; a[t] is remembered for ``pre``."""
+    connections = network.connections
+    for kind in layout.classes:
+        weights = code.select("weights", kind.connections, len(connections))
+        sources = code.select("activity", connections.sources[kind.connections], len(network.neurons))
+        code.line(f"multiply({weights}, {sources}, {_slots(code, kind.start, kind.stop, kind.delay)})")

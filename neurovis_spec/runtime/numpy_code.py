@@ -1,0 +1,138 @@
+"""NumPy code in the making: lines with identifiers of our own, and the arrays that they refer to by name.
+
+In: typed trees and index arrays. Out: the text of one Python function and its namespace. Names of the author never
+reach the text: every one of them is replaced by an identifier made here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.compiler.network import FloatArray, IntArray
+from neurovis_spec.language.expressions.emit import emit
+from neurovis_spec.language.expressions.tree import Name, Tree, Unary, names
+from neurovis_spec.runtime.state import constants
+
+Functions: TypeAlias = Mapping[str, Callable[[str], str]]
+
+
+_PARTS = ("activity", "weights", "signals", "history", "cells", "traces")
+
+
+class Code:
+    """Lines of the step function, one level deep, and what they need."""
+
+    def __init__(self, dt: float) -> None:
+        self.namespace: dict[str, object] = {"np": np, "bincount": np.bincount, "multiply": np.multiply}
+        self.helpers: list[str] = []
+        self.lines: list[str] = []
+        self.indent = 1
+        self.used: set[str] = set()
+        self._count = 0
+        #: identifiers that stand for the names every expression knows
+        self.clock = {name: self.constant(np.float64(value)) for name, value in constants(dt).items()}
+        self.clock |= {"k": "k_", "t": "t_"}
+
+    def name(self, prefix: str) -> str:
+        """A new identifier."""
+        self._count += 1
+        return f"{prefix}{self._count}"
+
+    def line(self, text: str) -> None:
+        """Append a line."""
+        self.lines.append("    " * self.indent + text)
+
+    def let(self, prefix: str, value: str) -> str:
+        """Give a value a new identifier."""
+        name = self.name(prefix)
+        self.line(f"{name} = {value}")
+        return name
+
+    def constant(self, value: object) -> str:
+        """A value that stays, under a new identifier."""
+        name = self.name("c")
+        self.namespace[name] = value
+        return name
+
+    def parameters(self, values: Mapping[str, FloatArray]) -> dict[str, str]:
+        """Parameters as constants: one number where all members share it."""
+        return {name: self.constant(shared(array)) for name, array in values.items()}
+
+    def select(self, array: str, indices: IntArray, size: int, broadcast: bool = False) -> str:
+        """Elements of a vector of this size: a slice where they lie in a row, which costs no copy.
+
+        With ``broadcast``, equal indices give a single element.
+        """
+        first, count = int(indices[0]), len(indices)
+        if np.array_equal(indices, np.arange(first, first + count)):
+            return array if count == size else f"{array}[{first}:{first + count}]"
+        if broadcast and (indices == first).all():
+            return f"{array}[{first}:{first + 1}]"
+        return f"{array}[{self.constant(np.ascontiguousarray(indices, dtype=np.intp))}]"
+
+    def position(self, indices: IntArray, size: int) -> str:
+        """The subscript that ``select`` reads, for writing."""
+        chosen = self.select("", indices, size)
+        return chosen or "[:]"
+
+    def slot(self, delay: int) -> str:
+        """k mod delay."""
+        if delay == 1:
+            return "0"
+        self.used.add(f"r{delay} = k % {delay}")
+        return f"r{delay}"
+
+    def expression(self, tree: Tree, known: Mapping[str, str], functions: Functions | None = None) -> str:
+        """An expression as code."""
+        if names(tree) & {"k", "t"}:
+            self.used.add("k_ = float64(k)")
+            self.used.add(f"t_ = k_ * {self.clock['dt']}")
+        return emit(tree, {**self.clock, **known}, functions or {})
+
+    def fresh(self, prefix: str, tree: Tree, known: Mapping[str, str], functions: Functions | None = None) -> str:
+        """The value of an expression under a new identifier, and never an alias of an array that changes."""
+        code = self.expression(tree, known, functions)
+        return self.let(prefix, f"np.array({code})" if _may_alias(tree) else code)
+
+    def text(self) -> str:
+        """The functions as Python text."""
+        head = ["def step(state, s):", "    k = state.k"]
+        body = "\n".join(self.lines)
+        head += [f"    {name} = state.{name}" for name in _PARTS if name in body]
+        head += [f"    {text}" for text in sorted(self.used)]
+        return "\n".join([*self.helpers, *head, body, "    state.k = k + 1", ""])
+
+    def compiled(self) -> Callable[..., None]:
+        """The step function. The text holds our own identifiers only."""
+        namespace = {**self.namespace, "float64": np.float64}
+        exec(compile(self.text(), "<step of a network>", "exec"), namespace)
+        made = namespace["step"]
+        assert callable(made)
+        return made
+
+
+def _may_alias(tree: Tree) -> bool:
+    while isinstance(tree, Unary) and tree.operator == "+":
+        tree = tree.operand
+    return isinstance(tree, Name)
+
+
+def shared(array: FloatArray) -> FloatArray | np.float64:
+    """One number if all are the same, else the array."""
+    if len(array) and (array == array[0]).all():
+        return np.float64(array[0])
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def any_given(array: npt.NDArray[np.float64]) -> bool:
+    """Whether a number is not 0 (NaN counts)."""
+    return bool((array != 0).any())
+
+
+def all_names(trees: Iterable[Tree | None]) -> frozenset[str]:
+    """All names that occur in some of these."""
+    return frozenset().union(*(names(tree) for tree in trees if tree is not None))

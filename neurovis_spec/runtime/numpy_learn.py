@@ -1,0 +1,104 @@
+"""NumPy code for plasticity: w[t+1] and the states of a rule, for all connections that share it.
+
+In: a Plasticity. Out: lines in a ``Code``. New values are all computed before the first old one is replaced.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from neurovis_spec.compiler.network import IntArray, Network, Plasticity
+from neurovis_spec.language.expressions.tree import Tree
+from neurovis_spec.runtime.numpy_blocks import emit_let
+from neurovis_spec.runtime.numpy_code import Code
+from neurovis_spec.runtime.state import rule_names
+
+
+def emit_history(code: Code, depth: int) -> None:
+    """a[t] into its row of the history."""
+    if depth:
+        code.line(f"history[k % {depth}] = activity")
+
+
+def emit_learn(code: Code, network: Network, number: int, depth: int) -> None:
+    """The rule of a plasticity at a step and, where it has one, at an episode's end."""
+    plasticity = network.plasticity[number]
+    rule = plasticity.rule
+    known = code.parameters(plasticity.parameters) | _seen(code, network, plasticity, depth)
+    traces = {q.name: code.let("v", f"traces[{number}][{i}]") for i, q in enumerate(rule.state)}
+    weight = _weight(code, network, plasticity)
+    steps = {q.name: q.each_step for q in rule.state} | {"weight": rule.each_step}
+    ends = {q.name: q.each_episode for q in rule.state} | {"weight": rule.each_episode}
+    _change(code, network, plasticity, known | traces | {"weight": weight}, steps)
+    if network.episode is not None and any(tree is not None for tree in ends.values()):
+        code.line(f"if (k + 1) % {network.episode} == 0:")
+        code.indent += 1
+        weight = _weight(code, network, plasticity)
+        _change(code, network, plasticity, known | traces | {"weight": weight}, ends)
+        code.indent -= 1
+
+
+def _weight(code: Code, network: Network, plasticity: Plasticity) -> str:
+    return code.let("w", code.select("weights", plasticity.members, len(network.connections)))
+
+
+def _change(
+    code: Code, network: Network, plasticity: Plasticity, known: dict[str, str], trees: dict[str, Tree | None]
+) -> None:
+    """All right-hand sides, then all changes, the weight within its bounds."""
+    values = emit_let(code, plasticity.rule.let, known, list(trees.values()))
+    new = {name: code.fresh("n", tree, values) for name, tree in trees.items() if tree is not None}
+    for name, value in new.items():
+        if name != "weight":
+            code.line(f"{known[name]}[:] = {value}")
+    if "weight" in new:
+        place = code.position(plasticity.members, len(network.connections))
+        code.line(f"weights{place} = {_bounded(code, network, plasticity, new['weight'])}")
+
+
+def _bounded(code: Code, network: Network, plasticity: Plasticity, weight: str) -> str:
+    low, high = network.connections.low[plasticity.members], network.connections.high[plasticity.members]
+    if (low > -np.inf).any():
+        weight = f"np.maximum({weight}, {code.constant(low.copy())})"
+    if (high < np.inf).any():
+        weight = f"np.minimum({weight}, {code.constant(high.copy())})"
+    return weight
+
+
+def _seen(code: Code, network: Network, plasticity: Plasticity, depth: int) -> dict[str, str]:
+    """Arrays for pre, sent, post and the signals; only what the rule reads is gathered."""
+    read, members = rule_names(plasticity.rule), plasticity.members
+    connections, n = network.connections, len(network.neurons)
+    sources, targets = connections.sources[members], connections.targets[members]
+    made: dict[str, Callable[[], str]] = {
+        "sent": lambda: code.select("activity", sources, n, broadcast=True),
+        "post": lambda: code.select("activity", targets, n, broadcast=True),
+        "pre": lambda: _pre(code, sources, connections.delays[members], n, depth),
+    }
+    seen = {name: code.let("a", make()) for name, make in made.items() if name in read}
+    for signal, indices in plasticity.signals.items():
+        if signal in read:
+            seen[signal] = code.let("a", _signal(code, indices, n, network.input_size))
+    return seen
+
+
+def _pre(code: Code, sources: IntArray, delays: IntArray, n: int, depth: int) -> str:
+    """a_j[t−d] of each connection."""
+    if not delays.any():
+        return code.select("activity", sources, n, broadcast=True)
+    first = int(delays[0])
+    if (delays == first).all():
+        return code.select(f"history[(k - {first}) % {depth}]", sources, n, broadcast=True)
+    rows = f"(k - {code.constant(delays.copy())}) % {depth}"
+    return f"history[{rows}, {code.constant(np.ascontiguousarray(sources, dtype=np.intp))}]"
+
+
+def _signal(code: Code, indices: IntArray, n: int, inputs: int) -> str:
+    """A signal of a rule: activities, inputs, or some of both."""
+    if (indices < n).all():
+        return code.select("activity", indices, n, broadcast=True)
+    if (indices >= n).all():
+        return code.select("s", indices - n, inputs, broadcast=True)
+    return code.select("np.concatenate((activity, s))", indices, n + inputs)

@@ -1,0 +1,190 @@
+"""The Recording: activities and weights over a run; the Snapshot: those of one step.
+
+In: arrays as a ``.npz`` holds them (language reference, §12). Out: frozen values that answer by name. They refer to
+their Network by its hash and hold as much of its structure as is needed to read them alone.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from neurovis_spec.compiler.network import FloatArray, IntArray, Network, frozen
+from neurovis_spec.diagnostics import suggest
+
+
+class RecordingError(ValueError):
+    """A recording that cannot be read, written, or used with this network."""
+
+
+class UnknownNameError(KeyError):
+    """A name that a recording or simulation does not know; the message offers the nearest."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """One step: ``activity`` (n,) is a[t], ``weights`` (m,) w[t] of all connections.
+
+    ``previous_weights`` (m,) is w[t−1], None at step 0 and where step t − 1 was not recorded.
+    """
+
+    step: int
+    activity: FloatArray
+    weights: FloatArray
+    previous_weights: FloatArray | None
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A run of a network with n neurons and m connections, p of which can change.
+
+    ``step`` (rows,) are the steps recorded, ``activity`` (rows, n) is a[t], ``weights`` (rows, p) is w[t], before the
+    step's update; ``plastic`` (p,) are the indices of the changing connections,
+    ``weights_static`` (m − p,) the weights of the others, in their order. All arrays are read-only. ``recording["O"]`` is the activity of a neuron (rows,), of a group or output (rows, size).
+    """
+
+    activity: FloatArray
+    neurons: tuple[str, ...]
+    weights: FloatArray
+    weights_static: FloatArray
+    plastic: IntArray
+    sources: IntArray
+    targets: IntArray
+    delays: IntArray
+    dt: float
+    step: IntArray
+    #: 1, 2, … among connections that share both ends (``data-index``)
+    ranks: IntArray
+    #: names besides those of neurons: neuron indices, and whether a single neuron is meant
+    views: Mapping[str, tuple[tuple[int, ...], bool]] = field(default_factory=dict)
+    network: str = ""
+    hash: str = ""
+
+    def __post_init__(self) -> None:
+        for array in (self.activity, self.weights, self.weights_static, self.plastic, self.sources, self.targets,
+                      self.delays, self.step, self.ranks):  # fmt: skip
+            frozen(array)
+
+    def __len__(self) -> int:
+        return len(self.step)
+
+    def __getitem__(self, name: str) -> FloatArray:
+        """Activities by the name of a neuron, a group or an output. Raises KeyError with the nearest names."""
+        if name in self._neuron_index:
+            return self.activity[:, self._neuron_index[name]]
+        if name in self.views:
+            members, single = self.views[name]
+            return self.activity[:, members[0]] if single else self.activity[:, list(members)]
+        raise unknown("neuron, group or output", name, [*self.neurons, *self.views])
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._neuron_index or name in self.views
+
+    @cached_property
+    def _neuron_index(self) -> Mapping[str, int]:
+        return {name: index for index, name in enumerate(self.neurons)}
+
+    @cached_property
+    def connection_names(self) -> tuple[str, ...]:
+        """``C1 -> K1``, the second with the same ends ``C1 -> K1 (2)``, in the order of the connections."""
+        return tuple(
+            f"{self.neurons[s]} -> {self.neurons[t]}" + (f" ({rank})" if rank > 1 else "")
+            for s, t, rank in zip(self.sources.tolist(), self.targets.tolist(), self.ranks.tolist(), strict=True)
+        )
+
+    @cached_property
+    def connection_index(self) -> Mapping[str, int]:
+        """Connection name to index."""
+        return {name: index for index, name in enumerate(self.connection_names)}
+
+    def weight(self, name: str) -> FloatArray:
+        """w[t] of a connection by name, (rows,), also of one that stays. Raises KeyError with the nearest names."""
+        index = self.connection_index.get(name)
+        if index is None:
+            raise unknown("connection", name, self.connection_names)
+        column = int(np.searchsorted(self.plastic, index))
+        if column < len(self.plastic) and self.plastic[column] == index:
+            return self.weights[:, column]
+        return np.broadcast_to(self.weights_static[index - column], (len(self),))
+
+    def all_weights(self, row: int) -> FloatArray:
+        """w[t] of all connections (m,) in a row."""
+        weights = np.empty(len(self.sources))
+        weights[self._static] = self.weights_static
+        weights[self.plastic] = self.weights[row]
+        return weights
+
+    @cached_property
+    def _static(self) -> IntArray:
+        return np.setdiff1d(np.arange(len(self.sources)), self.plastic, assume_unique=True)
+
+    def row(self, step: int) -> int:
+        """The row that holds a step. Raises RecordingError where it was not recorded."""
+        row = int(np.searchsorted(self.step, step))
+        if row == len(self.step) or self.step[row] != step:
+            span = f"steps {self.step[0]} to {self.step[-1]}" if len(self.step) else "no steps"
+            raise RecordingError(f"step {step} is not in the recording, which has {span} in {len(self.step)} rows")
+        return row
+
+    def snapshot(self, step: int) -> Snapshot:
+        """Activities and all weights at a step. Raises RecordingError where it was not recorded."""
+        row = self.row(step)
+        before = self.all_weights(row - 1) if row > 0 and self.step[row - 1] == step - 1 else None
+        return Snapshot(step, self.activity[row], self.all_weights(row), before)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a file of the format that the suffix names. Raises RecordingError, OSError."""
+        from neurovis_spec.runtime import formats
+
+        formats.save(self, path)
+
+
+def unknown(what: str, name: str, known: Iterable[str]) -> UnknownNameError:
+    """An error that offers the nearest known names."""
+    hint = suggest(name, known)
+    return UnknownNameError(f"no {what} '{name}'" + (f"; {hint}" if hint else ""))
+
+
+def recording_of(
+    network: Network, step: IntArray, activity: FloatArray, weights: FloatArray, all_weights: FloatArray
+) -> Recording:
+    """A recording with the structure of a network; ``all_weights`` (m,) gives those that stay."""
+    connections = network.connections
+    static = np.flatnonzero(connections.rules < 0)
+    groups = {g.name: (tuple(g.indices), False) for g in network.neurons.groups if g.name not in network.neuron_index}
+    outputs = {o.name: (tuple(o.neurons.tolist()), o.scalar) for o in network.outputs}
+    return Recording(
+        activity=activity,
+        neurons=network.neurons.names,
+        weights=weights,
+        weights_static=all_weights[static],
+        plastic=network.changing.copy(),
+        sources=connections.sources.copy(),
+        targets=connections.targets.copy(),
+        delays=connections.delays.copy(),
+        dt=network.dt,
+        step=step,
+        ranks=_ranks(network),
+        views=outputs | groups,
+        network=network.name,
+        hash=network.hash,
+    )
+
+
+def _ranks(network: Network) -> IntArray:
+    """1 for each connection, 2, 3, … for the further ones that share both ends."""
+    connections = network.connections
+    ranks = np.ones(len(connections), dtype=np.int64)
+    pairs = connections.sources * len(network.neurons) + connections.targets
+    if len(np.unique(pairs)) < len(pairs):
+        for index, name in enumerate(network.connection_names):
+            if name.endswith(")"):
+                ranks[index] = int(name[name.rindex("(") + 1 : -1])
+    return ranks

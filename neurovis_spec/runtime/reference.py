@@ -1,0 +1,217 @@
+"""The reference interpreter: walks the update program plainly, one neuron and one connection after the other.
+
+In: a Network, a State, the vector of all inputs. Out: the State, advanced. It is slow and meant to be obviously
+right: every other backend is tested against it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from neurovis_spec.compiler.network import (
+    Block,
+    FloatArray,
+    Gather,
+    Learn,
+    Network,
+    Plasticity,
+    ReadInputs,
+    Send,
+    Update,
+)
+from neurovis_spec.language.expressions.evaluate import evaluate
+from neurovis_spec.language.expressions.tree import Tree
+from neurovis_spec.runtime.backend import Availability, Capabilities
+from neurovis_spec.runtime.signals import signal_layout
+from neurovis_spec.runtime.state import State, constants
+
+
+class ReferenceBackend:
+    """Executes anything, slowly."""
+
+    name = "reference"
+    capabilities = Capabilities()
+
+    def availability(self) -> Availability:
+        """Always there."""
+        return Availability(True, "plain and slow: what the others are tested against")
+
+    def prepare(self, network: Network) -> ReferenceStepper:
+        """Nothing is compiled."""
+        return ReferenceStepper(network)
+
+
+class ReferenceStepper:
+    """One network; ``step`` executes its program once."""
+
+    def __init__(self, network: Network) -> None:
+        self.network = network
+        self.offsets = signal_layout(network).offsets
+
+    def step(self, state: State, inputs: FloatArray, /) -> None:
+        """Execute the operations of the program in order."""
+        drives: dict[int, list[float]] = {}
+        for operation in self.network.program:
+            match operation:
+                case ReadInputs():
+                    pass  # done by the caller: ``inputs`` holds them
+                case Gather(block=number):
+                    drives[number] = self.gather(self.network.blocks[number], state, inputs)
+                case Update(block=number):
+                    self.update(number, drives[number], state)
+                case Send():
+                    self.send(state)
+                case Learn(plasticity=number):
+                    self.learn(number, state, inputs)
+        state.k += 1
+
+    def gather(self, block: Block, state: State, inputs: FloatArray) -> list[float]:
+        """u[t] of each member: what arrives, combined, + bias + input (§5.2)."""
+        connections, neurons = self.network.connections, self.network.neurons
+        arriving: list[list[tuple[float, float]]] = [[] for _ in block.members]
+        for connection, slot in zip(block.incoming.tolist(), block.slots.tolist(), strict=True):
+            signal = self.arriving(connection, state)
+            arriving[slot].append((signal, float(connections.centres[connection])))
+        drives = []
+        for neuron, signals in zip(block.members.tolist(), arriving, strict=True):
+            drive = combined(block.combine, signals) + float(neurons.bias[neuron])
+            if neurons.input[neuron] >= 0:
+                drive += float(inputs[neurons.input[neuron]])
+            drives.append(drive)
+        return drives
+
+    def arriving(self, connection: int, state: State) -> float:
+        """w[t−d]·a[t−d]: of this step for d = 0, else what was sent d steps ago."""
+        connections = self.network.connections
+        delay = int(connections.delays[connection])
+        if delay == 0:
+            return float(state.weights[connection]) * float(state.activity[connections.sources[connection]])
+        return float(state.signals[self.offsets[connection] + state.k % delay])
+
+    def update(self, number: int, drives: list[float], state: State) -> None:
+        """The states of a block from old states and the drive, then the activities from the new ones."""
+        block, neurons = self.network.blocks[number], self.network.neurons
+        for position, neuron in enumerate(block.members.tolist()):
+            initial = float(neurons.initial[neuron])
+            if state.k == 0 and not state.continued and not math.isnan(initial):
+                state.activity[neuron] = initial
+            else:
+                state.activity[neuron] = self.advance(number, position, drives[position], state)
+
+    def advance(self, number: int, position: int, drive: float, state: State) -> float:
+        """One neuron's step: its states are replaced, its activity is returned."""
+        block = self.network.blocks[number]
+        model, cells = block.model, state.cells[number]
+        own = self.clock(state) | {name: float(values[position]) for name, values in block.model_parameters.items()}
+        own["drive"] = drive
+        shape = self.clock(state) | {
+            name: float(values[position]) for name, values in block.activation_parameters.items()
+        }
+        functions = {"f": lambda x: evaluate(block.activation.value, shape | {"x": x})}
+        old = {quantity.name: float(cells[i][position]) for i, quantity in enumerate(model.state)}
+        known = with_let(own | old, model.let)
+        new = changed(old, {q.name: q.each_step for q in model.state}, known)
+        activity = evaluate(model.activity, known | new, functions)
+        if self.ends_episode(state):
+            known = with_let(own | new, model.let)
+            new = changed(new, {q.name: q.each_episode for q in model.state}, known)
+        for i, quantity in enumerate(model.state):
+            cells[i][position] = new[quantity.name]
+        return activity
+
+    def send(self, state: State) -> None:
+        """w[t]·a[t] of every delayed connection leaves; a[t] is remembered."""
+        connections = self.network.connections
+        for connection, delay in enumerate(connections.delays.tolist()):
+            if delay > 0:
+                signal = float(state.weights[connection]) * float(state.activity[connections.sources[connection]])
+                state.signals[self.offsets[connection] + state.k % delay] = signal
+        if len(state.history):
+            state.history[state.k % len(state.history)] = state.activity
+
+    def learn(self, number: int, state: State, inputs: FloatArray) -> None:
+        """w[t+1] and the states of a rule from old values; at an episode's end, once more from what these gave."""
+        plasticity = self.network.plasticity[number]
+        for position, connection in enumerate(plasticity.members.tolist()):
+            self.learn_one(plasticity, position, connection, state.traces[number], state, inputs)
+
+    def learn_one(
+        self,
+        plasticity: Plasticity,
+        position: int,
+        connection: int,
+        traces: tuple[FloatArray, ...],
+        state: State,
+        inputs: FloatArray,
+    ) -> None:
+        """The weight and the states of one connection."""
+        rule, connections = plasticity.rule, self.network.connections
+        low, high = float(connections.low[connection]), float(connections.high[connection])
+        own = self.clock(state) | {name: float(values[position]) for name, values in plasticity.parameters.items()}
+        own |= self.seen(connection, state)
+        both = (*state.activity.tolist(), *inputs.tolist())
+        own |= {signal: both[plasticity.signals[signal][position]] for signal in rule.signals}
+        old = {quantity.name: float(traces[i][position]) for i, quantity in enumerate(rule.state)}
+        old["weight"] = float(state.weights[connection])
+        steps = {quantity.name: quantity.each_step for quantity in rule.state} | {"weight": rule.each_step}
+        new = changed(old, steps, with_let(own | old, rule.let))
+        if rule.each_step is not None:
+            new["weight"] = min(max(new["weight"], low), high)
+        if self.ends_episode(state):
+            ends = {quantity.name: quantity.each_episode for quantity in rule.state} | {"weight": rule.each_episode}
+            new = changed(new, ends, with_let(own | new, rule.let))
+            if rule.each_episode is not None:
+                new["weight"] = min(max(new["weight"], low), high)
+        for i, quantity in enumerate(rule.state):
+            traces[i][position] = new[quantity.name]
+        state.weights[connection] = new["weight"]
+
+    def seen(self, connection: int, state: State) -> dict[str, float]:
+        """``pre`` = a_j[t−d], ``sent`` = a_j[t] and ``post`` = a_i[t] of a connection from j to i."""
+        connections = self.network.connections
+        source, target = int(connections.sources[connection]), int(connections.targets[connection])
+        delay = int(connections.delays[connection])
+        sent = float(state.activity[source])
+        pre = sent
+        if delay > 0 and len(state.history):
+            pre = float(state.history[(state.k - delay) % len(state.history), source])
+        return {"pre": pre, "sent": sent, "post": float(state.activity[target])}
+
+    def clock(self, state: State) -> dict[str, float]:
+        """The step, the seconds and the constants."""
+        return constants(self.network.dt) | {"k": float(state.k), "t": state.k * self.network.dt}
+
+    def ends_episode(self, state: State) -> bool:
+        """Whether (t + 1) mod m = 0."""
+        return self.network.episode is not None and (state.k + 1) % self.network.episode == 0
+
+
+def combined(combine: str, signals: Iterable[tuple[float, float]]) -> float:
+    """Signals and centres of one neuron as one number, taken in the order of the connections.
+
+    >>> combined("product", []), combined("distance", [(3.0, 0.0), (0.0, 4.0)])
+    (1.0, 5.0)
+    """
+    if combine == "product":
+        product = 1.0
+        for signal, _ in signals:
+            product *= signal
+        return product
+    total = 0.0
+    for signal, centre in signals:
+        total += (signal - centre) * (signal - centre) if combine == "distance" else signal
+    return math.sqrt(total) if combine == "distance" else total
+
+
+def with_let(known: dict[str, float], let: tuple[tuple[str, Tree], ...]) -> dict[str, float]:
+    """The names known and the intermediate values, computed in order."""
+    known = dict(known)
+    for name, tree in let:
+        known[name] = evaluate(tree, known)
+    return known
+
+
+def changed(old: dict[str, float], trees: dict[str, Tree | None], known: dict[str, float]) -> dict[str, float]:
+    """New values, all from ``known``; what has no expression stays."""
+    return {name: value if (tree := trees[name]) is None else evaluate(tree, known) for name, value in old.items()}

@@ -1,0 +1,105 @@
+"""The State: all that a run carries from step to step.
+
+In: a Network. Out: a mutable bundle of arrays that every backend advances in place; so one backend can begin a
+step in the state of another.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from neurovis_spec.compiler.network import FloatArray, Network, Plasticity, Quantity, Rule
+from neurovis_spec.language.expressions.arrays import evaluate_array
+from neurovis_spec.language.expressions.tree import names
+from neurovis_spec.runtime.signals import signal_layout
+
+
+@dataclass(slots=True)
+class State:
+    """What a step reads and writes; n neurons, m connections.
+
+    ``k`` is the step to compute next; ``activity`` (n,) is a[k−1], ``weights`` (m,) is w[k]; ``signals`` as in
+    ``SignalLayout``; row t mod (depth) of ``history`` (depth, n) is a[t], for ``pre``; ``cells[b][i]`` is state i of
+    the model of block b, ``traces[p][i]`` that of the rule of plasticity p, each as long as the members.
+    ``continued`` says that a[−1] is given, so that nobody takes ``initial`` at step 0.
+    """
+
+    k: int
+    activity: FloatArray
+    weights: FloatArray
+    signals: FloatArray
+    history: FloatArray
+    cells: tuple[tuple[FloatArray, ...], ...]
+    traces: tuple[tuple[FloatArray, ...], ...]
+    continued: bool = False
+
+    def copy(self) -> State:
+        """A state of its own: no array is shared."""
+        return replace(
+            self,
+            activity=self.activity.copy(),
+            weights=self.weights.copy(),
+            signals=self.signals.copy(),
+            history=self.history.copy(),
+            cells=tuple(tuple(array.copy() for array in block) for block in self.cells),
+            traces=tuple(tuple(array.copy() for array in rule) for rule in self.traces),
+        )
+
+
+def initial_state(network: Network) -> State:
+    """The state before step 0: nothing is under way, weights are w[0], model and rule states have their initials."""
+    n = len(network.neurons)
+    return State(
+        k=0,
+        activity=np.zeros(n),
+        weights=np.array(network.connections.weights, dtype=np.float64),
+        signals=np.zeros(signal_layout(network).size),
+        history=np.zeros((history_depth(network), n)),
+        cells=tuple(
+            _initials(block.model.state, block.model_parameters, len(block.members), network.dt)
+            for block in network.blocks
+        ),
+        traces=tuple(
+            _initials(entry.rule.state, entry.parameters, len(entry.members), network.dt)
+            for entry in network.plasticity
+        ),
+    )
+
+
+def history_depth(network: Network) -> int:
+    """Rows of the history: a[t−d] … a[t] for the largest d of a rule that reads ``pre``; 0 where none is delayed."""
+    deepest = max(
+        (int(network.connections.delays[entry.members].max(initial=0)) for entry in _readers_of_pre(network)),
+        default=0,
+    )
+    return deepest + 1 if deepest else 0
+
+
+def _readers_of_pre(network: Network) -> list[Plasticity]:
+    return [entry for entry in network.plasticity if "pre" in rule_names(entry.rule)]
+
+
+def rule_names(rule: Rule) -> frozenset[str]:
+    """All names that the expressions of a rule read at a step or at an episode's end."""
+    trees = [tree for _, tree in rule.let] + [rule.each_step, rule.each_episode]
+    trees += [tree for quantity in rule.state for tree in (quantity.each_step, quantity.each_episode)]
+    return frozenset().union(*(names(tree) for tree in trees if tree is not None))
+
+
+def constants(dt: float) -> dict[str, float]:
+    """The constants that every expression may name."""
+    return {"pi": math.pi, "e": math.e, "dt": dt}
+
+
+def _initials(
+    quantities: tuple[Quantity, ...], parameters: Mapping[str, FloatArray], count: int, dt: float
+) -> tuple[FloatArray, ...]:
+    known: dict[str, float | FloatArray] = {**constants(dt), **parameters}
+    return tuple(
+        np.array(np.broadcast_to(evaluate_array(quantity.initial, known), (count,)), dtype=np.float64)
+        for quantity in quantities
+    )

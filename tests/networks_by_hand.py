@@ -1,0 +1,269 @@
+"""Small networks for tests of the runtime, lowered here by hand: no compiler is needed, and none can be at fault.
+
+In: neurons and links, one by one. Out: a Network whose blocks and program follow the contract (delay-0 connections in
+topological order, then Send, then Learn).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from neurovis_spec.compiler.network import (
+    Activation,
+    Block,
+    Combine,
+    Connections,
+    FloatArray,
+    Gather,
+    Group,
+    Input,
+    LayoutSettings,
+    Learn,
+    Model,
+    Network,
+    Neurons,
+    Operation,
+    Output,
+    Plasticity,
+    Quantity,
+    ReadInputs,
+    RenderSettings,
+    Rule,
+    Send,
+    Update,
+)
+from neurovis_spec.language.expressions.parser import parse
+from neurovis_spec.language.expressions.tree import Tree
+
+States = Mapping[str, tuple[str, str | None, str | None]]
+
+
+def tree(text: str) -> Tree:
+    """An expression, which may call f."""
+    return parse(text, extra_functions={"f": 1})
+
+
+def optional(text: str | None) -> Tree | None:
+    return None if text is None else tree(text)
+
+
+def quantities(states: States) -> tuple[Quantity, ...]:
+    return tuple(
+        Quantity(name, tree(initial), optional(step), optional(end)) for name, (initial, step, end) in states.items()
+    )
+
+
+def activation(value: str, **parameters: float) -> Activation:
+    return Activation(value, tuple(parameters), tree(value))
+
+
+def model(activity: str, states: States, parameters: Sequence[str] = (), let: Mapping[str, str] | None = None) -> Model:
+    lets = tuple((name, tree(text)) for name, text in (let or {}).items())
+    return Model(activity + repr(states), tuple(parameters), lets, quantities(states), tree(activity))
+
+
+def rule(
+    step: str | None = None,
+    end: str | None = None,
+    states: States | None = None,
+    parameters: Sequence[str] = (),
+    signals: Sequence[str] = (),
+    let: Mapping[str, str] | None = None,
+) -> Rule:
+    lets = tuple((name, tree(text)) for name, text in (let or {}).items())
+    found = quantities(states or {})
+    return Rule("rule", tuple(parameters), tuple(signals), lets, found, optional(step), optional(end))
+
+
+IDENTITY = activation("x")
+TANH = activation("tanh(x)")
+GAUSSIAN = activation("exp(-sigma * x^2)", sigma=1.0)
+STATIC = model("f(drive)", {})
+LEAKY = model("f(v)", {"v": ("0", "(1 - leak) * v + leak * drive", None)}, ["leak"])
+DELTA = rule("weight + rate * pre * (target - post)", parameters=["rate"], signals=["target"])
+
+
+@dataclass(frozen=True)
+class Unit:
+    """One neuron."""
+
+    name: str
+    activation: Activation = IDENTITY
+    model: Model = STATIC
+    combine: Combine = "sum"
+    bias: float = 0.0
+    initial: float = float("nan")
+    input: int = -1
+    shape: Mapping[str, float] = field(default_factory=dict)
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Link:
+    """One connection; ``learns`` is the index of its Use."""
+
+    source: int
+    target: int
+    weight: float = 1.0
+    delay: int = 1
+    centre: float = 0.0
+    learns: int = -1
+    low: float = float("-inf")
+    high: float = float("inf")
+
+
+@dataclass(frozen=True)
+class Use:
+    """A rule in use; a signal is an index into the activities followed by the inputs."""
+
+    rule: Rule
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    signals: Mapping[str, int] = field(default_factory=dict)
+
+
+def build(
+    units: Sequence[Unit],
+    links: Sequence[Link] = (),
+    uses: Sequence[Use] = (),
+    inputs: Sequence[Input] = (),
+    outputs: Sequence[Output] = (),
+    groups: Sequence[Group] = (),
+    dt: float = 1.0,
+    episode: int | None = None,
+    steps: int = 100,
+    parameters: Mapping[str, float] | None = None,
+    structural: Sequence[str] = (),
+) -> Network:
+    """Lower neurons and links to a Network."""
+    blocks = lowered(units, links)
+    levels: list[Operation] = [ReadInputs()]
+    for number in range(len(blocks)):
+        levels += [Gather(number), Update(number)]
+    rules = tuple(learning(number, use, links) for number, use in enumerate(uses))
+    return Network(
+        name="by_hand",
+        title="By hand",
+        description="",
+        dt=dt,
+        dt_given=dt != 1.0,
+        steps=steps,
+        episode=episode,
+        seed=0,
+        parameters=dict(parameters or {}),
+        structural=frozenset(structural),
+        neurons=neurons(units, groups),
+        connections=connections(links),
+        inputs=tuple(inputs),
+        outputs=tuple(outputs),
+        blocks=blocks,
+        plasticity=rules,
+        program=(*levels, Send(), *(Learn(number) for number in range(len(uses)))),
+        layout=LayoutSettings(),
+        render=RenderSettings(),
+        hash="0" * 64,
+    )
+
+
+def neurons(units: Sequence[Unit], groups: Sequence[Group]) -> Neurons:
+    names = tuple(unit.name for unit in units)
+    return Neurons(
+        names=names,
+        labels=names,
+        groups=tuple(groups),
+        bias=floats([unit.bias for unit in units]),
+        initial=floats([unit.initial for unit in units]),
+        input=np.array([unit.input for unit in units], dtype=np.int64),
+        position=np.full((len(units), 2), np.nan),
+    )
+
+
+def connections(links: Sequence[Link]) -> Connections:
+    def integers(values: Sequence[int]) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+        return np.array(values, dtype=np.int64)
+
+    return Connections(
+        sources=integers([link.source for link in links]),
+        targets=integers([link.target for link in links]),
+        weights=floats([link.weight for link in links]),
+        centres=floats([link.centre for link in links]),
+        delays=integers([link.delay for link in links]),
+        rules=integers([link.learns for link in links]),
+        entry=integers([0 for _ in links]),
+        low=floats([link.low for link in links]),
+        high=floats([link.high for link in links]),
+        entries=("all",),
+        descriptions=(None,),
+    )
+
+
+def floats(values: Sequence[float]) -> FloatArray:
+    return np.array(values, dtype=np.float64)
+
+
+def level_of(index: int, links: Sequence[Link]) -> int:
+    """The longest way to a neuron along delay-0 connections."""
+    before = [link.source for link in links if link.delay == 0 and link.target == index]
+    return 1 + max(level_of(source, links) for source in before) if before else 0
+
+
+def lowered(units: Sequence[Unit], links: Sequence[Link]) -> tuple[Block, ...]:
+    """Blocks of equal level, combination, activation and model, level by level."""
+    alike: dict[tuple[int, str, str, str], list[int]] = {}
+    for index, unit in enumerate(units):
+        key = (level_of(index, links), unit.combine, unit.activation.name, unit.model.name)
+        alike.setdefault(key, []).append(index)
+    return tuple(block(key[0], alike[key], units, links) for key in sorted(alike))
+
+
+def block(level: int, members: list[int], units: Sequence[Unit], links: Sequence[Link]) -> Block:
+    first = units[members[0]]
+    incoming = [number for number, link in enumerate(links) if link.target in members]
+    return Block(
+        level=level,
+        members=np.array(members, dtype=np.int64),
+        combine=first.combine,
+        activation=first.activation,
+        activation_parameters={name: floats([units[i].shape[name] for i in members]) for name in first.shape},
+        model=first.model,
+        model_parameters={name: floats([units[i].parameters[name] for i in members]) for name in first.parameters},
+        incoming=np.array(incoming, dtype=np.int64),
+        slots=np.array([members.index(links[number].target) for number in incoming], dtype=np.int64),
+    )
+
+
+def learning(number: int, use: Use, links: Sequence[Link]) -> Plasticity:
+    members = [index for index, link in enumerate(links) if link.learns == number]
+    return Plasticity(
+        rule=use.rule,
+        members=np.array(members, dtype=np.int64),
+        parameters={name: np.full(len(members), value) for name, value in use.parameters.items()},
+        signals={name: np.full(len(members), index, dtype=np.int64) for name, index in use.signals.items()},
+        title="rule",
+    )
+
+
+def cpg_rbf(learns: bool = True) -> Network:
+    """Use case 1 of the paper: 2 rhythm neurons, 8 kernels, an output, a teacher; 28 connections."""
+    units = [Unit("C1", TANH, initial=0.1), Unit("C2", TANH, initial=0.0)]
+    units += [Unit(f"K{i + 1}", GAUSSIAN, combine="distance", shape={"sigma": 40.0}) for i in range(8)]
+    units += [Unit("O"), Unit("T", input=0)]
+    phi, alpha = 0.049, 1.01
+    cosine, sine = alpha * np.cos(phi), alpha * np.sin(phi)
+    links = [Link(0, 0, cosine), Link(0, 1, -sine), Link(1, 0, sine), Link(1, 1, cosine)]
+    angles = 2 * np.pi * np.arange(8) / 8
+    links += [Link(0, 2 + i, 1.0, 0, 0.2 * np.cos(angle)) for i, angle in enumerate(angles)]
+    links += [Link(1, 2 + i, 1.0, 0, 0.2 * np.sin(angle)) for i, angle in enumerate(angles)]
+    links += [Link(2 + i, 10, 0.0, 0, learns=0 if learns else -1) for i in range(8)]
+    uses = [Use(DELTA, {"rate": 0.01}, {"target": 11})] if learns else []
+    target = Input("target", 0, 1, tree("0.5*sin(2*pi*k/128.67) + 0.2*sin(4*pi*k/128.67)"))
+    groups = [
+        Group("C", 0, 2, "tanh", "static", "sum", {}, {}),
+        Group("K", 2, 8, "gaussian", "static", "distance", {}, {}),
+        Group("O", 10, 1, "identity", "static", "sum", {}, {}),
+        Group("T", 11, 1, "identity", "static", "sum", {}, {}),
+    ]
+    outputs = [Output("signal", np.array([10]), True), Output("kernels", np.arange(2, 10), False)]
+    return build(units, links, uses, [target], outputs, groups, dt=0.025)
