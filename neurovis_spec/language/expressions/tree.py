@@ -7,12 +7,28 @@ exclusive), in the text of its expression.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
+
+from neurovis_spec.language.expressions.errors import ExpressionError
 
 UnaryOperator = Literal["-", "+", "not"]
 BinaryOperator = Literal["+", "-", "*", "/", "%", "^", "<", "<=", ">", ">=", "==", "!=", "and", "or"]
+
+#: How tight the operators bind; ``not`` is between ``and`` and the comparisons, signs between ``%`` and ``^``.
+LEVELS: Mapping[str, int] = {
+    **dict.fromkeys(("or",), 1),
+    **dict.fromkeys(("and",), 2),
+    **dict.fromkeys(("<", "<=", ">", ">=", "==", "!="), 4),
+    **dict.fromkeys(("+", "-"), 5),
+    **dict.fromkeys(("*", "/", "%"), 6),
+    **dict.fromkeys(("^", "**"), 8),
+}
+#: The cost of an expression: its nodes.
+MAX_NODES = 600
+#: How far down a tree goes; long sums go down to the left. Every walk may recurse.
+MAX_DEPTH = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,9 +125,11 @@ def children(tree: Tree) -> tuple[Tree, ...]:
 
 def walk(tree: Tree) -> Iterator[Tree]:
     """The node and all below it, depth first."""
-    yield tree
-    for child in children(tree):
-        yield from walk(child)
+    waiting = [tree]
+    while waiting:
+        node = waiting.pop()
+        yield node
+        waiting.extend(reversed(children(node)))
 
 
 def names(tree: Tree) -> frozenset[str]:
@@ -122,3 +140,77 @@ def names(tree: Tree) -> frozenset[str]:
 def draws(tree: Tree) -> bool:
     """Whether a random number is drawn anywhere."""
     return any(isinstance(node, Draw) for node in walk(tree))
+
+
+def is_square(tree: Tree) -> Tree | None:
+    """The base, where the node is a power whose exponent is written as 2: then it is base·base, bit for bit."""
+    match tree:
+        case Binary(operator="^", left=base, right=Number(value=2.0)):
+            return base
+        case Call(function="pow", arguments=(base, Number(value=2.0))):
+            return base
+        case _:
+            return None
+
+
+def rebuild(tree: Tree, parts: tuple[Tree, ...]) -> Tree:
+    """The node with other operands, in the order of ``children``."""
+    match tree:
+        case Unary():
+            return replace(tree, operand=parts[0])
+        case Binary():
+            return replace(tree, left=parts[0], right=parts[1])
+        case Conditional():
+            return replace(tree, then=parts[0], condition=parts[1], otherwise=parts[2])
+        case Call():
+            return replace(tree, arguments=parts)
+        case Draw():
+            return replace(tree, first=parts[0], second=parts[1])
+        case _:
+            return tree
+
+
+def substitute(tree: Tree, mapping: Mapping[str, Tree]) -> Tree:
+    """The tree with the names in ``mapping`` replaced (at once, not again in what was put in).
+
+    What is put in keeps its own places, which belong to another text. Raises ExpressionError at the whole of
+    ``tree`` where the result is deeper or has more nodes than an expression may.
+
+    >>> substitute(Binary("*", Name("u"), Name("x")), {"u": Number(2.0), "x": Name("u")})
+    Binary(operator='*', left=Number(value=2.0, start=0, end=0), right=Name(name='u', start=0, end=0), start=0, end=0)
+    """
+    sizes = {name: sum(1 for _ in walk(put)) for name, put in mapping.items()}
+    nodes = sum(sizes.get(node.name, 1) if isinstance(node, Name) else 1 for node in walk(tree))
+    _check_nodes(nodes, tree)
+    result = _substituted(tree, mapping)
+    check_extent(result, tree)
+    return result
+
+
+def _substituted(tree: Tree, mapping: Mapping[str, Tree]) -> Tree:
+    if isinstance(tree, Name):
+        return mapping.get(tree.name, tree)
+    return rebuild(tree, tuple(_substituted(part, mapping) for part in children(tree)))
+
+
+def check_extent(tree: Tree, place: Tree | None = None) -> None:
+    """Raise ExpressionError, at ``place``, where a tree has too many nodes or goes too deep."""
+    place = place or tree
+    waiting = [(tree, 1)]
+    nodes = deepest = 0
+    while waiting:
+        node, depth = waiting.pop()
+        nodes += 1
+        deepest = max(deepest, depth)
+        waiting.extend((child, depth + 1) for child in children(node))
+    _check_nodes(nodes, place)
+    if deepest > MAX_DEPTH:
+        message = f"this expression has more than {MAX_DEPTH} operations one upon the other"
+        raise ExpressionError("expression-too-deep", message, place.start, place.end, "divide it into parts with names")
+
+
+def _check_nodes(nodes: int, place: Tree) -> None:
+    if nodes > MAX_NODES:
+        message = f"this expression takes {nodes} operations and values; {MAX_NODES} are the most"
+        hint = "divide it into parts with names"
+        raise ExpressionError("expression-too-costly", message, place.start, place.end, hint)

@@ -1,0 +1,152 @@
+"""Randomness that depends on names alone: Philox4x32-10, counted (§4 of the language).
+
+In: the seed, what is drawn (a purpose and a name), and for each number its counter (i, j, step, number of the draw).
+Out: the number. There is no state: a draw depends on no order, no backend and no platform. Source: Salmon, Moraes,
+Dror and Shaw, Parallel random numbers: as easy as 1, 2, 3 (SC 2011).
+
+Exactly: the key is the first 8 bytes, little-endian, of the SHA-256 of ``SEED/PURPOSE/NAME`` (UTF-8, the seed in
+decimal), the low word first. A block is four words w0 … w3 of 32 bits. A uniform number is ⌊w0/2^5⌋·2^26 + ⌊w1/2^6⌋
+over 2^53, in [0, 1); a normal one comes from two such, of w0 w1 and of w2 w3, by ``box_muller.normal``.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.compiler import box_muller
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+IntArray: TypeAlias = npt.NDArray[np.int64]
+WordArray: TypeAlias = npt.NDArray[np.uint32]
+#: One part of a counter: integers that broadcast with the other parts; taken modulo 2^32.
+Index: TypeAlias = int | npt.NDArray[np.integer]
+Value: TypeAlias = float | FloatArray
+
+_MULTIPLIERS = (np.uint64(0xD2511F53), np.uint64(0xCD9E8D57))
+_WEYL = (0x9E3779B9, 0xBB67AE85)
+_ROUNDS = 10
+_LOW, _HIGH = np.uint64(0xFFFFFFFF), np.uint64(32)
+#: Blocks made at once: what fits into a processor's cache.
+_CHUNK = 16384
+
+
+def philox4x32(counter: WordArray, key: tuple[int, int]) -> WordArray:
+    """The blocks of Philox4x32-10 for counters (…, 4) and a key of two words: (…, 4).
+
+    >>> [hex(word) for word in philox4x32(np.zeros(4, np.uint32), (0, 0))]
+    ['0x6627e8d5', '0xe169c58d', '0xbc57ac4c', '0x9b00dbd8']
+    """
+    counters = np.asarray(counter, dtype=np.uint32)
+    flat = counters.reshape(-1, 4)
+    blocks = np.empty_like(flat)
+    for start in range(0, len(flat), _CHUNK):
+        blocks[start : start + _CHUNK] = _rounds(flat[start : start + _CHUNK], key)
+    return blocks.reshape(counters.shape)
+
+
+def _rounds(counters: WordArray, key: tuple[int, int]) -> WordArray:
+    c0, c1, c2, c3 = counters.T.astype(np.uint64)
+    k0, k1 = key
+    for _ in range(_ROUNDS):
+        first, second = _MULTIPLIERS[0] * c0, _MULTIPLIERS[1] * c2
+        c0, c1 = (second >> _HIGH) ^ c1 ^ np.uint64(k0), second & _LOW
+        c2, c3 = (first >> _HIGH) ^ c3 ^ np.uint64(k1), first & _LOW
+        k0, k1 = (k0 + _WEYL[0]) & 0xFFFFFFFF, (k1 + _WEYL[1]) & 0xFFFFFFFF
+    return np.stack((c0, c1, c2, c3), axis=-1).astype(np.uint32)
+
+
+def _fraction(high: WordArray, low: WordArray) -> FloatArray:
+    """53 bits of two words, as a number in [0, 1)."""
+    return ((high >> np.uint32(5)) * 67108864.0 + (low >> np.uint32(6))) * 2.0**-53
+
+
+@dataclass(frozen=True)
+class Stream:
+    """The numbers of one purpose and name under a seed.
+
+    The purpose is one of ``weight``, ``centre``, ``edges``, ``bias``, ``initial``, ``noise``; the name that of the
+    group or the entry, with the path of its instance.
+
+    >>> Stream(7, "weight", "K -> O").uniform(0, np.arange(3), 0, 0).round(6)
+    array([0.091661, 0.668837, 0.808927])
+    """
+
+    seed: int
+    purpose: str
+    name: str
+
+    @cached_property
+    def key(self) -> tuple[int, int]:
+        """The two words of the key, low and high."""
+        digest = hashlib.sha256(f"{self.seed}/{self.purpose}/{self.name}".encode()).digest()
+        return int.from_bytes(digest[:4], "little"), int.from_bytes(digest[4:8], "little")
+
+    def words(self, i: Index, j: Index, step: Index, draw: Index) -> WordArray:
+        """The four words of each counter: the shape of the broadcast parts, and (4,)."""
+        parts = np.broadcast_arrays(*(np.asarray(part, dtype=np.int64) for part in (i, j, step, draw)))
+        return philox4x32(np.stack(parts, axis=-1).astype(np.uint32), self.key)
+
+    def uniform(self, i: Index, j: Index, step: Index, draw: Index) -> FloatArray:
+        """Uniform numbers in [0, 1), of the shape to which the parts of the counter broadcast."""
+        words = self.words(i, j, step, draw)
+        return np.asarray(_fraction(words[..., 0], words[..., 1]))
+
+    def normal(self, i: Index, j: Index, step: Index, draw: Index) -> FloatArray:
+        """Standard normal numbers, of the shape to which the parts of the counter broadcast."""
+        words = self.words(i, j, step, draw)
+        first = _fraction(words[..., 0], words[..., 1])
+        return np.asarray(box_muller.normal(first, _fraction(words[..., 2], words[..., 3])))
+
+    def drawn(
+        self,
+        kind: Literal["normal", "uniform"],
+        first: Value,
+        second: Value,
+        i: Index,
+        j: Index,
+        step: Index,
+        draw: Index,
+    ) -> FloatArray:
+        """``normal(first, second)``: mean and deviation; or ``uniform(first, second)``: from low to below high."""
+        if kind == "normal":
+            return np.asarray(first + second * self.normal(i, j, step, draw))
+        return np.asarray(first + (second - first) * self.uniform(i, j, step, draw))
+
+    def random_targets(self, row: int, n: int, probability: float) -> IntArray:
+        """The targets 0 … n−1 that row ``row`` connects to, each with this probability, ascending.
+
+        From target to target goes a geometric gap: the numbers u0, u1, … of the counters (row, number of the gap, 0, 0)
+        leave out ⌊ln(1 − u)/ln(1 − probability)⌋ targets before the first, after the first, and so on.
+        """
+        if probability <= 0 or n <= 0:
+            return np.empty(0, dtype=np.int64)
+        if probability >= 1:
+            return np.arange(n, dtype=np.int64)
+        scale = _log1p(-probability)
+        expected = n * probability
+        batch = int(expected + 4 * expected**0.5) + 4
+        found: list[IntArray] = []
+        gaps, last = 0, -1
+        while last < n:
+            number = np.arange(gaps, gaps + batch, dtype=np.int64)
+            with np.errstate(over="ignore"):  # a gap beyond all numbers is one beyond n
+                skipped = np.floor(box_muller.log(1.0 - self.uniform(row, number, 0, 0)) / scale)
+            targets = last + np.cumsum(np.minimum(skipped, n).astype(np.int64) + 1)
+            found.append(targets)
+            gaps, last = gaps + batch, int(targets[-1])
+        joined = np.concatenate(found)
+        return joined[joined < n]
+
+
+def _log1p(x: float) -> float:
+    """ln(1 + x), right for a small x as well (Kahan), by the same logarithm as the gaps."""
+    rounded = 1.0 + x
+    if rounded == 1.0:
+        return x
+    return float(box_muller.log(np.array(rounded))) * (x / (rounded - 1.0))

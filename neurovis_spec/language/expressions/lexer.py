@@ -1,0 +1,189 @@
+"""From text to tokens.
+
+In: the text of an expression. Out: its tokens, the last of kind ``end``; or an ExpressionError at the first character
+that no expression holds, with what to write instead. Habits from other languages (``&&``, ``a[i]``, ``−``, ``σ``) are
+recognised here, so that they get an answer and not a shrug.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import unicodedata
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from neurovis_spec.language.expressions.errors import ExpressionError
+
+Kind = Literal["number", "name", "operator", "end"]
+
+#: The longest expression, in characters (§6).
+MAX_LENGTH = 1000
+#: Words that are operators, and so no names.
+WORDS = frozenset({"and", "or", "not", "if", "else"})
+
+
+@dataclass(frozen=True, slots=True)
+class Token:
+    """A piece of the text, from ``start`` to ``end``; words that are operators are of kind ``operator``."""
+
+    kind: Kind
+    text: str
+    start: int
+    end: int
+
+
+_BLANK = re.compile(r"[ \t\r\n]+")
+_NUMBER = re.compile(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_TAIL = re.compile(r"[A-Za-z0-9_.]+")
+_QUOTED = re.compile(r"(?P<quote>['\"`“”‘’]).*?(?:['\"`“”‘’]|$)", re.DOTALL)
+_OPERATOR = re.compile(r"\*\*|<=|>=|==|!=|[-+*/%^<>(),]")
+
+_FOREIGN: Mapping[str, str] = {
+    "===": "write '==' for 'is equal to'",
+    "!==": "write '!=' for 'is not equal to'",
+    "&&": "write 'and'",
+    "||": "write 'or'",
+    "//": "write 'floor(a / b)' for a whole quotient",
+    "<>": "write '!=' for 'is not equal to'",
+    "=<": "write '<='",
+    "=>": "write '>='",
+    "<<": "multiply by a power of 2",
+    ">>": "divide by a power of 2",
+    ":=": "a value gets its name where it is declared, not in an expression",
+    "&": "write 'and'",
+    "|": "write 'or'; for a magnitude 'abs(x)'",
+    "!": "write 'not'",
+    "~": "write 'not'",
+    "=": "write '==' for 'is equal to'",
+    "?": "write 'a if condition else b' for a choice",
+    ":": "write 'a if condition else b' for a choice",
+}
+_FOREIGN_OPERATOR = re.compile("|".join(re.escape(text) for text in _FOREIGN))
+
+_LOOKALIKES: Mapping[str, str] = {
+    "−": "-", "–": "-", "—": "-", "‐": "-", "‑": "-", "‒": "-", "×": "*", "·": "*", "⋅": "*", "∙": "*", "∗": "*",
+    "÷": "/", "⁄": "/", "∕": "/", "≤": "<=", "≥": ">=", "⩽": "<=", "⩾": ">=", "≠": "!=", "∧": "and", "∨": "or",
+    "¬": "not ", "√": "sqrt(…)", "²": "^2", "³": "^3", "¹": "^1", "⁻": "^-", "½": "0.5", "¼": "0.25", "¾": "0.75",
+    "…": "each term", "∑": "each term", "ˆ": "^", "µ": "mu",
+}  # fmt: skip
+
+
+def tokens(text: str) -> tuple[Token, ...]:
+    """The tokens of an expression. Raises ExpressionError.
+
+    >>> [token.text for token in tokens("-x^2 <= .5e-3")]
+    ['-', 'x', '^', '2', '<=', '.5e-3', '']
+    """
+    if len(text) > MAX_LENGTH:
+        message = f"this expression has {len(text)} characters; {MAX_LENGTH} are the most"
+        hint = "give its parts names, as parameters or in 'let'"
+        raise ExpressionError("expression-too-long", message, MAX_LENGTH, len(text), hint)
+    found: list[Token] = []
+    at = 0
+    while at < len(text):
+        if blank := _BLANK.match(text, at):
+            at = blank.end()
+            continue
+        token = _token(text, at, after=found[-1] if found else None)
+        found.append(token)
+        at = token.end
+    found.append(Token("end", "", len(text), len(text)))
+    return tuple(found)
+
+
+def is_operand(token: Token | None) -> bool:
+    """Whether a value ends with this token, so that an operator may follow."""
+    return token is not None and (token.kind in ("number", "name") or token.text == ")")
+
+
+def _token(text: str, at: int, after: Token | None) -> Token:
+    if number := _NUMBER.match(text, at):
+        return _number(text, number)
+    if name := _NAME.match(text, at):
+        kind: Kind = "operator" if name.group() in WORDS else "name"
+        return Token(kind, name.group(), at, name.end())
+    operator = _OPERATOR.match(text, at)
+    foreign = _FOREIGN_OPERATOR.match(text, at)
+    if operator and not (foreign and foreign.end() > operator.end()):
+        return Token("operator", operator.group(), at, operator.end())
+    if foreign:
+        message = f"'{foreign.group()}' is no operator here"
+        raise ExpressionError("foreign-operator", message, at, foreign.end(), _FOREIGN[foreign.group()])
+    raise _no_token(text, at, after)
+
+
+def _number(text: str, number: re.Match[str]) -> Token:
+    start, end = number.span()
+    tail = _TAIL.match(text, end)
+    if tail:
+        written = text[start : tail.end()]
+        raise ExpressionError(
+            "malformed-number",
+            f"'{written}' is no number",
+            start,
+            tail.end(),
+            _number_hint(number.group(), tail.group()),
+        )
+    if math.isinf(float(number.group())):
+        message = f"{_shortened(number.group())} is beyond the range of numbers, which ends near 1.8e308"
+        raise ExpressionError("number-overflow", message, start, end)
+    return Token("number", number.group(), start, end)
+
+
+def _number_hint(number: str, tail: str) -> str | None:
+    if tail.startswith("_"):
+        return "write the digits without underscores"
+    if number == "0" and re.fullmatch(r"[xXoObB][0-9a-fA-F]+", tail):
+        return "numbers are decimal here"
+    if re.fullmatch(r"[eE]", tail):
+        return f"an exponent needs digits, as in {number}e-3"
+    if _NAME.fullmatch(tail):
+        return f"for a product write {number} * {tail}"
+    return None
+
+
+def _no_token(text: str, at: int, after: Token | None) -> ExpressionError:
+    character = text[at]
+    if quoted := _QUOTED.match(text, at):
+        return ExpressionError("no-strings", "an expression holds no texts, only numbers", at, quoted.end())
+    if character == ".":
+        end = at + 1 + len(name.group() if (name := _NAME.match(text, at + 1)) else "")
+        hint = "refer to a value by its name alone"
+        return ExpressionError("no-attributes", "there are no attributes in an expression", at, end, hint)
+    if character in "[{" and re.search(r"\bfor\b", text[at:]):
+        message = "there are no comprehensions in an expression"
+        return ExpressionError("no-comprehensions", message, at, len(text), "write the terms one by one")
+    if character in "[]" and (is_operand(after) or character == "]"):
+        message = "there are no subscripts in an expression"
+        hint = "a value that differs from neuron to neuron has one name; it means the one of each"
+        return ExpressionError("no-subscripts", message, at, at + 1, hint)
+    if character in "[]{}":
+        message = "an expression is one number; there are no lists, sets and mappings in it"
+        return ExpressionError("no-collections", message, at, at + 1, "use ( ) to group" if character in "[]" else None)
+    shown = f"'{character}'" if character.isprintable() else f"the character U+{ord(character):04X}"
+    return ExpressionError("unexpected-character", f"{shown} has no meaning here", at, at + 1, _lookalike(character))
+
+
+def _lookalike(character: str) -> str | None:
+    if character == "π":
+        return "write 'pi'"
+    if character in _LOOKALIKES:
+        return f"write '{_LOOKALIKES[character]}'"
+    if character.isspace() or unicodedata.category(character) in ("Zs", "Cf"):
+        return "an invisible character; leave it out, or put an ordinary blank"
+    greek = re.fullmatch(r"GREEK (?:SMALL|CAPITAL) LETTER (?:FINAL )?([A-Z]+)", unicodedata.name(character, ""))
+    if greek:
+        return f"names have ASCII letters; write '{greek.group(1).lower().replace('lamda', 'lambda')}'"
+    plain = unicodedata.normalize("NFKC", character)
+    if plain != character and plain.isascii() and plain.isprintable():
+        return f"write '{plain}'"
+    if character.isalnum():
+        return "names have ASCII letters, digits and underscores"
+    return None
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= 20 else text[:17] + "…"

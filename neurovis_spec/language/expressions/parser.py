@@ -1,0 +1,315 @@
+"""From text to a typed tree, by precedence climbing.
+
+In: the text of an expression (§6) and what its place allows. Out: a tree of ``tree.py``, or an ExpressionError at the
+characters at fault. From loose to tight: ``a if c else b`` (to the right), ``or``, ``and``, ``not``, comparisons
+(which do not chain), ``+ -``, ``* / %``, signs, ``^`` and ``**`` (to the right, so -x^2 is −(x²) and 2^-1 is a half).
+Names are not looked up here: who parses knows which there are (``unknown_names``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Literal, cast
+
+from neurovis_spec.diagnostics import nearest
+from neurovis_spec.language.expressions.errors import ExpressionError
+from neurovis_spec.language.expressions.functions import FUNCTIONS
+from neurovis_spec.language.expressions.lexer import Token, is_operand, tokens
+from neurovis_spec.language.expressions.tree import (
+    LEVELS,
+    Binary,
+    BinaryOperator,
+    Call,
+    Conditional,
+    Draw,
+    Name,
+    Number,
+    Tree,
+    Unary,
+    UnaryOperator,
+    check_extent,
+    walk,
+)
+
+__all__ = ["ExpressionError", "parse", "unknown_names"]
+
+#: How many operators, parentheses and calls may stand inside each other; keeps every walk off the recursion limit.
+MAX_NESTING = 64
+#: The functions that draw a number, with their arities.
+DRAWS: Mapping[str, int] = {"normal": 2, "uniform": 2}
+
+_COMPARISON, _SIGN, _POWER = LEVELS["<"], LEVELS["%"] + 1, LEVELS["^"]
+_NOT = LEVELS["<"] - 1
+
+_INSTEAD: Mapping[str, str] = {
+    "ln": "write 'log(x)', the natural logarithm",
+    "log10": "write 'log(x) / log(10)'",
+    "log2": "write 'log(x) / log(2)'",
+    "arcsin": "did you mean 'asin'?",
+    "arccos": "did you mean 'acos'?",
+    "arctan": "did you mean 'atan'?",
+    "arctan2": "did you mean 'atan2'?",
+    "fabs": "did you mean 'abs'?",
+    "sgn": "did you mean 'sign'?",
+    "heaviside": "did you mean 'step'?",
+    "logistic": "did you mean 'sigmoid'?",
+    "power": "did you mean 'pow'?",
+    "mod": "write 'a % b'",
+    "fmod": "write 'a % b'",
+    "int": "write 'floor(x)'",
+    "trunc": "write 'sign(x) * floor(abs(x))'",
+    "square": "write 'x^2'",
+    "cbrt": "write 'sign(x) * abs(x)^(1/3)'",
+    "relu": "write 'max(x, 0)'",
+    "where": "write 'a if condition else b'",
+    "sum": "write the terms one by one",
+    "gauss": "did you mean 'normal(mean, deviation)'?",
+    "random": "did you mean 'uniform(low, high)'?",
+    "rand": "did you mean 'uniform(low, high)'?",
+    "randn": "did you mean 'normal(mean, deviation)'?",
+}
+_WORDS: Mapping[str, tuple[str, str, str | None]] = {
+    "for": ("no-comprehensions", "there are no comprehensions in an expression", "write the terms one by one"),
+    "in": ("foreign-operator", "'in' is no operator here", "compare with '==' and 'or'"),
+    "is": ("foreign-operator", "'is' is no operator here", "write '==' for 'is equal to'"),
+    "mod": ("foreign-operator", "'mod' is no operator here", "write 'a % b'"),
+    "xor": ("foreign-operator", "'xor' is no operator here", "write '(a != 0) != (b != 0)'"),
+    "then": ("foreign-operator", "'then' is no operator here", "write 'a if condition else b'"),
+}
+
+
+def parse(text: str, *, random: bool = False, extra_functions: Mapping[str, int] | None = None) -> Tree:
+    """The tree of an expression. Raises ExpressionError.
+
+    ``random`` allows ``normal(m, s)`` and ``uniform(a, b)``, which become Draws numbered from 0 as they are written;
+    ``extra_functions`` are functions of this place besides those of §6, with their arities, which become Calls.
+
+    >>> parse("-x^2")
+    Unary(operator='-', operand=Binary(operator='^', left=Name(name='x', start=1, end=2), \
+right=Number(value=2.0, start=3, end=4), start=1, end=4), start=0, end=4)
+    """
+    return _Parser(text, random, dict(extra_functions or {})).whole()
+
+
+def unknown_names(tree: Tree, known: Iterable[str]) -> list[Name]:
+    """The names of a tree that are not known, in the order of the text.
+
+    >>> [(node.name, node.start) for node in unknown_names(parse("alpha * cos(phy)"), ["alpha", "phi"])]
+    [('phy', 12)]
+    """
+    allowed = frozenset(known)
+    unknown = [node for node in walk(tree) if isinstance(node, Name) and node.name not in allowed]
+    return sorted(unknown, key=lambda node: node.start)
+
+
+class _Parser:
+    """Goes through the tokens once. Each method starts at the first token of what it is named after."""
+
+    def __init__(self, text: str, random: bool, extra_functions: Mapping[str, int]) -> None:
+        self.tokens = tokens(text)
+        self.at = 0
+        self.nesting = 0
+        self.draws = 0
+        self.random = random
+        self.extra_functions = extra_functions
+
+    @property
+    def token(self) -> Token:
+        return self.tokens[self.at]
+
+    @property
+    def previous(self) -> Token | None:
+        return self.tokens[self.at - 1] if self.at else None
+
+    def at_end(self) -> bool:
+        return self.token.kind == "end"
+
+    def is_operator(self, *texts: str) -> bool:
+        return self.token.kind == "operator" and self.token.text in texts
+
+    def advance(self) -> Token:
+        token = self.token
+        self.at += 1
+        return token
+
+    @contextmanager
+    def deeper(self, token: Token) -> Iterator[None]:
+        if self.nesting >= MAX_NESTING:
+            message = f"this expression is nested more than {MAX_NESTING} levels deep"
+            raise ExpressionError("expression-too-deep", message, token.start, token.end, "give its parts names")
+        self.nesting += 1
+        yield
+        self.nesting -= 1
+
+    def whole(self) -> Tree:
+        if self.at_end():
+            raise ExpressionError("empty-expression", "an expression is missing here", 0, self.token.end)
+        tree = self.conditional()
+        if not self.at_end():
+            raise self.unexpected()
+        check_extent(tree)
+        return tree
+
+    def conditional(self) -> Tree:
+        then = self.binary(0)
+        if not self.is_operator("if"):
+            return then
+        word = self.advance()
+        condition = self.binary(0)
+        if not self.is_operator("else"):
+            if not self.at_end() and not self.is_operator(")", ","):
+                raise self.unexpected()
+            message = "'if' without 'else': a choice needs both values"
+            raise ExpressionError("missing-else", message, word.start, word.end, "write 'a if condition else b'")
+        word = self.advance()
+        with self.deeper(word):
+            otherwise = self.conditional()
+        return Conditional(condition, then, otherwise, then.start, otherwise.end)
+
+    def binary(self, level: int) -> Tree:
+        """Operands joined by operators that bind at least as tight as ``level``."""
+        left = self.prefix(level)
+        while self.token.kind == "operator" and LEVELS.get(self.token.text, -1) >= level:
+            token = self.advance()
+            own = LEVELS[token.text]
+            with self.deeper(token):
+                right = self.binary(own if own == _POWER else own + 1)
+            operator = cast(BinaryOperator, "^" if token.text == "**" else token.text)
+            left = Binary(operator, left, right, left.start, right.end)
+            if own == _COMPARISON and LEVELS.get(self.token.text) == _COMPARISON:
+                message = "comparisons do not chain"
+                hint = "join two comparisons with 'and', as in 'a < b and b < c'"
+                raise ExpressionError("chained-comparison", message, self.token.start, self.token.end, hint)
+        return left
+
+    def prefix(self, level: int) -> Tree:
+        """A sign or ``not`` with its operand, else an operand."""
+        token = self.token
+        if not self.is_operator("-", "+", "not"):
+            return self.operand()
+        if token.text == "not" and level > _NOT:
+            message = "'not' binds looser than the operator before it"
+            raise ExpressionError("missing-operand", message, token.start, token.end, "put (not …) in parentheses")
+        self.advance()
+        with self.deeper(token):
+            operand = self.binary(_NOT if token.text == "not" else _SIGN)
+        return Unary(cast(UnaryOperator, token.text), operand, token.start, operand.end)
+
+    def operand(self) -> Tree:
+        token = self.token
+        if token.kind == "number":
+            self.advance()
+            return Number(float(token.text), token.start, token.end)
+        if token.kind == "name":
+            self.advance()
+            return self.call(token) if self.is_operator("(") else Name(token.text, token.start, token.end)
+        if not self.is_operator("("):
+            raise self.missing()
+        opening = self.advance()
+        with self.deeper(opening):
+            tree = self.conditional()
+        self.close(opening)
+        return tree
+
+    def call(self, name: Token) -> Tree:
+        least, most = self.arity(name)
+        index, drawn = self.draws, name.text in DRAWS and name.text not in self.extra_functions
+        self.draws += drawn
+        opening = self.advance()
+        arguments: list[Tree] = []
+        with self.deeper(opening):
+            while not (self.is_operator(")") and not arguments):
+                arguments.append(self.conditional())
+                if not self.is_operator(","):
+                    break
+                self.advance()
+        end = self.close(opening).end
+        if len(arguments) < least or (most is not None and len(arguments) > most):
+            raise _wrong_arguments(name, end, len(arguments), least, most)
+        if drawn:
+            kind = cast(Literal["normal", "uniform"], name.text)
+            return Draw(kind, arguments[0], arguments[1], index, name.start, end)
+        return Call(name.text, tuple(arguments), name.start, end)
+
+    def arity(self, name: Token) -> tuple[int, int | None]:
+        """The least and the most arguments of a function. Raises ExpressionError where there is no such function."""
+        if name.text in self.extra_functions:
+            return self.extra_functions[name.text], self.extra_functions[name.text]
+        if name.text in FUNCTIONS:
+            return FUNCTIONS[name.text].least, FUNCTIONS[name.text].most
+        if name.text not in DRAWS:
+            raise self.unknown_function(name)
+        if not self.random:
+            message = f"'{name.text}' draws a random number, which this place does not allow"
+            hint = "draw in 'weight', 'centre', 'bias', 'initial' (once) or in 'noise' (at every step)"
+            raise ExpressionError("draw-not-allowed", message, name.start, name.end, hint)
+        return DRAWS[name.text], DRAWS[name.text]
+
+    def unknown_function(self, name: Token) -> ExpressionError:
+        known = (*self.extra_functions, *FUNCTIONS, *(DRAWS if self.random else ()))
+        close = nearest(name.text, known) if len(name.text) > 1 else ()
+        if name.text in _INSTEAD:
+            hint = _INSTEAD[name.text]
+        elif close:
+            hint = "did you mean " + " or ".join(f"'{other}'" for other in close) + "?"
+        else:
+            hint = f"for a product write '{name.text} * (…)'; the functions are {', '.join(known)}"
+        return ExpressionError("unknown-function", f"unknown function '{name.text}'", name.start, name.end, hint)
+
+    def close(self, opening: Token) -> Token:
+        if self.is_operator(")"):
+            return self.advance()
+        if not self.at_end():
+            raise self.unexpected()
+        message = "this parenthesis is never closed"
+        raise ExpressionError("unbalanced-parenthesis", message, opening.start, opening.end)
+
+    def missing(self) -> ExpressionError:
+        """Where a value should stand, there is none."""
+        token, previous = self.token, self.previous
+        if self.is_operator(")") and not any(other.text == "(" for other in self.tokens[: self.at]):
+            return ExpressionError("unbalanced-parenthesis", "this parenthesis closes nothing", token.start, token.end)
+        if previous is None:
+            message = f"'{token.text}' has no value before it"
+            return ExpressionError("missing-operand", message, token.start, token.end)
+        hint = None
+        if token.text == previous.text and token.text in ("*", "=", "^", "<", ">"):
+            hint = f"write '{token.text}' once"
+        if token.kind == "end":
+            message = f"a value is missing after '{previous.text}'"
+            return ExpressionError("missing-operand", message, previous.start, previous.end, hint)
+        message = f"a value is missing between '{previous.text}' and '{token.text}'"
+        return ExpressionError("missing-operand", message, token.start, token.end, hint)
+
+    def unexpected(self) -> ExpressionError:
+        """After a value stands what can follow none."""
+        token, previous = self.token, self.previous
+        if token.kind == "name" and token.text in _WORDS:
+            code, message, hint = _WORDS[token.text]
+            return ExpressionError(code, message, token.start, token.end, hint)
+        if self.is_operator(")"):
+            return ExpressionError("unbalanced-parenthesis", "this parenthesis closes nothing", token.start, token.end)
+        if self.is_operator(","):
+            message = "a comma stands only between the arguments of a function"
+            hint = "write decimals with a point, as in 0.5"
+            return ExpressionError("unexpected-comma", message, token.start, token.end, hint)
+        if self.is_operator("else"):
+            hint = "write 'a if condition else b'"
+            return ExpressionError("missing-if", "'else' without 'if'", token.start, token.end, hint)
+        before = "" if previous is None else previous.text
+        message = f"an operator is missing between '{before}' and '{token.text}'"
+        hint = f"for a product write '{before} * {token.text}'" if is_operand(token) else "for a product write '*'"
+        return ExpressionError("missing-operator", message, token.start, token.end, hint)
+
+
+def _wrong_arguments(name: Token, end: int, given: int, least: int, most: int | None) -> ExpressionError:
+    wanted = f"{least} or more" if most is None else str(least) if least == most else f"{least} to {most}"
+    noun = "argument" if wanted == "1" else "arguments"
+    message = f"'{name.text}' takes {wanted} {noun}, here {'is' if given == 1 else 'are'} {given}"
+    example = FUNCTIONS[name.text].usage if name.text in FUNCTIONS else None
+    if name.text in DRAWS and name.text not in FUNCTIONS:
+        example = "normal(mean, deviation)" if name.text == "normal" else "uniform(low, high)"
+    return ExpressionError(
+        "wrong-arguments", message, name.start, end, None if example is None else f"write '{example}'"
+    )
