@@ -1,22 +1,372 @@
-"""What users hold: a compiled network with ``.run``, ``.layout``, ``.render`` (the top layer, under the command line)."""
+"""What users hold: a compiled network with ``.run``, ``.layout``, ``.render`` (the top layer, under the command line).
+
+In: a path, a text or a mapping. Out: a CompiledNetwork, or SpecError with every finding.
+"""
 
 from __future__ import annotations
 
+import json
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import islice
+from pathlib import Path
 
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec import pipeline
+from neurovis_spec.compiler.compile import Request, rebind
+from neurovis_spec.compiler.limits import Limits
+from neurovis_spec.compiler.network import Network, RenderSettings
+from neurovis_spec.describe import describe
+from neurovis_spec.diagnostics import Diagnostic, Findings, Span, SpecError
+from neurovis_spec.language.source import SourceDocument
+from neurovis_spec.language.spec import Spec
+from neurovis_spec.layout import Layout, Point, Route
+from neurovis_spec.layout.arrange import choose_engine
+from neurovis_spec.layout.file import dump
+from neurovis_spec.layout.metrics import metrics
+from neurovis_spec.layout.problem import problem_of
+from neurovis_spec.runtime import backend as backends_module
+from neurovis_spec.runtime import formats
+from neurovis_spec.runtime.files import replacing
+from neurovis_spec.runtime.inputs import InputError
+from neurovis_spec.runtime.record import Progress
+from neurovis_spec.runtime.recording import Recording, RecordingError, Snapshot
+from neurovis_spec.runtime.simulation import Simulation
+from neurovis_spec.scene.gains import Gains
+from neurovis_spec.scene.renderers import RendererError, renderer_for
+
+OutputError = RendererError
+
+#: Frames a second where the spec writes no dt, and the most there are.
+DEFAULT_FPS, MOST_FPS = 25.0, 60.0
+
+
+def compile(
+    source: str | Path | Mapping[str, object],
+    *,
+    parameters: Mapping[str, float] | None = None,
+    seed: int | None = None,
+    root: str | Path | None = None,
+    limit: int | None = None,
+    **more: float,
+) -> CompiledNetwork:
+    """Compile a spec: a path, or a mapping with the content of one.
+
+    ``parameters`` (and further keywords) replace the values of the spec's parameters, ``seed`` its seed. Data files
+    may not lie outside ``root`` (default: the folder of the spec). ``limit`` is the most connections. Raises
+    SpecError with all findings.
+    """
+    given = {**(parameters or {}), **more}
+    if isinstance(source, Mapping):
+        text = json.dumps(_plain(source), indent=1, ensure_ascii=False, allow_nan=True)
+        return compile_text(text, file="<mapping>", parameters=given, seed=seed, root=root, limit=limit)
+    path = Path(source)
+    findings = Findings()
+    document = pipeline.read(path, str(source), findings)
+    request = _request(path.parent, root, given, seed, limit)
+    return _finish(document, request, findings, str(source))
+
+
+def compile_text(
+    text: str,
+    *,
+    file: str = "<text>",
+    folder: str | Path | None = None,
+    parameters: Mapping[str, float] | None = None,
+    seed: int | None = None,
+    root: str | Path | None = None,
+    limit: int | None = None,
+    **more: float,
+) -> CompiledNetwork:
+    """Compile the text of a spec; its data files are looked for in ``folder`` (default: the working one).
+
+    >>> network = compile_text("neurovis: 1\\nname: x\\nneurons: {A: {activation: tanh}}")
+    >>> network.network.neurons.names
+    ('A',)
+    """
+    findings = Findings()
+    document = pipeline.read_string(text, file, findings)
+    request = _request(Path(folder or "."), root, {**(parameters or {}), **more}, seed, limit)
+    return _finish(document, request, findings, file)
+
+
+def load(path: str | Path) -> Recording:
+    """Read a recording. Raises RecordingError for a file that is none, OSError for one that cannot be read."""
+    return formats.load(path)
+
+
+def schema() -> dict[str, object]:
+    """The JSON Schema (2020-12) of the language, for editors."""
+    from neurovis_spec.language.schema import json_schema
+
+    return json_schema()
+
+
+def backends() -> list[tuple[str, bool, str]]:
+    """Name, whether it is available, and a note, for each backend."""
+    result = []
+    for name in backends_module.names():
+        availability = backends_module.load(name).availability()
+        result.append((name, availability.available, availability.note))
+    return result
+
+
+def _request(
+    folder: Path,
+    root: str | Path | None,
+    parameters: Mapping[str, float],
+    seed: int | None,
+    limit: int | None,
+) -> Request:
+    limits = Limits() if limit is None else Limits(connections=limit)
+    values = {name: float(value) for name, value in parameters.items()}
+    return Request(folder, folder if root is None else Path(root), values, seed, limits)
+
+
+def _plain(value: object) -> object:
+    """Mappings, sequences and numbers of any make as those that JSON knows."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, str | int | float) or value is None:
+        return value
+    if isinstance(value, Iterable):
+        return [_plain(item) for item in value]
+    raise TypeError(f"a spec holds mappings, lists, texts and numbers, not {type(value).__name__}")
+
+
+def _finish(document: SourceDocument | None, request: Request, findings: Findings, file: str) -> CompiledNetwork:
+    spec = None if document is None else pipeline.shape(document, findings)
+    network = None if spec is None else pipeline.build(spec, request, findings)
+    findings.check()
+    if spec is None or network is None:
+        span = Span(file, 1, 1, 1, 2)
+        raise SpecError((Diagnostic("internal", "no network came out, and no finding says why", span),))
+    return CompiledNetwork(network, spec, request, findings.sorted(), dict(findings.sources))
+
+
+@dataclass(frozen=True, eq=False)
 class CompiledNetwork:
-    """A compiled network."""
+    """A compiled network: run it, lay it out, draw it. ``network`` holds its arrays, ``warnings`` what was noticed."""
+
+    network: Network
+    spec: Spec
+    request: Request
+    warnings: tuple[Diagnostic, ...]
+    sources: Mapping[str, str]
+
+    @property
+    def name(self) -> str:
+        """The name that the spec gives it."""
+        return self.network.name
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of the canonical network."""
+        return self.network.hash
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """The values of its parameters."""
+        return self.network.parameters
+
+    def __repr__(self) -> str:
+        network = self.network
+        return (
+            f"<network {network.name}: {len(network.neurons)} neurons, {len(network.connections)} connections, "
+            f"{len(network.changing)} plastic>"
+        )
+
+    def simulator(self, backend: str | None = None, *, start: Recording | None = None) -> Simulation:
+        """Step by step, for a control loop; ``start`` is a recording to go on from."""
+        return Simulation(
+            self.network, backend, start, lambda values: rebind(self.spec, self.request, self.network, values)
+        )
+
+    def run(
+        self,
+        steps: int | None = None,
+        inputs: Mapping[str, npt.ArrayLike] | None = None,
+        *,
+        backend: str | None = None,
+        every: int = 1,
+        start: Recording | None = None,
+        progress: Progress | None = None,
+    ) -> Recording:
+        """Run ``steps`` steps (default ``time.steps``) and record every ``every``-th.
+
+        ``inputs`` replace the sources of inputs: arrays of (steps,) or (steps, size). Raises InputError, BackendError,
+        RecordingError.
+        """
+        return pipeline.simulate(self.network, steps, inputs, backend, every, start, progress)
+
+    def layout(self, engine: str | None = None) -> NetworkLayout:
+        """Where everything is. Raises LayoutRefusalError where an engine cannot do what is asked."""
+        return NetworkLayout(self, pipeline.arrange(self.network, engine))
+
+    @cached_property
+    def _layout(self) -> Layout:
+        return pipeline.arrange(self.network)
+
+    @cached_property
+    def gains(self) -> Gains:
+        """The gains of Eqs. 2–5 for this network: the author's, else from the range of its default run."""
+        return pipeline.measure(self.network)
+
+    def choose_engine(self) -> tuple[str, str]:
+        """The layout engine, and why."""
+        engine = self.network.layout.engine
+        if engine != "auto":
+            return engine, "the spec names it"
+        return choose_engine(problem_of(self.network))
+
+    def choose_backend(self) -> tuple[str, str]:
+        """The backend that runs it by default, and why."""
+        return backends_module.choose_backend(self.network)
+
+    def describe(self) -> dict[str, object]:
+        """What ``neurovis inspect --format json`` prints."""
+        return describe(self.network, self.choose_engine())
+
+    def render(
+        self,
+        path: str | Path,
+        *,
+        step: int | None = None,
+        recording: Recording | None = None,
+        theme: str | None = None,
+        engine: str | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        """Draw one step into a file whose suffix says what kind.
+
+        Without ``step`` it is the last of the recording, or of a default run. Without ``recording`` the network runs
+        as far as the step. Raises OutputError for a kind that nobody draws, before anything is run.
+        """
+        suffix = Path(path).suffix
+        renderer_for(suffix, moving=False)
+        layout = self._layout if engine is None else pipeline.arrange(self.network, engine)
+        snapshot = self._snapshot(step, recording, progress)
+        scene = pipeline.picture(self.network, layout, snapshot, self.gains, self._settings(theme))
+        content = pipeline.draw(scene, suffix)
+        with replacing(path) as file:
+            file.write(content)
+
+    def animate(
+        self,
+        path: str | Path,
+        *,
+        steps: int | None = None,
+        start: int = 0,
+        fps: float | None = None,
+        recording: Recording | None = None,
+        theme: str | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        """Draw ``steps`` steps from step ``start`` on, one a frame, into a file whose suffix says what kind.
+
+        ``fps`` defaults to 1/dt, at most 60, and to 25 where the spec writes no dt.
+        """
+        suffix = Path(path).suffix
+        renderer_for(suffix, moving=True)
+        if fps is None:
+            fps = min(1 / self.network.dt, MOST_FPS) if self.network.dt_given else DEFAULT_FPS
+        if not (math.isfinite(fps) and fps > 0):
+            raise ValueError(f"frames a second are above 0, not {fps}")
+        snapshots = self._snapshots(start, steps, recording, progress)
+        film = pipeline.moving(self.network, self._layout, snapshots, self.gains, self._settings(theme), fps)
+        content = pipeline.animate(film, suffix, progress)
+        with replacing(path) as file:
+            file.write(content)
+
+    def _settings(self, theme: str | None) -> RenderSettings:
+        return self.network.render if theme is None else replace(self.network.render, theme=theme)
+
+    def _snapshot(self, step: int | None, recording: Recording | None, progress: Progress | None) -> Snapshot:
+        if step is not None and step < 0:
+            raise InputError(f"step {step}: steps count from 0")
+        if recording is None:
+            steps = self.network.steps if step is None else step + 1
+            recording = self.run(steps, progress=progress)
+        self._check(recording)
+        if not len(recording):
+            raise RecordingError("the recording holds no step")
+        return recording.snapshot(int(recording.step[-1]) if step is None else step)
+
+    def _snapshots(
+        self, start: int, steps: int | None, recording: Recording | None, progress: Progress | None
+    ) -> list[Snapshot]:
+        if start < 0 or (steps is not None and steps < 1):
+            raise InputError(f"{steps} frames from step {start}: at least one frame from step 0 on is wanted")
+        if recording is None:
+            count = max(1, self.network.steps - start) if steps is None else steps
+            recording = self.run(start + count, progress=progress)
+        self._check(recording)
+        rows = recording.step[recording.step >= start].tolist()
+        if not rows:
+            raise RecordingError(f"the recording holds no step from {start} on")
+        return [recording.snapshot(step) for step in islice(rows, steps)]
+
+    def _check(self, recording: Recording) -> None:
+        """A recording must be of this network: the same neurons and connections."""
+        network = self.network
+        same = recording.neurons == network.neurons.names and np.array_equal(
+            recording.sources, network.connections.sources
+        )
+        if not same or not np.array_equal(recording.targets, network.connections.targets):
+            whose = f"{recording.network or 'unnamed'}, {len(recording.neurons)} neurons"
+            raise RecordingError(f"the recording is of another network ({whose})")
+
+    def _repr_svg_(self) -> str:
+        """The network at the last step of its default run, for a notebook."""
+        snapshot = self._snapshot(None, None, None)
+        scene = pipeline.picture(self.network, self._layout, snapshot, self.gains, self.network.render)
+        return pipeline.draw(scene, ".svg").decode()
 
 
-def compile() -> CompiledNetwork:  # noqa: A001
-    """Compile a spec."""
-    raise NotImplementedError
+@dataclass(frozen=True, eq=False)
+class NetworkLayout:
+    """The layout of a compiled network."""
 
+    compiled: CompiledNetwork
+    value: Layout
 
-def compile_text() -> CompiledNetwork:
-    """Compile the text of a spec."""
-    raise NotImplementedError
+    @property
+    def engine(self) -> str:
+        """The engine that made it."""
+        return self.value.engine
 
+    @property
+    def positions(self) -> Mapping[str, Point]:
+        """Where each neuron is, by name, in units of the layout; x grows right, y grows down."""
+        return self.value.positions
 
-def load() -> object:
-    """Read a recording."""
-    raise NotImplementedError
+    @property
+    def routes(self) -> Mapping[str, Route]:
+        """How each connection runs, by name: a cubic Bézier spline of 1 + 3k points."""
+        return self.value.routes
+
+    def metrics(self) -> dict[str, float | int]:
+        """What ``neurovis layout --metrics`` prints, but for the seconds."""
+        return metrics(self.value, problem_of(self.compiled.network))
+
+    def dump(self) -> str:
+        """The layout file as a text."""
+        return dump(self.value)
+
+    def save(self, path: str | Path) -> None:
+        """Write the layout file."""
+        with replacing(path) as file:
+            file.write(self.dump().encode())
+
+    def _repr_svg_(self) -> str:
+        """The network in this layout, before anything happens, for a notebook."""
+        network = self.compiled.network
+        snapshot = Snapshot(0, np.zeros(len(network.neurons)), network.connections.weights, None)
+        scene = pipeline.picture(network, self.value, snapshot, self.compiled.gains, network.render)
+        return pipeline.draw(scene, ".svg").decode()

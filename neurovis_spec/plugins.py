@@ -12,6 +12,8 @@ LAYOUTS = "neurovis.layouts"
 RENDERERS = "neurovis.renderers"
 BACKENDS = "neurovis.backends"
 FORMATS = "neurovis.formats"
+#: packages with YAML files of activations, models and rules
+LIBRARIES = "neurovis.libraries"
 
 
 def _points(group: str) -> dict[str, EntryPoint]:
@@ -27,3 +29,8 @@ def load(group: str, name: str) -> object:
     """What is registered under this name, made. Raises KeyError where there is none."""
     made: object = _points(group)[name].load()()
     return made
+
+
+def package(group: str, name: str) -> str:
+    """The name of the package that is registered under this name."""
+    return _points(group)[name].module

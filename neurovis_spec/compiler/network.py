@@ -189,7 +189,8 @@ class Block:
 @dataclass(frozen=True, slots=True)
 class Plasticity:
     """Connections that learn by one rule. ``signals`` gives, for each signal of the rule, one index a
-    connection into the activities of all neurons followed by the vector of all inputs. Parameters are as long as ``members``."""
+    connection into the activities of all neurons followed by the vector of all inputs. Parameters are as long as
+    ``members``."""
 
     rule: Rule
     members: IntArray

@@ -1,7 +1,7 @@
 """The probe: a run whose only purpose is to see how far the values of a network go.
 
-In: a network. Out: Gains. The run is the network's own (its inputs, its default length, within a bound), never somebody's recording, so that
-a picture of a step is the same wherever the step comes from.
+In: a network. Out: Gains. The run is the network's own (its inputs, its default length, within a bound), never
+somebody's recording, so that a picture of a step is the same wherever the step comes from.
 """
 
 from __future__ import annotations

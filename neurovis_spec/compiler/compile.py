@@ -1,0 +1,209 @@
+"""The compiler: from a Spec to a Network, one stage after the other.
+
+In: a Spec, the folder of its data files, parameters to set. Out: a Network, or None with findings. A stage whose
+input is at fault is not begun; all others are, so that findings come at once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from neurovis_spec.compiler.builtin import builtin_definitions
+from neurovis_spec.compiler.connect import Bundle, Connector, join
+from neurovis_spec.compiler.constants import RESERVED, Constants, parse_formula
+from neurovis_spec.compiler.definitions import define
+from neurovis_spec.compiler.digest import digest
+from neurovis_spec.compiler.limits import Limits
+from neurovis_spec.compiler.lower import make_blocks, make_plasticity, make_program
+from neurovis_spec.compiler.network import IntArray, Network
+from neurovis_spec.compiler.order import Cycle, levels
+from neurovis_spec.compiler.populate import Population, key_span, populate
+from neurovis_spec.compiler.sections import layout_settings, make_outputs, render_settings
+from neurovis_spec.compiler.signals import make_inputs
+from neurovis_spec.compiler.tables import Files
+from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError, suggest
+from neurovis_spec.language.expressions.tree import names
+from neurovis_spec.language.model import opening
+from neurovis_spec.language.source import Mapping as SourceMapping
+from neurovis_spec.language.spec import Spec
+
+
+@dataclass(frozen=True)
+class Request:
+    """How a spec is to be compiled: where its files lie, what is set, how large it may become."""
+
+    base: Path
+    root: Path
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    seed: int | None = None
+    limits: Limits = field(default_factory=Limits)
+
+
+def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | None:
+    """The network of a spec; None where it is at fault (the findings say why)."""
+    before = findings.errors
+    seed = request.seed if request.seed is not None else 0 if spec.seed is None else spec.seed.value
+    definitions = define(spec, findings, builtin_definitions())
+    constants = Constants({}, 1.0, findings)
+    _evaluate_parameters(spec, constants, request.parameters)
+    steps, episode = _clock(spec, constants)
+    files = Files(request.base, request.root, findings)
+    inputs = make_inputs(spec, constants, files)
+    population = populate(spec, constants, definitions, inputs or (), files, request.limits, seed)
+    render = render_settings(spec.render, findings)
+    if population is None or inputs is None:
+        return None
+    directory = population.directory
+    outputs = make_outputs(spec, directory, findings)
+    layout = layout_settings(spec.layout, directory, findings)
+    by_name = {entry.name: entry for entry in inputs}
+    connector = Connector(spec, population, by_name, constants, definitions, files, request.limits, seed)
+    bundles = connector.connect()
+    if not len(population.neurons):
+        node = spec.source.entry("neurons")
+        span = opening(spec.source) if node is None else node.key.span
+        findings.error("no-neurons", span, "a network needs at least one neuron", "add a group under 'neurons'")
+    if bundles is None or findings.errors > before:
+        return None
+    plasticity, rules = make_plasticity(bundles)
+    connections = join(bundles, rules)
+    level = levels(len(population.neurons), connections.sources, connections.targets, connections.delays)
+    if isinstance(level, Cycle):
+        _report_cycle(level, population, connections.entry, bundles, findings)
+        return None
+    blocks = make_blocks(population, connections.sources, connections.targets, level)
+    program = make_program(blocks, plasticity)
+    content = digest(
+        "neurovis 1",
+        spec.name.value,
+        constants.dt,
+        episode,
+        seed if _random(spec) else 0,
+        constants.parameters,
+        population.neurons,
+        connections,
+        inputs,
+        outputs,
+        blocks,
+        plasticity,
+    )
+    return Network(
+        name=spec.name.value,
+        title=spec.name.value if spec.title is None else spec.title.value,
+        description="" if spec.description is None else spec.description.value,
+        dt=constants.dt,
+        dt_given=spec.time is not None and spec.time.dt is not None,
+        steps=steps,
+        episode=episode,
+        seed=seed,
+        parameters=dict(constants.parameters),
+        structural=frozenset(constants.structural),
+        neurons=population.neurons,
+        connections=connections,
+        inputs=inputs,
+        outputs=outputs,
+        blocks=blocks,
+        plasticity=plasticity,
+        program=program,
+        layout=layout,
+        render=render,
+        hash=content,
+    )
+
+
+def _random(spec: Spec) -> bool:
+    """Whether the seed is written: two spellings of the same default seed are the same network."""
+    return spec.seed is not None and spec.seed.value != 0
+
+
+def _evaluate_parameters(spec: Spec, constants: Constants, given: Mapping[str, float]) -> None:
+    """dt, then the parameters in the order written; what is set replaces the value, within its bounds."""
+    findings = constants.findings
+    if spec.time is not None and spec.time.dt is not None:
+        # Parameters may use dt, so dt uses none of them: the constants hold no parameter yet.
+        dt = constants.scalar(spec.time.dt)
+        if dt is not None and not dt > 0:
+            findings.error("out-of-range", spec.time.dt.span, f"'dt' is seconds a step and above 0, this is {dt:g}")
+        elif dt is not None:
+            constants.dt = dt
+    _parameters(spec, constants, given)
+    for name in given:
+        if name not in spec.parameters:
+            node = spec.source.entry("parameters")
+            span = opening(spec.source) if node is None else node.key.span
+            hint = suggest(name, spec.parameters, "parameters") or "the spec has no parameters"
+            findings.error("unknown-parameter", span, f"there is no parameter '{name}' to be set", hint)
+
+
+def _parameters(spec: Spec, constants: Constants, given: Mapping[str, float]) -> None:
+    findings = constants.findings
+    for name, parameter in spec.parameters.items():
+        span = key_span(spec, "parameters", name)
+        if name in RESERVED:
+            message = f"a parameter may not be called '{name}': the language gives this name a meaning of its own"
+            findings.error("reserved-name", span, message)
+        known = (*constants.parameters, *constants.broken, "pi", "e", "dt")
+        tree = parse_formula(parameter.value, known, findings, what="parameters before this one, and constants")
+        constants.uses[name] = frozenset() if tree is None or name in given else names(tree)
+        value = constants.scalar(parameter.value) if tree is not None else None
+        low = None if parameter.minimum is None else constants.scalar(parameter.minimum)
+        high = None if parameter.maximum is None else constants.scalar(parameter.maximum)
+        if name in given:
+            value = float(given[name])
+            if not math.isfinite(value):
+                findings.error("not-finite", span, f"the parameter '{name}' is set to {value}")
+        if value is None:
+            constants.broken.add(name)
+            continue
+        constants.parameters[name] = value
+        if (low is not None and value < low) or (high is not None and value > high):
+            shown = f"{'-∞' if low is None else f'{low:g}'} to {'∞' if high is None else f'{high:g}'}"
+            where = span if name in given else parameter.value.span
+            findings.error("out-of-range", where, f"'{name}' is {value:g}; its bounds are {shown}")
+
+
+def _clock(spec: Spec, constants: Constants) -> tuple[int, int | None]:
+    """The default run length and the length of an episode."""
+    time = spec.time
+    steps = None if time is None or time.steps is None else constants.integer(time.steps, "'steps'", 1)
+    episode = None if time is None or time.episode is None else constants.integer(time.episode, "'episode'", 1)
+    return (1000 if steps is None else steps), episode
+
+
+def _report_cycle(
+    cycle: Cycle, population: Population, entry: IntArray, bundles: tuple[Bundle, ...], findings: Findings
+) -> None:
+    path = [population.neurons.names[neuron] for neuron in cycle.neurons]
+    shown = path if len(path) <= 12 else [*path[:6], "…", *path[-5:]]
+    message = f"these neurons wait for each other within one step: {' -> '.join(shown)}"
+    hint = "give one of these connections a delay of at least 1"
+    findings.error("delay-0-cycle", bundles[int(entry[cycle.connection])].key, message, hint)
+
+
+def rebind(spec: Spec, request: Request, network: Network, changes: Mapping[str, float]) -> Network:
+    """The same network with other parameters. Raises SpecError where these are unknown, out of bounds, or where
+    something of the structure depends on them."""
+    findings = Findings()
+    fixed = [name for name in changes if name in network.structural]
+    for name in fixed:
+        span = key_span(spec, "parameters", name)
+        message = f"'{name}' cannot be set in a run: the structure of the network depends on it"
+        findings.error("structural-parameter", span, message)
+    findings.check()
+    parameters = {**request.parameters, **changes}
+    made = compile_spec(spec, Request(request.base, request.root, parameters, network.seed, request.limits), findings)
+    findings.check()
+    if made is None:  # pragma: no cover - an error is among the findings where there is no network
+        raise SpecError((Diagnostic("internal", "the network could not be made", opening(spec.source)),))
+    same = np.array_equal(made.connections.sources, network.connections.sources)
+    if not same or not np.array_equal(made.connections.delays, network.connections.delays):
+        raise SpecError((Diagnostic("structural-parameter", "this would change the structure", opening(spec.source)),))
+    return made
+
+
+__all__ = ["Request", "SourceMapping", "compile_spec", "rebind"]

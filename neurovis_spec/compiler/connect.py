@@ -1,0 +1,375 @@
+"""Connections: from the entries of a spec to structures of arrays.
+
+In: the ``connections`` section, the Population, Constants, Definitions. Out: Connections in the order written (a
+matrix or pattern row by row), and for each plastic entry what it learns by.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from neurovis_spec.compiler.constants import Constants, Randomness
+from neurovis_spec.compiler.definitions import Definitions
+from neurovis_spec.compiler.draws import Stream
+from neurovis_spec.compiler.edges import EdgeReader
+from neurovis_spec.compiler.learning import Learning, learning_of
+from neurovis_spec.compiler.limits import Limits
+from neurovis_spec.compiler.matrices import Grid, fit, grid_of
+from neurovis_spec.compiler.network import Connections, FloatArray, Input, IntArray, frozen
+from neurovis_spec.compiler.patterns import Ends, all_to_all, pairs_of
+from neurovis_spec.compiler.populate import Population
+from neurovis_spec.compiler.references import resolve_end
+from neurovis_spec.compiler.tables import Files
+from neurovis_spec.diagnostics import Span
+from neurovis_spec.language.located import Formula, Located
+from neurovis_spec.language.spec import ConnectionModel, Spec
+from neurovis_spec.language.values import FileReference, Rows
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """The connections of one entry: neuron indices and values, and the rule, if any."""
+
+    name: str
+    key: Span
+    sources: IntArray
+    targets: IntArray
+    weights: FloatArray
+    centres: FloatArray
+    delays: IntArray
+    low: float
+    high: float
+    learning: Learning | None
+    description: str | None
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """Which pairs of an entry exist (positions within its ends), and what its shape says of weights and delays."""
+
+    i: IntArray
+    j: IntArray
+    weights: FloatArray | None = None
+    delays: IntArray | None = None
+
+
+@dataclass(frozen=True)
+class Connector:
+    """Makes the connections of every entry."""
+
+    spec: Spec
+    population: Population
+    inputs: Mapping[str, Input]
+    constants: Constants
+    definitions: Definitions
+    files: Files
+    limits: Limits
+    seed: int
+
+    def connect(self) -> tuple[Bundle, ...] | None:
+        """All entries; None where one is at fault, the others are still looked at."""
+        result: list[Bundle] = []
+        failed = False
+        total = 0
+        seen: dict[str, int] = {}
+        for key, body in self.spec.connections:
+            bundle = self._entry(key, body, seen, total)
+            if bundle is None:
+                failed = True
+                continue
+            total += len(bundle.sources)
+            result.append(bundle)
+        return None if failed else tuple(result)
+
+    def _entry(self, key: Located[str], body: ConnectionModel, seen: dict[str, int], total: int) -> Bundle | None:
+        findings = self.constants.findings
+        before = findings.errors
+        ends = self._ends(key)
+        if ends is None:
+            return None
+        name = _normal(key.value)
+        seen[name] = seen.get(name, 0) + 1
+        if seen[name] > 1:
+            name = f"{name} ({seen[name]})"
+        sources, targets = ends
+        if total + len(sources) * len(targets) > self.limits.connections and _dense(body):
+            count = total + len(sources) * len(targets)
+            message = f"this makes up to {count:,} connections; the limit is {self.limits.connections:,}"
+            findings.error("too-many", key.span, message, "raise it with --limit")
+            return None
+        return _EntryBuilder(self, key, body, name, sources, targets).build(before)
+
+    def _ends(self, key: Located[str]) -> tuple[IntArray, IntArray] | None:
+        findings = self.constants.findings
+        left, arrow, right = key.value.partition("->")
+        if not arrow or "->" in right:
+            message = f"'{key.value}' is no connection"
+            findings.error("bad-connection", key.span, message, "write FROM -> TO")
+            return None
+        offset = len(left) + len(arrow)
+        directory = self.population.directory
+        sources = resolve_end(_piece(key, 0, len(left)), directory, findings)
+        targets = resolve_end(_piece(key, offset, len(key.value)), directory, findings)
+        if sources is None or targets is None:
+            return None
+        return np.array(sources, dtype=np.int64), np.array(targets, dtype=np.int64)
+
+
+def _piece(key: Located[str], start: int, end: int) -> Located[str]:
+    """A part of a key as a text of its own, with its place."""
+    from neurovis_spec.language.source import Scalar
+
+    span = key.node.at(start, end)
+    inner = 0 if span != key.node.span else None
+    return Located(key.value[start:end], Scalar(key.value[start:end], span, inner))
+
+
+def _normal(text: str) -> str:
+    """An entry's name with single blanks: ``K1 + K3 -> O``."""
+    left, _, right = text.partition("->")
+    ends = (" + ".join(part.strip() for part in end.split("+")) for end in (left, right))
+    return " -> ".join(ends)
+
+
+def _dense(body: ConnectionModel) -> bool:
+    return body.edges is None
+
+
+@dataclass(frozen=True)
+class _EntryBuilder:
+    """Builds one entry, step by step: its shape, its weights, its rule."""
+
+    connector: Connector
+    key: Located[str]
+    body: ConnectionModel
+    name: str
+    sources: IntArray
+    targets: IntArray
+
+    @property
+    def constants(self) -> Constants:
+        return self.connector.constants
+
+    def stream(self, purpose: str) -> Stream:
+        return Stream(self.connector.seed, purpose, self.name)
+
+    def build(self, before: int) -> Bundle | None:
+        body, findings = self.body, self.constants.findings
+        self._conflicts()
+        delay = 1 if body.delay is None else self.constants.integer(body.delay, "a delay", 0)
+        centre = self._centre_grid()
+        shape = self._shape(centre)
+        if shape is None or delay is None or findings.errors > before:
+            return None
+        if not len(shape.i):
+            findings.error("no-connection", self.key.span, "this entry makes no connection at all")
+            return None
+        weights = shape.weights if shape.weights is not None else self._weights(shape)
+        centres = self._centres(centre, shape)
+        delays = np.full(len(shape.i), delay, dtype=np.int64)
+        if shape.delays is not None:
+            delays = np.where(shape.delays >= 0, shape.delays, delays)
+        bounds = self._bounds(weights)
+        learning = self._learning(shape)
+        if weights is None or centres is None or bounds is None or findings.errors > before:
+            return None
+        return Bundle(
+            self.name,
+            self.key.span,
+            self.sources[shape.i],
+            self.targets[shape.j],
+            weights,
+            centres,
+            delays,
+            bounds[0],
+            bounds[1],
+            learning,
+            None if body.description is None else body.description.value,
+        )
+
+    def _conflicts(self) -> None:
+        """What excludes each other: each pair is one finding, at the second key."""
+        pairs = [
+            ("matrix", "weight"),
+            ("matrix", "edges"),
+            ("matrix", "pattern"),
+            ("edges", "weight"),
+            ("edges", "pattern"),
+            ("edges", "centre"),
+        ]
+        for first, second in pairs:
+            one, other = self.body.source.entry(first), self.body.source.entry(second)
+            if one is not None and other is not None:
+                later = max(one, other, key=lambda entry: entry.key.span)
+                message = f"'{second}' beside '{first}': the {first} says it already"
+                self.constants.findings.error("conflicting-keys", later.key.span, message, f"remove '{second}'")
+        rows = self.body.source.entry("rows")
+        if rows is not None and self.body.matrix is None and not isinstance(self.body.centre, (Rows, FileReference)):
+            message = "'rows' says how a matrix is read; there is no matrix"
+            self.constants.findings.error("useless-key", rows.key.span, message)
+
+    def _centre_grid(self) -> Grid | None:
+        centre = self.body.centre
+        if not isinstance(centre, (Rows, FileReference)):
+            return None
+        return self._grid(centre, "centre")
+
+    def _grid(self, matrix: Rows | FileReference, purpose: str) -> Grid | None:
+        grid = grid_of(matrix, self.constants, self.connector.files, self.stream(purpose))
+        if grid is None:
+            return None
+        by_target = self.body.rows is not None and self.body.rows.value == "to"
+        return fit(grid, len(self.sources), len(self.targets), by_target, self.constants.findings)
+
+    def _shape(self, centre: Grid | None) -> _Shape | None:
+        body = self.body
+        if body.edges is not None:
+            return self._edges()
+        if body.matrix is not None:
+            grid = self._grid(body.matrix, "weight")
+            if grid is None:
+                return None
+            present = grid.present if centre is None else grid.present & centre.present
+            i, j = np.nonzero(present)
+            return _Shape(i, j, np.ascontiguousarray(grid.values[i, j]))
+        if isinstance(body.centre, (Rows, FileReference)):
+            if centre is None:
+                return None
+            i, j = np.nonzero(centre.present)
+            return _Shape(i, j)
+        loops = body.self is not None and body.self.value
+        n, m = len(self.sources), len(self.targets)
+        single_loop = n == 1 and m == 1
+        ends = Ends(self.sources, self.targets, loops or single_loop)
+        if body.pattern is not None:
+            pairs = pairs_of(body.pattern, ends, self.constants, self.stream("edges"))
+            return None if pairs is None else _Shape(*pairs)
+        if n > 1 and m > 1:
+            message = f"{n} neurons to {m} neurons: how are they connected?"
+            hint = "add pattern: all_to_all, or pattern: one_to_one, or a matrix"
+            self.constants.findings.error("pattern-missing", self.key.span, message, hint)
+            return None
+        return _Shape(*all_to_all(ends))
+
+    def _edges(self) -> _Shape | None:
+        names = self.connector.population.neurons.names
+        sources = {names[neuron]: place for place, neuron in enumerate(self.sources.tolist())}
+        targets = {names[neuron]: place for place, neuron in enumerate(self.targets.tolist())}
+        reader = EdgeReader(sources, targets, self.constants, self.connector.files, self.stream("weight"))
+        assert self.body.edges is not None
+        edges = reader.read(self.body.edges)
+        return None if edges is None else _Shape(edges.i, edges.j, edges.weights, edges.delays)
+
+    def _values(self, formula: Formula, shape: _Shape, purpose: str) -> FloatArray | None:
+        """A formula of i, j, n_from, n_to (and distance) for every pair."""
+        extra: dict[str, float | FloatArray] = {
+            "i": shape.i.astype(np.float64),
+            "j": shape.j.astype(np.float64),
+            "n_from": float(len(self.sources)),
+            "n_to": float(len(self.targets)),
+        }
+        position = self.connector.population.neurons.position
+        apart = position[self.sources[shape.i]] - position[self.targets[shape.j]]
+        if np.isfinite(apart).all():
+            extra["distance"] = np.hypot(apart[:, 0], apart[:, 1])
+        elif isinstance(formula.value, str) and "distance" in formula.value:
+            message = "'distance' needs a position of every neuron of both ends"
+            self.constants.findings.error("no-position", formula.span, message, "give the groups a 'position'")
+            return None
+        value = self.constants.value(formula, extra, Randomness(self.stream(purpose), shape.i, shape.j))
+        return None if value is None else np.broadcast_to(np.asarray(value, dtype=np.float64), shape.i.shape).copy()
+
+    def _weights(self, shape: _Shape) -> FloatArray | None:
+        if self.body.weight is None:
+            return np.ones(len(shape.i))
+        return self._values(self.body.weight, shape, "weight")
+
+    def _centres(self, grid: Grid | None, shape: _Shape) -> FloatArray | None:
+        centre = self.body.centre
+        if centre is None:
+            return np.zeros(len(shape.i))
+        groups = self.connector.population.neurons.groups
+        combine = [group.combine for group in groups for _ in range(group.count)]
+        if all(combine[target] != "distance" for target in self.targets.tolist()):
+            entry = self.body.source.entry("centre")
+            span = self.key.span if entry is None else entry.key.span
+            message = "'centre' has no effect: none of the targets combines by distance"
+            self.constants.findings.error("useless-key", span, message, "give the targets combine: distance")
+            return None
+        if grid is not None:
+            return np.ascontiguousarray(grid.values[shape.i, shape.j])
+        assert isinstance(centre, Located)
+        return self._values(centre, shape, "centre")
+
+    def _bounds(self, weights: FloatArray | None) -> tuple[float, float] | None:
+        bounds = self.body.bounds
+        if bounds is None:
+            return (-np.inf, np.inf)
+        findings = self.constants.findings
+        entry = self.body.source.entry("bounds")
+        assert entry is not None
+        if self.body.plasticity is None:
+            findings.error("useless-key", entry.key.span, "'bounds' hold plastic weights; there is no 'plasticity'")
+            return None
+        low, high = self.constants.scalar(bounds[0]), self.constants.scalar(bounds[1])
+        if low is None or high is None:
+            return None
+        if low > high:
+            findings.error("out-of-range", entry.value.span, f"the lower bound {low:g} is above the upper one {high:g}")
+            return None
+        if weights is not None and ((weights < low) | (weights > high)).any():
+            first = weights[(weights < low) | (weights > high)][0]
+            message = f"the first weight {first:g} lies outside the bounds {low:g} to {high:g}"
+            findings.error("weight-outside", entry.value.span, message)
+            return None
+        return (low, high)
+
+    def _learning(self, shape: _Shape) -> Learning | None:
+        if self.body.plasticity is None:
+            return None
+        connector = self.connector
+        return learning_of(
+            self.body.plasticity,
+            shape.j,
+            len(self.targets),
+            connector.population,
+            connector.inputs,
+            connector.definitions,
+            self.constants,
+        )
+
+
+def join(bundles: tuple[Bundle, ...], rules: IntArray) -> Connections:
+    """All entries as one structure of arrays; ``rules`` says, for each connection, which plasticity it has."""
+    empty = np.zeros(0)
+    none = empty.astype(np.int64)
+    sizes = [len(bundle.sources) for bundle in bundles]
+    result = Connections(
+        sources=np.concatenate([bundle.sources for bundle in bundles] or [none]),
+        targets=np.concatenate([bundle.targets for bundle in bundles] or [none]),
+        weights=np.concatenate([bundle.weights for bundle in bundles] or [empty]),
+        centres=np.concatenate([bundle.centres for bundle in bundles] or [empty]),
+        delays=np.concatenate([bundle.delays for bundle in bundles] or [none]),
+        rules=rules,
+        entry=np.repeat(np.arange(len(bundles), dtype=np.int64), sizes),
+        low=np.repeat(np.array([bundle.low for bundle in bundles], dtype=np.float64), sizes),
+        high=np.repeat(np.array([bundle.high for bundle in bundles], dtype=np.float64), sizes),
+        entries=tuple(bundle.name for bundle in bundles),
+        descriptions=tuple(bundle.description for bundle in bundles),
+    )
+    for array in (
+        result.sources,
+        result.targets,
+        result.weights,
+        result.centres,
+        result.delays,
+        result.rules,
+        result.entry,
+        result.low,
+        result.high,
+    ):
+        frozen(array)
+    return result

@@ -1,0 +1,119 @@
+"""Learning: what an entry of ``connections`` says of its plasticity.
+
+In: a Choice (a rule with settings and signals). Out: a Learning: the rule, its parameters (one value a connection),
+and for each signal where it comes from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from neurovis_spec.compiler.constants import Constants
+from neurovis_spec.compiler.definitions import Definitions
+from neurovis_spec.compiler.network import FloatArray, Input, IntArray, Rule
+from neurovis_spec.compiler.populate import Population
+from neurovis_spec.compiler.references import resolve_end
+from neurovis_spec.compiler.settings import choose, parameters
+from neurovis_spec.diagnostics import suggest
+from neurovis_spec.language.located import Located
+from neurovis_spec.language.source import Entry, Scalar
+from neurovis_spec.language.values import Choice
+
+
+@dataclass(frozen=True)
+class Learning:
+    """A rule in use. ``signals`` are indices into all activities followed by all inputs, one a connection."""
+
+    rule: Rule
+    parameters: Mapping[str, FloatArray]
+    signals: Mapping[str, IntArray]
+    title: str
+
+
+def learning_of(
+    choice: Choice,
+    targets: IntArray,
+    target_count: int,
+    population: Population,
+    inputs: Mapping[str, Input],
+    definitions: Definitions,
+    constants: Constants,
+) -> Learning | None:
+    """The rule of an entry whose connection c goes to the ``targets[c]``-th of ``target_count`` targets."""
+    found = choose(choice, definitions.rules, "rule", constants)
+    if found is None:
+        return None
+    rule, defaults = found
+    n = len(targets)
+    values = parameters(choice.settings, defaults, n, constants, rule.signals)
+    signals: dict[str, IntArray] = {}
+    failed = values is None
+    entries = {entry.name: entry for entry in choice.settings}
+    for signal in rule.signals:
+        if signal not in entries:
+            message = f"the rule '{rule.name}' needs the signal '{signal}'"
+            hint = f"write {{{rule.name}: {{{signal}: NEURON_OR_INPUT}}}}"
+            constants.findings.error("missing-signal", choice.name.span, message, hint)
+            failed = True
+            continue
+        where = _signal(entries[signal], targets, target_count, population, inputs, constants)
+        if where is None:
+            failed = True
+        else:
+            signals[signal] = where
+    if failed or values is None:
+        return None
+    return Learning(rule, values, signals, _title(rule, values, entries))
+
+
+def _signal(
+    entry: Entry,
+    targets: IntArray,
+    target_count: int,
+    population: Population,
+    inputs: Mapping[str, Input],
+    constants: Constants,
+) -> IntArray | None:
+    findings = constants.findings
+    node = entry.value
+    if not isinstance(node, Scalar) or not isinstance(node.value, str):
+        findings.error(
+            "wrong-type", node.span, f"the signal '{entry.name}' is the name of a neuron, a group or an input"
+        )
+        return None
+    name = node.value.strip()
+    n = len(population.neurons)
+    if name in inputs:
+        source = inputs[name]
+        where = np.arange(n + source.start, n + source.start + source.size, dtype=np.int64)
+    elif population.directory.find(name) is None and ".." not in name and "+" not in name:
+        hint = suggest(name, (*population.directory.known, *inputs), "neurons and inputs")
+        findings.error("unknown-signal", node.span, f"there is no neuron, group or input '{name}'", hint)
+        return None
+    else:
+        neurons = resolve_end(Located(node.value, node), population.directory, findings)
+        if neurons is None:
+            return None
+        where = np.array(neurons, dtype=np.int64)
+    if len(where) == 1:
+        return np.repeat(where, len(targets))
+    if len(where) == target_count:
+        return where[targets]
+    message = f"the signal '{name}' has {len(where)} components; 1 or {target_count}, one for each target, are wanted"
+    findings.error("wrong-size", node.span, message)
+    return None
+
+
+def _title(rule: Rule, values: Mapping[str, FloatArray], entries: Mapping[str, Entry]) -> str:
+    """``delta(rate=0.01, target=T)``."""
+    parts = [
+        f"{name}={array[0]:g}" if len(array) and (array == array[0]).all() else f"{name}=…"
+        for name, array in values.items()
+    ]
+    for signal in rule.signals:
+        node = entries[signal].value
+        parts.append(f"{signal}={node.value}" if isinstance(node, Scalar) else signal)
+    return f"{rule.name}({', '.join(parts)})" if parts else rule.name

@@ -1,0 +1,302 @@
+"""Neurons: from the groups of a spec to structures of arrays.
+
+In: the ``neurons`` and ``inputs`` sections, Constants, Definitions. Out: a Population: Neurons, a Directory of names,
+and for each group what its activation and its model are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from neurovis_spec.compiler.constants import Constants
+from neurovis_spec.compiler.definitions import Definitions
+from neurovis_spec.compiler.draws import Stream
+from neurovis_spec.compiler.limits import Limits
+from neurovis_spec.compiler.network import (
+    Activation,
+    Combine,
+    FloatArray,
+    Group,
+    Input,
+    IntArray,
+    Model,
+    Neurons,
+    Role,
+    frozen,
+)
+from neurovis_spec.compiler.positions import positions_of
+from neurovis_spec.compiler.references import Directory
+from neurovis_spec.compiler.settings import choose, parameters, spread
+from neurovis_spec.compiler.tables import Files
+from neurovis_spec.diagnostics import Findings, Span, suggest
+from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name
+from neurovis_spec.language.source import Mapping as SourceMapping
+from neurovis_spec.language.source import Scalar
+from neurovis_spec.language.spec import GroupModel, Spec
+from neurovis_spec.language.values import Choice, FormulaList
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What the neurons of a group are: definitions with parameters, one value a neuron."""
+
+    activation: Activation
+    activation_parameters: Mapping[str, FloatArray]
+    model: Model
+    model_parameters: Mapping[str, FloatArray]
+
+
+@dataclass(frozen=True)
+class Population:
+    """All neurons, how they are called, and what each group is."""
+
+    neurons: Neurons
+    directory: Directory
+    kinds: tuple[Kind, ...]
+
+
+@dataclass(frozen=True)
+class _Built:
+    """One group, before its values are joined with those of the others."""
+
+    group: Group
+    kind: Kind
+    names: tuple[str, ...]
+    labels: tuple[str, ...]
+    bias: FloatArray
+    initial: FloatArray
+    input: IntArray
+    position: FloatArray
+    first: int | None
+
+
+def key_span(spec: Spec, section: str, name: str) -> Span:
+    """Where an entry of a section has its name."""
+    node = spec.source.get(section)
+    entry = node.entry(name) if isinstance(node, SourceMapping) else None
+    return spec.source.span if entry is None else entry.key.span
+
+
+def populate(
+    spec: Spec,
+    constants: Constants,
+    definitions: Definitions,
+    inputs: tuple[Input, ...],
+    files: Files,
+    limits: Limits,
+    seed: int,
+) -> Population | None:
+    """Make every neuron. None where a group is at fault; the others are still looked at."""
+    findings = constants.findings
+    builder = _Builder(spec, constants, definitions, {entry.name: entry for entry in inputs}, files, limits, seed)
+    built: list[_Built] = []
+    failed = False
+    start = 0
+    for name, model in spec.neurons.items():
+        group = builder.group(name, model, start)
+        if group is None:
+            failed = True
+            continue
+        built.append(group)
+        start += group.group.count
+    owners = _owners(spec, built, findings)
+    if failed or owners is None:
+        return None
+    return _join(built)
+
+
+def _owners(spec: Spec, built: list[_Built], findings: Findings) -> dict[str, str] | None:
+    """Neuron name to group name; two declarations of one name are a finding."""
+    owners: dict[str, str] = {}
+    groups = {item.group.name for item in built}
+    clean = True
+    for item in built:
+        for neuron in item.names:
+            other = owners.get(neuron)
+            if other is None and neuron in groups and neuron != item.group.name:
+                other = neuron
+            if other is not None and other != item.group.name:
+                first = key_span(spec, "neurons", other)
+                clean = False
+                message = f"'{item.group.name}' and '{other}' (line {first.line}) both make the name '{neuron}'"
+                findings.error("duplicate-neuron", key_span(spec, "neurons", item.group.name), message)
+                break
+            owners[neuron] = item.group.name
+    return owners if clean else None
+
+
+def _join(built: list[_Built]) -> Population:
+    names = tuple(name for item in built for name in item.names)
+    empty = np.zeros(0)
+    neurons = Neurons(
+        names=names,
+        labels=tuple(label for item in built for label in item.labels),
+        groups=tuple(item.group for item in built),
+        bias=np.concatenate([item.bias for item in built] or [empty]),
+        initial=np.concatenate([item.initial for item in built] or [empty]),
+        input=np.concatenate([item.input for item in built] or [empty.astype(np.int64)]),
+        position=np.concatenate([item.position for item in built] or [np.zeros((0, 2))]),
+    )
+    for array in (neurons.bias, neurons.initial, neurons.input, neurons.position):
+        frozen(array)
+    directory = Directory(
+        {item.group.name: item.group for item in built},
+        {name: index for index, name in enumerate(names)},
+        {item.group.name: item.first for item in built if item.first is not None},
+    )
+    return Population(neurons, directory, tuple(item.kind for item in built))
+
+
+@dataclass(frozen=True)
+class _Builder:
+    spec: Spec
+    constants: Constants
+    definitions: Definitions
+    inputs: Mapping[str, Input]
+    files: Files
+    limits: Limits
+    seed: int
+
+    def group(self, name: str, model: GroupModel, start: int) -> _Built | None:
+        """One group; None where something about it is at fault."""
+        findings = self.constants.findings
+        before = findings.errors
+        if name in self.inputs and not IDENTIFIER.fullmatch(name):
+            return None
+        if name in self.inputs:
+            first = key_span(self.spec, "inputs", name)
+            message = f"'{name}' is an input already (line {first.line}); groups and inputs share their names"
+            findings.error("duplicate-name", key_span(self.spec, "neurons", name), message)
+        names, first_number = self._names(name, model, start)
+        if names is None:
+            return None
+        n = len(names)
+        kind = self._kind(model, n)
+        bias = np.zeros(n) if model.bias is None else self._drawn(model.bias, n, "bias", name)
+        initial = np.full(n, np.nan) if model.initial is None else self._drawn(model.initial, n, "initial", name)
+        input_index = self._input(model, n)
+        position = positions_of(model.position, n, self.constants, self.files)
+        labels = self._labels(model, names)
+        if kind is None or bias is None or initial is None or input_index is None or position is None or labels is None:
+            return None
+        if findings.errors > before:
+            return None
+        group = Group(
+            name=name,
+            start=start,
+            count=n,
+            activation=kind.activation.name,
+            model=kind.model.name,
+            combine=cast(Combine, model.combine.value if model.combine else "sum"),
+            activation_parameters={k: tuple(v.tolist()) for k, v in kind.activation_parameters.items()},
+            model_parameters={k: tuple(v.tolist()) for k, v in kind.model_parameters.items()},
+            input=None if model.input is None else model.input.value,
+            box=None if model.box is None else model.box.value,
+            role=None if model.role is None else cast(Role, model.role.value),
+            description=None if model.description is None else model.description.value,
+        )
+        return _Built(group, kind, names, labels, bias, initial, input_index, position, first_number)
+
+    def _names(self, name: str, model: GroupModel, start: int) -> tuple[tuple[str, ...] | None, int | None]:
+        findings = self.constants.findings
+        count = None
+        if model.count is not None:
+            count = self.constants.integer(model.count, "'count'", 1)
+            if count is None:
+                return None, None
+            if start + count > self.limits.neurons:
+                message = f"this makes {start + count:,} neurons; the limit is {self.limits.neurons:,}"
+                findings.error("too-many", model.count.span, message, "raise it with --limit")
+                return None, None
+        if model.names is not None:
+            return self._listed(model, count), None
+        if model.first is not None and count is None:
+            findings.error("first-without-count", model.first.span, "'first' needs 'count'")
+            return None, None
+        if count is None:
+            return (name,), None
+        first = 1 if model.first is None else self.constants.integer(model.first, "'first'", 0)
+        if first is None:
+            return None, None
+        names = tuple(f"{name}{number}" for number in range(first, first + count))
+        if len(names[-1]) > 64:
+            findings.error("bad-name", key_span(self.spec, "neurons", name), bad_name(names[-1]), NAME_RULE)
+            return None, None
+        return names, first
+
+    def _listed(self, model: GroupModel, count: int | None) -> tuple[str, ...] | None:
+        findings = self.constants.findings
+        assert model.names is not None
+        seen: dict[str, Located[str]] = {}
+        for item in model.names:
+            if not IDENTIFIER.fullmatch(item.value):
+                findings.error("bad-name", item.span, bad_name(item.value), NAME_RULE)
+                return None
+            if item.value in seen:
+                line = seen[item.value].span.line
+                findings.error("duplicate-neuron", item.span, f"'{item.value}' is named before (line {line})")
+                return None
+            seen[item.value] = item
+        if not seen or (count is not None and count != len(seen)):
+            wanted = "at least one name" if count is None else f"{count} names"
+            span = model.names[0].span if model.names else model.source.span
+            findings.error("wrong-size", span, f"'names' has {len(seen)} names, {wanted} are wanted")
+            return None
+        return tuple(seen)
+
+    def _kind(self, model: GroupModel, n: int) -> Kind | None:
+        activation = choose(
+            model.activation or _default("identity", model), self.definitions.activations, "activation", self.constants
+        )
+        neuron = choose(model.model or _default("static", model), self.definitions.models, "model", self.constants)
+        first = activation and parameters(
+            model.activation.settings if model.activation else (), activation[1], n, self.constants
+        )
+        second = neuron and parameters(model.model.settings if model.model else (), neuron[1], n, self.constants)
+        if activation is None or neuron is None or first is None or second is None:
+            return None
+        return Kind(activation[0], first, neuron[0], second)
+
+    def _drawn(self, formulas: Formula | FormulaList, n: int, purpose: str, name: str) -> FloatArray | None:
+        return spread(formulas, n, self.constants, f"'{purpose}'", Stream(self.seed, purpose, name))
+
+    def _input(self, model: GroupModel, n: int) -> IntArray | None:
+        if model.input is None:
+            return np.full(n, -1, dtype=np.int64)
+        found = self.inputs.get(model.input.value)
+        findings = self.constants.findings
+        if found is None:
+            known = tuple(self.spec.inputs)
+            if model.input.value not in known:
+                hint = suggest(model.input.value, known, "inputs") or "no inputs are declared; add it under 'inputs'"
+                findings.error("unknown-input", model.input.span, f"there is no input '{model.input.value}'", hint)
+            return None
+        if found.size == 1:
+            return np.full(n, found.start, dtype=np.int64)
+        if found.size == n:
+            return np.arange(found.start, found.start + n, dtype=np.int64)
+        message = (
+            f"the input '{found.name}' has {found.size} components, the group has {n} neuron{'s' if n != 1 else ''}"
+        )
+        findings.error("wrong-size", model.input.span, message, "an input has one component, or one for each neuron")
+        return None
+
+    def _labels(self, model: GroupModel, names: tuple[str, ...]) -> tuple[str, ...] | None:
+        if model.label is None:
+            return names
+        labels = tuple(item.value for item in model.label)
+        if len(labels) == len(names):
+            return labels
+        if len(labels) == 1:
+            return labels * len(names)
+        message = f"'label' has {len(labels)} texts for {len(names)} neurons"
+        self.constants.findings.error("wrong-size", model.label[0].span, message)
+        return None
+
+
+def _default(name: str, model: GroupModel) -> Choice:
+    return Choice(Located(name, Scalar(name, model.source.span)), ())

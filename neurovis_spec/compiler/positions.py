@@ -1,0 +1,57 @@
+"""Positions of neurons as data: ``[x, y]``, a list of these, or a file.
+
+In: the node of a group's ``position``. Out: (n, 2) numbers, NaN where there is none.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from neurovis_spec.compiler.constants import Constants
+from neurovis_spec.compiler.network import FloatArray
+from neurovis_spec.compiler.tables import Files
+from neurovis_spec.language.located import formula_of
+from neurovis_spec.language.source import Node, Packed, Sequence
+from neurovis_spec.language.values import FileReference
+
+
+def _point(node: Node, constants: Constants) -> tuple[float, float] | None:
+    if not isinstance(node, Sequence) or len(node.items) != 2:
+        constants.findings.error("wrong-type", node.span, "a position is two numbers [x, y]")
+        return None
+    values = []
+    for item in node.items:
+        formula = formula_of(item, constants.findings)
+        value = None if formula is None else constants.scalar(formula)
+        if value is not None:
+            values.append(value)
+    return (values[0], values[1]) if len(values) == 2 else None
+
+
+def positions_of(
+    node: FileReference | Sequence | Packed | None, n: int, constants: Constants, files: Files
+) -> FloatArray | None:
+    """One position for each of n neurons; None where they are at fault."""
+    if node is None:
+        return np.full((n, 2), np.nan)
+    if isinstance(node, FileReference):
+        table = files.table(node.path)
+        if table is None:
+            return None
+        if table.values.shape != (n, 2) or not table.present.all():
+            rows, columns = table.values.shape
+            message = f"positions of {n} neurons are {n} rows of 2 numbers; the file has {rows} × {columns}"
+            constants.findings.error("wrong-size", node.path.span, message)
+            return None
+        return np.array(table.values, dtype=np.float64)
+    items = node.items
+    if n == 1 and items and not isinstance(items[0], (Sequence, Packed)):
+        items = (Sequence(items, node.span),)
+    if len(items) != n:
+        message = f"{len(items)} positions for {n} neuron{'s' if n != 1 else ''}"
+        constants.findings.error("wrong-size", node.span, message)
+        return None
+    points = [_point(item, constants) for item in items]
+    if any(point is None for point in points):
+        return None
+    return np.array([point for point in points if point is not None], dtype=np.float64)

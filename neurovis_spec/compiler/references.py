@@ -1,0 +1,115 @@
+"""References: from ``K``, ``K3``, ``K3..K5`` or ``K1 + O`` to neuron indices.
+
+In: the groups and neuron names of a network. Out: tuples of indices, or a finding with the nearest known names.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from neurovis_spec.compiler.network import Group
+from neurovis_spec.diagnostics import Findings, Span, suggest
+from neurovis_spec.language.located import Located
+
+_RANGE = re.compile(r"\s*(?P<low>\S+?)\s*\.\.\s*(?P<high>\S+)\s*")
+
+
+@dataclass(frozen=True)
+class Directory:
+    """Who is called what: groups by name, and the numbers of counted groups."""
+
+    groups: Mapping[str, Group]
+    neurons: Mapping[str, int]
+    #: the number of the first neuron of each counted group
+    first: Mapping[str, int]
+
+    @cached_property
+    def known(self) -> tuple[str, ...]:
+        """Every name that a reference may use; groups first."""
+        return tuple(dict.fromkeys([*self.groups, *self.neurons]))
+
+    def find(self, name: str) -> tuple[int, ...] | None:
+        """The neurons of a group, or one neuron."""
+        group = self.groups.get(name)
+        if group is not None:
+            return tuple(group.indices)
+        neuron = self.neurons.get(name)
+        return None if neuron is None else (neuron,)
+
+    def range(self, low: str, high: str) -> tuple[int, ...] | str:
+        """The neurons of a counted group from one of its numbers to another; a text says why not."""
+        for name in sorted((g for g in self.first if low.startswith(g)), key=len, reverse=True):
+            start, stop = low[len(name) :], high[len(name) :]
+            if not (high.startswith(name) and start.isdecimal() and stop.isdecimal()):
+                continue
+            group, first = self.groups[name], self.first[name]
+            a, b = int(start) - first, int(stop) - first
+            if not (0 <= a < group.count and 0 <= b < group.count):
+                last = first + group.count - 1
+                return f"'{name}' has the numbers {first} to {last}"
+            if a > b:
+                return "the range runs backwards"
+            return tuple(range(group.start + a, group.start + b + 1))
+        return "both ends of a range must be neurons of one counted group"
+
+
+def parts(text: Located[str]) -> Iterator[tuple[str, Span]]:
+    """The references that are joined with ``+``, each with its place.
+
+    >>> from neurovis_spec.language.source import Scalar
+    >>> node = Scalar("K1 + K3", Span("x", 1, 1, 1, 8))
+    >>> [(name, span.column) for name, span in parts(Located("K1 + K3", node))]
+    [('K1', 1), ('K3', 6)]
+    """
+    start = 0
+    for piece in text.value.split("+"):
+        stripped = piece.strip()
+        offset = start + (len(piece) - len(piece.lstrip()))
+        yield stripped, text.node.at(offset, offset + len(stripped))
+        start += len(piece) + 1
+
+
+def resolve_part(name: str, span: Span, directory: Directory, findings: Findings) -> tuple[int, ...] | None:
+    """One reference: a group, a neuron or a range."""
+    match = _RANGE.fullmatch(name)
+    if match:
+        found = directory.range(match["low"], match["high"])
+        if isinstance(found, str):
+            findings.error("bad-range", span, f"'{name}' is no range: {found}")
+            return None
+        return found
+    result = directory.find(name)
+    if result is None:
+        if not name:
+            findings.error("empty-reference", span, "a reference is missing here", "name a group, a neuron or a range")
+        else:
+            hint = suggest(name, directory.known, "groups and neurons")
+            findings.error("unknown-neuron", span, f"there is no neuron or group '{name}'", hint)
+    return result
+
+
+def resolve(texts: tuple[Located[str], ...], directory: Directory, findings: Findings) -> tuple[int, ...] | None:
+    """Several references, in the order written; a neuron named twice is a finding."""
+    result: list[int] = []
+    seen: set[int] = set()
+    failed = False
+    for text in texts:
+        for name, span in parts(text):
+            found = resolve_part(name, span, directory, findings)
+            if found is None:
+                failed = True
+                continue
+            if seen.intersection(found):
+                findings.error("repeated-reference", span, f"'{name}' names neurons that are named before it")
+                failed = True
+            seen.update(found)
+            result.extend(found)
+    return None if failed else tuple(result)
+
+
+def resolve_end(text: Located[str], directory: Directory, findings: Findings) -> tuple[int, ...] | None:
+    """One end of a connection: references joined with ``+``."""
+    return resolve((text,), directory, findings)

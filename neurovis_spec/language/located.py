@@ -1,0 +1,203 @@
+"""Leaves of a spec: values that know where they stand, and how they are checked.
+
+In: nodes of a SourceDocument. Out: Located values (text, number, truth value, formula), or a finding at the node. The
+checks are pydantic validators: they report into the Findings that the caller passes as ``context``, and then give up
+on that value with the error ``reported``, so that all other values are still looked at.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Generic, NoReturn, TypeAlias, TypeVar
+
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import PydanticCustomError, core_schema
+
+from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.language.source import Node, Packed, Scalar, Sequence, describe
+
+T = TypeVar("T")
+N = TypeVar("N", bound=Node)
+
+#: The error by which a validator says that the finding is already noted.
+REPORTED = "reported"
+
+IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,63}")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Leaf(Generic[N]):
+    """The annotation of a field whose value our own ``check`` makes from a node; ``schema`` is what editors see."""
+
+    check: Callable[[N, ValidationInfo], object]
+    schema: JsonSchemaValue
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        """The check alone: pydantic need not know the classes of our values."""
+        return core_schema.with_info_plain_validator_function(self.check)
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """The JSON Schema of the value as written."""
+        return dict(self.schema)
+
+
+@dataclass(frozen=True, slots=True)
+class Located(Generic[T]):
+    """A value and its place; ``node`` is the scalar it came from."""
+
+    value: T
+    node: Scalar
+
+    @property
+    def span(self) -> Span:
+        """Where the whole value stands."""
+        return self.node.span
+
+
+#: A number or an expression, as written.
+Formula: TypeAlias = Located[int | float | str]
+
+
+def findings_of(info: ValidationInfo) -> Findings:
+    """The Findings that the caller of the validation passed along."""
+    assert isinstance(info.context, Findings)
+    return info.context
+
+
+def give_up() -> NoReturn:
+    """Leave this value; the finding is noted."""
+    raise PydanticCustomError(REPORTED, "reported")
+
+
+def refuse(
+    info: ValidationInfo, node: Node, wanted: str, hint: str | None = None, code: str = "wrong-type"
+) -> NoReturn:
+    """Note that something else was wanted here, and leave this value."""
+    findings_of(info).error(code, node.span, f"expected {wanted}, found {describe(node)}", hint)
+    give_up()
+
+
+def as_text(node: Node, info: ValidationInfo) -> Located[str]:
+    """A text; numbers and truth values are answered with a hint to quote them."""
+    if isinstance(node, Scalar) and isinstance(node.value, str):
+        return Located(node.value, node)
+    quoted = isinstance(node, Scalar) and node.value is not None
+    refuse(info, node, "a text", "put it in quotes" if quoted else None)
+
+
+def as_identifier(node: Node, info: ValidationInfo) -> Located[str]:
+    """A name: an ASCII letter or underscore, then letters, digits, underscores, at most 64."""
+    text = as_text(node, info)
+    if not IDENTIFIER.fullmatch(text.value):
+        findings_of(info).error("bad-name", node.span, bad_name(text.value), NAME_RULE)
+        give_up()
+    return text
+
+
+NAME_RULE = "a name is a letter or underscore, then letters, digits and underscores, 64 at most"
+
+
+def bad_name(name: str) -> str:
+    """The sentence for a name that is none."""
+    shown = name if len(name) <= 40 else name[:37] + "…"
+    return f"'{shown}' is not a name"
+
+
+def as_bool(node: Node, info: ValidationInfo) -> Located[bool]:
+    """true or false; what other YAML versions read as such is answered with the right word."""
+    if isinstance(node, Scalar) and isinstance(node.value, bool):
+        return Located(node.value, node)
+    hint = None
+    if isinstance(node, Scalar) and isinstance(node.value, str):
+        word = node.value.casefold()
+        hint = {"yes": "write true", "on": "write true", "no": "write false", "off": "write false"}.get(word)
+    refuse(info, node, "true or false", hint)
+
+
+def formula_of(node: Node, findings: Findings) -> Formula | None:
+    """A finite number, or the text of an expression; None where it is neither (that is noted)."""
+    if isinstance(node, Scalar):
+        value = node.value
+        if isinstance(value, str) and value.strip():
+            return Located(value, node)
+        if isinstance(value, (int, float)) and not isinstance(value, bool):
+            if math.isfinite(value):
+                return Located(value, node)
+            findings.error("not-finite", node.span, "a finite number is wanted here")
+            return None
+    message = f"expected a number or an expression, found {describe(node)}"
+    findings.error("wrong-type", node.span, message)
+    return None
+
+
+def as_formula(node: Node, info: ValidationInfo) -> Formula:
+    """A finite number, or the text of an expression."""
+    formula = formula_of(node, findings_of(info))
+    if formula is None:
+        give_up()
+    return formula
+
+
+def as_number(node: Node, info: ValidationInfo) -> Located[float]:
+    """A finite number as such, no expression."""
+    formula = as_formula(node, info)
+    if isinstance(formula.value, str):
+        refuse(info, node, "a number")
+    return Located(float(formula.value), formula.node)
+
+
+def as_integer(node: Node, info: ValidationInfo) -> Located[int]:
+    """An integer as such (2.0 counts), no expression."""
+    number = as_number(node, info)
+    if number.value != int(number.value):
+        refuse(info, node, "an integer")
+    whole = number.node.value
+    return Located(whole if isinstance(whole, int) else int(number.value), number.node)
+
+
+def as_texts(node: Node, info: ValidationInfo) -> tuple[Located[str], ...]:
+    """A text or a list of texts."""
+    if isinstance(node, (Sequence, Packed)):
+        return tuple(as_text(item, info) for item in node.items)
+    return (as_text(node, info),)
+
+
+def one_of(*words: str) -> Callable[[Node, ValidationInfo], Located[str]]:
+    """A validator for a choice between words; a misspelling is answered with the nearest ones."""
+
+    def check(node: Node, info: ValidationInfo) -> Located[str]:
+        from neurovis_spec.diagnostics import suggest
+
+        text = as_text(node, info)
+        if text.value not in words:
+            message = f"'{text.value}' is not one of {', '.join(words)}"
+            findings_of(info).error("unknown-value", node.span, message, suggest(text.value, words))
+            give_up()
+        return text
+
+    return check
+
+
+_FORMULA_SCHEMA: JsonSchemaValue = {
+    "anyOf": [{"type": "number"}, {"type": "string", "minLength": 1, "maxLength": 1000}],
+}
+
+TextField = Annotated[Located[str], Leaf(as_text, {"type": "string"})]
+TextsField = Annotated[
+    tuple[Located[str], ...],
+    Leaf(as_texts, {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
+]
+IdentifierField = Annotated[
+    Located[str],
+    Leaf(as_identifier, {"type": "string", "pattern": "^[A-Za-z_][A-Za-z0-9_]{0,63}$"}),
+]
+BoolField = Annotated[Located[bool], Leaf(as_bool, {"type": "boolean"})]
+NumberField = Annotated[Located[float], Leaf(as_number, {"type": "number"})]
+IntegerField = Annotated[Located[int], Leaf(as_integer, {"type": "integer"})]
+FormulaField = Annotated[Formula, Leaf(as_formula, _FORMULA_SCHEMA)]

@@ -1,0 +1,45 @@
+"""The JSON Schema of the language, from its models.
+
+In: the pydantic models. Out: a JSON Schema 2020-12 as plain data, with the descriptions that an editor shows.
+"""
+
+from __future__ import annotations
+
+from neurovis_spec.language.spec import ConnectionModel, Spec
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def json_schema() -> dict[str, object]:
+    """The schema of a whole spec. Keys that no model knows are refused in it as they are by the compiler."""
+    schema: dict[str, object] = Spec.model_json_schema(by_alias=True)
+    body: dict[str, object] = ConnectionModel.model_json_schema(by_alias=True)
+    definitions = schema.setdefault("$defs", {})
+    assert isinstance(definitions, dict)
+    definitions["ConnectionModel"] = {key: value for key, value in body.items() if key != "$defs"}
+    entries = {
+        "type": "object",
+        "propertyNames": {"pattern": "^[^>]*->[^>]*$"},
+        "additionalProperties": {
+            "anyOf": [{"type": ["number", "string", "null"]}, {"$ref": "#/$defs/ConnectionModel"}]
+        },
+    }
+    definitions["Connections"] = {"anyOf": [entries, {"type": "array", "items": entries}]}
+    closed = {"$schema": DIALECT, "title": "NeuroVis spec, version 1", **_closed(schema)}
+    closed["title"] = "NeuroVis spec, version 1"
+    return closed
+
+
+def _closed(value: dict[str, object]) -> dict[str, object]:
+    """The same schema with every model closed: ``additionalProperties: false`` where properties are listed."""
+    result: dict[str, object] = {}
+    for key, item in value.items():
+        if isinstance(item, dict):
+            result[key] = _closed(item)
+        elif isinstance(item, list):
+            result[key] = [_closed(one) if isinstance(one, dict) else one for one in item]
+        else:
+            result[key] = item
+    if isinstance(value.get("properties"), dict) and value.get("type") == "object":
+        result.setdefault("additionalProperties", False)
+    return result

@@ -1,0 +1,42 @@
+"""From a SourceDocument to a Spec: the shape is checked, nothing is resolved.
+
+In: a SourceDocument and Findings. Out: the Spec, or None where its shape is at fault (the Findings say what is wrong).
+"""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from pydantic import ValidationError
+
+from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.located import REPORTED
+from neurovis_spec.language.model import Model, opening
+from neurovis_spec.language.source import SourceDocument
+from neurovis_spec.language.spec import Library, Spec
+
+M = TypeVar("M", bound=Model)
+
+
+def read_shape(document: SourceDocument, model: type[M], findings: Findings) -> M | None:
+    """Check a document against a model. All findings are noted; the result is None where there is an error."""
+    before = findings.errors
+    try:
+        result = model.model_validate(document.root, context=findings)
+    except ValidationError as error:
+        for item in error.errors(include_url=False, include_context=False, include_input=False):
+            if item["type"] != REPORTED and findings.errors == before:
+                keys = ".".join(str(part) for part in item["loc"])
+                findings.error("wrong-shape", opening(document.root), f"{keys}: {item['msg']}")
+        return None
+    return result if findings.errors == before else None
+
+
+def read_spec(document: SourceDocument, findings: Findings) -> Spec | None:
+    """The Spec of a document."""
+    return read_shape(document, Spec, findings)
+
+
+def read_library(document: SourceDocument, findings: Findings) -> Library | None:
+    """The definitions of a library file."""
+    return read_shape(document, Library, findings)

@@ -1,0 +1,303 @@
+"""Values that may be written in several ways: choices with parameters, matrices, references, patterns.
+
+In: nodes. Out: one frozen value each, so that nobody behind this module asks again how it was written.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, TypeAlias
+
+from pydantic import ValidationInfo
+
+from neurovis_spec.diagnostics import Span, suggest
+from neurovis_spec.language.located import (
+    Formula,
+    Leaf,
+    Located,
+    as_bool,
+    as_formula,
+    as_text,
+    as_texts,
+    findings_of,
+    give_up,
+    refuse,
+)
+from neurovis_spec.language.source import Entry, Mapping, Node, Packed, Scalar, Sequence
+
+FORMULA = {"anyOf": [{"type": "number"}, {"type": "string"}]}
+FORMULAS = {"anyOf": [*FORMULA["anyOf"], {"type": "array", "items": FORMULA}]}
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """``name`` or ``{name: {parameter: value, …}}``: an activation, a model or a rule with its settings."""
+
+    name: Located[str]
+    settings: tuple[Entry, ...]
+
+
+def as_choice(node: Node, info: ValidationInfo) -> Choice:
+    """A name, or a mapping with one key whose value is a mapping of settings (or nothing)."""
+    if isinstance(node, Scalar):
+        if not isinstance(node.value, str):
+            refuse(info, node, "a name, or {name: {parameter: value}}")
+        return Choice(as_text(node, info), ())
+    if not isinstance(node, Mapping):
+        refuse(info, node, "a name, or {name: {parameter: value}}")
+    if len(node.entries) != 1:
+        span = node.entries[1].key.span if node.entries else node.span
+        findings_of(info).error("one-key", span, f"expected one name here, found {len(node.entries)}")
+        give_up()
+    entry = node.entries[0]
+    name = Located(entry.name, entry.key)
+    if isinstance(entry.value, Scalar) and entry.value.value is None:
+        return Choice(name, ())
+    if not isinstance(entry.value, Mapping):
+        refuse(info, entry.value, f"a mapping of the settings of '{entry.name}'", "write {name: {parameter: value}}")
+    return Choice(name, entry.value.entries)
+
+
+ChoiceField = Annotated[
+    Choice,
+    Leaf(
+        as_choice,
+        {
+            "anyOf": [
+                {"type": "string"},
+                {"type": "object", "minProperties": 1, "maxProperties": 1},
+            ]
+        },
+    ),
+]
+
+
+@dataclass(frozen=True, slots=True)
+class FileReference:
+    """``{file: path}``; ``key`` names the array of an archive."""
+
+    path: Located[str]
+    key: Located[str] | None
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """Dense rows as written: every row a list of formulas or nulls (checked when they are evaluated)."""
+
+    node: Sequence | Packed
+
+    @property
+    def span(self) -> Span:
+        """The whole matrix."""
+        return self.node.span
+
+
+Matrix: TypeAlias = Rows | FileReference
+
+
+def as_file(node: Mapping, info: ValidationInfo) -> FileReference:
+    """``{file: path, key: name}``."""
+    known = ("file", "key")
+    for entry in node.entries:
+        if entry.name not in known:
+            message = f"unknown key '{entry.name}'"
+            findings_of(info).error("unknown-key", entry.key.span, message, suggest(entry.name, known))
+    path = node.get("file")
+    if path is None:
+        findings_of(info).error("missing-key", node.span, "the key 'file' is missing")
+        give_up()
+    key = node.get("key")
+    return FileReference(as_text(path, info), None if key is None else as_text(key, info), node.span)
+
+
+def as_matrix(node: Node, info: ValidationInfo) -> Matrix:
+    """A list of rows, or a file."""
+    if isinstance(node, Mapping):
+        return as_file(node, info)
+    if not isinstance(node, (Sequence, Packed)):
+        refuse(info, node, "a list of rows, or {file: …}")
+    if isinstance(node, Packed) and node.rows is None:
+        refuse(info, node.cell(0), "a row, that is a list", "a matrix is a list of lists: [[1, 2], [3, 4]]")
+    if isinstance(node, Sequence):
+        for row in node.items:
+            if not isinstance(row, (Sequence, Packed)):
+                refuse(info, row, "a row, that is a list", "a matrix is a list of lists: [[1, 2], [3, 4]]")
+    return Rows(node)
+
+
+_FILE = {
+    "type": "object",
+    "properties": {"file": {"type": "string"}, "key": {"type": "string"}},
+    "required": ["file"],
+    "additionalProperties": False,
+}
+_CELL = {"anyOf": [*FORMULA["anyOf"], {"type": "null"}]}
+_ROWS = {"type": "array", "items": {"type": "array", "items": _CELL}}
+
+MatrixField = Annotated[Matrix, Leaf(as_matrix, {"anyOf": [_ROWS, _FILE]})]
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeRows:
+    """Edges as written: ``[from, to, weight, delay]``, the last two optional (checked when they are connected)."""
+
+    node: Sequence | Packed
+
+
+def as_edges(node: Node, info: ValidationInfo) -> EdgeRows | FileReference:
+    """A list of edges, or a file."""
+    if isinstance(node, Mapping):
+        return as_file(node, info)
+    if not isinstance(node, (Sequence, Packed)):
+        refuse(info, node, "a list of edges [from, to, weight], or {file: …}")
+    if isinstance(node, Packed) and node.rows is None:
+        refuse(info, node.cell(0), "an edge, that is a list [from, to, weight]")
+    return EdgeRows(node)
+
+
+EdgesField = Annotated[
+    EdgeRows | FileReference,
+    Leaf(as_edges, {"anyOf": [{"type": "array", "items": {"type": "array", "minItems": 2, "maxItems": 4}}, _FILE]}),
+]
+
+
+def as_centre(node: Node, info: ValidationInfo) -> Formula | Matrix:
+    """Like a weight or like a matrix."""
+    return as_formula(node, info) if isinstance(node, Scalar) else as_matrix(node, info)
+
+
+CentreField = Annotated[
+    Formula | Matrix,
+    Leaf(as_centre, {"anyOf": [*FORMULA["anyOf"], _ROWS, _FILE]}),
+]
+
+
+@dataclass(frozen=True, slots=True)
+class FormulaList:
+    """A list of n values, one each."""
+
+    items: tuple[Formula, ...]
+    span: Span
+
+
+def as_formulas(node: Node, info: ValidationInfo) -> Formula | FormulaList:
+    """A formula, or a list with one for each neuron."""
+    if isinstance(node, (Sequence, Packed)):
+        return FormulaList(tuple(as_formula(item, info) for item in node.items), node.span)
+    return as_formula(node, info)
+
+
+FormulasField = Annotated[Formula | FormulaList, Leaf(as_formulas, FORMULAS)]
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A named constant: its value, and the bounds within which it may be set."""
+
+    value: Formula
+    minimum: Formula | None
+    maximum: Formula | None
+    description: str | None
+
+
+def as_parameter(node: Node, info: ValidationInfo) -> Parameter:
+    """A formula, or ``{value, min, max, description}``."""
+    if not isinstance(node, Mapping):
+        return Parameter(as_formula(node, info), None, None, None)
+    known = ("value", "min", "max", "description")
+    for entry in node.entries:
+        if entry.name not in known:
+            message = f"unknown key '{entry.name}'"
+            findings_of(info).error("unknown-key", entry.key.span, message, suggest(entry.name, known))
+    value, low, high, text = (node.get(name) for name in known)
+    if value is None:
+        findings_of(info).error("missing-key", node.span, "the key 'value' is missing")
+        give_up()
+    return Parameter(
+        as_formula(value, info),
+        None if low is None else as_formula(low, info),
+        None if high is None else as_formula(high, info),
+        None if text is None else as_text(text, info).value,
+    )
+
+
+ParameterField = Annotated[
+    Parameter,
+    Leaf(
+        as_parameter,
+        {
+            "anyOf": [
+                *FORMULA["anyOf"],
+                {
+                    "type": "object",
+                    "properties": {
+                        "value": FORMULA,
+                        "min": FORMULA,
+                        "max": FORMULA,
+                        "description": {"type": "string"},
+                    },
+                    "required": ["value"],
+                    "additionalProperties": False,
+                },
+            ]
+        },
+    ),
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """One or several references to neurons, as written, each with its place."""
+
+    parts: tuple[Located[str], ...]
+    span: Span
+
+
+def as_reference(node: Node, info: ValidationInfo) -> Reference:
+    """A reference, or a list of them."""
+    return Reference(as_texts(node, info), node.span)
+
+
+ReferenceField = Annotated[
+    Reference,
+    Leaf(as_reference, {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """Two numbers, x and y."""
+
+    x: float
+    y: float
+    span: Span
+
+
+def as_point(node: Node, info: ValidationInfo) -> Point:
+    """``[x, y]``: two finite numbers."""
+    from neurovis_spec.language.located import as_number
+
+    if not isinstance(node, Sequence) or len(node.items) != 2:
+        refuse(info, node, "a position [x, y]")
+    x, y = (as_number(item, info).value for item in node.items)
+    return Point(x, y, node.span)
+
+
+PointField = Annotated[
+    Point,
+    Leaf(as_point, {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}),
+]
+
+
+def as_title(node: Node, info: ValidationInfo) -> Located[bool] | Located[str]:
+    """true, false or a text."""
+    if isinstance(node, Scalar) and isinstance(node.value, str):
+        return as_text(node, info)
+    return as_bool(node, info)
+
+
+TitleField = Annotated[
+    Located[bool] | Located[str],
+    Leaf(as_title, {"anyOf": [{"type": "boolean"}, {"type": "string"}]}),
+]

@@ -1,0 +1,106 @@
+"""The whole way, from a text to a picture, on one page.
+
+Each function is one stage: it takes a value, gives a new one, and reaches back to none before it.
+
+    text ─read─▶ SourceDocument ─shape─▶ Spec ─build─▶ Network ─simulate─▶ Recording ─▶ Snapshot
+                                                          └─arrange─▶ Layout        │
+    Network + Layout + Snapshot ─encode (Eqs. 2–5)─▶ Scene ─draw─▶ bytes of a picture
+    Network + Layout + Snapshots ─film─▶ Film ─animate─▶ bytes of a moving one
+
+What the first three find at fault goes into Findings, all at once; ``Findings.check`` raises SpecError.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import numpy.typing as npt
+
+from neurovis_spec.compiler.compile import Request, compile_spec
+from neurovis_spec.compiler.network import Network, RenderSettings
+from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.reader import read_file, read_text
+from neurovis_spec.language.shape import read_spec
+from neurovis_spec.language.source import SourceDocument
+from neurovis_spec.language.spec import Spec
+from neurovis_spec.layout import Layout
+from neurovis_spec.layout.arrange import lay_out
+from neurovis_spec.runtime.record import Progress, record
+from neurovis_spec.runtime.recording import Recording, Snapshot
+from neurovis_spec.scene import Film, Scene
+from neurovis_spec.scene.encode import encode
+from neurovis_spec.scene.film import film
+from neurovis_spec.scene.gains import Gains
+from neurovis_spec.scene.probe import probe
+from neurovis_spec.scene.renderers import renderer_for
+
+
+def read(path: Path, name: str, findings: Findings) -> SourceDocument | None:
+    """YAML becomes values that know their line."""
+    return read_file(path, name, findings)
+
+
+def read_string(text: str, name: str, findings: Findings) -> SourceDocument | None:
+    """The same for a text in memory."""
+    return read_text(text, name, findings)
+
+
+def shape(document: SourceDocument, findings: Findings) -> Spec | None:
+    """The shape as written: known keys, the right kind of value at each."""
+    return read_spec(document, findings)
+
+
+def build(spec: Spec, request: Request, findings: Findings) -> Network | None:
+    """Expand, connect, check, lower: frozen arrays and an update program."""
+    return compile_spec(spec, request, findings)
+
+
+def simulate(
+    network: Network,
+    steps: int | None = None,
+    inputs: Mapping[str, npt.ArrayLike] | None = None,
+    backend: str | None = None,
+    every: int = 1,
+    start: Recording | None = None,
+    progress: Progress | None = None,
+) -> Recording:
+    """Run the update program, record activities and weights."""
+    return record(network, steps, inputs, backend, every, start, progress)
+
+
+def arrange(network: Network, engine: str | None = None) -> Layout:
+    """A position for every neuron, a route for every connection."""
+    return lay_out(network, engine)
+
+
+def measure(network: Network, progress: Progress | None = None) -> Gains:
+    """The gains of Eqs. 2–5: the author's, else such that the range of a default run shows."""
+    return probe(network, progress)
+
+
+def picture(network: Network, layout: Layout, snapshot: Snapshot, gains: Gains, settings: RenderSettings) -> Scene:
+    """One step as discs, splines and texts."""
+    return encode(network, layout, snapshot, gains, settings)
+
+
+def moving(
+    network: Network,
+    layout: Layout,
+    snapshots: Iterable[Snapshot],
+    gains: Gains,
+    settings: RenderSettings,
+    fps: float,
+) -> Film:
+    """Several steps as a scene whose colours and widths change."""
+    return film(network, layout, snapshots, gains, settings, fps)
+
+
+def draw(scene: Scene, suffix: str) -> bytes:
+    """A scene as the content of a file of this kind. Raises RendererError where nobody draws such files."""
+    return renderer_for(suffix, moving=False).draw(scene, suffix)
+
+
+def animate(moving_scene: Film, suffix: str, progress: Progress | None = None) -> bytes:
+    """A film as the content of a file of this kind. Raises RendererError where nobody makes such films."""
+    return renderer_for(suffix, moving=True).animate(moving_scene, suffix, progress)
