@@ -114,11 +114,11 @@ def _parser(text: str, pure: bool) -> EventSource:
 def _document(root: Node | None, file: str, findings: Findings) -> SourceDocument | None:
     if isinstance(root, Mapping):
         return SourceDocument(file, root)
-    hint = "a spec begins with 'neurovis: 1' and 'name: …', each on a line of its own"
+    hint = "a spec begins with a line 'neurovis: 1'"
     if root is None:
         findings.error("not-a-mapping", Span(file, 1, 1, 1, 1), "there is nothing in this file", hint)
     else:
-        message = f"a spec is a mapping of keys to values, but this is {describe(root)}"
+        message = f"keys with their values ('key: value') are wanted here, but this is {describe(root)}"
         findings.error("not-a-mapping", root.span, message, hint)
     return None
 

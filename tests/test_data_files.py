@@ -1,0 +1,332 @@
+"""Tables and edges from files: values, and every way in which a file may be at fault."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+import pickle
+import struct
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from neurovis_spec.diagnostics import Diagnostic, Findings, Span
+from neurovis_spec.language.data_files import EdgeTable, Table, read_edges, read_table
+from neurovis_spec.language.data_files_csv import CellError, parse_edges, parse_numbers, parse_rows
+from neurovis_spec.language.data_files_npy import parse_npy
+
+HERE = Span("net.yaml", 4, 20, 4, 30)
+
+
+def table(folder: Path, name: str, data: str | bytes) -> Table:
+    found, findings = attempt(folder, name, data)
+    assert findings == ()
+    assert found is not None
+    return found
+
+
+def fault(folder: Path, name: str, data: str | bytes) -> Diagnostic:
+    found, findings = attempt(folder, name, data)
+    assert found is None
+    assert [finding.span for finding in findings] == [HERE]
+    return findings[0]
+
+
+def attempt(folder: Path, name: str, data: str | bytes) -> tuple[Table | None, tuple[Diagnostic, ...]]:
+    (folder / name).write_bytes(data.encode() if isinstance(data, str) else data)
+    findings = Findings()
+    return read_table(name, folder, folder, HERE, findings), findings.sorted()
+
+
+def npy(array: np.ndarray, allow_pickle: bool = False) -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, array, allow_pickle=allow_pickle)
+    return stream.getvalue()
+
+
+def npy_header(text: str, data: bytes = b"") -> bytes:
+    header = text.encode() + b"\n"
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header + data
+
+
+def test_csv_with_header_and_empty_cells(tmp_path: Path) -> None:
+    data = "\ufeffx, y\r\n1,\r\n-2.5e1,.5\r\n"
+    got = table(tmp_path, "a.csv", data)
+    assert got.header == ("x", "y")
+    np.testing.assert_array_equal(got.values, [[1, np.nan], [-25, 0.5]])
+    np.testing.assert_array_equal(got.present, [[True, False], [True, True]])
+    assert got.digest == hashlib.sha256(data.encode()).hexdigest()
+    assert got.values.dtype == np.float64
+
+
+def test_csv_without_header_takes_the_quick_way_to_the_same_numbers(tmp_path: Path) -> None:
+    body = "1,2.5,-3e-7\n4,5,0.1\n"
+    got = table(tmp_path, "a.csv", body)
+    assert got.header is None
+    np.testing.assert_array_equal(got.values, [[1, 2.5, -3e-7], [4, 5, 0.1]])
+    assert got.present.all()
+    np.testing.assert_array_equal(table(tmp_path, "b.csv", "a,b,c\n" + body).values, got.values)
+
+
+def test_an_empty_line_of_one_column_is_an_empty_cell(tmp_path: Path) -> None:
+    got = table(tmp_path, "a.csv", "1\n\n3\n\n\n")
+    np.testing.assert_array_equal(got.values, [[1], [np.nan], [3]])
+
+
+@given(st.lists(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=3, max_size=3), min_size=1))
+def test_csv_numbers_read_back_exactly(rows: list[list[float]]) -> None:
+    text = "\n".join(",".join(map(repr, row)) for row in rows)
+    np.testing.assert_array_equal(parse_numbers(text.encode()).values, rows)
+    np.testing.assert_array_equal(parse_numbers(b'a,b,"c"\n' + text.encode()).values, rows)
+
+
+@pytest.mark.parametrize(
+    ("data", "code", "words"),
+    [
+        ("1,2\n3\n", "file-format", "row 2 has 1 cell, the first row 2"),
+        ("x,y\n1,2\n3,4,5\n", "file-format", "row 3 has 3 cells, the first row 2"),
+        ("1,2\n\n3,4\n", "file-format", "row 2 has 1 cell"),
+        ("1,nan\n", "not-finite", "row 1, column 2: 'nan'"),
+        ("x,y\n1,2\n-inf,3\n", "not-finite", "row 3, column 1: '-inf'"),
+        ("1,.NaN\n", "not-finite", "row 1, column 2"),
+        ("1\n1e999\n", "not-finite", "row 2, column 1: '1e999'"),
+        ("1,x\n", "file-format", "row 1, column 2: 'x' is no number"),
+        ("1,2\n3,1_000\n", "file-format", "row 2, column 2: '1_000'"),
+        ("1,2\n3,0x1f\n", "file-format", "row 2, column 2: '0x1f'"),
+        ("1,2\n3,١\n", "file-format", "row 2, column 2"),
+        ("1,2 3\n", "file-format", "row 1, column 2: '2 3'"),
+        ("x,y\n", "file-format", "no row of numbers"),
+        ("", "file-format", "empty"),
+        ("\n\n", "file-format", "empty"),
+        (b"1,2\n3,\xff\n", "invalid-utf8", "row 2"),
+        ('1,"2\n', "file-format", "no CSV"),
+        ("1,2\x00\n", "file-format", "row 1, column 2"),
+        ("1," + "9" * 200_000, "file-format", "row 1"),
+    ],
+)
+def test_faults_of_a_csv(tmp_path: Path, data: str | bytes, code: str, words: str) -> None:
+    finding = fault(tmp_path, "a.csv", data)
+    assert finding.code == code
+    assert words in finding.message
+    assert "'a.csv'" in finding.message
+    assert len(finding.message) < 300
+
+
+def test_semicolons_are_explained(tmp_path: Path) -> None:
+    finding = fault(tmp_path, "b.csv", "x\n1;2\n")
+    assert finding.hint == "columns are separated by commas"
+
+
+@pytest.mark.parametrize("dtype", ["<f8", ">f4", "<f2", "<i4", "|u1", ">i8"])
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_npy_of_every_real_type(tmp_path: Path, dtype: str, order: str) -> None:
+    array = np.array([[1, 2, 3], [4, 5, 6]], dtype=dtype)
+    got = table(tmp_path, "a.npy", npy(np.asfortranarray(array) if order == "F" else array))
+    np.testing.assert_array_equal(got.values, [[1, 2, 3], [4, 5, 6]])
+    assert got.values.dtype == np.float64
+    assert got.header is None
+    assert got.present.all()
+    assert got.present.shape == (2, 3)
+
+
+def test_a_one_dimensional_npy_is_a_column(tmp_path: Path) -> None:
+    assert table(tmp_path, "a.npy", npy(np.arange(4.0))).values.shape == (4, 1)
+
+
+class Bomb:
+    def __reduce__(self) -> tuple[object, tuple[str]]:
+        return os.mkdir, ("exploded",)
+
+
+@pytest.mark.parametrize(
+    ("data", "code", "words"),
+    [
+        (npy(np.array([Bomb()], dtype=object), allow_pickle=True), "file-format", "Python objects"),
+        (pickle.dumps(Bomb()), "file-format", "no .npy file"),
+        (npy(np.array([1j])), "file-format", "complex"),
+        (npy(np.array([True])), "file-format", "truth values"),
+        (npy(np.array(["x"])), "file-format", "texts"),
+        (npy(np.zeros(2, dtype=[("a", "<f8")])), "file-format", "structures"),
+        (npy(np.zeros((2, 2, 2))), "file-format", "3 dimensions"),
+        (npy(np.array(1.0)), "file-format", "0 dimensions"),
+        (npy(np.zeros((0, 3))), "file-format", "empty"),
+        (npy(np.array([[1, 2], [3, np.nan]])), "not-finite", "row 2, column 2 is NaN"),
+        (npy(np.array([1, np.inf])), "not-finite", "row 2, column 1 is infinity"),
+        (npy(np.zeros(8))[:-1], "file-format", "64 bytes"),
+        (npy(np.zeros(8)) + b"x", "file-format", "64 bytes"),
+        (npy_header("{'descr': '<f8', 'fortran_order': False, 'shape': (10**9,)}"), "file-format", ""),
+        (
+            npy_header("{'descr': '<f8', 'fortran_order': False, 'shape': (9999999999999, 999999999)}"),
+            "file-format",
+            "",
+        ),
+        (npy_header("{'descr': '<f8', 'fortran_order': False, 'shape': (-1, -8)}", b"x" * 64), "file-format", "empty"),
+        (npy_header("{'descr': '<f8', 'fortran_order': False, 'shape': (True, 1)}", b"x" * 8), "", ""),
+        (npy_header("__import__('os').mkdir('exploded')"), "file-format", "header"),
+        (npy_header("(" * 5000), "file-format", "header"),
+        (npy_header("{"), "file-format", "header"),
+        (b"\x93NUMPY\x09\x09", "file-format", "header"),
+        (b"\x93NUMPY", "file-format", "header"),
+        (b"", "file-format", "no .npy file"),
+    ],
+)
+def test_faults_of_an_npy(tmp_path: Path, data: bytes, code: str, words: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    found, findings = attempt(tmp_path, "a.npy", data)
+    assert not (tmp_path / "exploded").exists()
+    if code:
+        assert found is None
+        assert [finding.code for finding in findings] == [code]
+        assert words in findings[0].message
+        assert findings[0].span == HERE
+
+
+@given(st.binary(max_size=200), st.integers(0, 150), st.binary(min_size=1, max_size=3))
+def test_nothing_but_its_own_error_leaves_a_parser(noise: bytes, at: int, patch: bytes) -> None:
+    base = npy(np.arange(6.0).reshape(2, 3))
+    mutated = base[:at] + patch + base[at + len(patch) :]
+    for data in (noise, b"\x93NUMPY\x01\x00" + noise, mutated):
+        try:
+            values = parse_npy(data)
+        except CellError:
+            continue
+        assert np.isfinite(values).all()
+    for data in (noise, b"from,to,weight\n" + noise):
+        for parse in (parse_numbers, lambda data: parse_edges(parse_rows(data), "")):
+            with suppress(CellError):
+                parse(data)
+
+
+def edges(folder: Path, data: str) -> tuple[EdgeTable | None, tuple[Diagnostic, ...]]:
+    (folder / "e.csv").write_text(data, encoding="utf-8", newline="")
+    findings = Findings()
+    return read_edges("e.csv", folder, folder, HERE, findings), findings.sorted()
+
+
+def test_edges_by_the_names_of_the_columns(tmp_path: Path) -> None:
+    got, findings = edges(tmp_path, "Weight,to,delay,from\n0.5,O1,,K1\n,O2,3,K2\n")
+    assert findings == ()
+    assert got is not None
+    assert got.sources == ("K1", "K2")
+    assert got.targets == ("O1", "O2")
+    assert got.weights.tolist() == [0.5, 1.0]
+    assert got.delays == (None, 3)
+    assert got.rows == (2, 3)
+
+
+def test_edges_without_delays(tmp_path: Path) -> None:
+    got, _ = edges(tmp_path, "from,to,weight\nK1,O1,-2\n")
+    assert got is not None
+    assert (got.weights.tolist(), got.delays) == ([-2.0], (None,))
+
+
+@pytest.mark.parametrize(
+    ("data", "code", "words", "hint"),
+    [
+        ("K1,O1,0.5\n", "file-format", "row 1, column 1: no column is called 'k1'", "the columns are"),
+        ("from,to,wieght\n", "file-format", "row 1, column 3", "did you mean 'weight'?"),
+        ("from,to\nA,B\n", "file-format", "no column 'weight'", "from,to,weight"),
+        ("from,to,to,weight\n", "file-format", "'to' is there twice", None),
+        ("from,to,weight\nA,B\n", "file-format", "row 2 has 2 cells, the header 3", None),
+        ("from,to,weight\nA,,1\n", "file-format", "row 2, column 2: the name", None),
+        ("from,to,weight\nA,B,1\nA,B,nan\n", "not-finite", "row 3, column 3", "empty cell"),
+        ("from,to,weight\nA,B,x\n", "file-format", "row 2, column 3: 'x' is no number", None),
+        ("from,to,weight,delay\nA,B,1,1.5\n", "file-format", "row 2, column 4: '1.5' is no delay", None),
+        ("from,to,weight,delay\nA,B,1,-1\n", "file-format", "row 2, column 4: '-1' is no delay", None),
+        ("", "file-format", "empty", None),
+    ],
+)
+def test_faults_of_edges(tmp_path: Path, data: str, code: str, words: str, hint: str | None) -> None:
+    got, findings = edges(tmp_path, data)
+    assert got is None
+    assert [finding.code for finding in findings] == [code]
+    assert words in findings[0].message
+    assert (hint or "") in (findings[0].hint or "")
+
+
+def refused(path: str, root: Path, base: Path) -> Diagnostic:
+    findings = Findings()
+    assert read_table(path, root, base, HERE, findings) is None
+    (finding,) = findings.sorted()
+    return finding
+
+
+def test_paths_are_relative_to_the_file_that_names_them(tmp_path: Path) -> None:
+    (tmp_path / "library").mkdir()
+    (tmp_path / "a.csv").write_text("1\n")
+    findings = Findings()
+    got = read_table("../a.csv", tmp_path, tmp_path / "library", HERE, findings)
+    assert got is not None
+    assert refused("a.csv", tmp_path, tmp_path / "library").code == "file-missing"
+
+
+def test_no_path_leaves_the_root(tmp_path: Path) -> None:
+    root = tmp_path / "root"
+    (root / "sub").mkdir(parents=True)
+    outside = tmp_path / "secret.csv"
+    outside.write_text("1\n")
+    (tmp_path / "root-2").mkdir()
+    (tmp_path / "root-2" / "a.csv").write_text("1\n")
+    (root / "link.csv").symlink_to(outside)
+    (root / "folder").symlink_to(tmp_path)
+    (root / "inner.csv").write_text("7\n")
+    (root / "fine.csv").symlink_to(root / "inner.csv")
+    for path in (
+        "../secret.csv",
+        "sub/../../secret.csv",
+        "link.csv",
+        "folder/secret.csv",
+        "../root-2/a.csv",
+        str(outside),
+        str(root / "inner.csv"),
+        "C:\\secret.csv",
+        "\\\\host\\share.csv",
+    ):
+        assert refused(path, root, root).code == "path-outside", path
+    assert table(root, "inner.csv", "7\n").values[0, 0] == 7
+    assert read_table("fine.csv", root, root, HERE, Findings()) is not None
+
+
+def test_what_is_no_regular_file_is_never_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[object] = []
+    monkeypatch.setattr(os, "open", lambda *arguments: opened.append(arguments))
+    (tmp_path / "folder.csv").mkdir()
+    os.mkfifo(tmp_path / "pipe.csv")
+    (tmp_path / "loop.csv").symlink_to(tmp_path / "loop.csv")
+    for name, code in (
+        ("folder.csv", "file-kind"),
+        ("pipe.csv", "file-kind"),
+        ("loop.csv", "file-missing"),
+        ("none.csv", "file-missing"),
+        ("pipe.csv/x.csv", "file-missing"),
+        ("", "file-format"),
+        ("a\0.csv", "file-missing"),
+        ("x" * 5000 + ".csv", "file-"),
+        ("a.txt", "file-format"),
+    ):
+        assert refused(name, tmp_path, tmp_path).code.startswith(code), name
+    device = Path("/dev")
+    findings = Findings()
+    (tmp_path / "zero.csv").symlink_to("/dev/zero")
+    assert read_table("zero.csv", tmp_path, tmp_path, HERE, findings) is None
+    assert read_table("zero.csv", device.parent, tmp_path, HERE, findings) is None
+    assert {finding.code for finding in findings.sorted()} == {"path-outside", "file-kind"}
+    assert opened == []
+
+
+def test_a_missing_file_is_answered_with_one_that_is_alike(tmp_path: Path) -> None:
+    (tmp_path / "centres.csv").write_text("1\n")
+    finding = refused("centers.csv", tmp_path, tmp_path)
+    assert finding.hint == "did you mean 'centres.csv'?"
+    assert "'centers.csv' does not exist" in finding.message
+
+
+def test_a_huge_file_is_refused_by_its_size(tmp_path: Path) -> None:
+    with (tmp_path / "huge.csv").open("wb") as stream:
+        stream.truncate(1 << 40)
+    assert refused("huge.csv", tmp_path, tmp_path).code == "too-large"
