@@ -62,10 +62,9 @@ def _engine(name: str) -> LayoutEngine:
         known = plugins.names(plugins.LAYOUTS)
         hint = suggest(name, ("auto", *known), "known engines")
         raise LayoutRefusalError("unknown-engine", f"there is no layout engine '{name}' here", hint) from None
-    if not (hasattr(made, "lay_out") and isinstance(getattr(made, "capabilities", None), Capabilities)):
+    if not isinstance(made, LayoutEngine) or not isinstance(made.capabilities, Capabilities):
         raise LayoutRefusalError("broken-engine", f"what is installed as layout engine '{name}' is none")
-    engine: LayoutEngine = made  # type: ignore[assignment]
-    return engine
+    return made
 
 
 def refuse_what_it_cannot(problem: LayoutProblem, name: str, can: Capabilities) -> None:
@@ -83,7 +82,7 @@ def refuse_what_it_cannot(problem: LayoutProblem, name: str, can: Capabilities) 
         raise LayoutRefusalError(
             "position-missing",
             f"the engine '{name}' needs a position for every neuron; '{free[0]}'{more} has none",
-            "give it one in layout.positions, or choose another engine: the layered one arranges the rest around the pins",
+            "give it one in layout.positions, or choose the layered engine, which arranges the rest around the pins",
         )
     asked: Mapping[str, tuple[bool, bool, str]] = {
         "layout-pins-unsupported": (bool(problem.pins), can.pins, "keep pinned positions (layout.positions)"),
@@ -124,12 +123,16 @@ def _check(problem: LayoutProblem, name: str, result: Layout) -> None:
         raise fault("did not place every neuron of the network, and no other, once")
     if set(result.routes) != {edge.name for edge in problem.edges}:
         raise fault("did not route every connection of the network, and no other, once")
-    for neuron, point in result.positions.items():
-        if not all(math.isfinite(c) for c in point):
-            raise fault(f"gave '{neuron}' a position that is not finite")
-    for edge, route in result.routes.items():
+    for placed, position in result.positions.items():
+        if not all(math.isfinite(c) for c in position):
+            raise fault(f"gave '{placed}' a position that is not finite")
+    for edge in problem.edges:
+        route = result.routes[edge.name]
         if len(route) < 4 or len(route) % 3 != 1 or not all(math.isfinite(c) for point in route for c in point):
-            raise fault(f"gave '{edge}' a route that is no cubic spline")
+            raise fault(f"gave '{edge.name}' a route that is no cubic spline")
+        for point, neuron in ((route[0], edge.source), (route[-1], edge.target)):
+            if distance(point, result.positions[problem.neurons[neuron]]) > 0.01:
+                raise fault(f"gave '{edge.name}' a route that does not lead from centre to centre")
 
 
 def _tidy(problem: LayoutProblem, name: str, result: Layout) -> Layout:

@@ -1,7 +1,7 @@
 """What a layout is worth: crossings, overlaps, routes over discs, flow, area.
 
-In: a layout and its problem. Out: the numbers of ``neurovis layout --metrics`` (§12), computed from the routes as drawn:
-splines flattened to short segments, which meet only in the cells of a grid.
+In: a layout and its problem. Out: the numbers of ``neurovis layout --metrics`` (§12), computed from the routes as
+drawn: splines flattened to short segments, which meet only in the cells of a grid.
 """
 
 from __future__ import annotations
@@ -197,13 +197,12 @@ def _near(p: FloatArray, a: FloatArray, b: FloatArray) -> npt.NDArray[np.bool_]:
 
 
 def _flow(layout: Layout, problem: LayoutProblem) -> float:
-    """Share of the edges outside strongly connected components whose target lies further along the direction; 1 for none."""
+    """Share of the edges outside strongly connected components whose target lies further along the direction; 1 for
+    none."""
     graph: nx.DiGraph[int] = nx.DiGraph()
     graph.add_nodes_from(range(len(problem.neurons)))
     graph.add_edges_from((edge.source, edge.target) for edge in problem.edges)
-    component = {
-        node: number for number, part in enumerate(nx.strongly_connected_components(graph)) for node in part
-    }
+    component = {node: number for number, part in enumerate(nx.strongly_connected_components(graph)) for node in part}
     dx, dy = _ALONG[problem.direction]
     along = [dx * x + dy * y for x, y in (layout.positions[name] for name in problem.neurons)]
     open_edges = [edge for edge in problem.edges if component[edge.source] != component[edge.target]]

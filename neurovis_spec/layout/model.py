@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal, Protocol, TypeAlias
+from typing import Literal, Protocol, TypeAlias, runtime_checkable
 
 Point: TypeAlias = tuple[float, float]
 #: A cubic Bézier spline: 1 + 3k points from the centre of the source to the centre of the target.
@@ -90,6 +90,7 @@ class Capabilities:
     edges: int = 10_000_000
 
 
+@runtime_checkable
 class LayoutEngine(Protocol):
     """An engine, found through the entry point group ``neurovis.layouts`` (the entry point names a class that is called
     without arguments)."""
@@ -98,8 +99,8 @@ class LayoutEngine(Protocol):
     capabilities: Capabilities
 
     def lay_out(self, problem: LayoutProblem) -> Layout:
-        """Place every neuron once and route every edge. Deterministic. Raises ``LayoutRefusalError`` for a problem that cannot
-        be solved as asked."""
+        """Place every neuron once and route every edge. Deterministic. Raises ``LayoutRefusalError`` for a problem
+        that cannot be solved as asked."""
         ...
 
 

@@ -38,7 +38,12 @@ def natural_key(name: str) -> NaturalKey:
     return tuple(parts), name
 
 
-def _edge_key(name: str) -> tuple[NaturalKey, ...]:
+def edge_key(name: str) -> tuple[NaturalKey, ...]:
+    """A sort key for the names of edges: source, target, then the number among equals.
+
+    >>> sorted(["K2 -> O", "K -> O (2)", "K -> O"], key=edge_key)
+    ['K -> O', 'K -> O (2)', 'K2 -> O']
+    """
     return tuple(natural_key(part) for part in name.split(" "))
 
 
@@ -57,8 +62,9 @@ def canonical(
 ) -> LayoutProblem:
     """The problem made of these parts, in canonical order.
 
-    ``edges`` are (name, source, target, delay); ``spacing`` is that of neurons, then that of ranks. Equal parts in any order
-    give an equal problem. The members of a group keep the order in which they are given (that of their numbers).
+    ``edges`` are (name, source, target, delay); ``spacing`` is that of neurons, then that of ranks. Equal parts in
+    any order give an equal problem. The members of a group keep the order in which they are given (that of their
+    numbers).
     """
     names = tuple(sorted(neurons, key=natural_key))
     index = {name: i for i, name in enumerate(names)}
@@ -76,7 +82,7 @@ def canonical(
         ),
         edges=tuple(
             LayoutEdge(name, index[source], index[target], delay)
-            for name, source, target, delay in sorted(edges, key=lambda edge: _edge_key(edge[0]))
+            for name, source, target, delay in sorted(edges, key=lambda edge: edge_key(edge[0]))
         ),
         pins=dict(sorted(pinned.items())),
         direction=direction,

@@ -1,13 +1,15 @@
 """The layered engine: from a problem to a layout, stage by stage.
 
-In: a LayoutProblem. Out: a Layout. After Sugiyama, Tagawa and Toda (1981): units and blocks, components, ranks, order, places,
-pins, routes; every stage is deterministic and computes in plain IEEE arithmetic, so the result is the same everywhere.
+In: a LayoutProblem. Out: a Layout. After Sugiyama, Tagawa and Toda (1981): units and blocks, components, ranks,
+order, places, pins, routes; every stage is deterministic and computes in plain IEEE arithmetic, so the result is the
+same everywhere.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 from neurovis_layouts.formations import columns, grid
 from neurovis_layouts.frame import from_picture, to_picture
@@ -62,13 +64,18 @@ class LayeredEngine:
                 ways[i] = passing if plan.places[edge.source][1] < plan.places[edge.target][1] else passing[::-1]
         block = {m: k for k, unit in enumerate(units) if unit.places is not None for m in unit.members}
         within = frozenset(
-            i for i, edge in enumerate(problem.edges) if edge.source in block and block[edge.source] == block.get(edge.target)
+            i
+            for i, edge in enumerate(problem.edges)
+            if edge.source in block and block[edge.source] == block.get(edge.target)
         )
         routes = route_all(problem.edges, centres, ways, within)
         return Layout(
             problem.network,
             self.name,
-            {name: to_picture(centre, problem.direction) for name, centre in zip(problem.neurons, centres, strict=True)},
+            {
+                name: to_picture(centre, problem.direction)
+                for name, centre in zip(problem.neurons, centres, strict=True)
+            },
             {
                 edge.name: tuple(to_picture(point, problem.direction) for point in route)
                 for edge, route in zip(problem.edges, routes, strict=True)
@@ -133,9 +140,10 @@ def _ranks(problem: LayoutProblem, units: Sequence[Unit], edges: Sequence[int]) 
 def _draw_in(
     levels: Levels, order: Sequence[Sequence[int]], places: list[Point], guests: set[int], spacing: float
 ) -> None:
-    """Unconnected neurons at the end of a rank stand close to their neighbour, two units off, not where the rank left them."""
+    """Unconnected neurons at the end of a rank stand close to their neighbour, two units off, not where the rank left
+    them."""
     for rank in order:
-        for before, node in zip(rank, rank[1:], strict=False):
+        for before, node in pairwise(rank):
             own, other = levels.nodes[node], levels.nodes[before]
             if own.members and own.members[0][0] in guests and node == rank[-1] and other.members:
                 beside = 2.0 if other.members[0][0] not in guests else 1.0

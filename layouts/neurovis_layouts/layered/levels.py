@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 from neurovis_layouts.layered.units import Unit
 from neurovis_spec.layout.model import LayoutProblem
@@ -18,8 +19,8 @@ _MOST_PASSAGES = 60_000
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """Something in a rank. ``members`` with their offsets; none for a passage. ``reach`` is how far centres lie from its
-    middle, across and along; ``kin`` is shared by neurons of a group that keep their order."""
+    """Something in a rank. ``members`` with their offsets; none for a passage. ``reach`` is how far centres lie from
+    its middle, across and along; ``kin`` is shared by neurons of a group that keep their order."""
 
     rank: int
     members: tuple[tuple[int, float, float], ...] = ()
@@ -41,7 +42,8 @@ class Segment:
 
 @dataclass(slots=True)
 class Levels:
-    """Nodes by index, node indices by rank, segments below each rank, and the passages of each edge, from above to below."""
+    """Nodes by index, node indices by rank, segments below each rank, and the passages of each edge, from above to
+    below."""
 
     nodes: list[Node] = field(default_factory=list)
     ranks: list[list[int]] = field(default_factory=list)
@@ -106,6 +108,6 @@ def _connect(levels: Levels, problem: LayoutProblem, i: int, where: dict[int, tu
     if passages:
         levels.passages[i] = passages
     line = [upper, *((node, 0.0) for node in passages), lower]
-    for step, ((a, offset_a), (b, offset_b)) in enumerate(zip(line, line[1:], strict=False)):
+    for step, ((a, offset_a), (b, offset_b)) in enumerate(pairwise(line)):
         ends = (step == 0) + (step == len(line) - 2)
         levels.segments[top + step].append(Segment(a, offset_a, b, offset_b, (8.0, 2.0, 1.0)[ends]))

@@ -1,7 +1,7 @@
 """Order: who stands beside whom in a rank, so that few segments cross.
 
-In: Levels. Out: node indices by rank, in order. Sweeps by barycentres from two starts, then swaps of neighbours. Members of
-a box stay together; neurons of a group keep the order of their numbers unless crossings gain clearly.
+In: Levels. Out: node indices by rank, in order. Sweeps by barycentres from two starts, then swaps of neighbours.
+Members of a box stay together; neurons of a group keep the order of their numbers unless crossings gain clearly.
 """
 
 from __future__ import annotations

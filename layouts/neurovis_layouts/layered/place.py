@@ -1,13 +1,15 @@
 """Places: coordinates across and along for nodes that have their ranks and order.
 
-In: Levels and the order. Out: x and y of every node. Across, each rank is moved to the weighted mean of what its nodes are
-connected to, in sweeps; within a rank that is an isotonic regression, so that what is symmetric stays symmetric. Along, ranks are as far
-apart as asked, farther where blocks are high or the ranks so wide that lines would run flat over discs.
+In: Levels and the order. Out: x and y of every node. Across, each rank is moved to the weighted mean of what its
+nodes are connected to, in sweeps; within a rank that is an isotonic regression, so that what is symmetric stays
+symmetric. Along, ranks are as far apart as asked, farther where blocks are high or the ranks so wide that lines would
+run flat over discs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 from neurovis_layouts.isotonic import spread
 from neurovis_layouts.layered.levels import Levels
@@ -38,14 +40,18 @@ def placed(levels: Levels, order: Sequence[Sequence[int]], neuron_spacing: float
 
 def _gaps(levels: Levels, order: Sequence[Sequence[int]], spacing: float) -> list[list[float]]:
     """Least distances between neighbours; a rank much narrower than its neighbours is stretched."""
-    plain = [[_gap(levels, a, b, spacing) for a, b in zip(rank, rank[1:], strict=False)] for rank in order]
-    widths = [sum(gaps) for gaps in plain]
+    plain = [[_gap(levels, a, b, spacing) for a, b in pairwise(rank)] for rank in order]
+    widths = [sum(gaps) + _ends(levels, rank) for gaps, rank in zip(plain, order, strict=True)]
     result: list[list[float]] = []
     for r, gaps in enumerate(plain):
         beside = max((widths[i] for i in (r - 1, r + 1) if 0 <= i < len(widths)), default=0.0)
         stretch = min(_MOST_STRETCH, _NARROW * beside / widths[r]) if widths[r] > 0 else 1.0
         result.append([gap * max(1.0, stretch) for gap in gaps])
     return result
+
+
+def _ends(levels: Levels, rank: Sequence[int]) -> float:
+    return levels.nodes[rank[0]].reach[0] + levels.nodes[rank[-1]].reach[0] if rank else 0.0
 
 
 def _gap(levels: Levels, a: int, b: int, spacing: float) -> float:

@@ -1,7 +1,8 @@
 """Ranks: how far along the direction each unit stands.
 
-In: units and the connections between them. Out: a rank for each, from 0; connections that go back against the ranks are as few as
-a greedy choice makes them, then the ranks are tightened (short connections, as in Gansner et al. 1993, by local moves).
+In: units and the connections between them. Out: a rank for each, from 0; connections that go back against the ranks
+are as few as a greedy choice makes them, then the ranks are tightened (short connections, as in Gansner et al. 1993,
+by local moves).
 """
 
 from __future__ import annotations
@@ -73,6 +74,7 @@ def _cut(
                 came[other] += 1
     head: list[int] = []
     tail: list[int] = []
+    reached = dict.fromkeys(loop, 0.0)  # among equals, what the head drives most comes next
     left = list(loop)
     while left:
         sinks = [unit for unit in left if went[unit] == 0]
@@ -84,13 +86,14 @@ def _cut(
             chosen = sources[0]
             head.append(chosen)
         else:
-            chosen = max(left, key=lambda unit: (surplus[unit], -unit))
+            chosen = max(left, key=lambda unit: (surplus[unit], reached[unit], -unit))
             head.append(chosen)
         left.remove(chosen)
         inside.discard(chosen)
         for other in graph.successors(chosen):
             if other in inside:
                 surplus[other] += arcs[chosen, other]
+                reached[other] += arcs[chosen, other]
                 came[other] -= 1
         for other in graph.predecessors(chosen):
             if other in inside:

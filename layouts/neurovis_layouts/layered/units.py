@@ -1,8 +1,8 @@
 """Units: neurons that share a rank, and blocks: units that are placed as one piece.
 
-In: a LayoutProblem. Out: units in canonical order, each neuron in exactly one. A group shares a rank, unless connections
-within it run forward (a chain): then each of its neurons finds its own. Neurons that drive each other in a loop (a half-centre
-oscillator, a ring, a reservoir) are one block: a row where they are a line, else a ring.
+In: a LayoutProblem. Out: units in canonical order, each neuron in exactly one. A group shares a rank, unless
+connections within it run forward (a chain): then each of its neurons finds its own. Neurons that drive each other in
+a loop (a half-centre oscillator, a ring, a reservoir) are one block: a row where they are a line, else a ring.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import networkx as nx
 
 from neurovis_layouts.formations import offsets
 from neurovis_layouts.frame import from_picture
+from neurovis_spec.layout.geometry import snap, turn
 from neurovis_spec.layout.model import Arrangement, LayoutProblem, LayoutRefusalError, Point
 
 #: Loops of more neurons than this are unrolled along the direction instead of drawn as a ring.
@@ -66,7 +67,8 @@ def _arranged(problem: LayoutProblem) -> list[Unit]:
 
 
 def _graph(problem: LayoutProblem, members: Iterable[int]) -> nx.DiGraph[int]:
-    """The connections among these neurons, loops of one neuron to itself left out; nodes and edges in canonical order."""
+    """The connections among these neurons, loops of one neuron to itself left out; nodes and edges in canonical
+    order."""
     graph: nx.DiGraph[int] = nx.DiGraph()
     graph.add_nodes_from(sorted(members))
     for edge in problem.edges:
@@ -100,12 +102,28 @@ def _of_lone(problem: LayoutProblem, lone: Sequence[int]) -> list[Unit]:
     pairs.add_nodes_from(lone)
     pairs.add_edges_from((a, b) for (a, b), kind in kinds.items() if a < b and kinds.get((b, a)) == kind)
     found: list[Unit] = []
+    whole = _graph(problem, range(len(problem.neurons)))
     for component in sorted(sorted(part) for part in nx.connected_components(pairs)):
-        if 1 < len(component) <= _MOST_IN_A_RING:
+        if 1 < len(component) <= _MOST_IN_A_RING and not _returns(whole, component):
             found.append(_block(problem, component))
         else:
             found += [Unit((member,)) for member in component]
     return found
+
+
+def _returns(graph: nx.DiGraph[int], members: Sequence[int]) -> bool:
+    """Whether what leaves these neurons comes back to them through others: then one of them comes first."""
+    inside = set(members)
+    met = {after for member in members for after in graph.successors(member) if after not in inside}
+    waiting = sorted(met)
+    while waiting:
+        for after in graph.successors(waiting.pop()):
+            if after in inside:
+                return True
+            if after not in met:
+                met.add(after)
+                waiting.append(after)
+    return False
 
 
 def _block(problem: LayoutProblem, members: Sequence[int]) -> Unit:
@@ -120,7 +138,16 @@ def _block(problem: LayoutProblem, members: Sequence[int]) -> Unit:
         order = list(nx.dfs_preorder_nodes(graph, min(ends) if ends else min(members), sort_neighbors=sorted))
         if ends:
             how, wide = "row", _PAIR if len(members) == 2 else _LINE
+    if how == "ring" and len(order) in (4, 6):
+        # with a side on top, not a corner: connections from above and to below find their way between
+        return Unit(tuple(order), tuple(_on_its_side(offsets("ring", len(order), spacing * wide))))
     return Unit(tuple(order), tuple(offsets(how, len(order), spacing * wide)))
+
+
+def _on_its_side(places: Sequence[Point]) -> list[Point]:
+    """A ring of four or six turned back by half a place."""
+    cosine, sine = turn(0.5 / len(places))
+    return [(snap(x * cosine + y * sine), snap(y * cosine - x * sine)) for x, y in places]
 
 
 def _without_needless_loops(problem: LayoutProblem, found: list[Unit]) -> list[Unit]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from neurovis_spec.layout.model import Point, Route
 
@@ -68,9 +69,9 @@ def _leaning(x: float, y: float, lean: float, sign: float, length: float) -> Poi
 def _slopes(start: Point, end: Point, ways: Sequence[Waypoint]) -> list[float]:
     """Slopes (across by along) at waypoints: monotone (Fritsch and Butland 1984), so that nothing overshoots."""
     line = [start, *((way.x, way.y) for way in ways), end]
-    secants = [(b[0] - a[0]) / (b[1] - a[1]) if b[1] != a[1] else 0.0 for a, b in zip(line, line[1:], strict=False)]
+    secants = [(b[0] - a[0]) / (b[1] - a[1]) if b[1] != a[1] else 0.0 for a, b in pairwise(line)]
     result: list[float] = []
-    for before, after in zip(secants, secants[1:], strict=False):
+    for before, after in pairwise(secants):
         slope = 2 * before * after / (before + after) if before * after > 0 else 0.0
         result.append(max(-_SLOPE, min(_SLOPE, slope)))
     return result

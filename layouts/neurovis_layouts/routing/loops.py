@@ -25,24 +25,28 @@ _WAYS: tuple[Point, ...] = (
     (-_DIAGONAL, _DIAGONAL),
 )
 _ALONG = 0.15
-_DIAGONALLY = 0.1
+_DIAGONALLY = 0.25
+_CROWDED = 0.35
 #: Length of the handles: three quarters of it is how far the loop reaches.
-_HANDLES = (1.05, 0.8)
+_HANDLES = (1.05, 0.74)
 
 
 def loop(centre: Point, way: Point, handle: float, wide: float = 0.59) -> Route:
-    """A loop towards ``way`` (a unit vector); the handles are ``handle`` long along it."""
+    """A loop towards ``way`` (a unit vector); the handles are ``handle`` long along it. It begins on its upper (else
+    left) side, so that loops of a mirrored pair are mirror images."""
     (x, y), (ux, uy) = centre, way
     ax, ay = ux * handle, uy * handle
     bx, by = -uy * handle * wide, ux * handle * wide
+    if (by, bx) < (0.0, 0.0):
+        bx, by = -bx, -by
     return centre, (x + ax - bx, y + ay - by), (x + ax + bx, y + ay + by), centre
 
 
 def best_loop(
     centre: Point, index: int, turn: int, near: Sequence[Point], tangents: Sequence[Point], obstacles: Obstacles
 ) -> Route:
-    """The loop with most room. ``near`` are neighbours' centres, ``tangents`` unit vectors in which other edges leave or
-    arrive; ``turn`` counts the loops that this neuron has already: each further one is drawn around the first."""
+    """The loop with most room. ``near`` are neighbours' centres, ``tangents`` unit vectors in which other edges leave
+    or arrive; ``turn`` counts the loops that this neuron has already: each further one is drawn around the first."""
     ranked: list[tuple[float, int, Route]] = []
     for place, way in enumerate(_WAYS):
         crowd = _crowd(centre, way, near) + _traffic(way, tangents)
@@ -60,11 +64,11 @@ def _crowd(centre: Point, way: Point, near: Sequence[Point]) -> float:
     for other in near:
         far = distance(centre, other)
         towards = ((other[0] - centre[0]) * way[0] + (other[1] - centre[1]) * way[1]) / far
-        total += max(0.0, towards) / (far * far)
+        total += _CROWDED * max(0.0, towards) / (far * far)
     return total
 
 
 def _traffic(way: Point, tangents: Sequence[Point]) -> float:
-    """How many edges would run through the loop: those within some 40° of its way."""
-    inside = [max(0.0, way[0] * x + way[1] * y - 0.7) for x, y in tangents]
-    return min(1.5, 1.5 * sum(inside))
+    """How many edges would run through the loop: those within some 35° of its way."""
+    inside = [max(0.0, way[0] * x + way[1] * y - 0.82) for x, y in tangents]
+    return min(1.5, 2.5 * sum(inside))

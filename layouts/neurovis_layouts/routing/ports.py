@@ -9,13 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from neurovis_layouts.isotonic import spread
 
-_GAP = 0.22
+_GAP = 0.28
 _PARTNER_GAP = 0.5
 _WIDEST = 0.85
-_LEAN = 0.75
+#: Lines leave more steeply than they arrive: first out of the rank, then across.
+_LEAN_SOURCE, _LEAN_TARGET = 0.5, 0.75
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -36,11 +38,15 @@ def leanings(ports: Sequence[Port]) -> dict[tuple[int, bool], float]:
     A lone connection leans towards its other end; several keep a least difference, smaller where they are many.
     """
     ordered = sorted(ports)
-    wishes = [_LEAN * port.across / math.sqrt(port.across**2 + port.along**2) for port in ordered]
+    wishes = [
+        (_LEAN_SOURCE if port.at_source else _LEAN_TARGET)
+        * (port.across / math.sqrt(port.across * port.across + port.along * port.along))
+        for port in ordered
+    ]
     room = 2 * _WIDEST / max(1, len(ordered) - 1)
     gaps = [
         min(room, _PARTNER_GAP if first.partner == second.partner else _GAP)
-        for first, second in zip(ordered, ordered[1:], strict=False)
+        for first, second in pairwise(ordered)
     ]
     places = spread(wishes, [1.0] * len(ordered), gaps)
     # a whole fan that leans out to one side is moved back, one that is too wide is narrowed as well

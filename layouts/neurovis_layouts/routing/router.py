@@ -117,10 +117,7 @@ def _bows(
         reciprocal = (target, source) in between
         base = 0.2 + 0.05 * distance(start, end)
         for place, i in enumerate(equal):
-            if reciprocal:
-                height = base + 0.3 * place
-            else:
-                height = 0.3 * (place - (len(equal) - 1) / 2)
+            height = base + 0.3 * place if reciprocal else 0.3 * (place - (len(equal) - 1) / 2)
             sided = reciprocal or len(equal) > 1
             routes[i] = clear_bow(start, end, (source, target), obstacles, height, sided)[0]
     return routes
@@ -156,9 +153,7 @@ def _neighbours(centres: Sequence[Point], of: Mapping[int, object]) -> dict[int,
     for neuron in of:
         column, row = int(centres[neuron][0] // _NEAR), int(centres[neuron][1] // _NEAR)
         around = [k for i in (-1, 0, 1) for j in (-1, 0, 1) for k in cells.get((column + i, row + j), ())]
-        result[neuron] = [
-            centres[k] for k in around if k != neuron and distance(centres[k], centres[neuron]) <= _NEAR
-        ]
+        result[neuron] = [centres[k] for k in around if k != neuron and distance(centres[k], centres[neuron]) <= _NEAR]
     return result
 
 

@@ -1,0 +1,177 @@
+"""Layout files (§11): a Layout as YAML, and back.
+
+In: a Layout, or a text. Out: a text whose numbers read back exactly, or a Layout. A file that the layout command
+writes holds every neuron and every route; one written by hand may hold any part.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+
+from neurovis_spec.diagnostics import Findings, suggest
+from neurovis_spec.language.reader import read_text
+from neurovis_spec.language.source import Mapping, Node, Packed, Scalar, Sequence, describe
+from neurovis_spec.layout.model import Layout, Point, Route
+from neurovis_spec.layout.problem import edge_key, natural_key
+
+VERSION = 1
+_KEYS = ("neurovis_layout", "network", "engine", "positions", "routes")
+_NAME = r"[A-Za-z_][A-Za-z0-9_]*(?:\.[A-Za-z_][A-Za-z0-9_]*)*"
+_PLAIN = re.compile(rf"{_NAME}(?: -> {_NAME}(?: \([0-9]+\))?)?")
+#: What some YAML reader takes for something else than a text.
+_SPECIAL = frozenset({"null", "true", "false", "yes", "no", "on", "off", "y", "n"})
+#: A YAML key this long has to be announced by a question mark.
+_LONG_KEY = 1000
+
+
+def dump(layout: Layout) -> str:
+    """The layout as the text of a layout file: positions in natural order of the names, then every route.
+
+    >>> print(dump(Layout("x", "grid", {"A": (0.0, 0.5)}, {})), end="")
+    neurovis_layout: 1
+    network: x
+    engine: grid
+    positions:
+      A: [0, 0.5]
+    routes: {}
+    """
+    lines = [f"neurovis_layout: {VERSION}", f"network: {_text(layout.network)}", f"engine: {_text(layout.engine)}"]
+    positions = sorted(layout.positions, key=natural_key)
+    lines += _section("positions", [(name, _point(layout.positions[name])) for name in positions])
+    routes = sorted(layout.routes, key=edge_key)
+    lines += _section(
+        "routes", [(name, "[" + ", ".join(_point(point) for point in layout.routes[name]) + "]") for name in routes]
+    )
+    return "\n".join(lines) + "\n"
+
+
+def _section(title: str, entries: list[tuple[str, str]]) -> list[str]:
+    if not entries:
+        return [f"{title}: {{}}"]
+    lines = [f"{title}:"]
+    for name, value in entries:
+        key = _text(name)
+        lines += [f"  {key}: {value}"] if len(key) < _LONG_KEY else [f"  ? {key}", f"  : {value}"]
+    return lines
+
+
+def _text(text: str) -> str:
+    """Plain where every reader of YAML takes it for a text, else in double quotes (JSON's are YAML's, too)."""
+    plain = _PLAIN.fullmatch(text) is not None and text.casefold() not in _SPECIAL
+    return text if plain else json.dumps(text, ensure_ascii=True)
+
+
+def _point(point: Point) -> str:
+    return f"[{_number(point[0])}, {_number(point[1])}]"
+
+
+def _number(value: float) -> str:
+    """The shortest text that reads back as this number; whole ones without a point."""
+    value = float(value) + 0.0
+    if value.is_integer() and abs(value) < 2**53:
+        return str(int(value))
+    text = repr(value)
+    # an exponent without a point is no number to every reader of YAML
+    return text if "e" not in text or "." in text else text.replace("e", ".0e")
+
+
+def parse(text: str, file: str, findings: Findings) -> Layout | None:
+    """The layout that a text holds; None where something is wrong with it, which is then among the findings.
+
+    ``network`` and ``engine`` may be missing (then '' and 'manual'), and so may any neuron and any route.
+    """
+    before = findings.errors
+    document = read_text(text, file, findings)
+    if document is None or findings.errors > before:
+        return None
+    root = document.root
+    for entry in root.entries:
+        if entry.name not in _KEYS:
+            hint = suggest(entry.name, _KEYS, "keys of a layout file")
+            findings.error("unknown-key", entry.key.span, f"unknown key '{entry.name}' in a layout file", hint)
+    _check_version(root, findings)
+    network = _name(root, "network", "", findings)
+    engine = _name(root, "engine", "manual", findings)
+    positions: dict[str, Point] = {}
+    for name, node in _entries(root, "positions", findings):
+        point = _read_point(node, f"the position of '{name}'", findings)
+        if point is not None:
+            positions[name] = point
+    routes: dict[str, Route] = {}
+    for name, node in _entries(root, "routes", findings):
+        route = _read_route(node, name, findings)
+        if route is not None:
+            routes[name] = route
+    return None if findings.errors > before else Layout(network, engine, positions, routes)
+
+
+def _check_version(root: Mapping, findings: Findings) -> None:
+    node = root.get("neurovis_layout")
+    if node is None:
+        findings.error(
+            "missing-key", root.span, "a layout file begins with 'neurovis_layout: 1'", "add neurovis_layout: 1"
+        )
+    elif not isinstance(node, Scalar) or isinstance(node.value, bool) or node.value != VERSION:
+        findings.error("layout-version", node.span, f"expected version {VERSION}, found {describe(node)}")
+
+
+def _name(root: Mapping, key: str, default: str, findings: Findings) -> str:
+    node = root.get(key)
+    if node is None:
+        return default
+    if not isinstance(node, Scalar) or not isinstance(node.value, str):
+        findings.error("wrong-type", node.span, f"'{key}' is a name, found {describe(node)}")
+        return default
+    return node.value
+
+
+def _entries(root: Mapping, key: str, findings: Findings) -> list[tuple[str, Node]]:
+    node = root.get(key)
+    if node is None or (isinstance(node, Scalar) and node.value is None):
+        return []
+    if not isinstance(node, Mapping):
+        findings.error("wrong-type", node.span, f"'{key}' is a mapping of names, found {describe(node)}")
+        return []
+    return [(entry.name, entry.value) for entry in node.entries]
+
+
+def _read_point(node: Node, what: str, findings: Findings) -> Point | None:
+    items = node.items if isinstance(node, Sequence | Packed) else ()
+    if len(items) != 2:
+        found = f"a list of {len(items)}" if isinstance(node, Sequence | Packed) else describe(node)
+        findings.error("wrong-type", node.span, f"{what} is a pair [x, y], found {found}")
+        return None
+    x, y = (_read_number(item, what, findings) for item in items)
+    return None if x is None or y is None else (x, y)
+
+
+def _read_number(node: Node, what: str, findings: Findings) -> float | None:
+    value = node.value if isinstance(node, Scalar) else None
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        findings.error("wrong-type", node.span, f"{what} has a number here, found {describe(node)}")
+        return None
+    if not math.isfinite(value):
+        findings.error("not-finite", node.span, f"{what} has a number that is not finite")
+        return None
+    return float(value)
+
+
+def _read_route(node: Node, name: str, findings: Findings) -> Route | None:
+    what = f"the route of '{name}'"
+    if not isinstance(node, Sequence | Packed):
+        findings.error("wrong-type", node.span, f"{what} is a list of points, found {describe(node)}")
+        return None
+    items = node.items
+    points = [_read_point(item, what, findings) for item in items]
+    if len(items) < 4 or len(items) % 3 != 1:
+        findings.error(
+            "route-points",
+            node.span,
+            f"{what} has {len(items)} points; a cubic Bézier spline has 4, 7, 10, …",
+            "the centre of the source, then two control points and an end for each piece",
+        )
+        return None
+    whole = tuple(point for point in points if point is not None)
+    return whole if len(whole) == len(items) else None
