@@ -2,8 +2,8 @@
 
 In: a Recording and a path, or a path. Out: a file, or a Recording. A file is believed in nothing: headers are read
 before memory is taken, sizes must agree with each other and with the archive, and pickles are never loaded. Beside the
-arrays of §12 ours hold ``about``, a JSON text with what arrays do not say (names of groups and outputs, the network's hash,
-ranks of parallel connections); a file without it is read as well.
+arrays of §12 ours hold ``about``, a JSON text with what arrays do not say (names of groups and outputs, the network's
+hash, ranks of parallel connections); a file without it is read as well.
 """
 
 from __future__ import annotations

@@ -46,8 +46,9 @@ class Recording:
     """A run of a network with n neurons and m connections, p of which can change.
 
     ``step`` (rows,) are the steps recorded, ``activity`` (rows, n) is a[t], ``weights`` (rows, p) is w[t], before the
-    step's update; ``plastic`` (p,) are the indices of the changing connections,
-    ``weights_static`` (m − p,) the weights of the others, in their order. All arrays are read-only. ``recording["O"]`` is the activity of a neuron (rows,), of a group or output (rows, size).
+    step's update; ``plastic`` (p,) are the indices of the changing connections, ``weights_static`` (m − p,) those of
+    the others, in their order. All arrays are read-only. ``recording["O"]`` is the activity of a neuron (rows,), of a
+    group or output (rows, size).
     """
 
     activity: FloatArray
