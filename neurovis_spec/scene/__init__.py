@@ -5,6 +5,9 @@ Renderers use what stands here; ``encode``, ``film`` and ``choose_gains`` are in
 
 from neurovis_spec.scene.film import still
 from neurovis_spec.scene.model import (
+    HEAD_MORE,
+    HEAD_OF_LENGTH,
+    HEAD_OF_WIDTH,
     Arrowhead,
     Disc,
     Film,
@@ -27,6 +30,9 @@ from neurovis_spec.scene.themes import THEMES, blend, channels, colours, readabl
 
 __all__ = [
     "FAMILIES",
+    "HEAD_MORE",
+    "HEAD_OF_LENGTH",
+    "HEAD_OF_WIDTH",
     "SUBSCRIPT_DROP",
     "SUBSCRIPT_SIZE",
     "THEMES",

@@ -88,9 +88,13 @@ class Arrowhead:
         return self.tip, left, notch, right
 
 
+#: How the half width of a head follows from its length and the width of its line.
+HEAD_OF_LENGTH, HEAD_OF_WIDTH, HEAD_MORE = 0.28, 0.42, 0.6
+
+
 def head_half_width(width: float, length: float) -> float:
     """Half the width of the head on a line of this width: it grows slower than the line, but always covers its end."""
-    return max(0.28 * length + 0.42 * width, 0.5 * width / Arrowhead.NOTCH + 0.6)
+    return max(HEAD_OF_LENGTH * length + HEAD_OF_WIDTH * width, 0.5 / Arrowhead.NOTCH * width + HEAD_MORE)
 
 
 @dataclass(frozen=True, slots=True)

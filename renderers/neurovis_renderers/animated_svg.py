@@ -1,0 +1,236 @@
+"""Animated SVG: a Film as one file without script, the structure of the still with palettes on top.
+
+In: a Film. Out: the bytes of an ``.svg`` that moves, also inside ``<img>``. The attributes are those of frame 0; each
+group that changes has one SMIL animation of its ``class``, a letter for the colour and, where a weight changes, one each
+for width and glow. What these classes look like stands in a style sheet that holds only where no reduced motion is
+asked for: where it is, the picture stands still at frame 0.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from string import ascii_letters
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_renderers.markup import document, element, escape, num, open_group, pairs
+from neurovis_spec.scene import (
+    HEAD_MORE,
+    HEAD_OF_LENGTH,
+    HEAD_OF_WIDTH,
+    Arrowhead,
+    Film,
+    Group,
+    Progress,
+    RendererCapabilities,
+    Scene,
+    Text,
+    Theme,
+    colours,
+    readable,
+)
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+#: Levels of colour from −1 to +1; an odd number, so that 0 is one of them.
+LEVELS = 51
+#: At most so many different widths are told apart, and so many captions.
+_MOST_WIDTHS, _MOST_CAPTIONS = 240, 500
+_ROOT = "nv"
+
+
+class AnimatedSvgRenderer:
+    """Films as SVG."""
+
+    name = "animated_svg"
+    capabilities = RendererCapabilities(films=frozenset({".svg"}))
+
+    def draw(self, scene: Scene, suffix: str) -> bytes:
+        """Stills are made by ``svg``. Raises ValueError."""
+        raise ValueError("this renderer makes no stills")
+
+    def animate(self, film: Film, suffix: str, progress: Progress | None = None) -> bytes:
+        """The film as an SVG file: frame n shows during [n/F, (n+1)/F) seconds, and it starts over at the end."""
+        writer = _Writer(film)
+        body = []
+        for done, group in enumerate(film.scene.groups):
+            body.append(writer.group(group))
+            if progress is not None:
+                progress(done + 1, len(film.scene.groups))
+        return document(film.scene, "".join(body), writer.style(), {"class": _ROOT})
+
+
+class _Writer:
+    """Writes the groups of a film, and remembers which classes they use."""
+
+    def __init__(self, film: Film) -> None:
+        self._film = film
+        self._discs = {name: place for place, name in enumerate(film.discs)}
+        self._lines = {name: place for place, name in enumerate(film.lines)}
+        self._disc_levels = _levels(film.disc_values)
+        self._line_levels = _levels(film.line_values)
+        self._changing = film.changing
+        self._width_step = _step(film.line_widths)
+        self._glow_step = _step(film.glow_widths)
+        self._letters: set[int] = set()
+        self._widths: set[int] = set()
+        self._glows: set[int] = set()
+        self._captions = -1
+
+    def group(self, group: Group) -> str:
+        """A group, animated where it changes."""
+        if group.id == self._film.caption:
+            return self._caption(group)
+        if group.id in self._discs:
+            levels = self._disc_levels[:, self._discs[group.id]]
+            return self._animated(group, [self._letter(level) for level in levels.tolist()])
+        if group.id in self._lines:
+            return self._connection(group, self._lines[group.id])
+        shapes = "".join(element(shape) for shape in group.shapes)
+        return (f"{open_group(group)}{shapes}</g>" if group.title or group.data else shapes) + "\n"
+
+    def _letter(self, level: int) -> str:
+        self._letters.add(level)
+        return ascii_letters[level]
+
+    def _connection(self, group: Group, place: int) -> str:
+        tokens = [self._letter(level) for level in self._line_levels[:, place].tolist()]
+        if self._changing[place]:
+            widths = np.rint(self._film.line_widths[:, place] / self._width_step).astype(int).tolist()
+            glows = np.rint(self._film.glow_widths[:, place] / self._glow_step).astype(int).tolist()
+            self._widths.update(widths)
+            self._glows.update(glows)
+            tokens = [f"{c} w{w} g{g}" for c, w, g in zip(tokens, widths, glows, strict=True)]
+        return self._animated(group, tokens)
+
+    def _animated(self, group: Group, tokens: Sequence[str]) -> str:
+        shapes = "".join(
+            self._head_element(shape)
+            if isinstance(shape, Arrowhead) and group.id in self._lines and self._changing[self._lines[group.id]]
+            else element(shape, ' class="on"' if isinstance(shape, Text) and shape.on_disc else "")
+            for shape in group.shapes
+        )
+        frames = animation(tokens, self._film.frames / self._film.fps)
+        return f"{open_group(group, _class(tokens[0]))}{shapes}{frames}</g>\n"
+
+    def _head_element(self, head: Arrowhead) -> str:
+        """A head in its own coordinates, so that its width alone can be scaled: at the tip, pointing right."""
+        (x, y), (dx, dy) = head.tip, head.direction
+        half, back, notch = head.half_width, -head.length, -head.NOTCH * head.length
+        points = pairs([(0, 0), (back, half), (notch, 0), (back, -half)])
+        place = f"matrix({dx:.4g} {dy:.4g} {-dy:.4g} {dx:.4g} {num(x)} {num(y)})"
+        return (
+            f'<g transform="{place}"><polygon points="{points}" fill="{head.fill}" '
+            f'style="--h:{half:.4g};--l:{head.length:.4g}"/></g>'
+        )
+
+    def _caption(self, group: Group) -> str:
+        """One text for each caption; all but the one of the moment are not displayed."""
+        (shape,) = group.shapes
+        assert isinstance(shape, Text)
+        stride = max(1, math.ceil(self._film.frames / _MOST_CAPTIONS))
+        shown = list(dict.fromkeys(self._film.captions[::stride]))
+        number = {words: place for place, words in enumerate(shown)}
+        tokens = [f"t{number[words]}" for words in self._film.captions[::stride] for _ in range(stride)]
+        start = f'x="{num(shape.point[0])}" y="{num(shape.point[1])}"'
+        hidden = ' display="none"'
+        lines = "".join(
+            f"<text {start}{hidden if place else ''}>{escape(words)}</text>" for place, words in enumerate(shown)
+        )
+        frames = animation(tokens[: self._film.frames], self._film.frames / self._film.fps)
+        self._captions = len(shown)
+        return (
+            f'<g class="caption" font-size="{num(shape.size)}" fill="{shape.fill}"><g{_class(tokens[0])}>{lines}'
+            f"{frames}</g></g>\n"
+        )
+
+    def style(self) -> str:
+        """The style sheet; its rules hold only where motion is welcome."""
+        theme = self._film.scene.theme
+        rules = [
+            "[data-neuron]>circle,[data-connection] polygon{fill:currentColor}",
+            "[data-connection]>path:not(.glow){stroke:currentColor}",
+            ".on{fill:var(--d)}",
+            *self._palette(theme),
+        ]
+        if self._widths:
+            rules += self._width_rules()
+        if self._captions > 1:
+            rules.append(".caption text{display:none}")
+            rules += [f".t{n}>:nth-child({n + 1}){{display:inline}}" for n in range(self._captions)]
+        scoped = "".join(_scoped(rule) for rule in rules)
+        return f"<style>@media (prefers-reduced-motion:no-preference){{{scoped}}}</style>\n"
+
+    def _palette(self, theme: Theme) -> list[str]:
+        levels = sorted(self._letters)
+        fills = colours(theme, [2 * level / (LEVELS - 1) - 1 for level in levels])
+        return [
+            f".{ascii_letters[level]}{{color:{fill};--d:{readable(theme, fill)}}}"
+            for level, fill in zip(levels, fills, strict=True)
+        ]
+
+    def _width_rules(self) -> list[str]:
+        rules = [
+            '[class*=" w"]>path:not(.glow){stroke-width:calc(var(--w)*1px)}',
+            '[class*=" w"]>.glow{stroke-width:calc(var(--g)*1px)}',
+            f'[class*=" w"] polygon{{transform:scaleY(calc({_half_width("var(--w)", "var(--l)")}/var(--h)))}}',
+        ]
+        rules += [f".w{level}{{--w:{num(level * self._width_step)}}}" for level in sorted(self._widths)]
+        rules += [f".g{level}{{--g:{num(level * self._glow_step)}}}" for level in sorted(self._glows)]
+        return rules
+
+
+def _half_width(width: str, length: str) -> str:
+    """``head_half_width`` as a CSS expression."""
+    of_length, of_width, more = HEAD_OF_LENGTH, HEAD_OF_WIDTH, HEAD_MORE
+    return f"max({of_length}*{length} + {of_width}*{width},{0.5 / Arrowhead.NOTCH:.4g}*{width} + {more})"
+
+
+def _scoped(rule: str) -> str:
+    """A rule for this picture alone, should it stand inside a page."""
+    selectors, rest = rule.split("{", 1)
+    return ",".join(f".{_ROOT} {selector}" for selector in selectors.split(",")) + "{" + rest
+
+
+def _class(token: str) -> str:
+    return f' class="{token}"'
+
+
+def _levels(values: FloatArray) -> IntArray:
+    levels: IntArray = np.rint((np.nan_to_num(values) + 1) / 2 * (LEVELS - 1)).astype(np.int64)
+    return levels
+
+
+def _step(widths: FloatArray) -> float:
+    """The smallest difference of widths that is told apart: a twentieth of a unit, more where there are too many."""
+    return max(0.05, float(widths.max(initial=0.0)) / _MOST_WIDTHS)
+
+
+def animation(tokens: Sequence[str], seconds: float) -> str:
+    """The SMIL animation of a class through ``tokens``, one a frame; '' where it never changes.
+
+    Frames are told either one by one, which is even spacing, or where they change, whichever is shorter.
+    """
+    frames = len(tokens)
+    changes = [place for place in range(frames) if place == 0 or tokens[place] != tokens[place - 1]]
+    if len(changes) == 1:
+        return ""
+    every = ";".join(tokens)
+    digits = len(str(frames)) + 2
+    times = ";".join(_fraction(place, frames, digits) for place in changes)
+    some = ";".join(tokens[place] for place in changes)
+    values = f'values="{every}"'
+    if len(some) + len(times) + 12 < len(every):
+        values = f'values="{some}" keyTimes="{times}"'
+    return (
+        f'<animate attributeName="class" calcMode="discrete" dur="{seconds:.6g}s" repeatCount="indefinite" {values}/>'
+    )
+
+
+def _fraction(place: int, frames: int, digits: int) -> str:
+    """When a frame starts, as a share of the whole, rounded down so that it is not late."""
+    scale = 10**digits
+    return f"{place * scale // frames / scale:.{digits}f}".rstrip("0").rstrip(".").replace("0.", ".", 1) or "0"

@@ -1,0 +1,62 @@
+"""Lettering: texts as masks, by Pillow.
+
+In: a Text of a Scene. Out: a Mask. The font is Liberation Sans or Arial (what browsers on Linux take for ``Arial``),
+else DejaVu Sans, else the scalable font that is part of Pillow: pictures are the same wherever the same font is found.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from neurovis_renderers.coverage import Mask, Size
+from neurovis_spec.scene import SUBSCRIPT_DROP, SUBSCRIPT_SIZE, Text
+
+#: (regular, bold), the first pair found is taken
+_FILES = (
+    ("LiberationSans-Regular.ttf", "LiberationSans-Bold.ttf"),
+    ("Arial.ttf", "Arial_Bold.ttf"),
+    ("arial.ttf", "arialbd.ttf"),
+    ("DejaVuSans.ttf", "DejaVuSans-Bold.ttf"),
+)
+#: texts are drawn so much larger, then reduced: glyphs stand where they should, to a fraction of a pixel
+_FINER = 8
+
+Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
+
+
+@lru_cache(maxsize=64)
+def font(size: float, bold: bool) -> Font:
+    """The font of this size in pixels."""
+    for names in _FILES:
+        try:
+            return ImageFont.truetype(names[bold], size, layout_engine=ImageFont.Layout.BASIC)
+        except OSError:
+            continue
+    return ImageFont.load_default(size)
+
+
+def lettering(text: Text, size: Size) -> Mask:
+    """The mask of a text with its subscript, in a picture of this size."""
+    bold = text.weight >= 600
+    runs = [(text.text, text.size, 0.0)]
+    if text.subscript:
+        runs.append((text.subscript, SUBSCRIPT_SIZE * text.size, SUBSCRIPT_DROP * text.size))
+    fonts = [font(_FINER * points, bold) for _, points, _ in runs]
+    lengths = [made.getlength(words) / _FINER for made, (words, _, _) in zip(fonts, runs, strict=True)]
+    x = text.point[0] - {"start": 0.0, "middle": sum(lengths) / 2, "end": sum(lengths)}[text.anchor]
+    left, top = int(np.floor(x)) - 2, int(np.floor(text.point[1] - 1.2 * text.size)) - 1
+    wide, high = int(sum(lengths)) + 6, int(2 * text.size) + 4
+    tile = Image.new("L", (wide * _FINER, high * _FINER))
+    pen = ImageDraw.Draw(tile)
+    for made, (words, _, drop), length in zip(fonts, runs, lengths, strict=True):
+        at = ((x - left) * _FINER, (text.point[1] + drop - top) * _FINER)
+        pen.text(at, words, fill=255, font=made, anchor="ls")
+        x += length
+    share = np.asarray(tile.reduce(_FINER), float) / 255
+    rows, columns = np.nonzero(share)
+    rows, columns, share = rows + top, columns + left, share[rows, columns]
+    kept = (rows >= 0) & (rows < size[1]) & (columns >= 0) & (columns < size[0])
+    return Mask((rows * size[0] + columns)[kept].astype(np.int64), share[kept])
