@@ -1,1 +1,20 @@
-"""The command line."""
+"""The command line: ``neurovis COMMAND …``.
+
+In: arguments, files, standard input. Out: results on standard output, everything else on standard error, and an exit
+status: 0 for success, 1 where the input is at fault, 2 for wrong usage, 130 after Ctrl-C, 141 where the reader of
+standard output has gone. One module a command; a command's module is imported when it is called.
+"""
+
+from __future__ import annotations
+
+import sys
+
+
+def main() -> None:
+    """Run ``neurovis`` on the arguments of the process; ends it."""
+    try:
+        from neurovis_spec.cli.commands import neurovis
+
+        neurovis.main(prog_name="neurovis")
+    except KeyboardInterrupt:  # while something was still being imported, or after the command has ended
+        sys.exit(130)

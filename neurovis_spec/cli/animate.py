@@ -1,0 +1,59 @@
+"""``neurovis animate``: a moving picture of a run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from neurovis_spec.cli.files import check_target, network_of, recording_of, writing
+from neurovis_spec.cli.options import (
+    examples,
+    output_option,
+    recording_option,
+    set_option,
+    spec_argument,
+    theme_option,
+)
+from neurovis_spec.cli.progress import progress
+
+
+@click.command(
+    epilog=examples(
+        "neurovis animate first.yaml -o first.svg --steps 200",
+        "neurovis animate first.yaml -o first.svg --from 1000 --steps 128 --fps 25",
+        "neurovis animate first.yaml -o first.svg --recording first.npz",
+    )
+)
+@spec_argument
+@output_option("The moving picture; the suffix says what kind, such as .svg.", required=True)
+@click.option(
+    "--steps", type=click.IntRange(min=1), metavar="N", help="Frames, one a step; default: to the end of the run."
+)
+@click.option("--from", "start", type=click.IntRange(min=0), default=0, metavar="N", help="The first step to show.")
+@click.option(
+    "--fps",
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="F",
+    help="Frames a second; default 1/dt, at most 60, and 25 where the spec writes no dt.",
+)
+@recording_option
+@theme_option
+@set_option
+def command(
+    spec: str,
+    output: Path,
+    steps: int | None,
+    start: int,
+    fps: float | None,
+    recording: str | None,
+    theme: str | None,
+    settings: dict[str, float],
+) -> None:
+    """Draw a run as a moving picture, one frame a step."""
+    check_target(output)
+    network = network_of(spec, settings)
+    record = recording_of(recording)
+    with progress("drawing") as bar, writing(output):
+        network.animate(output, steps=steps, start=start, fps=fps, recording=record, theme=theme, progress=bar)
+    click.echo(str(output))

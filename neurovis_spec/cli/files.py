@@ -1,0 +1,128 @@
+"""Files and standard input as the commands read and write them.
+
+In: a SPEC, a recording or a table as named on the command line, or a path to write. Out: a compiled network, a
+recording, an array; or an error that ends the command.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from neurovis_spec.cli.failure import fault
+from neurovis_spec.cli.progress import progress
+
+if TYPE_CHECKING:
+    from neurovis_spec.api import CompiledNetwork
+    from neurovis_spec.compiler.network import FloatArray
+    from neurovis_spec.runtime.recording import Recording
+
+STDIN: Final = "<stdin>"
+#: characters read from standard input: more than the language allows, so that its own limit speaks
+_LARGEST: Final = (64 << 20) + 1
+
+
+def compiled(
+    spec: str, parameters: Mapping[str, float] | None = None, *, root: Path | None = None, limit: int | None = None
+) -> CompiledNetwork:
+    """The network of a SPEC, ``-`` being standard input. Raises SpecError."""
+    from neurovis_spec import api
+
+    with progress("compiling"):
+        if spec == "-":
+            folder = Path.cwd()
+            text = _standard_input()
+            return api.compile_text(text, file=STDIN, folder=folder, parameters=parameters, root=root, limit=limit)
+        return api.compile(spec, parameters=parameters, root=root, limit=limit)
+
+
+def network_of(spec: str, parameters: Mapping[str, float] | None = None) -> CompiledNetwork:
+    """The same, its warnings shown on standard error."""
+    from neurovis_spec.findings import show_text
+
+    network = compiled(spec, parameters)
+    if network.warnings:
+        click.echo(show_text(network.warnings, network.sources), err=True)
+    return network
+
+
+def _standard_input() -> str:
+    from neurovis_spec.diagnostics import Diagnostic, Span, SpecError
+
+    data = sys.stdin.buffer.read(_LARGEST)
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        before = data[: error.start].decode("utf-8")
+        line, column = before.count("\n") + 1, error.start and len(before) - before.rfind("\n")
+        span = Span(STDIN, line, column or 1, line, (column or 1) + 1)
+        message = f"the byte 0x{data[error.start]:02x} is not UTF-8"
+        shown = {STDIN: data.decode("utf-8", "replace")}
+        raise SpecError([Diagnostic("invalid-utf8", message, span, hint="save the text as UTF-8")], shown) from None
+
+
+def recording_of(path: str | None) -> Recording | None:
+    """A recording, if one is named. Raises RecordingError."""
+    if path is None:
+        return None
+    from neurovis_spec import api
+
+    return api.load(path)
+
+
+def tables(named: Mapping[str, str]) -> dict[str, FloatArray]:
+    """Input name to array (steps, columns) of the ``.csv`` and ``.npy`` files. Raises SpecError with all findings."""
+    if not named:
+        return {}
+    from neurovis_spec.diagnostics import Findings, Span
+    from neurovis_spec.language.data_files import read_table
+
+    findings = Findings()
+    arrays: dict[str, FloatArray] = {}
+    for name, text in named.items():
+        place = Span(text, 1, 1, 1, 1)
+        folder = Path(text).resolve().parent
+        table = read_table(Path(text).resolve().name, folder, folder, place, findings)
+        if table is None:
+            continue
+        if not table.present.all():
+            row = int((~table.present).any(axis=1).argmax()) + 1
+            findings.error("cell-empty", place, f"a cell is empty, in row {row} of the numbers")
+        arrays[name] = table.values
+    findings.check()
+    return arrays
+
+
+def check_target(path: Path | None) -> None:
+    """Refuse a path that cannot be written before any work is done for it."""
+    if path is None:
+        return
+    if path.is_dir():
+        raise fault(f"{path} is a folder, not a file")
+    if not path.parent.is_dir():
+        raise fault(f"{path}: there is no folder '{path.parent}'", f"make it: mkdir -p {path.parent}")
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """A block that writes a file; what the system refuses is said of this path."""
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise fault(f"{path} cannot be written: {error.strerror or error}") from error
+
+
+def count(number: int, word: str) -> str:
+    """A number with thousands apart, and its noun.
+
+    >>> count(12000, "step"), count(1, "step")
+    ('12,000 steps', '1 step')
+    """
+    return f"{number:,} {word}{'' if number == 1 else 's'}"

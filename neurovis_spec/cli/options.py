@@ -1,0 +1,117 @@
+"""Arguments and options that several commands share.
+
+In: texts of the command line. Out: checked values; what cannot be one is wrong usage (status 2), with the nearest
+known names where a name is wanted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TypeVar
+
+import click
+
+from neurovis_spec import plugins
+from neurovis_spec.diagnostics import suggest
+
+F = TypeVar("F", bound=Callable[..., object])
+Callback = Callable[[click.Context, click.Parameter, str | None], str | None]
+
+
+def _pair(text: str, form: str) -> tuple[str, str]:
+    """The two sides of ``name=…``."""
+    name, _, value = (part.strip() for part in text.partition("="))
+    if not name or not value:
+        raise click.BadParameter(f"'{text}' is not of the form {form}")
+    return name, value
+
+
+def _settings(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, float]:
+    """Name to number; the last of several counts."""
+    settings = {}
+    for name, text in (_pair(value, "name=value") for value in values):
+        try:
+            number = float(text)
+        except ValueError:
+            number = math.nan
+        if not math.isfinite(number) or "_" in text:
+            raise click.BadParameter(f"'{text}' is not a finite number")
+        settings[name] = number
+    return settings
+
+
+def _files(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, str]:
+    """Name to path; the last of several counts."""
+    return dict(_pair(value, "name=FILE") for value in values)
+
+
+def known(what: str, names: Callable[[], Iterable[str]]) -> Callback:
+    """A check for an option whose value is one of ``names()``, which is not called before there is a value."""
+
+    def check(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+        if value is not None:
+            there = tuple(names())
+            if value not in there:
+                raise click.BadParameter(f"there is no {what} '{value}'; {suggest(value, there, 'there are')}")
+        return value
+
+    return check
+
+
+def _themes() -> Iterable[str]:
+    from neurovis_spec.scene.themes import THEMES
+
+    return THEMES
+
+
+spec_argument = click.argument("spec", metavar="SPEC")
+set_option = click.option(
+    "--set",
+    "settings",
+    metavar="name=value",
+    multiple=True,
+    callback=_settings,
+    help="Give a parameter another value. Repeatable.",
+)
+input_option = click.option(
+    "--input",
+    "inputs",
+    metavar="name=FILE",
+    multiple=True,
+    callback=_files,
+    help="Replace the source of an input by a .csv or .npy file, one row a step. Repeatable.",
+)
+backend_option = click.option(
+    "--backend",
+    metavar="B",
+    callback=known("backend", lambda: ("list", *plugins.names(plugins.BACKENDS))),
+    help="What computes; 'list' shows which there are.",
+)
+engine_option = click.option(
+    "--engine",
+    metavar="E",
+    callback=known("layout engine", lambda: ("auto", *plugins.names(plugins.LAYOUTS))),
+    help="Layout engine, such as layered, circular, grid or manual; else the spec's.",
+)
+theme_option = click.option(
+    "--theme",
+    metavar="T",
+    callback=known("theme", _themes),
+    help="default, dark, print or paper; else the spec's.",
+)
+recording_option = click.option(
+    "--recording", metavar="FILE", help="Show steps of this recording; without it the network is run."
+)
+
+
+def output_option(text: str, *, required: bool = False) -> Callable[[F], F]:
+    """``-o FILE``."""
+    kind = click.Path(path_type=Path)
+    return click.option("-o", "--output", type=kind, metavar="FILE", required=required, help=text)
+
+
+def examples(*lines: str) -> str:
+    """The examples at the end of a command's help, a line each."""
+    return "\b\nExamples:\n" + "\n".join(f"  {line}" for line in lines)

@@ -1,0 +1,147 @@
+"""The overview of a compiled network: what ``neurovis inspect`` prints for people.
+
+In: a compiled network. Out: a text: tables of groups, connections by entry, inputs and outputs, the connection matrix
+of a small network (Eq. 11), the choices made and the hash.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from neurovis_spec.cli.files import count
+from neurovis_spec.cli.tables import number, spread, table
+from neurovis_spec.findings import printable
+
+if TYPE_CHECKING:
+    from neurovis_spec.api import CompiledNetwork
+    from neurovis_spec.compiler.network import Group, Input, IntArray, Network
+
+#: The largest network whose connection matrix is shown, in neurons.
+_MATRIX = 24
+_OF_GROUPS = ("group", "neurons", "size", "activation", "model", "combine", "bias", "input", "box")
+_OF_ENTRIES = ("entry", "number", "weight", "delay", "rule", "bounds")
+
+
+def overview(compiled: CompiledNetwork) -> str:
+    """All of it, paragraph by paragraph."""
+    network = compiled.network
+    return "\n\n".join(part for part in _parts(compiled, network) if part)
+
+
+def _parts(compiled: CompiledNetwork, network: Network) -> Iterator[str]:
+    yield _head(network)
+    if network.parameters:
+        yield "parameters\n" + table([(name, number(value)) for name, value in network.parameters.items()])
+    groups = [_group(network, group) for group in network.neurons.groups]
+    yield "neurons\n" + table(*_without_empty(groups, _OF_GROUPS))
+    if len(network.connections):
+        entries = [_entry(network, index, name) for index, name in enumerate(network.connections.entries)]
+        yield "connections\n" + table(*_without_empty(entries, _OF_ENTRIES))
+    if network.inputs:
+        yield "inputs\n" + table([_input(entry) for entry in network.inputs], ("name", "size", "source"))
+    if network.outputs:
+        names = network.neurons.names
+        outputs = [(o.name, _few([names[i] for i in o.neurons.tolist()])) for o in network.outputs]
+        yield "outputs\n" + table(outputs, ("name", "neurons"))
+    yield _matrix(network)
+    choices = [("layout engine", *compiled.choose_engine()), ("backend", *compiled.choose_backend())]
+    yield "choices\n" + table([(what, f"{name}: {why}") for what, name, why in choices])
+    yield f"hash {network.hash}"
+
+
+def _head(network: Network) -> str:
+    """The name, the sizes and the clock."""
+    plastic = len(network.changing)
+    lines = [
+        f"{network.name}: {network.title}" if network.title != network.name else network.name,
+        f"{count(len(network.neurons), 'neuron')}, {count(len(network.connections), 'connection')}"
+        + (f", {plastic:,} of them learning" if plastic else ""),
+        f"dt {number(network.dt)} s, {count(network.steps, 'step')} ({number(network.dt * network.steps)} s)"
+        + (f", episodes of {count(network.episode, 'step')}" if network.episode is not None else "")
+        + f", seed {network.seed}",
+    ]
+    return "\n".join(printable(line) for line in lines)
+
+
+def _group(network: Network, group: Group) -> tuple[str, ...]:
+    names = network.neurons.names[group.start : group.start + group.count]
+    return (
+        group.name,
+        _range(names),
+        str(group.count),
+        _defined(group.activation, group.activation_parameters),
+        _defined(group.model, group.model_parameters),
+        group.combine,
+        spread(network.neurons.bias[list(group.indices)].tolist()),
+        group.input or "",
+        group.box or "",
+    )
+
+
+def _defined(name: str, parameters: Mapping[str, tuple[float, ...]]) -> str:
+    """A definition in use, with the values of its parameters."""
+    given = ", ".join(f"{key}={spread(values)}" for key, values in parameters.items())
+    return f"{name}({given})" if given else name
+
+
+def _range(names: tuple[str, ...]) -> str:
+    return names[0] if len(names) == 1 else f"{names[0]} … {names[-1]}"
+
+
+def _few(names: list[str], most: int = 12) -> str:
+    return " ".join(names[:most]) + (" …" if len(names) > most else "")
+
+
+def _entry(network: Network, index: int, name: str) -> tuple[str, ...]:
+    connections = network.connections
+    members = np.flatnonzero(connections.entry == index)
+    if not len(members):
+        return name, "0", "", "", "", ""
+    rules = dict.fromkeys(connections.rules[members].tolist())
+    return (
+        name,
+        f"{len(members):,}",
+        spread(connections.weights[members].tolist()),
+        _delays(connections.delays[members]),
+        ", ".join(network.plasticity[rule].title for rule in rules if rule >= 0),
+        _bounds(float(connections.low[members[0]]), float(connections.high[members[0]])),
+    )
+
+
+def _delays(delays: IntArray) -> str:
+    low, high = int(delays.min()), int(delays.max())
+    return str(low) if low == high else f"{low} … {high}"
+
+
+def _bounds(low: float, high: float) -> str:
+    return "" if low == -np.inf and high == np.inf else f"{number(low)} … {number(high)}"
+
+
+def _input(entry: Input) -> tuple[str, str, str]:
+    source = "external"
+    if entry.expression is not None:
+        source = "expression"
+    elif entry.table is not None:
+        source = f"table of {count(len(entry.table), 'row')}"
+    return entry.name, str(entry.size), source
+
+
+def _matrix(network: Network) -> str:
+    """C of Eq. 11: 1 where a connection leads from the row's neuron to the column's; more where several do."""
+    size = len(network.neurons)
+    if size > _MATRIX or not len(network.connections):
+        return ""
+    matrix = np.zeros((size, size), dtype=np.int64)
+    np.add.at(matrix, (network.connections.sources, network.connections.targets), 1)
+    names = network.neurons.names
+    rows = [(name, *(str(c) if c else "·" for c in row)) for name, row in zip(names, matrix.tolist(), strict=True)]
+    return "connection matrix C (from row to column)\n" + table(rows, ("", *names), right=True)
+
+
+def _without_empty(rows: Sequence[Sequence[str]], header: Sequence[str]) -> tuple[list[list[str]], list[str]]:
+    """Without the columns that say nothing."""
+    kept = [column for column in range(len(header)) if any(row[column] for row in rows)]
+    return [[row[column] for column in kept] for row in rows], [header[column] for column in kept]

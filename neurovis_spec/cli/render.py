@@ -1,0 +1,55 @@
+"""``neurovis render``: a picture of one step."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from neurovis_spec.cli.files import check_target, network_of, recording_of, writing
+from neurovis_spec.cli.options import (
+    engine_option,
+    examples,
+    output_option,
+    recording_option,
+    set_option,
+    spec_argument,
+    theme_option,
+)
+from neurovis_spec.cli.progress import progress
+
+
+@click.command(
+    epilog=examples(
+        "neurovis render first.yaml -o first.svg",
+        "neurovis render first.yaml -o first.png --step 120 --theme dark",
+        "neurovis render first.yaml -o first.svg --recording first.npz",
+    )
+)
+@spec_argument
+@output_option("The picture; the suffix says what kind, .svg or .png.", required=True)
+@click.option("--step", type=click.IntRange(min=0), metavar="N", help="The step to show; default: the last.")
+@recording_option
+@theme_option
+@engine_option
+@set_option
+def command(
+    spec: str,
+    output: Path,
+    step: int | None,
+    recording: str | None,
+    theme: str | None,
+    engine: str | None,
+    settings: dict[str, float],
+) -> None:
+    """Draw one step as a picture.
+
+    Colours show activities and signals, thickness shows weights, glow shows how weights change (the legend gives the
+    scales).
+    """
+    check_target(output)
+    network = network_of(spec, settings)
+    record = recording_of(recording)
+    with progress("drawing") as bar, writing(output):
+        network.render(output, step=step, recording=record, theme=theme, engine=engine, progress=bar)
+    click.echo(str(output))

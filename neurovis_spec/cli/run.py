@@ -1,0 +1,114 @@
+"""``neurovis run``: a run of a network, recorded or summed up."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import click
+
+from neurovis_spec.cli.files import check_target, count, network_of, recording_of, tables, writing
+from neurovis_spec.cli.options import backend_option, examples, input_option, output_option, set_option
+from neurovis_spec.cli.progress import progress
+
+if TYPE_CHECKING:
+    from neurovis_spec.api import CompiledNetwork
+    from neurovis_spec.runtime.recording import Recording
+
+#: activities shown where nothing is written to a file
+_MOST_SHOWN = 20
+
+
+@click.command(
+    epilog=examples(
+        "neurovis run first.yaml",
+        "neurovis run first.yaml --steps 4000 --set gain=0.5 -o first.npz",
+        "neurovis run first.yaml --input touch=touch.csv --every 10 -o first.csv",
+        "neurovis run first.yaml --from first.npz -o second.npz",
+        "neurovis run --backend list",
+    )
+)
+@click.argument("spec", metavar="SPEC", required=False)
+@click.option("--steps", type=click.IntRange(min=1), metavar="N", help="Steps to run; default: the spec's time.steps.")
+@set_option
+@input_option
+@backend_option
+@click.option(
+    "--every", type=click.IntRange(min=1), default=1, metavar="K", help="Record every K-th step only; default 1."
+)
+@click.option(
+    "--from", "start", metavar="RECORDING", help="Begin with the last weights and activities of this recording."
+)
+@output_option("Write the recording here (.npz or .csv); without it a summary is printed.")
+def command(
+    spec: str | None,
+    steps: int | None,
+    settings: dict[str, float],
+    inputs: dict[str, str],
+    backend: str | None,
+    every: int,
+    start: str | None,
+    output: Path | None,
+) -> None:
+    """Run a network and write a recording.
+
+    A recording holds the activity of every neuron and every weight that can change, at every step. Without -o
+    nothing is written, and the last step's values are printed.
+    """
+    if backend == "list":
+        _list_backends()
+        return
+    if spec is None:
+        raise click.UsageError("Missing argument 'SPEC'.")
+    check_target(output)
+    _check_format(output)
+    network = network_of(spec, settings)
+    arrays, before = tables(inputs), recording_of(start)
+    begun = perf_counter()
+    with progress("running") as bar:
+        recording = network.run(steps, arrays, backend=backend, every=every, start=before, progress=bar)
+    seconds = perf_counter() - begun
+    made = network.network.steps if steps is None else steps
+    summary = f"{count(made, 'step')} in {seconds:.2f} s, backend {backend or network.choose_backend()[0]}"
+    if output is None:
+        _print(network, recording, summary)
+        return
+    with progress("writing"), writing(output):
+        recording.save(output)
+    click.echo(f"{output}: {summary}")
+
+
+def _list_backends() -> None:
+    from neurovis_spec import api
+
+    for name, available, note in api.backends():
+        click.echo(f"{name} available {note}".rstrip() if available else f"{name} unavailable: {note}")
+
+
+def _check_format(output: Path | None) -> None:
+    """Refuse a suffix that no format has before anything is run."""
+    if output is not None:
+        from neurovis_spec.runtime.formats import for_path
+
+        for_path(output)
+
+
+def _print(network: CompiledNetwork, recording: Recording, summary: str) -> None:
+    """The outputs at the last step recorded, or the activities where the spec names none."""
+    from neurovis_spec.cli.tables import number, table
+
+    arrays = network.network
+    last = recording.activity[-1].tolist()
+    click.echo(f"{network.name}: {summary}")
+    if arrays.outputs:
+        what = "outputs"
+        rows = [(o.name, " ".join(number(last[i]) for i in o.neurons.tolist()[:_MOST_SHOWN])) for o in arrays.outputs]
+    else:
+        what = "activities"
+        rows = [(name, number(value)) for name, value in zip(recording.neurons, last, strict=True)][:_MOST_SHOWN]
+    click.echo(f"{what} at step {recording.step[-1]}:")
+    click.echo(table(rows))
+    if recording.weights.shape[1]:
+        least, most = recording.weights[-1].min(), recording.weights[-1].max()
+        click.echo(f"{count(recording.weights.shape[1], 'changing weight')}: {number(least)} to {number(most)}")

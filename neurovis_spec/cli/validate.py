@@ -1,0 +1,71 @@
+"""``neurovis validate``: every finding of one or several specs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import click
+
+from neurovis_spec.cli.files import STDIN, compiled, count
+from neurovis_spec.cli.options import examples
+from neurovis_spec.diagnostics import Diagnostic, SpecError
+
+
+@click.command(
+    epilog=examples(
+        "neurovis validate first.yaml",
+        "neurovis validate specs/*.yaml --strict",
+        "cat first.yaml | neurovis validate - --format json",
+    )
+)
+@click.argument("specs", metavar="SPEC...", nargs=-1, required=True)
+@click.option(
+    "--format", "form", type=click.Choice(["text", "json"]), default="text", help="text (default) or a JSON array."
+)
+@click.option("--strict", is_flag=True, help="Take warnings for errors.")
+@click.option("--limit", type=click.IntRange(min=1), metavar="N", help="The most connections; default ten million.")
+@click.option(
+    "--root",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Data files may lie anywhere below; default: the folder of the spec.",
+)
+def command(specs: tuple[str, ...], form: str, strict: bool, limit: int | None, root: Path | None) -> None:
+    """Show all errors and warnings of specs at once.
+
+    Findings go to standard error, and a line for each spec without errors to standard output; with --format json the
+    findings go to standard output. The status is 1 if there is an error.
+    """
+    if specs.count("-") > 1:
+        raise click.UsageError("standard input (-) can be read only once")
+    found: list[Diagnostic] = []
+    sources: dict[str, str] = {}
+    for spec in specs:
+        try:
+            network = compiled(spec, limit=limit, root=root)
+        except SpecError as error:
+            found += error.diagnostics
+            sources |= error.sources
+            continue
+        found += network.warnings
+        sources |= network.sources
+        if form == "text" and not (strict and network.warnings):
+            arrays = network.network
+            size = f"{count(len(arrays.neurons), 'neuron')}, {count(len(arrays.connections), 'connection')}"
+            click.echo(f"{STDIN if spec == '-' else spec}: ok ({size})")
+    if strict:
+        found = [replace(finding, severity="error") for finding in found]
+    _show(found, sources, form)
+    if any(finding.severity == "error" for finding in found):
+        raise click.exceptions.Exit(1)
+
+
+def _show(found: Iterable[Diagnostic], sources: dict[str, str], form: str) -> None:
+    from neurovis_spec.findings import show_text, to_json
+
+    if form == "json":
+        click.echo(to_json(found))
+    elif text := show_text(found, sources):
+        click.echo(text, err=True)
