@@ -109,22 +109,31 @@ def _moved(shape: Shape, x: float, y: float) -> Shape:
 
 
 def _colour(contents: Contents, gains: Gains, theme: Theme) -> Entry:
-    shapes: list[Shape] = [
-        _heading("Colour", theme),
-        Ramp((0, _SAMPLE_Y - 5), _RAMP, 10, tuple(colours(theme, np.linspace(-1, 1, _STRIPES)))),
-    ]
     rows = [("neuron: activity", gains.activity, _FIRST_Y)]
     if contents.lines:
         rows.append(("line: signal w·a", gains.signal, _SECOND_Y))
-    for words, gain, y in rows:
-        full = texts.number(1 / abs(gain)) if gain else "∞"
-        less, more = ("−", "+") if gain >= 0 else ("+", "−")
+    told = [(words, *_ends(gain), y) for words, gain, y in rows]
+    # the words stand in the middle, so the longer end counts twice
+    needed = [
+        texts.width(words, _SMALL) + 2 * max(texts.width(low, _SMALL), texts.width(high, _SMALL)) + 14
+        for words, low, high, _ in told
+    ]
+    across = max(_RAMP, *needed)
+    stripes = colours(theme, np.linspace(-1, 1, _STRIPES))
+    shapes: list[Shape] = [_heading("Colour", theme), Ramp((0, _SAMPLE_Y - 5), across, 10, tuple(stripes))]
+    for words, low, high, y in told:
         shapes += [
-            Text((0, y), less + full, _SMALL, theme.muted),
-            Text((_RAMP / 2, y), words, _SMALL, theme.muted, "middle"),
-            Text((_RAMP, y), more + full, _SMALL, theme.muted, "end"),
+            Text((0, y), low, _SMALL, theme.muted),
+            Text((across / 2, y), words, _SMALL, theme.muted, "middle"),
+            Text((across, y), high, _SMALL, theme.muted, "end"),
         ]
-    return Entry(tuple(shapes), _RAMP)
+    return Entry(tuple(shapes), across)
+
+
+def _ends(gain: float) -> tuple[str, str]:
+    """The values at which the colour is full; they change places where the gain is negative."""
+    full = texts.number(1 / abs(gain)) if gain else "∞"
+    return ("−" + full, "+" + full) if gain >= 0 else ("+" + full, "−" + full)
 
 
 def _thickness(gains: Gains, theme: Theme) -> Entry:

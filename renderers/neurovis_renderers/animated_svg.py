@@ -1,9 +1,9 @@
 """Animated SVG: a Film as one file without script, the structure of the still with palettes on top.
 
-In: a Film. Out: the bytes of an ``.svg`` that moves, also inside ``<img>``. The attributes are those of frame 0; each
-group that changes has one SMIL animation of its ``class``, a letter for the colour and, where a weight changes, one each
-for width and glow. What these classes look like stands in a style sheet that holds only where no reduced motion is
-asked for: where it is, the picture stands still at frame 0.
+In: a Film. Out: the bytes of an ``.svg`` that moves, also inside ``<img>``. The attributes are those of frame 0;
+each group that changes has one SMIL animation of its ``class``, a letter for the colour and, where a weight
+changes, one each for width and glow. What these classes look like stands in a style sheet that holds only where no
+reduced motion is asked for: where it is, the picture stands still at frame 0.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Coverage: how much of each pixel a shape covers, computed from distances rather than by supersampling.
 
 In: discs, strokes, polygons and rectangles in pixels. Out: a Mask: the pixels that a shape touches and the share of
-each that it covers. A Field keeps the distances of a stroke's pixels, so that another width costs no geometry. NumPy alone.
+each that it covers. A Field keeps the distances of a stroke's pixels, so that another width costs no geometry.
+NumPy alone.
 """
 
 from __future__ import annotations

@@ -1,0 +1,309 @@
+"""What a picture holds and where: lines end at discs, texts do not touch, everything lies inside."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hand_networks import C, Case, G, loop, network, numbered, straight, straight_layout, use_case_1
+
+from neurovis_spec.compiler.network import Network, RenderSettings
+from neurovis_spec.layout.model import Layout, Point
+from neurovis_spec.scene import Arrowhead, Disc, Group, Rectangle, Scene, Spline, Text, still, texts
+from neurovis_spec.scene.encode import encode
+from neurovis_spec.scene.film import film
+from neurovis_spec.scene.gains import Gains, choose_gains
+from neurovis_spec.scene.geometry import Rect, overlap, sample
+
+CASE = use_case_1(400)
+GAINS = choose_gains(CASE.network, RenderSettings(), *CASE.peaks)
+PLAIN = Gains(1.0, 1.0, 4.0, 100.0)
+
+
+def picture(case: Case = CASE, step: int = 160, settings: RenderSettings | None = None) -> Scene:
+    return encode(case.network, case.layout, case.snapshot(step), GAINS, settings or RenderSettings())
+
+
+def small(made: Network, layout: Layout, settings: RenderSettings | None = None, gains: Gains = PLAIN) -> Scene:
+    weights = made.connections.weights
+    case = Case(made, layout, np.full((1, len(made.neurons)), 0.5), weights[None])
+    return encode(made, layout, case.snapshot(0), gains, settings or RenderSettings())
+
+
+def with_data(scene: Scene, key: str) -> dict[str, Group]:
+    return {g.data[key] + g.data.get("index", ""): g for g in scene.groups if key in g.data}
+
+
+def text_rect(text: Text) -> Rect:
+    width = texts.width(text.text, text.size, text.weight, text.subscript)
+    left = text.point[0] - {"start": 0.0, "middle": width / 2, "end": width}[text.anchor]
+    return left, text.point[1] - 0.75 * text.size, left + width, text.point[1] + 0.2 * text.size
+
+
+def all_texts(scene: Scene) -> list[Text]:
+    return [s for s in scene.shapes() if isinstance(s, Text)]
+
+
+def check_texts(scene: Scene) -> None:
+    """No text touches another or leaves the picture; those on no disc touch none."""
+    rects = [(t, text_rect(t)) for t in all_texts(scene)]
+    for place, (_, one) in enumerate(rects):
+        assert one[0] >= 0
+        assert one[1] >= 0
+        assert one[2] <= scene.width
+        assert one[3] <= scene.height
+        assert not [t.text for t, other in rects[place + 1 :] if overlap(one, other)]
+    for shape in scene.shapes():
+        if isinstance(shape, Disc):
+            (x, y), r = shape.centre, shape.radius
+            for text, (x0, y0, x1, y1) in rects:
+                if not text.on_disc:
+                    assert math.hypot(x - min(max(x, x0), x1), y - min(max(y, y0), y1)) > r, text.text
+
+
+def check_inside(scene: Scene) -> None:
+    dots = []
+    for shape in scene.shapes():
+        match shape:
+            case Spline():
+                line = sample(shape.points, 16)
+                dots += [line - shape.width / 2, line + shape.width / 2]
+            case Disc():
+                reach = shape.radius + shape.stroke_width / 2
+                dots += [np.array([shape.centre]) - reach, np.array([shape.centre]) + reach]
+            case Arrowhead():
+                dots.append(np.array(shape.points))
+            case Rectangle():
+                far = (shape.corner[0] + shape.width, shape.corner[1] + shape.height)
+                dots.append(np.array([shape.corner, far]))
+            case _:
+                pass
+    everything = np.concatenate(dots)
+    assert everything.min() >= 0
+    assert everything[:, 0].max() <= scene.width
+    assert everything[:, 1].max() <= scene.height
+
+
+@pytest.mark.parametrize("settings", [RenderSettings(), RenderSettings(size=(500, 700)), RenderSettings(title=False)])
+def test_use_case_1_lies_inside_and_no_text_touches_another(settings: RenderSettings) -> None:
+    scene = picture(settings=settings)
+    check_texts(scene)
+    check_inside(scene)
+
+
+def test_each_neuron_and_connection_is_there_once_with_its_attributes() -> None:
+    scene = picture()
+    assert set(with_data(scene, "neuron")) == set(CASE.network.neurons.names)
+    lines = with_data(scene, "connection")
+    assert set(lines) == set(CASE.network.connection_names)
+    assert lines["K1 -> O"].data == {"connection": "K1 -> O", "from": "K1", "to": "O"}
+    assert len([g for g in scene.groups if "connection" in g.data]) == 28
+
+
+def test_titles_say_name_value_and_rule() -> None:
+    scene = picture(step=300)
+    weight = CASE.weights[300, 21]
+    title = with_data(scene, "connection")["K2 -> O"].title
+    assert "K2 → O" in title
+    assert texts.number(weight, 4) in title
+    assert "delta(rate=0.01)" in title
+    assert texts.number(CASE.activity[300, 0], 4) in with_data(scene, "neuron")["C1"].title
+
+
+def test_lines_run_from_rim_to_rim_and_heads_point_at_their_targets() -> None:
+    scene = picture()
+    discs = {name: g.shapes[0] for name, g in with_data(scene, "neuron").items()}
+    for group in with_data(scene, "connection").values():
+        line = next(s for s in group.shapes if isinstance(s, Spline) and not s.glow)
+        head = next(s for s in group.shapes if isinstance(s, Arrowhead))
+        source, target = discs[group.data["from"]], discs[group.data["to"]]
+        assert isinstance(source, Disc)
+        assert isinstance(target, Disc)
+        assert source.radius < math.dist(line.points[0], source.centre) < source.radius + 4
+        assert target.radius < math.dist(head.tip, target.centre) < target.radius + 4
+        assert math.dist(line.points[-1], head.points[2]) < 0.6
+        dots = sample(line.points, 40)
+        for disc in (source, target):
+            assert np.hypot(*(dots - np.array(disc.centre)).T).min() > disc.radius
+
+
+def test_trimming_keeps_the_curve() -> None:
+    """Every point of what is drawn lies on the route of the layout."""
+    scene = picture()
+    discs = {name: g.shapes[0] for name, g in with_data(scene, "neuron").items()}
+    one, other = discs["C1"], discs["K8"]
+    assert isinstance(one, Disc)
+    assert isinstance(other, Disc)
+    scale = (other.centre[0] - one.centre[0]) / 4.5
+    route = sample(CASE.layout.routes["C1 -> K8"], 4000)
+    drawn = next(s for s in with_data(scene, "connection")["C1 -> K8"].shapes if isinstance(s, Spline))
+    positions = CASE.layout.positions["C1"]
+    for x, y in sample(drawn.points, 10).tolist():
+        at = ((x - one.centre[0]) / scale + positions[0], (y - one.centre[1]) / scale + positions[1])
+        assert np.hypot(*(route - np.array(at)).T).min() < 2e-3
+
+
+def test_no_line_crosses_the_title_of_a_box() -> None:
+    scene = picture()
+    titles = [g.shapes[0] for g in scene.groups if g.id.startswith("title:")]
+    assert {t.text.split(" ·")[0] for t in titles if isinstance(t, Text)} == {"rhythm", "kernels"}
+    for title in titles:
+        assert isinstance(title, Text)
+        x0, y0, x1, y1 = text_rect(title)
+        for shape in scene.shapes():
+            if isinstance(shape, Spline):
+                dots = sample(shape.points, 60)
+                inside = (dots[:, 0] > x0) & (dots[:, 0] < x1) & (dots[:, 1] > y0) & (dots[:, 1] < y1)
+                assert not inside.any()
+
+
+def test_a_teacher_has_a_dotted_line_and_a_place_in_the_legend() -> None:
+    scene = picture()
+    taught = [g for g in scene.groups if "signal" in g.data]
+    assert [g.data["signal"] for g in taught] == ["T -> O"]
+    line = taught[0].shapes[0]
+    assert isinstance(line, Spline)
+    assert line.dash
+    assert "target of delta" in [t.text for t in all_texts(scene)]
+    assert "T is the target of delta" in taught[0].title
+
+
+def test_the_legend_explains_what_there_is_and_nothing_else() -> None:
+    words = {t.text for t in all_texts(picture())}
+    assert {"Colour", "Thickness", "Glow", "Dotted"} <= words
+    made = network([numbered("A", 2)], [C("A1", "A2", 2.0)])
+    layout = straight_layout(made, {"A1": (0, 0), "A2": (0, 2)})
+    words = {t.text for t in all_texts(small(made, layout))}
+    assert {"Colour", "Thickness"} <= words
+    assert not {"Glow", "Dotted"} & words
+    assert not all_texts(small(made, layout, RenderSettings(legend=False, labels=False, title=False)))
+
+
+def test_the_legend_states_the_gains() -> None:
+    gains = Gains(2.0, 4.0, 5.0, 200.0)
+    made = use_case_1(3)
+    scene = encode(made.network, made.layout, made.snapshot(2), gains, RenderSettings())
+    words = [t.text for t in all_texts(scene)]
+    assert {"−0.5", "+0.5", "−0.25", "+0.25", "|Δw| 0.005 a step"} <= set(words)
+    legend = next(g for g in scene.groups if g.id == "legend")
+    strokes = [s.width for s in legend.shapes if isinstance(s, Spline) and s.width in (1.0, 2.5, 5.0)]
+    assert strokes
+    for width in strokes:
+        assert texts.number(width / 5.0) in words
+
+
+def test_the_caption_says_step_time_and_error() -> None:
+    (caption,) = next(g for g in picture().groups if g.id == "caption").shapes
+    assert isinstance(caption, Text)
+    error = CASE.activity[160, 11] - CASE.activity[160, 10]
+    assert caption.text == f"step 160 · 4.00 s · error {error:+.2f}".replace("-", "−")
+
+
+def test_without_a_written_dt_there_are_no_seconds() -> None:
+    scene = encode(replace(CASE.network, dt_given=False), CASE.layout, CASE.snapshot(7), GAINS, RenderSettings())
+    assert any(t.text.startswith("step 7 · error") for t in all_texts(scene))
+
+
+def test_title_true_false_or_a_text() -> None:
+    assert "Function approximation" in {t.text for t in all_texts(picture())}
+    assert "Other" in {t.text for t in all_texts(picture(settings=RenderSettings(title="Other")))}
+    words = {t.text for t in all_texts(picture(settings=RenderSettings(title=False)))}
+    assert not {w for w in words if w.startswith(("Function", "step"))}
+
+
+def test_the_size_is_what_the_author_says() -> None:
+    for size in ((300, 200), (1920, 1080), (64, 64)):
+        scene = picture(settings=RenderSettings(size=size))
+        assert (scene.width, scene.height) == size
+        check_inside(scene)
+
+
+def grid(columns: int, rows: int) -> Case:
+    count = columns * rows
+    made = network(
+        [numbered("N", count)],
+        [C(f"N{i + 1}", f"N{(i * 7) % count + 1}") for i in range(count) if (i * 7) % count != i],
+    )
+    places: dict[str, Point] = {f"N{i + 1}": (float(i % columns), 2.0 * (i // columns)) for i in range(count)}
+    return Case(made, straight_layout(made, places), np.full((1, count), 0.5), made.connections.weights[None])
+
+
+def test_a_large_network_stays_within_1280_by_960_and_drops_labels_rather_than_piling_them() -> None:
+    case = grid(60, 12)
+    scene = encode(case.network, case.layout, case.snapshot(0), PLAIN, RenderSettings())
+    assert scene.width <= 1280
+    assert scene.height <= 960
+    assert len(with_data(scene, "neuron")) == 720
+    check_texts(scene)
+    check_inside(scene)
+
+
+def test_long_labels_find_room_or_are_shortened_and_are_whole_in_the_title() -> None:
+    long = "a very long label that nobody can draw on a disc"
+    made = network([G("A", ("A1", "A2", "A3"), labels=("K1", "knee flexor", long))], [C("A1", "A2"), C("A2", "A3")])
+    layout = straight_layout(made, {"A1": (0, 0), "A2": (1, 0), "A3": (2, 0)})
+    scene = small(made, layout)
+    check_texts(scene)
+    groups = with_data(scene, "neuron")
+    drawn = {name: [s.text for s in g.shapes if isinstance(s, Text)] for name, g in groups.items()}
+    assert drawn["A1"] == ["K1"]
+    assert drawn["A2"] == ["knee flexor"]
+    assert drawn["A3"] == [long] or drawn["A3"][0].endswith("…")
+    assert long in groups["A3"].title
+
+
+def test_numbered_neurons_have_subscripts() -> None:
+    label = with_data(picture(), "neuron")["K3"].shapes[1]
+    assert isinstance(label, Text)
+    assert (label.text, label.subscript) == ("K", "3")
+
+
+def test_connections_that_share_both_ends_have_an_index() -> None:
+    made = network([numbered("A", 2)], [C("A1", "A2", 0.5, 3), C("A1", "A2", 0.7, 1), C("A2", "A1")])
+    lines = with_data(small(made, straight_layout(made, {"A1": (0, 0), "A2": (2, 0)})), "connection")
+    assert set(lines) == {"A1 -> A21", "A1 -> A22", "A2 -> A1"}
+    first = next(s for s in lines["A1 -> A21"].shapes if isinstance(s, Spline))
+    assert first.width == 4.0 * 0.7  # by delay first
+    assert "index" not in lines["A2 -> A1"].data
+    assert lines["A1 -> A22"].data["connection"] == "A1 -> A2"
+
+
+def test_discs_that_touch_still_have_a_line_and_a_head() -> None:
+    made = network([numbered("A", 2)], [C("A1", "A2"), C("A1", "A1")])
+    layout = Layout(
+        "x", "x", {"A1": (0, 0), "A2": (0.6, 0)}, {"A1 -> A2": straight((0, 0), (0.6, 0)), "A1 -> A1": loop((0, 0), -1)}
+    )
+    scene = small(made, layout)
+    check_inside(scene)
+    for group in with_data(scene, "connection").values():
+        assert any(isinstance(s, Spline) for s in group.shapes)
+        assert any(isinstance(s, Arrowhead) for s in group.shapes)
+
+
+def test_one_neuron_alone_is_a_picture() -> None:
+    made = network([G("A", ("A",))], [])
+    scene = small(made, Layout("x", "x", {"A": (0, 0)}, {}))
+    check_inside(scene)
+    check_texts(scene)
+
+
+def test_glows_lie_beneath_the_lines_that_cannot_glow() -> None:
+    lines = [g for g in picture().groups if "connection" in g.data]
+    plastic = [place for place, g in enumerate(lines) if g.data["to"] == "O"]
+    assert plastic == list(range(8))
+
+
+def test_every_step_has_the_same_geometry_and_a_films_frames_are_the_stills() -> None:
+    steps = range(150, 158)
+    moving = film(CASE.network, CASE.layout, [CASE.snapshot(k) for k in steps], GAINS, RenderSettings(), 40)
+    assert moving.frames == 8
+    for frame, step in enumerate(steps):
+        frozen, alone = still(moving, frame), picture(step=step)
+        assert [g.shapes for g in frozen.groups] == [g.shapes for g in alone.groups]
+
+
+def test_a_film_needs_a_frame() -> None:
+    with pytest.raises(ValueError, match="at least one frame"):
+        film(CASE.network, CASE.layout, [], GAINS, RenderSettings(), 40)
