@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -112,17 +113,13 @@ def networks(draw: st.DrawFn, gain: float = 0.9) -> Network:
             )
         )
     used = sorted({link.learns for link in links} - {-1})
-    links = [Link(**{**_fields(link), "learns": used.index(link.learns) if link.learns >= 0 else -1}) for link in links]
+    links = [replace(link, learns=used.index(link.learns) if link.learns >= 0 else -1) for link in links]
     uses = [_teach(USES[index], draw(st.integers(0, n + 2))) for index in used]
     inputs = [
         Input("wave", 0, 1, tree("0.3 * sin(0.1 * k) + 0 * t")),
         Input("rows", 1, 2, table=np.array([[0.1, -0.2], [0.3, 0.4], [-0.5, 0.2]])),
     ]
     return build(units, links, uses, inputs, dt=0.1, episode=draw(st.sampled_from([None, 1, 3, 7])))
-
-
-def _fields(link: Link) -> dict[str, object]:
-    return {name: getattr(link, name) for name in Link.__dataclass_fields__}
 
 
 def _teach(use: Use, signal: int) -> Use:

@@ -77,11 +77,11 @@ def names() -> tuple[str, ...]:
 
 def load(name: str) -> Backend:
     """The backend of this name. Raises BackendError where there is none."""
-    known = names()
-    if name not in known:
-        hint = suggest(name, known)
-        raise BackendError(f"unknown backend '{name}'" + (f"; {hint}" if hint else ""))
-    made = plugins.load(plugins.BACKENDS, name)
+    try:
+        made = plugins.load(plugins.BACKENDS, name)
+    except KeyError:
+        hint = suggest(name, names())
+        raise BackendError(f"unknown backend '{name}'" + (f"; {hint}" if hint else "")) from None
     if not isinstance(made, Backend):
         raise BackendError(f"the plug-in '{name}' is no backend: it lacks name, capabilities, availability or prepare")
     return made

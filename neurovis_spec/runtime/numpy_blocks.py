@@ -6,12 +6,10 @@ In: a Block. Out: lines in a ``Code``. Sums are made by ``bincount``, which adds
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from neurovis_spec.compiler.network import Block, Gather, Network, Update
-from neurovis_spec.language.expressions.tree import Tree, names
+from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.runtime.numpy_code import Code, all_names, any_given
 from neurovis_spec.runtime.signals import SignalLayout
 
@@ -70,7 +68,7 @@ def _signals(code: Code, network: Network, layout: SignalLayout, number: int) ->
 def _slots(code: Code, start: int, stop: int, delay: int) -> str:
     """The slots of this step of connections that are stored next to each other."""
     if delay == 1:
-        return f"signals[{start}:{stop}]"
+        return code.view("signals", f"{start}:{stop}")
     return f"signals[{start} + {code.slot(delay)}:{stop}:{delay}]"
 
 
@@ -104,7 +102,7 @@ def emit_update(code: Code, network: Network, operation: Update, drive: str) -> 
     block, number = network.blocks[operation.block], operation.block
     model = block.model
     own = code.parameters(block.model_parameters) | {"drive": drive}
-    functions = {"f": _activation(code, block)}
+    functions = {"f": lambda argument: _activation(code, block, argument)}
     old = {q.name: code.let("v", f"cells[{number}][{i}]") for i, q in enumerate(model.state)}
     known = emit_let(code, model.let, own | old, [q.each_step for q in model.state] + [model.activity])
     steps = {q.name: q.each_step for q in model.state}
@@ -160,14 +158,10 @@ def emit_let(
     return known
 
 
-def _activation(code: Code, block: Block) -> Callable[[str], str]:
-    """f as a function of its own, so that its argument is computed once."""
-    name = code.name("f")
-    known = code.parameters(block.activation_parameters) | {"x": "x"}
-    value = code.expression(block.activation.value, known)
-    code.helpers.append(f"def {name}(x, k_, t_): return {value}")
-    clock = "k_, t_" if names(block.activation.value) & {"k", "t"} else "0, 0"
-    return lambda argument: f"{name}({argument}, {clock})"
+def _activation(code: Code, block: Block, argument: str) -> str:
+    """f of an argument, which gets an identifier of its own so that it is computed once."""
+    x = argument if argument.isidentifier() else code.let("x", argument)
+    return code.expression(block.activation.value, code.parameters(block.activation_parameters) | {"x": x})
 
 
 def emit_send(code: Code, network: Network, layout: SignalLayout) -> None:

@@ -28,10 +28,10 @@ class Code:
 
     def __init__(self, dt: float) -> None:
         self.namespace: dict[str, object] = {"np": np, "bincount": np.bincount, "multiply": np.multiply}
-        self.helpers: list[str] = []
         self.lines: list[str] = []
         self.indent = 1
         self.used: set[str] = set()
+        self._views: dict[str, str] = {}
         self._count = 0
         #: identifiers that stand for the names every expression knows
         self.clock = {name: self.constant(np.float64(value)) for name, value in constants(dt).items()}
@@ -69,10 +69,16 @@ class Code:
         """
         first, count = int(indices[0]), len(indices)
         if np.array_equal(indices, np.arange(first, first + count)):
-            return array if count == size else f"{array}[{first}:{first + count}]"
+            return array if count == size else self.view(array, f"{first}:{first + count}")
         if broadcast and (indices == first).all():
-            return f"{array}[{first}:{first + 1}]"
+            return self.view(array, f"{first}:{first + 1}")
         return f"{array}[{self.constant(np.ascontiguousarray(indices, dtype=np.intp))}]"
+
+    def view(self, array: str, part: str) -> str:
+        """A slice. Slices of the state's own arrays are taken once a step, at its head: they follow all changes."""
+        if array not in _PARTS:
+            return f"{array}[{part}]"
+        return self._views.setdefault(f"{array}[{part}]", f"{array[0]}{len(self._views)}_")
 
     def position(self, indices: IntArray, size: int) -> str:
         """The subscript that ``select`` reads, for writing."""
@@ -100,11 +106,11 @@ class Code:
 
     def text(self) -> str:
         """The functions as Python text."""
-        head = ["def step(state, s):", "    k = state.k"]
-        body = "\n".join(self.lines)
-        head += [f"    {name} = state.{name}" for name in _PARTS if name in body]
-        head += [f"    {text}" for text in sorted(self.used)]
-        return "\n".join([*self.helpers, *head, body, "    state.k = k + 1", ""])
+        views = [f"    {name} = {code}" for code, name in self._views.items()]
+        body = [*views, *self.lines, "    state.k = k + 1", ""]
+        taken = [f"    {name} = state.{name}" for name in _PARTS if any(name in line for line in body)]
+        used = [f"    {text}" for text in sorted(self.used)]
+        return "\n".join(["def step(state, s):", "    k = state.k", *taken, *used, *body])
 
     def compiled(self) -> Callable[..., None]:
         """The step function. The text holds our own identifiers only."""

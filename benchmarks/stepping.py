@@ -1,0 +1,129 @@
+"""How long a step takes: the reference, the NumPy backend, and NumPy written by hand for the same network.
+
+In: nothing. Out: a table of microseconds a step and ratios, on standard output. Run it with
+``python benchmarks/stepping.py``; only the ratios of one run can be compared. By hand means what a careful author would
+write: index arrays, ``bincount``, one array for each group, nothing that the network does not need.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
+
+from networks_by_hand import TANH, Link, Unit, build, cpg_rbf
+
+from neurovis_spec.compiler.network import Block, Network
+from neurovis_spec.runtime.backend import load
+from neurovis_spec.runtime.inputs import InputReader
+from neurovis_spec.runtime.record import record
+from neurovis_spec.runtime.state import initial_state
+
+Run = Callable[[int], None]
+
+
+def random_network(n: int, m: int) -> Network:
+    """Tanh neurons, random connections of delay 1, sorted by source as a connectome is."""
+    random = np.random.default_rng(1)
+    ends = sorted(zip(random.integers(0, n, m).tolist(), random.integers(0, n, m).tolist(), strict=True))
+    weights = random.normal(0, (n / m) ** 0.5, m).tolist()
+    few = build([Unit(f"N{i}", TANH, bias=0.01 * i) for i in range(n)])
+    links = build([Unit("A"), Unit("B")], [Link(0, 1, w) for w in weights]).connections
+    sources, targets = (np.array(side, dtype=np.int64) for side in zip(*ends, strict=True))
+    block: Block = replace(few.blocks[0], incoming=np.arange(m), slots=targets)
+    return replace(few, connections=replace(links, sources=sources, targets=targets), blocks=(block,))
+
+
+def random_by_hand(network: Network) -> Run:
+    """Eq. 1 over arrays."""
+    connections, n = network.connections, len(network.neurons)
+    sources, targets = connections.sources.astype(np.intp), connections.targets.astype(np.intp)
+    weights, bias, tanh, bincount = connections.weights, network.neurons.bias, np.tanh, np.bincount
+
+    def run(steps: int) -> None:
+        activity, history = np.zeros(n), np.empty((steps, n))
+        for k in range(steps):
+            activity = tanh(bincount(targets, weights * activity[sources], n) + bias)
+            history[k] = activity
+
+    return run
+
+
+def cpg_by_hand(network: Network) -> Run:
+    """Use case 1 as one would write it: a loop over four groups."""
+    connections = network.connections
+    matrix = connections.weights[:4].reshape(2, 2)
+    centres = connections.centres[4:20].reshape(2, 8)
+
+    def run(steps: int) -> None:
+        k = np.arange(steps)
+        target = 0.5 * np.sin(2 * np.pi * k / 128.67) + 0.2 * np.sin(4 * np.pi * k / 128.67)
+        rhythm, weights = np.array([0.1, 0.0]), np.zeros(8)
+        history, learned = np.empty((steps, 12)), np.empty((steps, 8))
+        for t in range(steps):
+            if t:
+                rhythm = np.tanh((matrix * rhythm[:, None]).sum(axis=0))
+            distance = np.sqrt(((rhythm[:, None] - centres) ** 2).sum(axis=0))
+            kernels = np.exp(-40 * distance**2)
+            output = (weights * kernels).sum()
+            history[t, :2], history[t, 2:10], history[t, 10], history[t, 11] = rhythm, kernels, output, target[t]
+            learned[t] = weights
+            weights = weights + 0.01 * kernels * (target[t] - output)
+
+    return run
+
+
+def stepping(network: Network, backend: str) -> Run:
+    """The backend's step alone."""
+    stepper = load(backend).prepare(network)
+
+    def run(steps: int) -> None:
+        state, reader = initial_state(network), InputReader(network)
+        with np.errstate(all="ignore"):
+            for k in range(steps):
+                stepper.step(state, reader.at(k))
+
+    return run
+
+
+def recording(network: Network) -> Run:
+    """``record``: inputs, step, watch and record."""
+
+    def run(steps: int) -> None:
+        record(network, steps, backend="numpy")
+
+    return run
+
+
+def microseconds(run: Run, steps: int, repeats: int = 7) -> float:
+    """The best of several runs, a step."""
+    best = float("inf")
+    for _ in range(repeats):
+        start = time.perf_counter()
+        run(steps)
+        best = min(best, time.perf_counter() - start)
+    return best / steps * 1e6
+
+
+def main() -> None:
+    cases = (
+        ("12/28, use case 1", cpg_rbf(), cpg_by_hand, 4000),
+        ("302/7,000", random_network(302, 7000), random_by_hand, 2000),
+    )
+    print(f"{'µs a step':20}{'reference':>12}{'numpy step':>12}{'numpy record':>14}{'by hand':>10}{'record/hand':>13}")
+    for name, network, hand, steps in cases:
+        plain = microseconds(stepping(network, "reference"), max(steps // 100, 10), 3)
+        step = microseconds(stepping(network, "numpy"), steps)
+        whole = microseconds(recording(network), steps)
+        peer = microseconds(hand(network), steps)
+        print(f"{name:20}{plain:12.1f}{step:12.2f}{whole:14.2f}{peer:10.2f}{whole / peer:13.2f}")
+
+
+if __name__ == "__main__":
+    main()
