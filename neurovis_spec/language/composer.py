@@ -7,6 +7,7 @@ on. One event at a time is held, and nothing deeper than the language allows; lo
 
 from __future__ import annotations
 
+import re
 from typing import Final, Protocol
 
 from yaml.events import (
@@ -31,6 +32,7 @@ from neurovis_spec.language.scalars import NumberRangeError, resolve
 from neurovis_spec.language.source import Entry, Mapping, Node, Scalar, Sequence
 
 _PACK_FROM: Final = 64
+_COLON: Final = re.compile(r"[ \t]*:")
 
 
 class EventSource(Protocol):
@@ -49,6 +51,8 @@ class Composer:
         self._get = parser.get_event
         self._refuse = Refusals(text, file, findings)
         self._anchored: dict[str, Scalar] = {}
+        #: Line and column of each bracket that is open right now, outermost first: for wording a syntax error.
+        self.open_brackets: list[tuple[int, int]] = []
 
     def document(self) -> Node | None:
         """The root; None where there is no document. Raises yaml.YAMLError and ComposingStoppedError."""
@@ -128,16 +132,19 @@ class Composer:
 
     def _begin(self, start: CollectionStartEvent) -> tuple[int, int]:
         """Line and column at which a collection begins, behind its tag and anchor."""
+        begin = marks.begin(start).line + 1, marks.begin(start).column + 1
         if start.anchor is not None or start.tag is not None:
-            return self._refuse.properties(start)[1:]
-        return marks.begin(start).line + 1, marks.begin(start).column + 1
+            begin = self._refuse.properties(start)[1:]
+        if start.flow_style:
+            self.open_brackets.append(begin)
+        return begin
 
-    def _end(self, start: CollectionStartEvent, begin: tuple[int, int], end: Event, last: Span | None) -> Span:
+    def _end(self, start: CollectionStartEvent, begin: tuple[int, int], end: Event, last: tuple[int, int]) -> Span:
         """The place of a collection: a flow one ends behind its bracket, a block one with its last part."""
         if start.flow_style:
+            self.open_brackets.pop()
             return Span(self._file, *begin, marks.end(end).line + 1, marks.end(end).column + 1)
-        stop = begin if last is None else (last.end_line, last.end_column)
-        return Span(self._file, *begin, *max(begin, stop))
+        return Span(self._file, *begin, *max(begin, last))
 
     def _sequence(
         self,
@@ -160,7 +167,7 @@ class Composer:
             if len(items) == _PACK_FROM + 1 and run is None and (packer := Packer.of(items, self._file)):
                 rest = self._pack(packer, event, depth)
                 if isinstance(rest, SequenceEndEvent):
-                    return packer.finish(self._end(start, begin, rest, packer.last_place()))
+                    return packer.finish(self._end(start, begin, rest, packer.end()))
                 items = packer.take_back_items()
                 if isinstance(rest, Event):
                     event = rest
@@ -168,7 +175,7 @@ class Composer:
                     items.append(rest)
                     event = self._next()
         self._close_run(run, items)
-        return Sequence(tuple(items), self._end(start, begin, event, items[-1].span if items else None))
+        return Sequence(tuple(items), self._end(start, begin, event, _end_of(items[-1]) if items else begin))
 
     def _close_run(self, run: Run | None, items: list[Node]) -> None:
         if run is not None and run.joined:
@@ -190,14 +197,15 @@ class Composer:
                     cell = self._next()
                 if not isinstance(cell, SequenceEndEvent) or len(packer) == first:
                     return self._sequence(event, depth + 1, packer.take_back(first), cell)
-                packer.end_row()
+                bracket = marks.end(cell)
+                packer.end_row(bracket.line + 1, bracket.column + 1)
             event = self._next()
 
     def _mapping(self, start: MappingStartEvent, depth: int) -> Mapping:
         begin = self._begin(start)
         entries: dict[str, Entry] = {}
         commas = FlowCommas(self._text, self._file, self._refuse, entries) if start.flow_style else None
-        last: Span | None = None
+        last = begin
         key_event = self._next()
         while not isinstance(key_event, MappingEndEvent):
             key_node = self._node(key_event, depth + 1)
@@ -205,7 +213,9 @@ class Composer:
             if commas is None or not commas.cut(key_event, key_node, value_event):
                 key = self._key(key_event, key_node)
                 value = self._node(value_event, depth + 1)
-                last = value.span
+                if commas is not None and isinstance(value, Scalar):
+                    value = self._behind_colon(key_event, value_event, value)
+                last = _end_of(value)
                 name = None if key is None else str(key.value)
                 if key is not None and name is not None:
                     if name in entries:
@@ -219,6 +229,16 @@ class Composer:
         if commas is not None:
             commas.close()
         return Mapping(tuple(entries.values()), self._end(start, begin, key_event, last))
+
+    def _behind_colon(self, key_event: Event, value_event: Event, value: Scalar) -> Scalar:
+        """A value that is not there stands behind its colon; parsers differ about that."""
+        key_end, mark = marks.end(key_event), marks.begin(value_event)
+        between = self._text[key_end.index : mark.index] if mark.index == marks.end(value_event).index else ""
+        match = _COLON.match(between)
+        if match is None:
+            return value
+        line, column = key_end.line + 1, key_end.column + 1 + match.end()
+        return Scalar(value.value, Span(self._file, line, column, line, column), value.inner)
 
     def _key(self, event: Event, node: Node) -> Scalar | None:
         """The key as a text, refused where it is none; None where the entry has to be dropped."""
@@ -234,3 +254,7 @@ class Composer:
             return node
         self._refuse.key_not_text(node, event.value)
         return Scalar(event.value, node.span, node.inner) if event.value else None
+
+
+def _end_of(node: Node) -> tuple[int, int]:
+    return node.span.end_line, node.span.end_column

@@ -27,6 +27,7 @@ class Packer:
         self._arrays = Packed(Span(file, 1, 1, 1, 1))
         self._texts: dict[str, int] = {}
         self.in_rows = in_rows
+        self._closed = 1, 1
         self._row_ends = array("q", [0] if in_rows else [])
 
     @classmethod
@@ -46,7 +47,7 @@ class Packer:
             return False
         if not all(isinstance(cell, Scalar) and self._add_scalar(cell) for cell in node.items):
             return False
-        self.end_row()
+        self.end_row(node.span.end_line, node.span.end_column)
         return True
 
     def _add_scalar(self, scalar: Scalar) -> bool:
@@ -104,9 +105,10 @@ class Packer:
         arrays.quoted.append(quoted)
         return True
 
-    def end_row(self) -> None:
-        """The cells since the last row's end are a row."""
+    def end_row(self, line: int, column: int) -> None:
+        """The cells since the last row's end are a row, whose bracket closes before this place."""
         self._row_ends.append(len(self))
+        self._closed = line, column
 
     def take_back(self, first: int) -> list[Node]:
         """The cells from ``first`` on, as nodes; the packer forgets them."""
@@ -122,9 +124,9 @@ class Packer:
         """All items, as nodes, for a list that has to go on without packing."""
         return list(self.finish(self._arrays.span).items)
 
-    def last_place(self) -> Span:
-        """Where the last cell stands."""
-        return self.finish(self._arrays.span).cell(len(self) - 1).span
+    def end(self) -> tuple[int, int]:
+        """Line and column behind the last item."""
+        return self._closed if self.in_rows else (self._arrays.lines[-1], self._arrays.ends[-1])
 
     def finish(self, span: Span) -> Packed:
         """The list, which stands at ``span``."""

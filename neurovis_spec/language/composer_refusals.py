@@ -50,6 +50,7 @@ class Refusals:
         """Refuse a node's tag and anchor. Returns index, line and column (from 1) at which the node itself begins."""
         first = index = marks.begin(event).index
         line, column = marks.begin(event).line + 1, marks.begin(event).column + 1
+        last = marks.end(event)
         while (match := _PROPERTY.match(self._text, index)) and index < max(marks.end(event).index, first + 1):
             written = match.group()
             span = Span(self._file, line, column, line, column + len(written))
@@ -61,6 +62,8 @@ class Refusals:
             lines, columns = Lines(self._text[first:index]).place(index - first)
             line = marks.begin(event).line + lines
             column = columns + (marks.begin(event).column if lines == 1 else 0)
+        if index > last.index:  # a value that is not there does not begin behind the gap
+            return last.index, last.line + 1, last.column + 1
         return index, line, column
 
     def alias(self, event: AliasEvent) -> Span:

@@ -94,12 +94,15 @@ def read_text(text: str, file: str, findings: Findings, *, pure: bool = False) -
     lines = Lines(text)
     clean = _without_forbidden(text, file, lines, findings)
     clean = _without_directives(clean, file, findings)
+    if not clean.endswith(("\n", "\r")):
+        clean += "\n"  # without it the parsers differ about the place of what is missing at the end
+    composer = Composer(clean, file, findings, _parser(clean, pure))
     try:
-        root = Composer(clean, file, findings, _parser(clean, pure)).document()
+        root = composer.document()
     except ComposingStoppedError:
         return None
     except yaml.YAMLError as error:
-        syntax = explain(error, lines)
+        syntax = explain(error, lines, composer.open_brackets)
         findings.error(syntax.code, syntax.span(file, lines), syntax.message, syntax.hint)
         return None
     return _document(root, file, findings)

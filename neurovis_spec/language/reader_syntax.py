@@ -7,6 +7,7 @@ and a sentence that says what to change. Both parsers, C and Python, are underst
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from yaml.error import MarkedYAMLError
@@ -37,11 +38,11 @@ class Syntax:
         return Span(file, line, column, line, column + 1 if column <= width else column)
 
 
-def explain(error: Exception, lines: Lines) -> Syntax:
-    """Word an error that a parser raised."""
+def explain(error: Exception, lines: Lines, open_brackets: Sequence[tuple[int, int]]) -> Syntax:
+    """Word an error that a parser raised; ``open_brackets`` are the places of those open then, outermost first."""
     if not isinstance(error, MarkedYAMLError) or error.problem_mark is None:
         return Syntax("this is no YAML that could be read", 1, 1)
-    found = _Found(error, lines)
+    found = _Found(error, lines, open_brackets)
     for rule in _RULES:
         syntax = rule(found)
         if syntax is not None:
@@ -52,7 +53,7 @@ def explain(error: Exception, lines: Lines) -> Syntax:
 class _Found:
     """What a parser reported, and the line it stands on."""
 
-    def __init__(self, error: MarkedYAMLError, lines: Lines) -> None:
+    def __init__(self, error: MarkedYAMLError, lines: Lines, open_brackets: Sequence[tuple[int, int]]) -> None:
         mark = error.problem_mark
         assert mark is not None
         self.problem = error.problem or ""
@@ -63,6 +64,7 @@ class _Found:
         self.context_line = context.line + 1 if context else self.line
         self.context_column = context.column + 1 if context else self.column
         self.text = lines.line(self.line)
+        self.open_brackets = open_brackets
 
     @property
     def at_end(self) -> bool:
@@ -145,6 +147,17 @@ def _missing_colon(found: _Found) -> Syntax | None:
     return _no_colon(found.lines.line(found.context_line), found.context_line, found.context_column)
 
 
+def _no_node(found: _Found) -> Syntax | None:
+    if "node content" not in found.problem:
+        return None
+    if found.character == ":":
+        return Syntax("there is no key before ':'", found.line, found.column)
+    if found.at_end and found.open_brackets:
+        line, column = found.open_brackets[-1]
+        return Syntax(f"'{found.lines.line(line)[column - 1]}' is not closed", line, column)
+    return None
+
+
 def _no_colon(line: str, number: int, column: int) -> Syntax:
     """A line that should hold 'key: value' from a column on, and does not."""
     written = line[column - 1 :].rstrip()
@@ -216,14 +229,22 @@ def _indent(line: str) -> int:
 
 
 def _plain_words(problem: str) -> str:
-    """A parser's own words, without names of tokens."""
-    words = problem.replace("did not find expected", "expected").replace(
-        "<document start>", "the start of the document"
-    )
-    words = re.sub(r",? but (got|found) .*", "", words).replace("<block end>", "the end of the block")
+    """A parser's own words where no rule fits, for the commonest of them better ones."""
+    for phrase, words in _PHRASES.items():
+        if phrase in problem:
+            return words
+    words = re.sub(r",? but (got|found) .*", "", problem.replace("did not find expected", "expected"))
     return words or "this is no YAML"
 
 
+_PHRASES = {
+    "document start": "this belongs to nothing above it",
+    "node content": "a value is wanted here",
+    "comment or": "only a comment may follow here",
+    "block sequence entries": "a list item cannot stand here",
+    "unexpected ':'": "a blank is missing after ':'",
+    "block entry": "a list item cannot stand here",
+}
 _RULES = (
     _tab,
     _directive,
@@ -233,6 +254,7 @@ _RULES = (
     _missing_colon,
     _second_colon,
     _start_character,
+    _no_node,
     _unclosed,
     _block,
     _stray_bracket,
