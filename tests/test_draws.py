@@ -219,3 +219,18 @@ def test_every_target_is_equally_likely() -> None:
         counts[stream.random_targets(row, n, probability)] += 1
     error = math.sqrt(rows * probability * (1 - probability))
     assert np.abs(counts - rows * probability).max() < 5 * error
+
+
+@given(SEEDS, st.integers(0, 30), st.integers(0, 60), st.sampled_from([0.0, 1e-9, 0.02, 0.5, 0.97, 1.0]))
+def test_pairs_are_the_targets_row_by_row(seed: int, rows: int, n: int, probability: float) -> None:
+    stream = Stream(seed, "edges", "A -> B")
+    i, j = stream.random_pairs(rows, n, probability)
+    expected = [(row, int(t)) for row in range(rows) for t in stream.random_targets(row, n, probability)]
+    assert list(zip(i.tolist(), j.tolist(), strict=True)) == expected
+
+
+def test_pairs_of_many_rows() -> None:
+    stream = Stream(5, "edges", "A -> B")
+    i, j = stream.random_pairs(20000, 300, 0.01)
+    for row in (0, 1, 7777, 19999):
+        assert j[i == row].tolist() == stream.random_targets(row, 300, 0.01).tolist()

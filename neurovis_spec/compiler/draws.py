@@ -124,24 +124,46 @@ class Stream:
         From target to target goes a geometric gap: the numbers u0, u1, … of the counters (row, number of the gap, 0, 0)
         leave out ⌊ln(1 − u)/ln(1 − probability)⌋ targets before the first, after the first, and so on.
         """
+        return self._connected(np.array([row], dtype=np.int64), n, probability)[1]
+
+    def random_pairs(self, rows: int, n: int, probability: float) -> tuple[IntArray, IntArray]:
+        """The rows and the targets of ``random_targets`` for the rows 0 … rows−1, row by row."""
+        together = max(1, _CHUNK // _batch(n, probability))
+        blocks = [
+            self._connected(np.arange(start, min(start + together, rows), dtype=np.int64), n, probability)
+            for start in range(0, rows, together)
+        ]
+        i, j = zip(*blocks, strict=True) if blocks else ((), ())
+        none = np.empty(0, dtype=np.int64)
+        return np.concatenate((none, *i)), np.concatenate((none, *j))
+
+    def _connected(self, rows: IntArray, n: int, probability: float) -> tuple[IntArray, IntArray]:
+        """The pairs of several rows at once, ordered by row and target."""
         if probability <= 0 or n <= 0:
-            return np.empty(0, dtype=np.int64)
+            return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
         if probability >= 1:
-            return np.arange(n, dtype=np.int64)
-        scale = _log1p(-probability)
-        expected = n * probability
-        batch = int(expected + 4 * expected**0.5) + 4
-        found: list[IntArray] = []
-        gaps, last = 0, -1
-        while last < n:
-            number = np.arange(gaps, gaps + batch, dtype=np.int64)
+            return np.repeat(rows, n), np.tile(np.arange(n, dtype=np.int64), len(rows))
+        scale, batch = _log1p(-probability), _batch(n, probability)
+        found: list[tuple[IntArray, IntArray]] = []
+        last, number = np.full(len(rows), -1, dtype=np.int64), np.arange(batch, dtype=np.int64)
+        waiting = rows
+        while len(waiting):
             with np.errstate(over="ignore"):  # a gap beyond all numbers is one beyond n
-                skipped = np.floor(box_muller.log(1.0 - self.uniform(row, number, 0, 0)) / scale)
-            targets = last + np.cumsum(np.minimum(skipped, n).astype(np.int64) + 1)
-            found.append(targets)
-            gaps, last = gaps + batch, int(targets[-1])
-        joined = np.concatenate(found)
-        return joined[joined < n]
+                skipped = np.floor(box_muller.log(1.0 - self.uniform(waiting[:, None], number, 0, 0)) / scale)
+            targets = last[:, None] + np.cumsum(np.minimum(skipped, n).astype(np.int64) + 1, axis=1)
+            inside = targets < n
+            found.append((np.repeat(waiting, np.count_nonzero(inside, axis=1)), targets[inside]))
+            unfinished = inside[:, -1]
+            waiting, last, number = waiting[unfinished], targets[unfinished, -1], number + batch
+        i, j = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        order = np.argsort(i, kind="stable")
+        return i[order], j[order]
+
+
+def _batch(n: int, probability: float) -> int:
+    """How many gaps to draw at once: nearly always enough for a row. The result does not depend on it."""
+    expected = n * min(max(probability, 0.0), 1.0)
+    return int(expected + 4 * expected**0.5) + 4
 
 
 def _log1p(x: float) -> float:

@@ -27,6 +27,8 @@ from neurovis_spec.language.expressions.tree import (
 )
 
 Value: TypeAlias = float | npt.NDArray[np.float64]
+#: What a name may mean; integers (indices, steps) become floats.
+Given: TypeAlias = Value | npt.NDArray[np.int64]
 #: Makes the numbers of a draw from its two arguments.
 Drawing: TypeAlias = Callable[[Draw, Value, Value], Value]
 _Operation: TypeAlias = Callable[[Value, Value], Value]
@@ -37,7 +39,7 @@ _OPERATIONS: Mapping[str, _Operation] = {
     "*": np.multiply,
     "/": np.divide,
     "%": np.remainder,
-    "^": np.power,
+    "^": np.float_power,  # not np.power, which takes a root of −∞ where the exponent is a scalar 0.5
     "<": np.less,
     "<=": np.less_equal,
     ">": np.greater,
@@ -52,7 +54,7 @@ _NONE: Mapping[str, Callable[..., Value]] = MappingProxyType({})
 
 def evaluate_array(
     tree: Tree,
-    names: Mapping[str, Value],
+    names: Mapping[str, Given],
     draw: Drawing | None = None,
     functions: Mapping[str, Callable[..., Value]] = _NONE,
 ) -> Value:
@@ -74,7 +76,7 @@ class _Evaluation:
     """One evaluation: what its names mean."""
 
     def __init__(
-        self, names: Mapping[str, Value], draw: Drawing | None, functions: Mapping[str, Callable[..., Value]]
+        self, names: Mapping[str, Given], draw: Drawing | None, functions: Mapping[str, Callable[..., Value]]
     ) -> None:
         self.names = names
         self.draw = draw

@@ -126,7 +126,7 @@ class _Emitter:
                 choice = f"{self.truth(condition)[0]}, {self.loose(then)}, {self.loose(otherwise)}"
                 return f"np.where({choice})", _ATOM
             case Call(function=function, arguments=arguments):
-                return self.call(function, [self.loose(argument) for argument in arguments])
+                return self.call(function, arguments)
             case Draw(first=first, second=second):
                 if self.draw is None:
                     raise ValueError("this expression draws, and no code to draw was given")
@@ -155,7 +155,7 @@ class _Emitter:
         if operator == "/" and isinstance(right, Number) and right.value != 0 and math.isfinite(right.value):
             return f"{self.tight(left, _MULTIPLY)}/{self.tight(right, _SIGN)}", _MULTIPLY
         # the operators of Python raise where both operands are Python floats; the functions of NumPy never do
-        name = {"/": "divide", "%": "remainder", "^": "power"}[operator]
+        name = {"/": "divide", "%": "remainder", "^": "float_power"}[operator]
         return f"np.{name}({self.loose(left)}, {self.loose(right)})", _ATOM
 
     def square(self, base: Tree) -> _Code:
@@ -164,13 +164,14 @@ class _Emitter:
             return f"{code}*{code}", _MULTIPLY
         return f"np.square({code})", _ATOM
 
-    def call(self, function: str, arguments: list[str]) -> _Code:
+    def call(self, function: str, arguments: tuple[Tree, ...]) -> _Code:
         if function in self.functions:
-            return self.functions[function](*arguments), _ANY
+            return self.functions[function](*map(self.loose, arguments)), _ANY
         entry = FUNCTIONS[function]
+        codes = [self.tight(argument, _SIGN if entry.signed else _ANY) for argument in arguments]
         if entry.most is None:
-            return _folded(entry.code, arguments), _ATOM
-        return entry.code.format(*arguments), _ATOM
+            return _folded(entry.code, codes), _ATOM
+        return entry.code.format(*codes), _ATOM
 
     def loose(self, tree: Tree) -> str:
         return self.value(tree)[0]

@@ -130,7 +130,7 @@ class Function:
     """A function: ``least`` to ``most`` arguments (None: as many as wanted), and what it is to each consumer.
 
     ``code`` is a template with ``{0}``, ``{1}``, … for the code of its arguments, and gives a call; of a function
-    of any number of arguments it takes two, and the emitter folds.
+    of any number of arguments it takes two, and the emitter folds. ``signed``: it puts a sign before its arguments.
     """
 
     usage: str
@@ -139,6 +139,7 @@ class Function:
     code: str
     least: int = 1
     most: int | None = 1
+    signed: bool = False
 
 
 def _clip(x: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
@@ -177,7 +178,7 @@ FUNCTIONS: Mapping[str, Function] = MappingProxyType(
         "log": _one("log", _with_pole(math.log, 0.0), np.log),
         "log1p": _one("log1p", _with_pole(math.log1p, -1.0), np.log1p),
         "expm1": _one("expm1", _unbounded(math.expm1), np.expm1),
-        "pow": Function("pow(x, exponent)", power, np.power, "np.power({0}, {1})", 2, 2),
+        "pow": Function("pow(x, exponent)", power, np.float_power, "np.float_power({0}, {1})", 2, 2),
         "sin": _one("sin", _defined(math.sin), np.sin),
         "cos": _one("cos", _defined(math.cos), np.cos),
         "tan": _one("tan", _defined(math.tan), np.tan),
@@ -188,7 +189,7 @@ FUNCTIONS: Mapping[str, Function] = MappingProxyType(
         "sinh": _one("sinh", _unbounded(math.sinh, odd=True), np.sinh),
         "cosh": _one("cosh", _unbounded(math.cosh), np.cosh),
         "tanh": _one("tanh", math.tanh, np.tanh),
-        "sigmoid": Function("sigmoid(x)", sigmoid, _sigmoid, "np.reciprocal(1.0 + np.exp(np.negative({0})))"),
+        "sigmoid": Function("sigmoid(x)", sigmoid, _sigmoid, "np.reciprocal(1.0 + np.exp(-{0}))", signed=True),
         "step": Function("step(x)", step, _step, "np.heaviside({0}, 1.0)"),
     }
 )

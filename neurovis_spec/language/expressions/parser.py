@@ -122,6 +122,11 @@ class _Parser:
     def previous(self) -> Token | None:
         return self.tokens[self.at - 1] if self.at else None
 
+    @property
+    def end(self) -> int:
+        """Where what was read so far ends; closing parentheses belong to it."""
+        return self.tokens[self.at - 1].end
+
     def at_end(self) -> bool:
         return self.token.kind == "end"
 
@@ -152,6 +157,7 @@ class _Parser:
         return tree
 
     def conditional(self) -> Tree:
+        start = self.token.start
         then = self.binary(0)
         if not self.is_operator("if"):
             return then
@@ -165,10 +171,11 @@ class _Parser:
         word = self.advance()
         with self.deeper(word):
             otherwise = self.conditional()
-        return Conditional(condition, then, otherwise, then.start, otherwise.end)
+        return Conditional(condition, then, otherwise, start, self.end)
 
     def binary(self, level: int) -> Tree:
         """Operands joined by operators that bind at least as tight as ``level``."""
+        start = self.token.start
         left = self.prefix(level)
         while self.token.kind == "operator" and LEVELS.get(self.token.text, -1) >= level:
             token = self.advance()
@@ -176,7 +183,7 @@ class _Parser:
             with self.deeper(token):
                 right = self.binary(own if own == _POWER else own + 1)
             operator = cast(BinaryOperator, "^" if token.text == "**" else token.text)
-            left = Binary(operator, left, right, left.start, right.end)
+            left = Binary(operator, left, right, start, self.end)
             if own == _COMPARISON and LEVELS.get(self.token.text) == _COMPARISON:
                 message = "comparisons do not chain"
                 hint = "join two comparisons with 'and', as in 'a < b and b < c'"
@@ -194,7 +201,7 @@ class _Parser:
         self.advance()
         with self.deeper(token):
             operand = self.binary(_NOT if token.text == "not" else _SIGN)
-        return Unary(cast(UnaryOperator, token.text), operand, token.start, operand.end)
+        return Unary(cast(UnaryOperator, token.text), operand, token.start, self.end)
 
     def operand(self) -> Tree:
         token = self.token
