@@ -1,0 +1,71 @@
+# From a fresh clone, with Python 3.11 or later and nothing else of ours:
+#
+#   make demo       makes .venv, installs, and runs the main job into demo/
+#   make test       every check that needs Python alone
+#   make test-all   the tests that need Chromium, graphviz' dot or a C compiler; fails without them
+#
+# PYTHON=... names another interpreter to make .venv with, PYTEST_ARGS=... adds to pytest's arguments.
+
+PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
+  $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
+PYTEST_ARGS ?=
+
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+ELSEWHERE := browser or dot or compiler
+
+.PHONY: help install demo test test-all needs format clean
+.DELETE_ON_ERROR:
+
+help:
+	@sed -n '/^#/!q; s/^# \{0,1\}//p' Makefile
+
+# The stamps lie in .venv, so that they go when it goes. A package is reinstalled when what it needs may have changed;
+# the code itself is used in place.
+
+$(VENV)/made:
+	@test -n "$(PYTHON)" || { echo "NeuroVis needs Python 3.11 or later: install it, or say PYTHON=/path/to/python" >&2; exit 1; }
+	@$(PYTHON) -m venv $(VENV) || { echo "$(PYTHON) -m venv failed; on Debian: apt-get install python3-venv" >&2; exit 1; }
+	@touch $@
+
+$(VENV)/installed: $(VENV)/made pyproject.toml
+	@echo "installing into $(VENV) with $$($(BIN)/python --version) (a minute or so)"
+	@begun=$$(date +%s); $(PIP) --editable . && printf '%-26s%5s s   %s\n' install $$(($$(date +%s) - begun)) $(VENV)
+	@touch $@
+
+$(VENV)/tested: $(VENV)/installed
+	@echo "installing what the tests need"
+	@$(PIP) --editable '.[test]'
+	@touch $@
+
+install: $(VENV)/installed
+
+demo: $(VENV)/installed
+	@$(BIN)/python demo.py
+
+test: $(VENV)/tested
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/python -m pytest -m "not ($(ELSEWHERE))" $(PYTEST_ARGS)
+
+test-all: needs $(VENV)/tested
+	$(BIN)/python -m pytest -m "$(ELSEWHERE)" $(PYTEST_ARGS)
+
+# Skipping would hide that nothing was tested: what is missing is an error.
+needs:
+	@missing=; \
+	for browser in chromium chromium-browser google-chrome; do command -v $$browser >/dev/null && break; done \
+	  || missing="$$missing Chromium (apt-get install chromium);"; \
+	command -v dot >/dev/null || missing="$$missing dot (apt-get install graphviz);"; \
+	command -v cc >/dev/null || command -v gcc >/dev/null || missing="$$missing a C compiler (apt-get install gcc libc6-dev);"; \
+	test -z "$$missing" || { echo "make test-all needs what is not here:$$missing" >&2; exit 1; }
+
+format: $(VENV)/tested
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+clean:
+	rm -rf $(VENV) demo build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
