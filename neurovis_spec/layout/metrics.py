@@ -22,9 +22,9 @@ IntArray = npt.NDArray[np.int64]
 _MEETING = 0.35
 _OVER = 0.3
 _SLACK = 1e-9
-_STEP = 0.25
+_STEP = 0.4
 #: The most segments that a cubic piece is flattened to.
-_FINEST = 64
+_FINEST = 4096
 _ALONG: dict[Direction, Point] = {"down": (0, 1), "up": (0, -1), "right": (1, 0), "left": (-1, 0)}
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import networkx as nx
 
@@ -17,11 +18,17 @@ _APART = 1.5
 
 
 def components_of(problem: LayoutProblem, units: Sequence[Unit]) -> tuple[list[list[int]], list[int]]:
-    """Components of several connected units or of one that has connections, as unit indices; and units without any."""
+    """Components of several connected units or of one block, as unit indices; and units without connections.
+
+    Components that a box joins are one.
+    """
     owner = {member: i for i, unit in enumerate(units) for member in unit.members}
     graph: nx.Graph[int] = nx.Graph()
     graph.add_nodes_from(range(len(units)))
     graph.add_edges_from((owner[edge.source], owner[edge.target]) for edge in problem.edges)
+    for _, members in problem.boxes:
+        mates = [owner[m] for m in members if graph.degree(owner[m]) or units[owner[m]].places is not None]
+        graph.add_edges_from(pairwise(mates))
     connected: list[list[int]] = []
     alone: list[int] = []
     for component in sorted(sorted(part) for part in nx.connected_components(graph)):

@@ -88,6 +88,7 @@ def _plan(problem: LayoutProblem, units: Sequence[Unit]) -> _Plan:
     connected, alone = components_of(problem, units)
     largest = max(connected, key=lambda part: sum(len(units[u].members) for u in part), default=None)
     parts: list[_Plan] = []
+    hosts = _hosts(problem, units, connected, alone)
     few = sum(len(units[u].members) for u in alone) <= 6
     owner = {m: u for u, unit in enumerate(units) for m in unit.members}
     edges: dict[int, list[int]] = {}
@@ -96,7 +97,7 @@ def _plan(problem: LayoutProblem, units: Sequence[Unit]) -> _Plan:
         if owner[edge.source] in part_of:
             edges.setdefault(part_of[owner[edge.source]], []).append(i)
     for k, part in enumerate(connected):
-        guests = alone if few and part is largest else []
+        guests = [u for u in alone if few and hosts.get(u, largest) == part]
         parts.append(_component(problem, [units[u] for u in part], [units[u] for u in guests], edges.get(k, [])))
     if alone and not (few and connected):
         parts.append(_unconnected(problem, [units[u] for u in alone]))
@@ -104,6 +105,20 @@ def _plan(problem: LayoutProblem, units: Sequence[Unit]) -> _Plan:
     for part_plan, shift in zip(parts, packed([part.extent() for part in parts]), strict=True):
         plan.add(part_plan, shift)
     return plan
+
+
+def _hosts(
+    problem: LayoutProblem, units: Sequence[Unit], connected: Sequence[list[int]], alone: Sequence[int]
+) -> dict[int, list[int]]:
+    """For units without connections that share a box with connected ones: the component to stand beside."""
+    part_of = {m: part for part in connected for u in part for m in units[u].members}
+    box_of = {m: box for _, box in problem.boxes for m in box}
+    hosts: dict[int, list[int]] = {}
+    for u in alone:
+        mates = [m for m in box_of.get(units[u].members[0], ()) if m in part_of]
+        if mates:
+            hosts[u] = part_of[mates[0]]
+    return hosts
 
 
 def _component(problem: LayoutProblem, units: Sequence[Unit], guests: Sequence[Unit], edges: Sequence[int]) -> _Plan:

@@ -29,20 +29,20 @@ def bow(start: Point, end: Point, height: float, hold: float = 0.3) -> Route:
 
 def clear_bow(
     start: Point, end: Point, own: tuple[int, int], obstacles: Obstacles, least: float, sided: bool
-) -> tuple[Route, float]:
-    """The flattest bow of at least ``least`` that is clear of foreign discs, else the clearest; and its clearance.
+) -> tuple[Route, float, float]:
+    """The flattest bow of at least ``least`` clear of foreign discs, else the clearest; its clearance and height.
 
     ``sided`` keeps it on the side of ``least`` (one of a reciprocal pair must not change over).
     """
-    best: tuple[Route, float] | None = None
+    best: tuple[Route, float, float] | None = None
     length = distance(start, end)
     for height, hold in _candidates(least, length, sided):
         route = bow(start, end, height, hold)
         clearance = obstacles.clearance(route, own)
         if clearance >= REACH - 0.03:
-            return route, clearance
+            return route, clearance, height
         if best is None or clearance > best[1]:
-            best = route, clearance
+            best = route, clearance, height
     assert best is not None
     return best
 

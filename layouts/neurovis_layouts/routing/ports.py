@@ -44,10 +44,7 @@ def leanings(ports: Sequence[Port]) -> dict[tuple[int, bool], float]:
         for port in ordered
     ]
     room = 2 * _WIDEST / max(1, len(ordered) - 1)
-    gaps = [
-        min(room, _PARTNER_GAP if first.partner == second.partner else _GAP)
-        for first, second in pairwise(ordered)
-    ]
+    gaps = [min(room, _PARTNER_GAP if first.partner == second.partner else _GAP) for first, second in pairwise(ordered)]
     places = spread(wishes, [1.0] * len(ordered), gaps)
     # a whole fan that leans out to one side is moved back, one that is too wide is narrowed as well
     over, under = places[-1] - _WIDEST, -_WIDEST - places[0]

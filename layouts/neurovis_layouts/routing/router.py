@@ -19,6 +19,8 @@ from neurovis_spec.layout.model import LayoutEdge, Point, Route
 __all__ = ["Waypoint", "route_all"]
 
 _NEAR = 3.0
+#: With more edges than this nobody can follow one: discs in the way are not gone round.
+_MOST_CAREFULLY = 4000
 _STEEP_ENOUGH = 0.75
 
 
@@ -33,14 +35,15 @@ def route_all(
     Without ``waypoints`` every edge runs from anywhere to anywhere; with them, edges not in ``bowed`` run along the
     direction (through their waypoints, if they have any).
     """
-    obstacles = Obstacles(centres)
+    near = Obstacles(centres)
+    obstacles = near if len(edges) <= _MOST_CAREFULLY else Obstacles(())
     routes: dict[int, Route] = {}
     if waypoints is not None:
         along = [i for i, edge in enumerate(edges) if i not in bowed and _runs_along(edge, centres)]
         routes.update(_curves(edges, centres, along, waypoints, obstacles))
     rest = [i for i, edge in enumerate(edges) if i not in routes and edge.source != edge.target]
     routes.update(_bows(edges, centres, rest, obstacles))
-    routes.update(_loops(edges, centres, routes, obstacles))
+    routes.update(_loops(edges, centres, routes, near))
     return [routes[i] for i in range(len(edges))]
 
 
@@ -57,6 +60,8 @@ def _curves(
     obstacles: Obstacles,
 ) -> dict[int, Route]:
     lean = _lean(edges, centres, chosen, waypoints)
+    shared = _shared(edges)
+    heights: dict[tuple[int, int], float] = {}
     routes: dict[int, Route] = {}
     for i in chosen:
         start, end = centres[edges[i].source], centres[edges[i].target]
@@ -70,11 +75,21 @@ def _curves(
             if found > clearance + 0.02:
                 best, clearance = other, found
         if clearance < TOUCH + 0.02:
-            other, found = clear_bow(start, end, own, obstacles, 0.3, False)
+            least = heights.get(own, 0.0) + 0.3
+            other, found, height = clear_bow(start, end, own, obstacles, least, own in shared)
             if found > clearance + 0.02:
-                best = other
+                best, heights[own] = other, height
         routes[i] = best
     return routes
+
+
+def _shared(edges: Sequence[LayoutEdge]) -> frozenset[tuple[int, int]]:
+    """Ends that several edges share, in either direction: these must not leave their side."""
+    times: dict[tuple[int, int], int] = {}
+    for edge in edges:
+        for ends in ((edge.source, edge.target), (edge.target, edge.source)):
+            times[ends] = times.get(ends, 0) + 1
+    return frozenset(ends for ends, count in times.items() if count > 1)
 
 
 def _lean(
@@ -116,10 +131,18 @@ def _bows(
         start, end = centres[source], centres[target]
         reciprocal = (target, source) in between
         base = 0.2 + 0.05 * distance(start, end)
+        left = right = 0.0
         for place, i in enumerate(equal):
-            height = base + 0.3 * place if reciprocal else 0.3 * (place - (len(equal) - 1) / 2)
+            # each further one outside those before it, wherever obstacles have sent these
+            if reciprocal:
+                least = left + 0.3 if place else base
+            else:
+                odd = len(equal) % 2
+                least = 0.0 if odd and place == 0 else left + 0.3 if (place + odd) % 2 == 0 else right - 0.3
+                least = least / 2 if not odd and place < 2 else least
             sided = reciprocal or len(equal) > 1
-            routes[i] = clear_bow(start, end, (source, target), obstacles, height, sided)[0]
+            routes[i], _, height = clear_bow(start, end, (source, target), obstacles, least, sided)
+            left, right = max(left, height), min(right, height)
     return routes
 
 

@@ -1,0 +1,140 @@
+"""What every layout engine has to keep, or to refuse by the limit that it declares.
+
+In: an engine's name and problems. Out: failed assertions. A third-party engine can be held to it in the same way.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from hypothesis import strategies as st
+
+from neurovis_spec.layout import RADIUS, Arrangement, Direction, Layout, LayoutProblem, LayoutRefusalError, Point
+from neurovis_spec.layout.arrange import lay_out_problem
+from neurovis_spec.layout.geometry import distance, sampled
+from neurovis_spec.layout.problem import canonical
+
+Edge = tuple[str, str, str, int]
+
+ENGINES = ("layered", "circular", "grid", "manual")
+
+
+def named(pairs: Iterable[tuple[str, str]], delay: int = 1) -> list[Edge]:
+    """Edges with the names that a network gives them."""
+    seen: dict[tuple[str, str], int] = {}
+    edges: list[Edge] = []
+    for source, target in pairs:
+        number = seen[source, target] = seen.get((source, target), 0) + 1
+        edges.append((f"{source} -> {target}" + (f" ({number})" if number > 1 else ""), source, target, delay))
+    return edges
+
+
+def members(group: str, count: int) -> list[str]:
+    return [f"{group}{i + 1}" for i in range(count)]
+
+
+def full(sources: Iterable[str], targets: Iterable[str]) -> list[tuple[str, str]]:
+    chosen = list(targets)
+    return [(source, target) for source in sources for target in chosen]
+
+
+def use_case_one(
+    direction: Direction = "down", arrange: tuple[tuple[list[str], Arrangement], ...] = ()
+) -> LayoutProblem:
+    """The paper's first: two neurons of a rhythm, eight kernels, an output; T stands alone."""
+    c, k = members("C", 2), members("K", 8)
+    edges = named(full(c, c)) + named(full(c, k), 0) + named(full(k, ["O"]), 0)
+    return canonical(
+        "cpg_rbf",
+        [*c, *k, "O", "T"],
+        [("C", c), ("K", k), ("O", ["O"]), ("T", ["T"])],
+        edges,
+        direction=direction,
+        arrange=arrange,
+        boxes=[("rhythm", c), ("kernels", k)],
+    )
+
+
+@st.composite
+def problems(draw: st.DrawFn, pinned: bool = True) -> LayoutProblem:
+    """Small networks of any make: groups, loops, parallel and reciprocal edges, lone neurons, boxes, pins."""
+    sizes = draw(st.lists(st.integers(1, 5), min_size=0, max_size=4))
+    groups = [(name, members(name, size)) for name, size in zip("ABCD", sizes, strict=False)]
+    names = [neuron for _, of in groups for neuron in of]
+    pairs = draw(st.lists(st.tuples(st.sampled_from(names), st.sampled_from(names)), max_size=24)) if names else []
+    lattice = st.tuples(st.integers(-4, 4), st.integers(-4, 4))
+    spots = draw(st.lists(lattice, unique=True, max_size=3)) if pinned else []
+    pins = {name: (0.7 * x, 0.9 * y) for name, (x, y) in zip(names[::2], spots, strict=False)}
+    boxes = [("frame", groups[0][1])] if draw(st.booleans()) and groups else []
+    return canonical(
+        "drawn",
+        names,
+        groups,
+        named(pairs, draw(st.integers(0, 1))),
+        pins,
+        draw(st.sampled_from(["down", "up", "right", "left"])),
+        boxes=boxes,
+    )
+
+
+def check(problem: LayoutProblem, engine: str) -> Layout | None:
+    """Hold an engine to the contract on one problem; None where it refused by what it declares."""
+    try:
+        layout = lay_out_problem(problem, engine)
+    except LayoutRefusalError as refusal:
+        check_refusal(engine, refusal)
+        return None
+    check_positions(problem, layout)
+    check_routes(problem, layout)
+    assert lay_out_problem(problem, engine) == layout
+    return layout
+
+
+def check_refusal(engine: str, refusal: LayoutRefusalError) -> None:
+    """A refusal names the engine, and what it declares not to do."""
+    assert engine in str(refusal)
+    assert refusal.code in {
+        "position-missing",
+        "layout-pins-unsupported",
+        "layout-arrange-unsupported",
+        "layout-boxes-unsupported",
+        "layout-direction-unsupported",
+    }
+
+
+def check_positions(problem: LayoutProblem, layout: Layout) -> None:
+    assert tuple(layout.positions) == problem.neurons
+    points = list(layout.positions.values())
+    assert all(math.isfinite(x) and math.isfinite(y) for x, y in points)
+    for i, one in enumerate(points):
+        for other in points[:i]:
+            assert distance(one, other) >= 2 * RADIUS - 1e-9
+    for i, point in enumerate(points):
+        if i in problem.pins:
+            assert point == problem.pins[i]
+        else:
+            assert all(float(1024 * c).is_integer() for c in point)
+    if points and not problem.pins:
+        assert min(x for x, _ in points) == 0
+        assert min(y for _, y in points) == 0
+
+
+def check_routes(problem: LayoutProblem, layout: Layout) -> None:
+    assert list(layout.routes) == [edge.name for edge in problem.edges]
+    lines: dict[frozenset[int], list[list[Point]]] = {}
+    for edge in problem.edges:
+        route = layout.routes[edge.name]
+        assert len(route) >= 4
+        assert len(route) % 3 == 1
+        assert route[0] == layout.positions[problem.neurons[edge.source]]
+        assert route[-1] == layout.positions[problem.neurons[edge.target]]
+        line = sampled(route, 0.05)
+        if edge.source == edge.target:
+            assert max(distance(point, route[0]) for point in line) > RADIUS + 0.1
+        else:
+            lines.setdefault(frozenset((edge.source, edge.target)), []).append(line)
+    for equal in lines.values():
+        for i, one in enumerate(equal):
+            for other in equal[:i]:
+                assert max(min(distance(p, q) for q in other) for p in one) > 0.04, "two edges share a line"

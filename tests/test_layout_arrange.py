@@ -1,0 +1,122 @@
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import layout_conformance as suite
+import pytest
+
+from neurovis_spec import plugins
+from neurovis_spec.layout import Capabilities, Layout, LayoutProblem, LayoutRefusalError, Point
+from neurovis_spec.layout.arrange import choose_engine, lay_out_problem, refuse_what_it_cannot
+from neurovis_spec.layout.geometry import straight
+from neurovis_spec.layout.problem import canonical
+
+PAIR = canonical("pair", ["A", "B"], [("A", ["A"]), ("B", ["B"])], suite.named([("A", "B")]))
+
+
+def test_auto_is_manual_where_everything_is_pinned() -> None:
+    pinned = canonical("pair", ["A", "B"], pins={"A": (0.0, 0.0), "B": (1.0, 0.0)})
+    assert choose_engine(pinned)[0] == "manual"
+    assert lay_out_problem(pinned).engine == "manual"
+    assert choose_engine(PAIR)[0] == "layered"
+    assert lay_out_problem(PAIR).engine == "layered"
+
+
+def test_an_unknown_engine_is_answered_with_the_nearest() -> None:
+    with pytest.raises(LayoutRefusalError, match="no layout engine 'layred'") as caught:
+        lay_out_problem(PAIR, "layred")
+    assert caught.value.code == "unknown-engine"
+    assert caught.value.hint == "did you mean 'layered'?"
+
+
+def test_manual_names_a_neuron_without_a_position() -> None:
+    with pytest.raises(LayoutRefusalError, match="'A' and 1 more has none") as caught:
+        lay_out_problem(PAIR, "manual")
+    assert caught.value.code == "position-missing"
+
+
+@pytest.mark.parametrize("engine", ["layered", "manual", "grid", "circular"])
+def test_pins_closer_than_a_disc_are_refused_by_name(engine: str) -> None:
+    pins = {"A": (0.0, 0.0), "B": (0.4, 0.4)}
+    with pytest.raises(LayoutRefusalError, match=r"'A' and 'B' are closer than 0\.6") as caught:
+        lay_out_problem(canonical("close", ["A", "B"], pins=pins), engine)
+    assert caught.value.code == "pins-too-close"
+
+
+def test_pins_just_a_disc_apart_are_fine() -> None:
+    pins = {"A": (0.0, 0.0), "B": (0.6, 0.0), "C": (0.3, 0.6), "D": (1.2, 0.0)}
+    assert lay_out_problem(canonical("near", list(pins), pins=pins)).positions == pins
+
+
+@pytest.mark.parametrize(
+    ("problem", "code"),
+    [
+        (canonical("p", ["A", "B"], pins={"A": (0.0, 0.0)}), "layout-pins-unsupported"),
+        (canonical("p", ["A"], arrange=[(["A"], "row")]), "layout-arrange-unsupported"),
+        (canonical("p", ["A"], boxes=[("frame", ["A"])]), "layout-boxes-unsupported"),
+        (canonical("p", ["A"], direction="right"), "layout-direction-unsupported"),
+        (canonical("p", ["A", "B", "C"]), "layout-too-large"),
+    ],
+)
+def test_what_an_engine_cannot_do_is_refused(problem: LayoutProblem, code: str) -> None:
+    with pytest.raises(LayoutRefusalError) as caught:
+        refuse_what_it_cannot(problem, "poor", Capabilities(neurons=2))
+    assert caught.value.code == code
+
+
+def test_circular_and_grid_say_that_they_cannot_arrange() -> None:
+    for engine in ("circular", "grid"):
+        with pytest.raises(LayoutRefusalError, match=f"'{engine}' cannot arrange"):
+            lay_out_problem(canonical("p", ["A"], arrange=[(["A"], "row")]), engine)
+
+
+@dataclass
+class Broken:
+    """An engine of somebody else's that gives back whatever it was given."""
+
+    layout: Layout
+    name: str = "broken"
+    capabilities: Capabilities = field(default_factory=Capabilities)
+
+    def lay_out(self, problem: LayoutProblem) -> Layout:
+        return self.layout
+
+
+A, B = (0.0, 0.0), (3.0, 4.0)
+ROUTE = {"A -> B": straight(A, B)}
+
+
+@pytest.mark.parametrize(
+    ("positions", "routes", "message"),
+    [
+        ({"A": A}, ROUTE, "place every neuron"),
+        ({"A": A, "B": B, "C": B}, ROUTE, "place every neuron"),
+        ({"A": A, "B": (float("nan"), 0.0)}, ROUTE, "'B' a position that is not finite"),
+        ({"A": A, "B": B}, {}, "route every connection"),
+        ({"A": A, "B": B}, {"A -> B": (A, A, B)}, "'A -> B' a route that is no cubic spline"),
+        ({"A": A, "B": B}, {"A -> B": straight(B, A)}, "centre to centre"),
+    ],
+)
+def test_what_an_engine_gives_back_is_checked(
+    monkeypatch: pytest.MonkeyPatch,
+    positions: dict[str, Point],
+    routes: dict[str, tuple[Point, ...]],
+    message: str,
+) -> None:
+    engine = Broken(Layout("pair", "broken", positions, routes))
+    monkeypatch.setattr(plugins, "load", lambda group, name: engine)
+    with pytest.raises(LayoutRefusalError, match=message) as caught:
+        lay_out_problem(PAIR, "broken")
+    assert caught.value.code == "broken-engine"
+
+
+def test_results_are_put_on_the_grid_and_at_the_origin(monkeypatch: pytest.MonkeyPatch) -> None:
+    a, b = (-7.30001, 2.0), (1.3, -1 / 3)
+    engine = Broken(Layout("pair", "broken", {"B": b, "A": a}, {"A -> B": straight(a, b)}))
+    monkeypatch.setattr(plugins, "load", lambda group, name: engine)
+    layout = lay_out_problem(PAIR, "broken")
+    assert list(layout.positions) == ["A", "B"]
+    assert layout.positions["A"] == (0.0, (2048 + 341) / 1024)
+    assert layout.positions["B"] == ((1331 + 7475) / 1024, 0.0)
+    assert layout.routes["A -> B"][0] == layout.positions["A"]
+    assert layout.routes["A -> B"][-1] == layout.positions["B"]

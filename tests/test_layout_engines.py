@@ -1,0 +1,282 @@
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import layout_conformance as suite
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from neurovis_layouts.formations import offsets
+from neurovis_layouts.isotonic import spread
+from neurovis_layouts.layered import LayeredEngine
+from neurovis_layouts.layered.ranks import ranks_of
+from neurovis_layouts.pins import fit
+
+from neurovis_spec.layout import Direction, Layout, LayoutProblem, LayoutRefusalError, Point
+from neurovis_spec.layout.arrange import lay_out_problem
+from neurovis_spec.layout.file import dump
+from neurovis_spec.layout.geometry import distance, sampled
+from neurovis_spec.layout.metrics import metrics
+from neurovis_spec.layout.problem import canonical
+
+
+@pytest.mark.parametrize("engine", suite.ENGINES)
+@settings(max_examples=60, deadline=None)
+@given(problem=suite.problems())
+def test_every_engine_keeps_the_contract_or_refuses(engine: str, problem: LayoutProblem) -> None:
+    suite.check(problem, engine)
+
+
+@pytest.mark.parametrize("engine", suite.ENGINES)
+def test_every_engine_lays_out_nothing_and_one(engine: str) -> None:
+    assert lay_out_problem(canonical("none", []), engine) == Layout("none", engine, {}, {})
+    one = canonical("one", ["A"], [("A", ["A"])], suite.named([("A", "A")]), {"A": (0.0, 0.0)})
+    layout = suite.check(one, engine)
+    assert layout is not None
+    assert layout.positions == {"A": (0.0, 0.0)}
+
+
+@pytest.mark.parametrize("engine", ["layered", "circular", "grid"])
+@pytest.mark.parametrize("direction", ["down", "up", "right", "left"])
+def test_use_case_one_in_every_direction(engine: str, direction: Direction) -> None:
+    problem = suite.use_case_one(direction)
+    layout = suite.check(problem, engine)
+    assert layout is not None
+    measured = metrics(layout, problem)
+    assert measured["overlaps"] == 0
+    if engine == "layered":
+        assert measured["crossings"] == 28  # the least for 2 × 8 in two ranks
+        assert measured["edges_over_neurons"] == 0
+        assert measured["flow"] == 1
+
+
+def test_use_case_one_is_centred_and_mirrored() -> None:
+    places = lay_out_problem(suite.use_case_one(), "layered").positions
+    axis = places["O"][0]
+    for left, right in [("C1", "C2"), ("K1", "K8"), ("K2", "K7"), ("K3", "K6"), ("K4", "K5")]:
+        assert places[left][0] + places[right][0] == 2 * axis
+        assert places[left][1] == places[right][1]
+    assert [places[f"K{i}"][0] for i in range(1, 9)] == [float(i) for i in range(8)]
+    assert places["C1"][1] < places["K1"][1] < places["O"][1] == places["T"][1]
+    assert places["T"][0] > places["O"][0]
+
+
+def test_self_loops_turn_away_from_the_neighbour() -> None:
+    layout = lay_out_problem(suite.use_case_one(), "layered")
+    assert min(x for x, _ in layout.routes["C1 -> C1"]) < layout.positions["C1"][0] - 0.3
+    assert max(x for x, _ in layout.routes["C2 -> C2"]) > layout.positions["C2"][0] + 0.3
+
+
+def test_arrivals_come_in_the_order_of_their_sources() -> None:
+    layout = lay_out_problem(suite.use_case_one(), "layered")
+    last = [layout.routes[f"K{i} -> O"][-2][0] for i in range(1, 9)]
+    assert all(a < b for a, b in pairwise(last))
+
+
+def test_straight_routes_keep_their_control_points_on_the_line() -> None:
+    names = suite.members("N", 12)
+    chain = canonical("chain", names, [("N", names)], suite.named(pairwise(names)))
+    layout = lay_out_problem(chain, "layered")
+    assert [layout.positions[name] for name in names] == [(0.0, 2.0 * i) for i in range(12)]
+    assert all(x == 0 for route in layout.routes.values() for x, _ in route)
+
+
+def test_a_group_that_drives_itself_in_a_ring_is_drawn_as_one() -> None:
+    names = suite.members("R", 16)
+    around = [(a, b) for a, b in pairwise([*names, names[0]])]
+    problem = canonical("ring", names, [("R", names)], suite.named([*around, *((b, a) for a, b in around)]))
+    layout = lay_out_problem(problem, "layered")
+    middle = [sum(c) / 16 for c in zip(*layout.positions.values(), strict=True)]
+    radii = [distance(point, (middle[0], middle[1])) for point in layout.positions.values()]
+    assert max(radii) - min(radii) < 0.01
+    assert metrics(layout, problem)["crossings"] == 0
+
+
+def test_what_spans_ranks_goes_round_the_neurons_between() -> None:
+    names = ["A", "B", "C"]
+    problem = canonical("skip", names, [(n, [n]) for n in names], suite.named([("A", "B"), ("B", "C"), ("A", "C")]))
+    layout = lay_out_problem(problem, "layered")
+    line = sampled(layout.routes["A -> C"])
+    assert min(distance(point, layout.positions["B"]) for point in line) > 0.4
+
+
+def test_feedback_stands_against_the_direction_and_apart() -> None:
+    h, o = suite.members("H", 3), ["O"]
+    pairs = suite.named([*suite.full(["I"], h), *suite.full(h, o)], 0) + suite.named(suite.full(o, h))
+    problem = canonical("fb", ["I", *h, *o], [("I", ["I"]), ("H", h), ("O", o)], pairs)
+    layout = suite.check(problem, "layered")
+    assert layout is not None
+    heights = [layout.positions[name][1] for name in ("I", "H1", "H2", "H3", "O")]
+    assert heights == [0.0, 2.0, 2.0, 2.0, 4.0]
+
+
+def test_what_runs_within_a_step_decides_where_a_loop_is_cut() -> None:
+    edges = suite.named([("B", "A")], 0) + suite.named([("A", "B")], 1)
+    places = lay_out_problem(canonical("cut", ["A", "B"], [("A", ["A"]), ("B", ["B"])], edges), "layered").positions
+    assert places["B"][1] < places["A"][1]
+
+
+def test_members_of_a_box_stay_together() -> None:
+    names = suite.members("N", 6)
+    targets = suite.members("M", 6)
+    pairs = [(names[i], targets[(3 * i) % 6]) for i in range(6)]
+    groups = [(n, [n]) for n in names + targets]
+    boxed = [names[0], names[3], names[5]]
+    problem = canonical("boxes", names + targets, groups, suite.named(pairs), boxes=[("frame", boxed)])
+    places = lay_out_problem(problem, "layered").positions
+    rank = sorted((x, name) for name, (x, y) in places.items() if y == places[boxed[0]][1])
+    at = [i for i, (_, name) in enumerate(rank) if name in boxed]
+    assert len(at) == 3
+    assert at[2] - at[0] == 2
+
+
+def test_arranged_groups_keep_their_formation() -> None:
+    kernels = suite.members("K", 8)
+    layout = lay_out_problem(suite.use_case_one(arrange=((kernels, "grid"),)), "layered")
+    places = [layout.positions[name] for name in kernels]
+    origin = places[0]
+    assert [(x - origin[0], y - origin[1]) for x, y in places] == [
+        (0, 0), (1, 0), (2, 0), (0, 1), (1, 1), (2, 1), (0.5, 2), (1.5, 2)
+    ]  # fmt: skip
+    sideways = lay_out_problem(suite.use_case_one("right", arrange=((kernels, "row"),)), "layered")
+    assert len({sideways.positions[name][1] for name in kernels}) == 1
+
+
+def test_arranging_a_neuron_twice_is_refused() -> None:
+    problem = canonical("twice", ["A", "B"], arrange=[(["A", "B"], "row"), (["A"], "ring")])
+    with pytest.raises(LayoutRefusalError, match="'A' is arranged twice"):
+        LayeredEngine().lay_out(problem)
+
+
+def test_pins_stay_and_push_others_off() -> None:
+    problem = suite.use_case_one()
+    free = lay_out_problem(problem, "layered").positions
+    o = problem.neurons.index("O")
+    t = problem.neurons.index("T")
+    pins = {o: (5.0, 5.0), t: (5.0 + free["K3"][0] - free["O"][0] + 0.1, 3.0)}
+    pinned = LayoutProblem("x", problem.neurons, problem.groups, problem.edges, pins)
+    layout = suite.check(pinned, "layered")
+    assert layout is not None
+    assert layout.positions["O"] == (5.0, 5.0)
+
+
+def test_one_pin_moves_the_whole() -> None:
+    problem = suite.use_case_one()
+    free = lay_out_problem(problem, "layered").positions
+    o = problem.neurons.index("O")
+    pinned = LayoutProblem("x", problem.neurons, problem.groups, problem.edges, {o: (10.0, -3.0)}, boxes=problem.boxes)
+    places = lay_out_problem(pinned, "layered").positions
+    shift = (10.0 - free["O"][0], -3.0 - free["O"][1])
+    assert places == {name: (x + shift[0], y + shift[1]) for name, (x, y) in free.items()}
+
+
+def test_a_long_chain_and_many_components_do_not_recurse() -> None:
+    names = suite.members("N", 3000)
+    layout = LayeredEngine().lay_out(canonical("long", names, [("N", names)], suite.named(pairwise(names))))
+    assert len(set(layout.positions.values())) == 3000
+    pairs = canonical("pairs", names, [(n, [n]) for n in names], suite.named(zip(names[::2], names[1::2], strict=True)))
+    assert len(set(LayeredEngine().lay_out(pairs).positions.values())) == 3000
+
+
+def test_the_same_bytes_whatever_the_hash_seed() -> None:
+    code = (
+        "import layout_conformance as s; from neurovis_spec.layout.arrange import lay_out_problem as l;"
+        "from neurovis_spec.layout.file import dump; from neurovis_spec.layout.problem import canonical as c;"
+        "n = s.members('R', 9); e = s.named([(n[i * 5 % 9], n[i * i % 7]) for i in range(20)]);"
+        "p = c('x', n + ['A', 'B'], [('R', n[:5])], e + s.named(s.full(['A'], n)), boxes=[('b', n[:3])]);"
+        "print(dump(l(p, 'layered')), dump(l(s.use_case_one(), 'layered')))"
+    )
+    texts = []
+    for seed in ("0", "7"):
+        environment = {**os.environ, "PYTHONHASHSEED": seed, "PYTHONPATH": str(Path(__file__).parent)}
+        run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
+        texts.append(run.stdout)
+    assert texts[0] == texts[1]
+    assert "C1 -> K1" in texts[0]
+
+
+@settings(max_examples=25, deadline=None)
+@given(problem=suite.problems(), random=st.randoms(use_true_random=False))
+def test_the_order_of_the_spec_does_not_show(problem: LayoutProblem, random: object) -> None:
+    assert hasattr(random, "shuffle")
+    names, groups = list(problem.neurons), [(g.name, [problem.neurons[m] for m in g.members]) for g in problem.groups]
+    edges = [(e.name, problem.neurons[e.source], problem.neurons[e.target], e.delay) for e in problem.edges]
+    pins = [(problem.neurons[i], point) for i, point in problem.pins.items()]
+    boxes = [(name, [problem.neurons[m] for m in of]) for name, of in problem.boxes]
+    for parts in (names, groups, edges, pins, boxes):
+        random.shuffle(parts)
+    shuffled = canonical(problem.network, names, groups, edges, dict(pins), problem.direction, boxes=boxes)
+    assert shuffled == problem
+    assert dump(lay_out_problem(shuffled, "layered")) == dump(lay_out_problem(problem, "layered"))
+
+
+def test_the_same_network_under_other_names_in_the_same_order_lies_the_same() -> None:
+    problem = suite.use_case_one()
+    renamed = canonical(
+        "other",
+        [f"x{name}" for name in problem.neurons],
+        [(f"x{g.name}", [f"x{problem.neurons[m]}" for m in g.members]) for g in problem.groups],
+        [
+            (f"x{a} -> x{b}", f"x{a}", f"x{b}", e.delay)
+            for e in problem.edges
+            for a, b in [(problem.neurons[e.source], problem.neurons[e.target])]
+        ],
+        boxes=[(name, [f"x{problem.neurons[m]}" for m in of]) for name, of in problem.boxes],
+    )
+    first, second = lay_out_problem(problem), lay_out_problem(renamed)
+    assert list(first.positions.values()) == list(second.positions.values())
+    assert list(first.routes.values()) == list(second.routes.values())
+
+
+@given(
+    st.lists(st.tuples(st.floats(-50, 50), st.floats(0.1, 9), st.floats(0, 3)), min_size=1, max_size=12),
+)
+def test_spread_keeps_distances_and_cannot_be_bettered(items: list[tuple[float, float, float]]) -> None:
+    wishes, weights, gaps = (list(column) for column in zip(*items, strict=True))
+    places = spread(wishes, weights, gaps)
+    assert all(b - a >= gap - 1e-9 for (a, b), gap in zip(pairwise(places), gaps, strict=False))
+
+    def cost(line: Sequence[float]) -> float:
+        return sum(w * (x - wish) * (x - wish) for w, x, wish in zip(weights, line, wishes, strict=True))
+
+    # convex: it is the best if no shift of a stretch that keeps the distances is better
+    for i in range(len(places)):
+        for j in range(i, len(places)):
+            for step in (-1e-3, 1e-3):
+                other = [x + step if i <= k <= j else x for k, x in enumerate(places)]
+                if all(b - a >= gap - 1e-12 for (a, b), gap in zip(pairwise(other), gaps, strict=False)):
+                    assert cost(other) >= cost(places) - 1e-9
+
+
+def test_ranks_are_tight_and_loops_are_cut_once() -> None:
+    arcs = {(0, 1): 1.0, (1, 2): 1.0, (3, 2): 1.0}
+    assert ranks_of(4, arcs, frozenset(), frozenset()) == [0, 1, 2, 1]
+    loop = {(0, 1): 1.0, (1, 2): 1.0, (2, 0): 1.0}
+    assert ranks_of(3, loop, frozenset(), frozenset()) == [0, 1, 2]
+    assert ranks_of(3, loop, frozenset({1}), frozenset()) == [2, 0, 1]
+
+
+@pytest.mark.parametrize("how", ["row", "column", "grid", "ring", "arc"])
+@given(count=st.integers(2, 40))
+def test_formations_keep_their_spacing(how: str, count: int) -> None:
+    assert how in ("row", "column", "grid", "ring", "arc")
+    points = offsets(how, count, 1.0)  # type: ignore[arg-type]
+    nearest = min(distance(a, b) for i, a in enumerate(points) for b in points[:i])
+    assert abs(nearest - 1) < 0.005
+
+
+@given(st.lists(st.tuples(st.integers(0, 6), st.integers(0, 6)), min_size=4, max_size=20, unique=True))
+def test_fitting_to_pins_leaves_no_overlap(cells: list[tuple[int, int]]) -> None:
+    free: list[Point] = [(float(x), float(y)) for x, y in cells]
+    pins = {0: (0.5, 0.5), 2: (3.3, 2.1)}
+    places, shift, moved = fit(free, pins)
+    assert places[0] == pins[0]
+    assert places[2] == pins[2]
+    for i, one in enumerate(places):
+        assert all(distance(one, other) >= 0.6 for other in places[:i])
+        if i not in moved:
+            assert one == (free[i][0] + shift[0], free[i][1] + shift[1])

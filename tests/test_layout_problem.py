@@ -1,0 +1,47 @@
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from neurovis_spec.layout.problem import canonical, edge_key, natural_key
+
+
+def test_numbers_in_names_count_as_numbers() -> None:
+    names = ["K10", "K2", "left10.K1", "left2.K1", "K", "a", "_x", "K02", "C1"]
+    assert sorted(names, key=natural_key) == ["C1", "K", "K02", "K2", "K10", "_x", "a", "left2.K1", "left10.K1"]
+
+
+@given(st.lists(st.from_regex(r"[A-Za-z_][A-Za-z0-9_.]{0,6}", fullmatch=True), unique=True))
+def test_natural_order_is_total(names: list[str]) -> None:
+    assert len({natural_key(name) for name in names}) == len(names)
+    backwards = names[::-1]
+    assert sorted(names, key=natural_key) == sorted(backwards, key=natural_key)
+
+
+def test_edges_stand_by_source_target_and_number() -> None:
+    names = ["K10 -> O", "K2 -> O (10)", "K2 -> O (2)", "K2 -> O", "K2 -> A", "K -> O"]
+    assert sorted(names, key=edge_key) == [
+        "K -> O", "K2 -> A", "K2 -> O", "K2 -> O (2)", "K2 -> O (10)", "K10 -> O"
+    ]  # fmt: skip
+
+
+def test_a_problem_is_in_canonical_order() -> None:
+    problem = canonical(
+        "x",
+        ["K10", "B", "K2"],
+        [("K", ["K2", "K10"]), ("B", ["B"])],
+        [("K10 -> B", "K10", "B", 1), ("K2 -> B", "K2", "B", 0)],
+        {"K10": (1, 2), "B": (0, 0)},
+        boxes=[("b", ["K10"]), ("a", ["B"]), ("b", ["K2"])],
+        spacing=(1.5, 3.0),
+        exits=["B"],
+    )
+    assert problem.neurons == ("B", "K2", "K10")
+    assert [(g.name, g.members) for g in problem.groups] == [("B", (0,)), ("K", (1, 2))]
+    assert [(e.name, e.source, e.target, e.delay) for e in problem.edges] == [
+        ("K2 -> B", 1, 0, 0),
+        ("K10 -> B", 2, 0, 1),
+    ]
+    assert list(problem.pins.items()) == [(0, (0.0, 0.0)), (2, (1.0, 2.0))]
+    assert problem.boxes == (("a", (0,)), ("b", (1, 2)))
+    assert (problem.neuron_spacing, problem.rank_spacing, problem.exits) == (1.5, 3.0, (0,))
