@@ -241,6 +241,7 @@ REFUSALS = [
     ("? [a]\n: 1\n{b: c}: 2\n", ["1:3 key-not-text", "3:1 key-not-text"]),
     ("", ["1:1 not-a-mapping"]),
     ("# nothing\n", ["1:1 not-a-mapping"]),
+    ("---\n# nothing", ["1:1 not-a-mapping"]),
     ("- a\n", ["1:1 not-a-mapping"]),
     ("text\n", ["1:1 not-a-mapping"]),
     ("a: 1\na: 2\nb: [\n", ["2:1 duplicate-key", "3:4 yaml-syntax"]),

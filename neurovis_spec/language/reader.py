@@ -24,7 +24,7 @@ from neurovis_spec.language.composer_refusals import ComposingStoppedError
 from neurovis_spec.language.reader_characters import FORBIDDEN, REPLACEMENT, Lines, character_name
 from neurovis_spec.language.reader_files import FileFault, read_bytes
 from neurovis_spec.language.reader_syntax import explain
-from neurovis_spec.language.source import Mapping, Node, SourceDocument, describe
+from neurovis_spec.language.source import Mapping, Node, Scalar, SourceDocument, describe
 
 LARGEST: Final = 64 << 20  # bytes
 _MOST_CHARACTERS: Final = 20
@@ -118,7 +118,7 @@ def _document(root: Node | None, file: str, findings: Findings) -> SourceDocumen
     if isinstance(root, Mapping):
         return SourceDocument(file, root)
     hint = "a spec begins with a line 'neurovis: 1'"
-    if root is None:
+    if root is None or (isinstance(root, Scalar) and root.value is None):
         findings.error("not-a-mapping", Span(file, 1, 1, 1, 1), "there is nothing in this file", hint)
     else:
         message = f"keys with their values ('key: value') are wanted here, but this is {describe(root)}"
