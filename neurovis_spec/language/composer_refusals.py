@@ -51,14 +51,15 @@ class Refusals:
         first = index = marks.begin(event).index
         line, column = marks.begin(event).line + 1, marks.begin(event).column + 1
         last = marks.end(event)
-        while (match := _PROPERTY.match(self._text, index)) and index < max(marks.end(event).index, first + 1):
+        while (match := _PROPERTY.match(self._text, index)) and index < max(last.index, first + 1):
             written = match.group()
             span = Span(self._file, line, column, line, column + len(written))
             if written.startswith("!"):
                 self._error("tag", span, f"tags such as '{_short(written)}' are not allowed", "leave it out")
             else:
                 self._error("anchor", span, f"anchors such as '{_short(written)}' are not allowed", _USE_NAMES)
-            index = _GAP.match(self._text, match.end()).end()  # type: ignore[union-attr]  # matches anything
+            gap = _GAP.match(self._text, match.end())
+            index = gap.end() if gap else match.end()
             lines, columns = Lines(self._text[first:index]).place(index - first)
             line = marks.begin(event).line + lines
             column = columns + (marks.begin(event).column if lines == 1 else 0)
