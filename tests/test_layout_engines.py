@@ -16,7 +16,7 @@ from neurovis_layouts.layered import LayeredEngine
 from neurovis_layouts.layered.ranks import ranks_of
 from neurovis_layouts.pins import fit
 
-from neurovis_spec.layout import Direction, Layout, LayoutProblem, LayoutRefusalError, Point
+from neurovis_spec.layout import Arrangement, Direction, Layout, LayoutProblem, LayoutRefusalError, Point
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.file import dump
 from neurovis_spec.layout.geometry import distance, sampled
@@ -240,8 +240,8 @@ def test_spread_keeps_distances_and_cannot_be_bettered(items: list[tuple[float, 
     places = spread(wishes, weights, gaps)
     assert all(b - a >= gap - 1e-9 for (a, b), gap in zip(pairwise(places), gaps, strict=False))
 
-    def cost(line: Sequence[float]) -> float:
-        return sum(w * (x - wish) * (x - wish) for w, x, wish in zip(weights, line, wishes, strict=True))
+    def cost(line: list[float]) -> float:
+        return float(sum(w * (x - wish) * (x - wish) for w, x, wish in zip(weights, line, wishes, strict=True)))
 
     # convex: it is the best if no shift of a stretch that keeps the distances is better
     for i in range(len(places)):
@@ -262,9 +262,8 @@ def test_ranks_are_tight_and_loops_are_cut_once() -> None:
 
 @pytest.mark.parametrize("how", ["row", "column", "grid", "ring", "arc"])
 @given(count=st.integers(2, 40))
-def test_formations_keep_their_spacing(how: str, count: int) -> None:
-    assert how in ("row", "column", "grid", "ring", "arc")
-    points = offsets(how, count, 1.0)  # type: ignore[arg-type]
+def test_formations_keep_their_spacing(how: Arrangement, count: int) -> None:
+    points = offsets(how, count, 1.0)
     nearest = min(distance(a, b) for i, a in enumerate(points) for b in points[:i])
     assert abs(nearest - 1) < 0.005
 

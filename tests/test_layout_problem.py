@@ -1,9 +1,14 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 from hypothesis import given
 from hypothesis import strategies as st
+from networks_by_hand import cpg_rbf
 
-from neurovis_spec.layout.problem import canonical, edge_key, natural_key
+from neurovis_spec.compiler.network import LayoutSettings
+from neurovis_spec.layout.arrange import lay_out
+from neurovis_spec.layout.problem import canonical, edge_key, natural_key, problem_of
 
 
 def test_numbers_in_names_count_as_numbers() -> None:
@@ -45,3 +50,34 @@ def test_a_problem_is_in_canonical_order() -> None:
     assert list(problem.pins.items()) == [(0, (0.0, 0.0)), (2, (1.0, 2.0))]
     assert problem.boxes == (("a", (0,)), ("b", (1, 2)))
     assert (problem.neuron_spacing, problem.rank_spacing, problem.exits) == (1.5, 3.0, (0,))
+
+
+def test_the_problem_of_a_network_holds_its_structure_and_settings() -> None:
+    network = cpg_rbf()
+    names = network.neurons.names
+    settings = LayoutSettings(
+        engine="layered",
+        direction="right",
+        positions={names.index("O"): (4.0, 1.0)},
+        arrange=((tuple(names.index(f"K{i}") for i in range(1, 9)), "arc"),),
+        boxes=(("ends", (names.index("O"), names.index("T"))),),
+        neuron_spacing=1.25,
+    )
+    problem = problem_of(replace(network, layout=settings))
+    assert problem.neurons == ("C1", "C2", *(f"K{i}" for i in range(1, 9)), "O", "T")
+    assert sorted(edge.name for edge in problem.edges) == sorted(network.connection_names)
+    delays = {edge.name: edge.delay for edge in problem.edges}
+    assert (delays["C1 -> C2"], delays["C1 -> K1"], delays["K8 -> O"]) == (1, 0, 0)
+    assert problem.pins == {10: (4.0, 1.0)}
+    assert problem.arrange == ((tuple(range(2, 10)), "arc"),)
+    assert ("ends", (10, 11)) in problem.boxes
+    assert (problem.direction, problem.neuron_spacing, problem.rank_spacing) == ("right", 1.25, 2.0)
+
+
+def test_a_network_is_laid_out_by_its_own_engine_or_the_one_named() -> None:
+    network = replace(cpg_rbf(), layout=LayoutSettings(engine="grid"))
+    assert lay_out(network).engine == "grid"
+    layout = lay_out(network, "layered")
+    assert layout.engine == "layered"
+    assert set(layout.positions) == set(network.neurons.names)
+    assert set(layout.routes) == set(network.connection_names)

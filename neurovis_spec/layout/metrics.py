@@ -25,6 +25,8 @@ _SLACK = 1e-9
 _STEP = 0.4
 #: The most segments that a cubic piece is flattened to.
 _FINEST = 4096
+#: Beyond this many in all they grow longer: memory has an end.
+_MOST_SEGMENTS = 2_000_000
 _ALONG: dict[Direction, Point] = {"down": (0, 1), "up": (0, -1), "right": (1, 0), "left": (-1, 0)}
 
 
@@ -57,7 +59,8 @@ class _Segments:
         points = np.array([piece for _, piece in pieces], dtype=np.float64).reshape(-1, 4, 2)
         owner = np.array([i for i, _ in pieces], dtype=np.int64)
         length = np.sqrt((np.diff(points, axis=1) ** 2).sum(axis=2)).sum(axis=1)
-        parts = np.clip(np.ceil(length / _STEP), 8, _FINEST).astype(np.int64)
+        step = max(_STEP, float(length.sum()) / _MOST_SEGMENTS)
+        parts = np.clip(np.ceil(length / step), 8, _FINEST).astype(np.int64)
         for count in np.unique(parts).tolist():
             chosen = parts == count
             line = _flatten(points[chosen], int(count))
