@@ -43,9 +43,12 @@ def _error(network: Network, activity: FloatArray) -> str | None:
     errors = np.array([activity[source] - activity[target] for source, target in pairs])
     if len(errors) == 1:
         return _signed(float(errors[0]))
-    return f"{float(np.sqrt(np.mean(errors**2))):.2f} (RMS)"
+    rms = float(np.sqrt(np.mean(errors**2)))
+    return f"{rms:.2f} (RMS)" if math.isfinite(rms) else "is no number"
 
 
 def _signed(value: float) -> str:
+    if not math.isfinite(value):
+        return "is no number"
     text = f"{value:+.2f}".replace("-", "−")
     return "0.00" if text in ("+0.00", "−0.00") else text

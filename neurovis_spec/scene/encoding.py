@@ -19,21 +19,29 @@ FAINTEST = 1e-3
 GLOW_REACH = 8.0
 
 
+def _quiet() -> np.errstate:
+    """The run has warned of values that are no numbers; a picture draws them as nothing."""
+    return np.errstate(invalid="ignore", over="ignore")
+
+
 def neuron_colour(activity: FloatArray, gain: float) -> FloatArray:
     """Eq. 2: NC_i[t] = clip(−1, γ_NC · a_i[t], 1)."""
-    result: FloatArray = np.clip(gain * activity, -1.0, 1.0)
+    with _quiet():
+        result: FloatArray = np.clip(gain * activity, -1.0, 1.0)
     return result
 
 
 def connection_colour(sent: FloatArray, weight: FloatArray, gain: float) -> FloatArray:
     """Eq. 3: CC_ij[t] = clip(−1, γ_CC · a_i[t] · w_ij[t], 1); ``sent`` is the activity of the source of each."""
-    result: FloatArray = np.clip(gain * sent * weight, -1.0, 1.0)
+    with _quiet():
+        result: FloatArray = np.clip(gain * sent * weight, -1.0, 1.0)
     return result
 
 
 def thickness(weight: FloatArray, gain: float) -> FloatArray:
     """Eq. 4: CT_ij[t] = |γ_CT · w_ij[t]|."""
-    result: FloatArray = np.abs(gain * weight)
+    with _quiet():
+        result: FloatArray = np.abs(gain * weight)
     return result
 
 
@@ -48,7 +56,8 @@ def glow(weight: FloatArray, previous: FloatArray | None, gain: float) -> FloatA
     """Eq. 5: LI_ij[t] = |γ_LI · (w_ij[t] − w_ij[t−1])|, none where there is no step before."""
     if previous is None:
         return np.zeros_like(weight)
-    result: FloatArray = np.abs(gain * (weight - previous))
+    with _quiet():
+        result: FloatArray = np.abs(gain * (weight - previous))
     return result
 
 

@@ -1,0 +1,248 @@
+"""Pictures in Chromium: what it draws, what it measures, and that films move in it, or stand still where asked.
+
+Needs ``chromium``; without it these tests fail rather than pass unseen.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import shutil
+import subprocess
+import time
+from collections.abc import Callable
+from html import unescape
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from threading import Thread
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hand_networks import Case, use_case_1
+from neurovis_renderers.animated_svg import LEVELS, AnimatedSvgRenderer
+from neurovis_renderers.raster import PillowRenderer
+from neurovis_renderers.svg import SvgRenderer
+from PIL import Image
+
+from neurovis_spec.compiler.network import RenderSettings
+from neurovis_spec.scene import Film, Scene, channels, colours, still
+from neurovis_spec.scene.encode import encode
+from neurovis_spec.scene.film import film
+from neurovis_spec.scene.gains import choose_gains
+
+pytestmark = pytest.mark.browser
+
+CASE = use_case_1(1300)
+GAINS = choose_gains(CASE.network, RenderSettings(), *CASE.peaks)
+FRAMES, FPS = 64, 40.0
+Browser = Callable[..., str]
+
+
+@pytest.fixture
+def browser(tmp_path: Path) -> Browser:
+    """Runs Chromium on a page of ours, without the network; gives what it prints."""
+    found = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    assert found, "these tests need chromium"
+
+    def run(html: str, *arguments: str) -> str:
+        page = tmp_path / "page.html"
+        page.write_text(html, encoding="utf-8")
+        command = [
+            found, "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run",
+            "--disable-component-update", "--disable-sync", "--hide-scrollbars", f"--user-data-dir={tmp_path / 'user'}",
+            *arguments, page.as_uri(),
+        ]  # fmt: skip
+        return subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
+
+    return run
+
+
+def scene(step: int, theme: str, case: Case = CASE) -> Scene:
+    return encode(case.network, case.layout, case.snapshot(step), GAINS, RenderSettings(theme=theme))
+
+
+def moving(theme: str = "default") -> Film:
+    steps = [CASE.snapshot(k) for k in range(120, 120 + FRAMES)]
+    return film(CASE.network, CASE.layout, steps, GAINS, RenderSettings(theme=theme), FPS)
+
+
+def shot(browser: Browser, folder: Path, svg: bytes, size: tuple[int, int], wait: float = 0.0) -> Image.Image:
+    """What Chromium shows of an SVG inside <img>, ``wait`` seconds after it came (the page has a slow part)."""
+    (folder / "picture.svg").write_bytes(svg)
+    target = folder / "shot.png"
+
+    class Slow(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            time.sleep(wait)
+            self.send_response(404)
+            self.end_headers()
+
+        def log_message(self, format: str, *args: object) -> None:
+            """Nothing."""
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Slow)
+    Thread(target=server.serve_forever, daemon=True).start()
+    slow = f'<img src="http://127.0.0.1:{server.server_port}/">' if wait else ""
+    try:
+        browser(
+            f'<body style="margin:0"><img src="picture.svg" style="display:block">{slow}',
+            f"--screenshot={target}", f"--window-size={size[0]},{size[1]}",
+        )  # fmt: skip
+    finally:
+        server.shutdown()
+        server.server_close()
+    return Image.open(io.BytesIO(target.read_bytes())).convert("RGB")
+
+
+def measured(browser: Browser, svg: bytes, script: str, *more: str) -> object:
+    """What a script that stands beside an inline SVG (``svg``) returns."""
+    page = (
+        f"<!doctype html><body style='margin:0'>{svg.decode()}<pre id=out></pre><script>"
+        f"const svg = document.querySelector('svg'), out = document.getElementById('out');"
+        f"const work = () => {{ out.textContent = JSON.stringify((() => {{{script}}})()); }};"
+        f"setTimeout(work, 300);</script>"
+    )
+    found = re.search(
+        r'<pre id="out">(.*?)</pre>', browser(page, "--dump-dom", "--virtual-time-budget=3000", *more), re.DOTALL
+    )
+    assert found
+    return json.loads(unescape(found[1]))
+
+
+def similarity(one: Image.Image, other: Image.Image, window: int = 8) -> float:
+    """The mean structural similarity of two pictures (Wang et al. 2004), greyscale, flat windows."""
+    a, b = (np.asarray(picture.convert("L"), float) for picture in (one, other))
+
+    def mean(x: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        total = np.pad(x, ((1, 0), (1, 0))).cumsum(0).cumsum(1)
+        w = window
+        result: npt.NDArray[np.float64] = (total[w:, w:] - total[:-w, w:] - total[w:, :-w] + total[:-w, :-w]) / w**2
+        return result
+
+    ma, mb = mean(a), mean(b)
+    va, vb, both = mean(a * a) - ma * ma, mean(b * b) - mb * mb, mean(a * b) - ma * mb
+    c1, c2 = (0.01 * 255) ** 2, (0.03 * 255) ** 2
+    return float(np.mean((2 * ma * mb + c1) * (2 * both + c2) / ((ma * ma + mb * mb + c1) * (va + vb + c2))))
+
+
+@pytest.mark.parametrize(("theme", "step"), [("default", 160), ("dark", 1180)])
+def test_the_raster_shows_the_same_picture(browser: Browser, tmp_path: Path, theme: str, step: int) -> None:
+    drawn = scene(step, theme)
+    size = (int(drawn.width), int(drawn.height))
+    theirs = shot(browser, tmp_path, SvgRenderer().draw(drawn, ".svg"), size)
+    ours = Image.open(io.BytesIO(PillowRenderer().draw(drawn, ".png"))).convert("RGB")
+    assert ours.size == theirs.size == size
+    assert similarity(ours, theirs) >= 0.985
+
+
+BOXES = """
+const all = [...svg.querySelectorAll('text')].map(t => { const b = t.getBBox();
+  return {text: t.textContent, disc: !!t.parentNode.dataset.neuron, box: [b.x, b.y, b.x + b.width, b.y + b.height]}; });
+const discs = [...svg.querySelectorAll('circle')].map(c => [c.cx.baseVal.value, c.cy.baseVal.value, c.r.baseVal.value]);
+const lines = [...svg.querySelectorAll('[data-connection]>path')].map(p => { const n = p.getTotalLength();
+  return [...Array(60).keys()].map(k => { const q = p.getPointAtLength(n * k / 59); return [q.x, q.y]; }); });
+return {texts: all, discs: discs, lines: lines, whole: svg.viewBox.baseVal.width + ' ' + svg.viewBox.baseVal.height,
+  drawn: (b => [b.x, b.y, b.x + b.width, b.y + b.height])(svg.getBBox({stroke: true}))};
+"""
+
+
+def test_texts_touch_nothing_and_all_lies_within_the_viewbox(browser: Browser) -> None:
+    found = measured(browser, SvgRenderer().draw(scene(1180, "default"), ".svg"), BOXES)
+    assert isinstance(found, dict)
+    width, height = (float(part) for part in found["whole"].split())
+    x0, y0, x1, y1 = found["drawn"]
+    assert (x0, y0) == (0, 0)
+    assert x1 <= width + 1e-6
+    assert y1 <= height + 1e-6
+    told = found["texts"]
+    assert len(told) > 20
+    for place, one in enumerate(told):
+        a = one["box"]
+        for other in told[place + 1 :]:
+            b = other["box"]
+            apart = a[0] >= b[2] or b[0] >= a[2] or a[1] >= b[3] - 3 or b[1] >= a[3] - 3
+            assert apart, (one["text"], other["text"])
+        for x, y, r in found["discs"]:
+            dx, dy = x - min(max(x, a[0]), a[2]), y - min(max(y, a[1]), a[3])
+            assert one["disc"] or dx * dx + dy * dy > r * r, one["text"]
+        for line in found["lines"]:
+            crossed = any(a[0] < x < a[2] and a[1] + 2 < y < a[3] - 2 for x, y in line)
+            assert one["disc"] or not crossed, one["text"]
+
+
+SEEK = (
+    f"const frames = {FRAMES}, fps = {FPS};"
+    + """
+svg.pauseAnimations();
+const at = name => getComputedStyle(svg.querySelector(name));
+const line = svg.querySelector('[data-connection="K5 -> O"]');
+const read = [...Array(frames).keys()].map(frame => { svg.setCurrentTime((frame + 0.02) / fps);
+  return [at('[data-neuron="K5"]>circle').fill, at('[data-connection="C1 -> K5"]>path').stroke,
+    parseFloat(getComputedStyle(line.querySelector('path:not(.glow)')).strokeWidth),
+    parseFloat(getComputedStyle(line.querySelector('.glow')).strokeWidth),
+    line.querySelector('polygon').getBoundingClientRect().height,
+    [...svg.querySelectorAll('.caption text')].filter(t => getComputedStyle(t).display != 'none')
+      .map(t => t.textContent).join('|')]; });
+return read;
+"""
+)
+
+
+def rgb(text: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in re.findall(r"\d+", text))
+
+
+def test_each_frame_of_a_film_shows_its_step(browser: Browser) -> None:
+    made = moving()
+    read = measured(browser, AnimatedSvgRenderer().animate(made, ".svg"), SEEK)
+    assert isinstance(read, list)
+    neuron = CASE.network.neuron_index["K5"]
+    carries, learns = (CASE.network.connection_index[name] for name in ("C1 -> K5", "K5 -> O"))
+    for frame, (fill, stroke, width, glow, _, caption) in enumerate(read):
+        for shown, value in ((fill, made.disc_values[frame, neuron]), (stroke, made.line_values[frame, carries])):
+            (wanted,) = colours(made.scene.theme, [float(value)])
+            assert np.abs(np.subtract(rgb(shown), channels(wanted))).max() <= 150 / (LEVELS - 1) + 1
+        assert width == pytest.approx(made.line_widths[frame, learns], abs=0.04)
+        assert glow == pytest.approx(made.glow_widths[frame, learns], abs=0.05)
+        assert caption == made.captions[frame]
+    assert len({row[0] for row in read}) > 5
+    assert len({row[3] for row in read}) > 10
+
+
+def test_a_film_starts_over_at_its_end(browser: Browser) -> None:
+    svg = AnimatedSvgRenderer().animate(moving(), ".svg")
+    script = f"""svg.pauseAnimations();
+    const fill = t => (svg.setCurrentTime(t), getComputedStyle(svg.querySelector('[data-neuron="K5"]>circle')).fill);
+    const f = n => [...Array({FRAMES}).keys()].map(k => fill((k + 0.02) / {FPS} + n * {FRAMES / FPS}));
+    return [f(0), f(1), f(5)];"""
+    read = measured(browser, svg, script)
+    assert isinstance(read, list)
+    assert read[0] == read[1] == read[2]
+
+
+def test_with_reduced_motion_a_film_stands_still_at_its_first_frame(browser: Browser) -> None:
+    made = moving()
+    svg = AnimatedSvgRenderer().animate(made, ".svg")
+    read = measured(browser, svg, SEEK, "--force-prefers-reduced-motion")
+    assert isinstance(read, list)
+    assert len({json.dumps(row) for row in read}) == 1
+    (first,) = colours(made.scene.theme, made.disc_values[0, [CASE.network.neuron_index["K5"]]])
+    assert rgb(read[0][0]) == channels(first)
+    assert read[0][5] == made.captions[0]
+
+
+def test_a_film_moves_inside_img_and_there_shows_its_frames(browser: Browser, tmp_path: Path) -> None:
+    """The picture after some time is one of the film's frames, and not always the same."""
+    made = moving()
+    size = (int(made.scene.width), int(made.scene.height))
+    svg = AnimatedSvgRenderer().animate(made, ".svg")
+    seen = [shot(browser, tmp_path, svg, size, wait) for wait in (0.3, 0.7, 1.2)]
+    frames = [
+        Image.open(io.BytesIO(PillowRenderer().draw(still(made, f), ".png"))).convert("RGB")
+        for f in range(0, FRAMES, 4)
+    ]
+    nearest = [max(range(len(frames)), key=lambda f: similarity(picture, frames[f])) for picture in seen]
+    assert len(set(nearest)) > 1
+    assert min(similarity(p, frames[f]) for p, f in zip(seen, nearest, strict=True)) >= 0.97
