@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 
 from neurovis_spec.cli.failure import fault
-from neurovis_spec.cli.files import writing
+from neurovis_spec.cli.files import check_target, writing
 from neurovis_spec.cli.options import examples, known
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,63}")
@@ -57,6 +57,7 @@ def command(name: str, example: str | None) -> None:
     if not _NAME.fullmatch(target.stem):
         hint = "a name is an ASCII letter or underscore, then letters, digits and underscores (at most 64)"
         raise fault(f"a spec cannot be called '{target.stem}'", hint, "invalid-name")
+    check_target(target)
     if example is None:
         text = package_files("neurovis_spec.cli").joinpath("starter.yaml").read_text(encoding="utf-8")
         wanted = {target: text.replace("starter.", f"{target.stem}.").encode()}

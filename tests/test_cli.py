@@ -1,0 +1,556 @@
+"""The command line: what each command prints and writes, how it ends, and that bad input never ends in a traceback."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import signal
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+import neurovis_spec as nv
+from neurovis_spec.cli.commands import COMMANDS, neurovis
+from neurovis_spec.cli.tables import table
+from neurovis_spec.version import __version__
+
+ROOT = Path(__file__).parents[1]
+SPECS = ROOT / "specs"
+ERRORS = sorted((ROOT / "tests" / "errors").glob("*.yaml"))
+SMALL = """\
+neurovis: 1
+name: small
+time: {dt: 0.5, steps: 10}
+parameters: {gain: {value: 0.5, min: 0}}
+inputs: {push: {expression: 1}, pull: {size: 2}}
+neurons:
+  A: {input: push, bias: 0.25}
+  B: {count: 2, input: pull}
+connections:
+  A -> B: {weight: gain, delay: 2}
+  B -> B: {weight: 0.1, pattern: ring, plasticity: {hebbian: {rate: 0.01}}, bounds: [-1, 1]}
+outputs: {last: B2, both: B}
+"""
+PULL = np.array([[1.0, 2.0], [3.0, 4.0]])
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty working folder with ``small.yaml``."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "small.yaml").write_text(SMALL, encoding="utf-8")
+    return tmp_path
+
+
+def call(*arguments: object, stdin: str | bytes | None = None) -> Result:
+    """A command in this process. An exception that is no exit is raised."""
+    result = CliRunner().invoke(neurovis, [str(argument) for argument in arguments], input=stdin)
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result
+
+
+def good(*arguments: object, stdin: str | None = None) -> str:
+    """The standard output of a command that succeeds and has nothing to complain about."""
+    result = call(*arguments, stdin=stdin)
+    assert (result.exit_code, result.stderr) == (0, "")
+    return result.stdout
+
+
+# Help
+
+
+def test_help_names_every_command_in_its_own_words() -> None:
+    shown = good("--help")
+    for name, line in COMMANDS.items():
+        assert f"{name} " in shown
+        assert line in shown
+        assert line.rstrip(".") in " ".join(good(name, "--help").split()), "the command says the same of itself"
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_examples_that_name_it(name: str) -> None:
+    examples = good(name, "--help").partition("Examples:")[2].strip().splitlines()
+    assert examples
+    assert all(f"neurovis {name}" in line for line in examples)
+
+
+def test_version_is_one_line() -> None:
+    assert good("--version") == f"neurovis {__version__}\n"
+
+
+# Wrong usage
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ("validat x.yaml", "no command 'validat'; did you mean 'validate'?"),
+        ("zzz", "the commands are: new, validate"),
+        ("run small.yaml --stpes 3", "--steps"),
+        ("run", "SPEC"),
+        ("run small.yaml --steps 0", "--steps"),
+        ("run small.yaml --every 0", "--every"),
+        ("run small.yaml --set gain", "name=value"),
+        ("run small.yaml --set gain=much", "'much' is not a finite number"),
+        ("run small.yaml --set gain=inf", "'inf' is not a finite number"),
+        ("run small.yaml --set gain=1_0", "'1_0' is not a finite number"),
+        ("run small.yaml --set =3", "name=value"),
+        ("run small.yaml --input push", "name=FILE"),
+        ("run small.yaml --backend numpi", "did you mean 'numpy'?"),
+        ("layout small.yaml --engine layred", "did you mean 'layered'?"),
+        ("render small.yaml", "-o"),
+        ("render small.yaml -o x.svg --theme drak", "did you mean 'dark'?"),
+        ("render small.yaml -o x.svg --step -1", "--step"),
+        ("animate small.yaml -o x.svg --fps 0", "--fps"),
+        ("validate", "SPEC"),
+        ("validate - -", "only once"),
+        ("validate small.yaml --format xml", "--format"),
+        ("new x --from cpg_rfb", "did you mean 'cpg_rbf'?"),
+    ],
+)
+def test_wrong_usage_is_status_2_and_says_what_was_meant(folder: Path, arguments: str, words: str) -> None:
+    result = call(*arguments.split())
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert words in result.stderr
+    assert sorted(folder.iterdir()) == [folder / "small.yaml"], "nothing was written"
+
+
+# Input at fault
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ("validate nothing.yaml", "nothing.yaml:1:1: error[file-missing]"),
+        ("inspect .", "error[file-kind]"),
+        ("render nothing.yaml -o x.svg", "error[file-missing]"),
+        ("run small.yaml --set gian=1", "did you mean 'gain'?"),
+        ("run small.yaml --set gain=-1", "small.yaml:4:"),
+        ("run small.yaml --input pusch=push.csv", "file-missing"),
+        ("run small.yaml --input pusch=one.csv", "did you mean 'push'?"),
+        ("run small.yaml --input pull=one.csv", "(steps, 2)"),
+        ("run small.yaml --input pull=gap.csv", "a cell is empty"),
+        ("run small.yaml --input push=small.yaml", "file-format"),
+        ("run small.yaml -o x.xyz", "'.xyz'"),
+        ("run small.yaml -o nowhere/x.npz", "there is no folder 'nowhere'"),
+        ("run small.yaml -o .", "is a folder"),
+        ("run small.yaml --from nothing.npz", "nothing.npz"),
+        ("run small.yaml --from one.csv", "one.csv"),
+        ("run small.yaml --from broken.npz", "broken.npz"),
+        ("layout small.yaml --engine manual", "error[position-missing]"),
+        ("layout small.yaml -o nowhere/x.yaml", "there is no folder 'nowhere'"),
+        ("render small.yaml -o x.xyz", "'.xyz'"),
+        ("render small.yaml -o x", "suffix"),
+        ("render small.yaml -o x.svg --recording nothing.npz", "nothing.npz"),
+        ("animate small.yaml -o x.svg --recording broken.npz", "broken.npz"),
+        ("animate small.yaml -o x.xyz", "'.xyz'"),
+        ("new small", "small.yaml is already there"),
+        ("new 1st", "error[invalid-name]"),
+        ("new nowhere/x", "nowhere"),
+    ],
+)
+def test_input_at_fault_is_status_1_and_one_clear_message(folder: Path, arguments: str, words: str) -> None:
+    (folder / "one.csv").write_text("1\n2\n", encoding="utf-8")
+    (folder / "gap.csv").write_text("1,2\n,3\n", encoding="utf-8")
+    (folder / "broken.npz").write_bytes(b"PK\x03\x04 and then nothing")
+    before = sorted(folder.rglob("*"))
+    result = call(*arguments.split())
+    assert (result.exit_code, result.stdout) == (1, "")
+    assert words in result.stderr
+    assert "Traceback" not in result.stderr
+    assert sorted(folder.rglob("*")) == before, "nothing was written"
+
+
+@pytest.mark.parametrize(
+    "text", ["", "\0", "- 1", "neurovis: 1", "a: {b: [", "neurovis: 1\nname: x\nneurons: 3", "é: ö"]
+)
+@pytest.mark.parametrize("command", ["validate", "inspect", "layout", "run"])
+def test_a_text_that_is_no_spec_gets_a_finding_from_every_command(folder: Path, command: str, text: str) -> None:
+    result = call(command, "-", stdin=text)
+    assert (result.exit_code, result.stdout) == (1, "")
+    assert "<stdin>:" in result.stderr
+    assert "error[" in result.stderr
+
+
+def test_bytes_that_are_no_text_get_a_finding_at_their_place(folder: Path) -> None:
+    result = call("validate", "-", stdin=b"neurovis: 1\nname: \xc3\xa9\xff\n")
+    assert result.exit_code == 1
+    assert "<stdin>:2:8: error[invalid-utf8]: the byte 0xff" in result.stderr
+
+
+# validate
+
+
+def test_validate_says_ok_for_each_spec_of_several() -> None:
+    specs = sorted(SPECS.glob("*.yaml"))
+    lines = good("validate", *specs).splitlines()
+    assert [line.split(": ok (")[0] for line in lines] == [str(spec) for spec in specs]
+    assert f"{SPECS / 'cpg_rbf.yaml'}: ok (12 neurons, 28 connections)" in lines
+
+
+def test_validate_goes_on_after_a_spec_at_fault(folder: Path) -> None:
+    (folder / "bad.yaml").write_text("neurovis: 1\nname: x\nneurons: {A: {activation: tahn}}\n", encoding="utf-8")
+    result = call("validate", "bad.yaml", "small.yaml")
+    assert (result.exit_code, result.stdout) == (1, "small.yaml: ok (3 neurons, 4 connections)\n")
+    assert "bad.yaml:3:27: error[unknown-activation]" in result.stderr
+    assert "help: did you mean 'tanh'?" in result.stderr
+    assert result.stderr.splitlines()[2].endswith("^^^^"), "carets stand under the name"
+
+
+def test_validate_prints_one_json_array_of_all_findings_in_order() -> None:
+    result = call("validate", "--format", "json", *ERRORS)
+    assert (result.exit_code, result.stderr) == (1, "")
+    found = json.loads(result.stdout)
+    keys = ["code", "severity", "message", "file", "line", "column", "end_line", "end_column", "hint"]
+    assert all(list(finding) == keys for finding in found)
+    assert {finding["file"] for finding in found} == {str(path) for path in ERRORS}
+    assert len(found) >= len(ERRORS)
+    assert json.loads(good("validate", "--format", "json", SPECS / "ring.yaml")) == []
+
+
+def test_validate_shows_at_most_twenty_findings_as_text(folder: Path) -> None:
+    groups = "\n".join(f"  N{i}: {{activation: tahn}}" for i in range(33))
+    result = call("validate", "-", stdin=f"neurovis: 1\nname: x\nneurons:\n{groups}\n")
+    assert result.stderr.count("error[") == 20
+    assert "13 more" in result.stderr
+    assert result.stderr.rstrip().endswith("33 errors")
+
+
+def test_validate_strict_makes_a_warning_an_error(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from neurovis_spec.compiler import compile as compiler
+
+    span = nv.compile("small.yaml").spec.name.span
+    real = compiler.compile_spec
+
+    def warned(spec: object, request: object, findings: object) -> object:
+        findings.warning("odd", span, "this is odd")  # type: ignore[attr-defined]
+        return real(spec, request, findings)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("neurovis_spec.pipeline.compile_spec", warned)
+    plain = call("validate", "small.yaml")
+    assert (plain.exit_code, plain.stdout) == (0, "small.yaml: ok (3 neurons, 4 connections)\n")
+    assert "small.yaml:2:7: warning[odd]: this is odd" in plain.stderr
+    strict = call("validate", "small.yaml", "--strict")
+    assert (strict.exit_code, strict.stdout) == (1, "")
+    assert "small.yaml:2:7: error[odd]: this is odd" in strict.stderr
+    shown = call("run", "small.yaml")
+    assert shown.exit_code == 0
+    assert "warning[odd]" in shown.stderr, "every command shows warnings"
+
+
+def test_validate_limit_and_root(folder: Path) -> None:
+    result = call("validate", "small.yaml", "--limit", "2")
+    assert result.exit_code == 1
+    assert "error[" in result.stderr
+    (folder / "data").mkdir()
+    (folder / "data" / "w.csv").write_text("1,2\n", encoding="utf-8")
+    (folder / "below").mkdir()
+    spec = "neurovis: 1\nname: x\nneurons: {A: {}, B: {count: 2}}\n"
+    spec += "connections: {A -> B: {matrix: {file: ../data/w.csv}}}\n"
+    (folder / "below" / "x.yaml").write_text(spec, encoding="utf-8")
+    assert "path-outside" in call("validate", "below/x.yaml").stderr
+    assert good("validate", "below/x.yaml", "--root", ".") == "below/x.yaml: ok (3 neurons, 2 connections)\n"
+
+
+# inspect, schema
+
+
+def test_inspect_json_is_the_object_of_the_contract(folder: Path) -> None:
+    seen = json.loads(good("inspect", "small.yaml", "--format", "json", "--set", "gain=2"))
+    assert (seen["name"], seen["dt"], seen["steps"], seen["seed"], seen["parameters"]) == (
+        "small",
+        0.5,
+        10,
+        0,
+        {"gain": 2},
+    )
+    assert seen["neurons"][0] == {
+        "name": "A", "group": "A", "module": None,
+        "activation": "identity", "model": "static", "combine": "sum", "bias": 0.25,
+    }  # fmt: skip
+    assert seen["connections"][0] == {"from": "A", "to": "B1", "weight": 2, "delay": 2, "rule": None}
+    assert seen["connections"][2] == {"from": "B1", "to": "B2", "weight": 0.1, "delay": 1, "rule": "hebbian"}
+    assert [entry["name"] for entry in seen["inputs"]] == ["push", "pull"]
+    assert [entry["name"] for entry in seen["outputs"]] == ["last", "both"]
+    assert len(seen["hash"]) == 64
+    assert "layered" in json.dumps(seen["engine"])
+    assert seen == json.loads(good("inspect", "-", "--format", "json", "--set", "gain=2", stdin=SMALL))
+
+
+def test_inspect_text_shows_the_tables_and_the_matrix(folder: Path) -> None:
+    lines = good("inspect", "small.yaml").splitlines()
+    assert lines[:3] == ["small", "3 neurons, 4 connections, 2 of them learning", "dt 0.5 s, 10 steps (5 s), seed 0"]
+    assert "  B      B1 … B2  2     identity    static  sum      0     pull" in lines
+    assert "  A -> B  2       0.5     2" in lines
+    assert "  B -> B  2       0.1     1      hebbian(rate=0.01)  -1 … 1" in lines
+    start = lines.index("connection matrix C (from row to column)")
+    assert lines[start + 1 : start + 5] == ["      A  B1  B2", "  A   ·   1   1", "  B1  ·   ·   1", "  B2  ·   1   ·"]
+    assert lines[-1] == f"hash {nv.compile('small.yaml').hash}"
+    assert any(line.startswith("  backend") and "numpy" in line for line in lines)
+
+
+def test_a_title_cannot_steer_the_terminal() -> None:
+    shown = table([("\x1b[31mred", "‮x")])
+    assert "\x1b" not in shown
+    assert "‮" not in shown
+
+
+def test_schema_is_a_json_schema_that_the_examples_meet() -> None:
+    import jsonschema
+    import yaml
+
+    schema = json.loads(good("schema"))
+    jsonschema.Draft202012Validator.check_schema(schema)
+    for path in SPECS.glob("*.yaml"):
+        jsonschema.Draft202012Validator(schema).validate(yaml.safe_load(path.read_text(encoding="utf-8")))
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.Draft202012Validator(schema).validate({"neurovis": 1, "name": "x", "neurns": {}})
+
+
+# layout
+
+
+def test_layout_goes_to_standard_output_or_into_a_file(folder: Path) -> None:
+    shown = good("layout", "small.yaml")
+    assert good("layout", "small.yaml", "-o", "small.layout.yaml") == (
+        "small.layout.yaml: 3 neurons, 4 connections, engine layered\n"
+    )
+    assert (folder / "small.layout.yaml").read_text(encoding="utf-8") == shown
+    assert shown.startswith("neurovis_layout: 1\nnetwork: small\nengine: layered\n")
+    assert "engine: circular" in good("layout", "small.yaml", "--engine", "circular")
+
+
+def test_layout_metrics_are_one_object_also_beside_a_file(folder: Path) -> None:
+    measured = json.loads(good("layout", "small.yaml", "--metrics", "-o", "x.yaml"))
+    assert list(measured) == [
+        "neurons", "edges", "crossings", "overlaps", "edges_over_neurons", "flow",
+        "symmetry", "area", "pins_moved", "seconds",
+    ]  # fmt: skip
+    assert (measured["neurons"], measured["edges"], measured["overlaps"]) == (3, 4, 0)
+    assert measured["seconds"] > 0
+    assert (folder / "x.yaml").is_file()
+
+
+# run
+
+
+def test_run_writes_what_the_api_gives(folder: Path) -> None:
+    np.save(folder / "pull.npy", PULL)
+    shown = good("run", "small.yaml", "--steps", 7, "--set", "gain=2", "--input", "pull=pull.npy", "-o", "x.npz")
+    assert shown.startswith("x.npz: 7 steps in ")
+    expected = nv.compile("small.yaml", gain=2).run(7, {"pull": PULL})
+    with np.load(folder / "x.npz") as file:
+        np.testing.assert_array_equal(file["activity"], expected.activity)
+        np.testing.assert_array_equal(file["weights"], expected.weights)
+        assert file["step"].tolist() == list(range(7))
+
+
+def test_run_reads_inputs_from_csv_with_and_without_a_header(folder: Path) -> None:
+    (folder / "a.csv").write_text("1,2\n3,4\n", encoding="utf-8")
+    (folder / "b.csv").write_text("left,right\n1,2\n3,4\n", encoding="utf-8")
+    for name in "ab":
+        good("run", "small.yaml", "--input", f"pull={folder / name}.csv", "-o", f"{name}.csv.npz")
+    expected = nv.compile("small.yaml").run(inputs={"pull": PULL})
+    for name in "ab":
+        np.testing.assert_array_equal(nv.load(f"{name}.csv.npz").activity, expected.activity)
+
+
+def test_run_records_every_kth_step_and_csv(folder: Path) -> None:
+    good("run", "small.yaml", "--every", 4, "-o", "x.csv")
+    lines = (folder / "x.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0] == "step,t,A,B1,B2,B1 -> B2,B2 -> B1"
+    assert [line.split(",")[0] for line in lines[1:]] == ["0", "4", "8"]
+
+
+def test_run_goes_on_from_a_recording(folder: Path) -> None:
+    good("run", "small.yaml", "--steps", 30, "-o", "first.npz")
+    good("run", "small.yaml", "--steps", 5, "--from", "first.npz", "-o", "second.npz")
+    compiled = nv.compile("small.yaml")
+    first = compiled.run(30)
+    expected = compiled.run(5, start=first)
+    np.testing.assert_array_equal(nv.load("second.npz").weights, expected.weights)
+    assert not np.array_equal(expected.weights[0], compiled.run(1).weights[0])
+
+
+def test_run_without_a_file_prints_the_last_values(folder: Path) -> None:
+    lines = good("run", "small.yaml", "--backend", "reference").splitlines()
+    last = nv.compile("small.yaml").run().activity[-1]
+    assert lines[0].startswith("small: 10 steps in ")
+    assert lines[0].endswith(" s, backend reference")
+    assert lines[1] == "outputs at step 9:"
+    assert lines[2] == f"  last  {last[2]:.6g}"
+    assert lines[3] == f"  both  {last[1]:.6g} {last[2]:.6g}"
+    assert lines[4].startswith("2 changing weights: ")
+    assert sorted(folder.iterdir()) == [folder / "small.yaml"]
+
+
+def test_run_lists_backends_without_a_spec() -> None:
+    lines = good("run", "--backend", "list").splitlines()
+    assert [line.split()[:2] for line in lines if line.split()[0] in ("numpy", "reference")] == [
+        ["numpy", "available"], ["reference", "available"],
+    ]  # fmt: skip
+
+
+def test_run_warns_in_a_line_where_numbers_overflow(folder: Path) -> None:
+    text = "neurovis: 1\nname: boom\nneurons: {A: {bias: 1}}\nconnections: {A -> A: 1e300}\n"
+    result = call("run", "-", "--steps", 9, stdin=text)
+    assert result.exit_code == 0
+    assert result.stderr == "warning: the activity of A is inf at step 2, in 'boom'\n"
+
+
+# render, animate
+
+
+def test_render_draws_what_the_api_draws(folder: Path) -> None:
+    assert good("render", "small.yaml", "-o", "x.svg", "--step", 3, "--theme", "dark", "--set", "gain=2") == "x.svg\n"
+    nv.compile("small.yaml", gain=2).render("y.svg", step=3, theme="dark")
+    content = (folder / "x.svg").read_text(encoding="utf-8")
+    assert content == (folder / "y.svg").read_text(encoding="utf-8")
+    assert content.count("data-neuron=") == 3
+    assert content.count("data-connection=") == 4
+
+
+def test_render_with_and_without_a_recording_is_the_same_picture(folder: Path) -> None:
+    good("run", "small.yaml", "-o", "x.npz")
+    good("render", "small.yaml", "-o", "a.svg", "--step", 4, "--recording", "x.npz")
+    good("render", "small.yaml", "-o", "b.svg", "--step", 4)
+    assert (folder / "a.svg").read_bytes() == (folder / "b.svg").read_bytes()
+    result = call("render", "small.yaml", "-o", "c.svg", "--step", 400, "--recording", "x.npz")
+    assert result.exit_code == 1
+    assert "step 400 is not in the recording" in result.stderr
+
+
+def test_render_refuses_the_recording_of_another_network(folder: Path) -> None:
+    good("run", SPECS / "mlp.yaml", "-o", "x.npz")
+    result = call("render", "small.yaml", "-o", "a.svg", "--recording", "x.npz")
+    assert result.exit_code == 1
+    assert "another network" in result.stderr
+    assert not (folder / "a.svg").exists()
+
+
+def test_render_makes_png(folder: Path) -> None:
+    good("render", "small.yaml", "-o", "x.png", "--engine", "circular")
+    assert (folder / "x.png").read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
+
+
+def test_animate_has_one_frame_a_step(folder: Path) -> None:
+    good("animate", "small.yaml", "-o", "x.svg", "--steps", 4, "--from", 2, "--fps", 5)
+    nv.compile("small.yaml").animate("y.svg", steps=4, start=2, fps=5)
+    assert (folder / "x.svg").read_bytes() == (folder / "y.svg").read_bytes()
+    assert b"<script" not in (folder / "x.svg").read_bytes()
+
+
+# new
+
+
+def test_new_writes_a_spec_that_goes_all_the_way(folder: Path) -> None:
+    assert good("new", "first") == "first.yaml\n"
+    assert good("validate", "first.yaml", "--strict") == "first.yaml: ok (4 neurons, 6 connections)\n"
+    text = (folder / "first.yaml").read_text(encoding="utf-8")
+    assert "starter" not in text.replace("A starter spec", "")
+    assert text.count("#") > 10, "it is commented"
+    run = nv.compile("first.yaml").run()
+    error = np.abs(run["T"] - run["O"])
+    assert error[-200:].max() < 0.2 * error[:200].max(), "it learns"
+    good("render", "first.yaml", "-o", "first.svg")
+
+
+@pytest.mark.parametrize("example", [path.stem for path in sorted(SPECS.glob("*.yaml"))])
+def test_new_from_an_example_is_that_example_under_another_name(folder: Path, example: str) -> None:
+    good("new", "mine", "--from", example)
+    mine, theirs = nv.compile("mine.yaml"), nv.compile(SPECS / f"{example}.yaml")
+    assert mine.name == "mine"
+    np.testing.assert_array_equal(mine.run(50).activity, theirs.run(50).activity)
+
+
+def test_new_overwrites_nothing(folder: Path) -> None:
+    (folder / "data").mkdir()
+    (folder / "data" / "centres.csv").write_text("mine\n", encoding="utf-8")
+    result = call("new", "walk", "--from", "cpg_rbf")
+    assert result.exit_code == 1
+    assert "centres.csv is already there" in result.stderr
+    assert not (folder / "walk.yaml").exists()
+    assert (folder / "data" / "centres.csv").read_text(encoding="utf-8") == "mine\n"
+
+
+def test_new_may_share_the_data_of_an_example(folder: Path) -> None:
+    assert good("new", "one", "--from", "cpg_rbf").split() == ["one.yaml", str(Path("data", "centres.csv"))]
+    assert good("new", "two", "--from", "cpg_rbf").split() == ["two.yaml"]
+    assert "cpg_rbf" in good("new", "x", "--from", "list").split()
+
+
+# The process
+
+
+def start(*arguments: object, stdout: int, stderr: int) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "neurovis_spec", *map(str, arguments)]
+    return subprocess.Popen(command, stdout=stdout, stderr=stderr)
+
+
+def finished(*arguments: object, env: Mapping[str, str] | None = None) -> subprocess.CompletedProcess[bytes]:
+    return subprocess.run([sys.executable, "-m", "neurovis_spec", *map(str, arguments)], capture_output=True, env=env)
+
+
+def test_python_m_is_the_command() -> None:
+    done = finished("--version")
+    assert (done.returncode, done.stdout.decode(), done.stderr) == (0, f"neurovis {__version__}\n", b"")
+
+
+def test_a_closed_pipe_ends_it_without_noise() -> None:
+    process = start("inspect", SPECS / "ring.yaml", "--format", "json", stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert process.stdout is not None
+    process.stdout.close()
+    _, complaint = process.communicate(timeout=60)
+    assert (process.returncode, complaint) == (141, b"")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="only where the system has a device that is always full")
+def test_a_full_disk_is_one_message() -> None:
+    with Path("/dev/full").open("wb") as full:
+        process = start("inspect", SPECS / "ring.yaml", stdout=full.fileno(), stderr=subprocess.PIPE)
+        _, complaint = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert complaint.decode() == "error: No space left on device\n"
+
+
+def test_a_terminal_without_utf_8_is_no_obstacle() -> None:
+    done = finished("inspect", SPECS / "cpg_rbf.yaml", env={**os.environ, "PYTHONIOENCODING": "latin-1"})
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert b"\\u2026" in done.stdout
+
+
+def test_a_long_run_shows_a_bar_and_ends_cleanly_on_ctrl_c(folder: Path) -> None:
+    terminal, child = pty.openpty()
+    arguments = ("run", "small.yaml", "--steps", 10**9, "--every", 10**8, "-o", "x.npz")
+    process = start(*arguments, stdout=subprocess.PIPE, stderr=child)
+    os.close(child)
+    shown = b""
+    while b"running" not in shown:
+        shown += os.read(terminal, 4096)
+    process.send_signal(signal.SIGINT)
+    shown += rest(terminal)
+    output, _ = process.communicate(timeout=60)
+    assert (process.returncode, output) == (130, b"")
+    assert b"stopped" in shown
+    assert b"Traceback" not in shown
+    assert sorted(folder.iterdir()) == [folder / "small.yaml"], "nothing half-written is left"
+
+
+def rest(terminal: int) -> bytes:
+    """What is written to a terminal until its other end closes."""
+    shown = b""
+    try:
+        while part := os.read(terminal, 4096):
+            shown += part
+    except OSError:  # how the system says that the other end has gone
+        pass
+    finally:
+        os.close(terminal)
+    return shown
