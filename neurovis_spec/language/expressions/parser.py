@@ -12,10 +12,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Literal, cast
 
-from neurovis_spec.diagnostics import nearest
+from neurovis_spec.language.expressions import mistakes
 from neurovis_spec.language.expressions.errors import ExpressionError
 from neurovis_spec.language.expressions.functions import FUNCTIONS
-from neurovis_spec.language.expressions.lexer import Token, is_operand, tokens
+from neurovis_spec.language.expressions.lexer import Token, tokens
 from neurovis_spec.language.expressions.tree import (
     LEVELS,
     Binary,
@@ -36,47 +36,11 @@ __all__ = ["ExpressionError", "parse", "unknown_names"]
 
 #: How many operators, parentheses and calls may stand inside each other; keeps every walk off the recursion limit.
 MAX_NESTING = 64
-#: The functions that draw a number, with their arities.
-DRAWS: Mapping[str, int] = {"normal": 2, "uniform": 2}
+#: The functions that draw a number from two arguments.
+DRAWS: Mapping[str, str] = {"normal": "normal(mean, deviation)", "uniform": "uniform(low, high)"}
 
 _COMPARISON, _SIGN, _POWER = LEVELS["<"], LEVELS["%"] + 1, LEVELS["^"]
 _NOT = LEVELS["<"] - 1
-
-_INSTEAD: Mapping[str, str] = {
-    "ln": "write 'log(x)', the natural logarithm",
-    "log10": "write 'log(x) / log(10)'",
-    "log2": "write 'log(x) / log(2)'",
-    "arcsin": "did you mean 'asin'?",
-    "arccos": "did you mean 'acos'?",
-    "arctan": "did you mean 'atan'?",
-    "arctan2": "did you mean 'atan2'?",
-    "fabs": "did you mean 'abs'?",
-    "sgn": "did you mean 'sign'?",
-    "heaviside": "did you mean 'step'?",
-    "logistic": "did you mean 'sigmoid'?",
-    "power": "did you mean 'pow'?",
-    "mod": "write 'a % b'",
-    "fmod": "write 'a % b'",
-    "int": "write 'floor(x)'",
-    "trunc": "write 'sign(x) * floor(abs(x))'",
-    "square": "write 'x^2'",
-    "cbrt": "write 'sign(x) * abs(x)^(1/3)'",
-    "relu": "write 'max(x, 0)'",
-    "where": "write 'a if condition else b'",
-    "sum": "write the terms one by one",
-    "gauss": "did you mean 'normal(mean, deviation)'?",
-    "random": "did you mean 'uniform(low, high)'?",
-    "rand": "did you mean 'uniform(low, high)'?",
-    "randn": "did you mean 'normal(mean, deviation)'?",
-}
-_WORDS: Mapping[str, tuple[str, str, str | None]] = {
-    "for": ("no-comprehensions", "there are no comprehensions in an expression", "write the terms one by one"),
-    "in": ("foreign-operator", "'in' is no operator here", "compare with '==' and 'or'"),
-    "is": ("foreign-operator", "'is' is no operator here", "write '==' for 'is equal to'"),
-    "mod": ("foreign-operator", "'mod' is no operator here", "write 'a % b'"),
-    "xor": ("foreign-operator", "'xor' is no operator here", "write '(a != 0) != (b != 0)'"),
-    "then": ("foreign-operator", "'then' is no operator here", "write 'a if condition else b'"),
-}
 
 
 def parse(text: str, *, random: bool = False, extra_functions: Mapping[str, int] | None = None) -> Tree:
@@ -152,7 +116,7 @@ class _Parser:
             raise ExpressionError("empty-expression", "an expression is missing here", 0, self.token.end)
         tree = self.conditional()
         if not self.at_end():
-            raise self.unexpected()
+            raise mistakes.unexpected(self.previous, self.token)
         check_extent(tree)
         return tree
 
@@ -165,7 +129,7 @@ class _Parser:
         condition = self.binary(0)
         if not self.is_operator("else"):
             if not self.at_end() and not self.is_operator(")", ","):
-                raise self.unexpected()
+                raise mistakes.unexpected(self.previous, self.token)
             message = "'if' without 'else': a choice needs both values"
             raise ExpressionError("missing-else", message, word.start, word.end, "write 'a if condition else b'")
         word = self.advance()
@@ -196,8 +160,7 @@ class _Parser:
         if not self.is_operator("-", "+", "not"):
             return self.operand()
         if token.text == "not" and level > _NOT:
-            message = "'not' binds looser than the operator before it"
-            raise ExpressionError("missing-operand", message, token.start, token.end, "put (not …) in parentheses")
+            raise mistakes.loose_not(token)
         self.advance()
         with self.deeper(token):
             operand = self.binary(_NOT if token.text == "not" else _SIGN)
@@ -212,7 +175,8 @@ class _Parser:
             self.advance()
             return self.call(token) if self.is_operator("(") else Name(token.text, token.start, token.end)
         if not self.is_operator("("):
-            raise self.missing()
+            opened = any(other.text == "(" for other in self.tokens[: self.at])
+            raise mistakes.missing(self.previous, token, opened)
         opening = self.advance()
         with self.deeper(opening):
             tree = self.conditional()
@@ -233,7 +197,8 @@ class _Parser:
                 self.advance()
         end = self.close(opening).end
         if len(arguments) < least or (most is not None and len(arguments) > most):
-            raise _wrong_arguments(name, end, len(arguments), least, most)
+            usage = DRAWS.get(name.text) if drawn else FUNCTIONS[name.text].usage if name.text in FUNCTIONS else None
+            raise mistakes.wrong_arguments(name, end, len(arguments), (least, most), usage)
         if drawn:
             kind = cast(Literal["normal", "uniform"], name.text)
             return Draw(kind, arguments[0], arguments[1], index, name.start, end)
@@ -246,77 +211,17 @@ class _Parser:
         if name.text in FUNCTIONS:
             return FUNCTIONS[name.text].least, FUNCTIONS[name.text].most
         if name.text not in DRAWS:
-            raise self.unknown_function(name)
+            raise mistakes.unknown_function(name, (*self.extra_functions, *FUNCTIONS, *(DRAWS if self.random else ())))
         if not self.random:
             message = f"'{name.text}' draws a random number, which this place does not allow"
             hint = "draw in 'weight', 'centre', 'bias', 'initial' (once) or in 'noise' (at every step)"
             raise ExpressionError("draw-not-allowed", message, name.start, name.end, hint)
-        return DRAWS[name.text], DRAWS[name.text]
-
-    def unknown_function(self, name: Token) -> ExpressionError:
-        known = (*self.extra_functions, *FUNCTIONS, *(DRAWS if self.random else ()))
-        close = nearest(name.text, known) if len(name.text) > 1 else ()
-        if name.text in _INSTEAD:
-            hint = _INSTEAD[name.text]
-        elif close:
-            hint = "did you mean " + " or ".join(f"'{other}'" for other in close) + "?"
-        else:
-            hint = f"for a product write '{name.text} * (…)'; the functions are {', '.join(known)}"
-        return ExpressionError("unknown-function", f"unknown function '{name.text}'", name.start, name.end, hint)
+        return 2, 2
 
     def close(self, opening: Token) -> Token:
         if self.is_operator(")"):
             return self.advance()
         if not self.at_end():
-            raise self.unexpected()
+            raise mistakes.unexpected(self.previous, self.token)
         message = "this parenthesis is never closed"
         raise ExpressionError("unbalanced-parenthesis", message, opening.start, opening.end)
-
-    def missing(self) -> ExpressionError:
-        """Where a value should stand, there is none."""
-        token, previous = self.token, self.previous
-        if self.is_operator(")") and not any(other.text == "(" for other in self.tokens[: self.at]):
-            return ExpressionError("unbalanced-parenthesis", "this parenthesis closes nothing", token.start, token.end)
-        if previous is None:
-            message = f"'{token.text}' has no value before it"
-            return ExpressionError("missing-operand", message, token.start, token.end)
-        hint = None
-        if token.text == previous.text and token.text in ("*", "=", "^", "<", ">"):
-            hint = f"write '{token.text}' once"
-        if token.kind == "end":
-            message = f"a value is missing after '{previous.text}'"
-            return ExpressionError("missing-operand", message, previous.start, previous.end, hint)
-        message = f"a value is missing between '{previous.text}' and '{token.text}'"
-        return ExpressionError("missing-operand", message, token.start, token.end, hint)
-
-    def unexpected(self) -> ExpressionError:
-        """After a value stands what can follow none."""
-        token, previous = self.token, self.previous
-        if token.kind == "name" and token.text in _WORDS:
-            code, message, hint = _WORDS[token.text]
-            return ExpressionError(code, message, token.start, token.end, hint)
-        if self.is_operator(")"):
-            return ExpressionError("unbalanced-parenthesis", "this parenthesis closes nothing", token.start, token.end)
-        if self.is_operator(","):
-            message = "a comma stands only between the arguments of a function"
-            hint = "write decimals with a point, as in 0.5"
-            return ExpressionError("unexpected-comma", message, token.start, token.end, hint)
-        if self.is_operator("else"):
-            hint = "write 'a if condition else b'"
-            return ExpressionError("missing-if", "'else' without 'if'", token.start, token.end, hint)
-        before = "" if previous is None else previous.text
-        message = f"an operator is missing between '{before}' and '{token.text}'"
-        hint = f"for a product write '{before} * {token.text}'" if is_operand(token) else "for a product write '*'"
-        return ExpressionError("missing-operator", message, token.start, token.end, hint)
-
-
-def _wrong_arguments(name: Token, end: int, given: int, least: int, most: int | None) -> ExpressionError:
-    wanted = f"{least} or more" if most is None else str(least) if least == most else f"{least} to {most}"
-    noun = "argument" if wanted == "1" else "arguments"
-    message = f"'{name.text}' takes {wanted} {noun}, here {'is' if given == 1 else 'are'} {given}"
-    example = FUNCTIONS[name.text].usage if name.text in FUNCTIONS else None
-    if name.text in DRAWS and name.text not in FUNCTIONS:
-        example = "normal(mean, deviation)" if name.text == "normal" else "uniform(low, high)"
-    return ExpressionError(
-        "wrong-arguments", message, name.start, end, None if example is None else f"write '{example}'"
-    )
