@@ -137,4 +137,6 @@ def _places(rect: Rect, width: float) -> list[tuple[float, float]]:
         for share in range(1, 12)
         if right > left
     ]
-    return corners + slid
+    outside = [(x0 + 2, above), (x0 + 2, below), (x1 - 2 - width, above), (x1 - 2 - width, below)]
+    beside = [(x, y) for y in (y0 + 13, y1 - 5) for x in (x0 - 8 - width, x1 + 8)]
+    return corners + outside + slid + beside

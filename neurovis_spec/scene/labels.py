@@ -16,8 +16,8 @@ from neurovis_spec.scene.model import Text
 from neurovis_spec.scene.obstacles import Obstacles
 
 _WEIGHT = 600
-#: on the disc: never smaller, never larger; beside it
-_SMALLEST, _LARGEST, _BESIDE = 9.0, 14.0, 11.0
+#: on the disc: never smaller, not for the sake of others, never larger; beside it
+_SMALLEST, _READABLE, _LARGEST, _BESIDE = 9.0, 10.5, 14.0, 11.0
 #: a disc smaller than this has no label
 _SMALLEST_DISC = 7.0
 
@@ -45,12 +45,12 @@ def labels_of(
     neurons = network.neurons
     if radius < _SMALLEST_DISC:
         return [None] * len(neurons)
+    parts = [_parts(label, name) for label, name in zip(neurons.labels, neurons.names, strict=True)]
+    common = _common_size(parts, radius)
     result: list[Label | None] = []
     outside = 0
-    for label, name, centre in zip(neurons.labels, neurons.names, centres, strict=True):
-        numbered = label == name.rsplit(".", 1)[-1]
-        base, subscript = texts.with_subscript(label) if numbered else (label, "")
-        found = _on_disc(base, subscript, centre, radius)
+    for label, (base, subscript), centre in zip(neurons.labels, parts, centres, strict=True):
+        found = _on_disc(base, subscript, centre, radius, common)
         if found is None and outside < 400:  # beyond that a picture is dense anyway
             outside += 1
             found = _beside(label, centre, radius, obstacles, picture)
@@ -58,13 +58,29 @@ def labels_of(
     return result
 
 
-def _on_disc(base: str, subscript: str, centre: Point, radius: float) -> Label | None:
-    size = min(_LARGEST, 0.76 * radius)
-    while size > _SMALLEST and texts.width(base, size, _WEIGHT, subscript) > _chord(radius, size):
+def _parts(label: str, name: str) -> tuple[str, str]:
+    """The label and its subscript: a numbered neuron without a label of its own has one."""
+    return texts.with_subscript(label) if label == name.rsplit(".", 1)[-1] else (label, "")
+
+
+def _fits(parts: tuple[str, str], size: float, radius: float) -> bool:
+    return texts.width(parts[0], size, _WEIGHT, parts[1]) <= _chord(radius, size)
+
+
+def _common_size(parts: list[tuple[str, str]], radius: float) -> float:
+    """The size of most labels: the largest at which all that fit at a readable size do fit."""
+    size = largest = min(_LARGEST, 0.76 * radius)
+    readable = [p for p in dict.fromkeys(parts) if _fits(p, min(_READABLE, largest), radius)]
+    while size > _READABLE and not all(_fits(p, size, radius) for p in readable):
         size -= 0.5
-    if size < _SMALLEST - 1e-9 and texts.width(base, size, _WEIGHT, subscript) > _chord(radius, size):
-        return None
-    if texts.width(base, size, _WEIGHT, subscript) > _chord(radius, size):
+    return size
+
+
+def _on_disc(base: str, subscript: str, centre: Point, radius: float, common: float) -> Label | None:
+    size = common
+    while size > _SMALLEST and not _fits((base, subscript), size, radius):
+        size -= 0.5
+    if not _fits((base, subscript), size, radius):
         return None
     drop = 0.36 if not subscript else 0.32
     return Label(base, subscript, size, (centre[0], centre[1] + drop * size), "middle", True)

@@ -121,15 +121,13 @@ def _spline(shape: Spline) -> str:
 
 
 def _ramp(shape: Ramp) -> str:
-    """Slices rather than a gradient: a gradient needs an id, and two pictures in one page would share it."""
+    """Stripes rather than a gradient: a gradient needs an id, and two pictures in one page would share it. Each stripe
+    reaches to the end, beneath those that follow, so that there are no seams."""
     (x, y), step = shape.corner, shape.width / len(shape.colours)
-    return (
-        '<g shape-rendering="crispEdges">'
-        + "".join(
-            f'<path d="M{num(x + place * step)} {num(y)}h{num(step)}v{num(shape.height)}h{num(-step)}z" fill="{fill}"/>'
-            for place, fill in enumerate(shape.colours)
-        )
-        + "</g>"
+    right, low = num(x + shape.width), num(y + shape.height)
+    return "".join(
+        f'<path d="M{num(x + place * step)} {num(y)}H{right}V{low}H{num(x + place * step)}z" fill="{fill}"/>'
+        for place, fill in enumerate(shape.colours)
     )
 
 
