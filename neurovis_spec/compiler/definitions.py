@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from neurovis_spec.compiler.constants import CONSTANTS, parse_formula
 from neurovis_spec.compiler.network import Activation, Model, Quantity, Rule
 from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.language.expressions.errors import ExpressionError
 from neurovis_spec.language.expressions.tree import Number, Tree, substitute
 from neurovis_spec.language.located import Formula
 from neurovis_spec.language.source import Mapping as SourceMapping
@@ -113,10 +114,19 @@ def _activation(name: str, model: ActivationModel, findings: Findings) -> tuple[
     defaults = checker.parameters(model.parameters)
     replaced: dict[str, Tree] = {}
     for key, tree in checker.let(model.let):
-        replaced[key] = substitute(tree, replaced)
+        replaced[key] = _expanded(tree, replaced, checker.known[key] or model.source.span, findings)
     value = checker.tree(model.value)
-    tree = substitute(value or Number(0.0), replaced)
+    tree = _expanded(value or Number(0.0), replaced, model.value.span, findings)
     return Activation(name, tuple(key for key, _ in defaults), tree), defaults
+
+
+def _expanded(tree: Tree, let: Mapping[str, Tree], span: Span, findings: Findings) -> Tree:
+    """The tree with its intermediate values put in; a finding where that makes too much of it."""
+    try:
+        return substitute(tree, let)
+    except ExpressionError as error:
+        findings.error(error.code, span, f"with its intermediate values put in, {error.message}", error.hint)
+        return Number(0.0)
 
 
 def _model(name: str, model: ModelModel, findings: Findings) -> tuple[Model, Defaults]:
