@@ -122,13 +122,14 @@ def _spline(shape: Spline) -> str:
 
 def _ramp(shape: Ramp) -> str:
     """Stripes rather than a gradient: a gradient needs an id, and two pictures in one page would share it. Each stripe
-    reaches to the end, beneath those that follow, so that there are no seams."""
+    reaches a little beneath the next, so that there are no seams."""
     (x, y), step = shape.corner, shape.width / len(shape.colours)
-    right, low = num(x + shape.width), num(y + shape.height)
-    return "".join(
-        f'<path d="M{num(x + place * step)} {num(y)}H{right}V{low}H{num(x + place * step)}z" fill="{fill}"/>'
-        for place, fill in enumerate(shape.colours)
-    )
+    down = num(shape.height)
+    result = ""
+    for place, fill in enumerate(shape.colours):
+        across = step if place == len(shape.colours) - 1 else step + 0.75
+        result += f'<path d="M{num(x + place * step)} {num(y)}h{num(across)}v{down}h{num(-across)}z" fill="{fill}"/>'
+    return result
 
 
 def _text(shape: Text, attributes: str, content: str) -> str:
