@@ -1,8 +1,8 @@
 """The plan of a picture: all that does not change from step to step.
 
 In: a network, its layout, gains and settings. Out: a Plan: the frame, discs, lines, boxes, labels, title and legend, in
-user units (pixels at scale 1). ``encode`` and ``film`` paint activities and weights on it, so every step of a network has
-the same geometry.
+user units (pixels at scale 1). ``encode`` and ``film`` paint activities and weights on it, so every step of a network
+has the same geometry.
 """
 
 from __future__ import annotations

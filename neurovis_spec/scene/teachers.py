@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.scene.geometry import FloatArray, Point, sample
+from neurovis_spec.scene.geometry import FloatArray, sample
 from neurovis_spec.scene.lines import Line, trimmed
 from neurovis_spec.scene.obstacles import Obstacles
 
@@ -70,6 +70,3 @@ def label_of(teachers: list[Teacher]) -> str:
     """What the legend says of them: ``target of delta``."""
     told = dict.fromkeys(f"{teacher.signal} of {teacher.rule}" for teacher in teachers)
     return next(iter(told)) if len(told) == 1 else f"{len(told)} signals of rules"
-
-
-__all__ = ["Point", "Teacher", "dash", "dotted", "label_of", "teachers_of"]
