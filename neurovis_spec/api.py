@@ -27,7 +27,6 @@ from neurovis_spec.language.spec import Spec
 from neurovis_spec.layout import Layout, Point, Route
 from neurovis_spec.layout.arrange import choose_engine
 from neurovis_spec.layout.file import dump
-from neurovis_spec.layout.metrics import metrics
 from neurovis_spec.layout.problem import problem_of
 from neurovis_spec.runtime import backend as backends_module
 from neurovis_spec.runtime import formats
@@ -353,6 +352,8 @@ class NetworkLayout:
 
     def metrics(self) -> dict[str, float | int]:
         """What ``neurovis layout --metrics`` prints, but for the seconds."""
+        from neurovis_spec.layout.metrics import metrics  # networkx, which nobody else here needs
+
         return metrics(self.value, problem_of(self.compiled.network))
 
     def dump(self) -> str:

@@ -1,0 +1,75 @@
+"""Who imports whom, and how little is imported: the contracts of import-linter, and a quick start."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from neurovis_spec.cli.commands import COMMANDS
+
+ROOT = Path(__file__).parents[1]
+HEAVY = {"numpy", "pydantic", "networkx", "yaml", "scipy", "PIL", "rich", "neurovis_layouts", "neurovis_renderers"}
+
+
+def loaded(code: str) -> set[str]:
+    """The modules that a fresh interpreter has after running ``code``."""
+    shown = "\nimport sys\nprint('\\n'.join(sys.modules), file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", code + shown], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return set(done.stderr.split())
+
+
+def command(*arguments: str) -> str:
+    """Code that runs the command line and goes on."""
+    return (
+        "from neurovis_spec.cli.commands import neurovis\n"
+        f"try: neurovis.main({list(arguments)!r}, prog_name='neurovis')\n"
+        "except SystemExit as end: assert not end.code, end"
+    )
+
+
+def test_the_contracts_hold() -> None:
+    from importlinter.cli import EXIT_STATUS_SUCCESS, lint_imports
+
+    status = lint_imports(config_filename=str(ROOT / "pyproject.toml"), no_cache=True)
+    assert status == EXIT_STATUS_SUCCESS
+
+
+def test_importing_the_package_imports_next_to_nothing() -> None:
+    modules = loaded("import neurovis_spec\nneurovis_spec.__version__")
+    assert {name for name in modules if name.startswith("neurovis_")} == {"neurovis_spec", "neurovis_spec.version"}
+    assert not modules & (HEAVY | {"click", "importlib.metadata"})
+
+
+def test_help_and_version_import_no_command_and_list_no_entry_point() -> None:
+    for option in ("--help", "--version"):
+        modules = loaded(command(option))
+        assert not modules & (HEAVY | {"importlib.metadata"})
+        assert not {f"neurovis_spec.cli.{name}" for name in COMMANDS} & modules
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_help_of_a_command_imports_nothing_heavy(name: str) -> None:
+    assert not loaded(command(name, "--help")) & HEAVY
+
+
+def test_validating_imports_nothing_that_lays_out_or_draws() -> None:
+    modules = loaded(command("validate", "specs/cpg_rbf.yaml"))
+    assert not modules & {"networkx", "scipy", "PIL", "rich", "neurovis_layouts", "neurovis_renderers"}
+
+
+def test_running_imports_nothing_that_lays_out_or_draws() -> None:
+    modules = loaded(command("run", "specs/ring.yaml", "--steps", "3"))
+    assert not modules & {"networkx", "scipy", "PIL", "rich", "neurovis_layouts", "neurovis_renderers"}
+
+
+def test_the_public_names_are_there_and_an_unknown_one_is_not() -> None:
+    import neurovis_spec
+
+    for name in neurovis_spec.__all__:
+        assert getattr(neurovis_spec, name) is not None
+    with pytest.raises(AttributeError, match="compil_text"):
+        neurovis_spec.compil_text  # noqa: B018
