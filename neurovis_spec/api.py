@@ -28,11 +28,11 @@ from neurovis_spec.layout import Layout, Point, Route
 from neurovis_spec.layout.arrange import choose_engine
 from neurovis_spec.layout.file import dump
 from neurovis_spec.layout.problem import problem_of
+from neurovis_spec.progress import Progress
 from neurovis_spec.runtime import backend as backends_module
 from neurovis_spec.runtime import formats
 from neurovis_spec.runtime.files import replacing
 from neurovis_spec.runtime.inputs import InputError
-from neurovis_spec.runtime.record import Progress
 from neurovis_spec.runtime.recording import Recording, RecordingError, Snapshot
 from neurovis_spec.runtime.simulation import Simulation
 from neurovis_spec.scene.gains import Gains

@@ -2,7 +2,7 @@
 
 In: facts that a stage noticed (a code, a place, a sentence). Out: an ordered tuple of Diagnostics, or a
 SpecError that holds them. Nothing is raised at the first mistake: a stage goes on and collects. How findings
-are shown (text, JSON) is in ``neurovis_spec.findings_text``.
+are shown (text, JSON) is in ``neurovis_spec.findings``.
 """
 
 from __future__ import annotations
@@ -76,9 +76,16 @@ class Findings:
         return sum(item.severity == "error" for item in self._items)
 
     def sorted(self) -> tuple[Diagnostic, ...]:
-        """All findings by place, each once."""
-        unique = dict.fromkeys(self._items)
-        return tuple(sorted(unique, key=lambda d: (d.span, d.severity, d.code, d.message)))
+        """All findings by place, each once.
+
+        Where a stretch of the text is at fault in one way, what later stages make of it is a follow-up and held back.
+        """
+        first: dict[Span, str] = {}
+        for item in self._items:
+            if item.severity == "error":
+                first.setdefault(item.span, item.code)
+        kept = [item for item in dict.fromkeys(self._items) if first.get(item.span, item.code) == item.code]
+        return tuple(sorted(kept, key=lambda d: (d.span, d.severity, d.code, d.message)))
 
     def check(self) -> None:
         """Raise SpecError if there is an error."""
@@ -106,9 +113,16 @@ def nearest(name: str, known: Iterable[str], most: int = 3) -> tuple[str, ...]:
         score = SequenceMatcher(None, folded, other, autojunk=False).ratio()
         if folded and other and (other.startswith(folded) or folded.startswith(other)):
             score = max(score, 0.75)
+        if _stem(folded) == _stem(other) != "":
+            score = max(score, 0.7)
         if score >= 0.6:
             scored.append((-score, candidate))
     return tuple(candidate for _, candidate in sorted(scored)[:most])
+
+
+def _stem(name: str) -> str:
+    """A name without the number at its end: K3 and K12 are alike."""
+    return name.rstrip("0123456789")
 
 
 def suggest(name: str, known: Iterable[str], what: str = "known") -> str | None:

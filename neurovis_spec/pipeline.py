@@ -26,7 +26,8 @@ from neurovis_spec.language.source import SourceDocument
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.layout import Layout
 from neurovis_spec.layout.arrange import lay_out
-from neurovis_spec.runtime.record import Progress, record
+from neurovis_spec.progress import Progress
+from neurovis_spec.runtime.record import record
 from neurovis_spec.runtime.recording import Recording, Snapshot
 from neurovis_spec.scene import Film, Scene
 from neurovis_spec.scene.encode import encode

@@ -67,11 +67,7 @@ def ring(ends: Ends) -> Pairs:
 
 def random(ends: Ends, probability: float, stream: Stream) -> Pairs:
     """Every pair with a probability; drawn row by row by geometric gaps (§4, Randomness)."""
-    m = len(ends.targets)
-    rows = [stream.random_targets(row, m, probability) for row in range(len(ends.sources))]
-    i = np.repeat(np.arange(len(rows)), [len(row) for row in rows])
-    j = np.concatenate([*rows, np.zeros(0, dtype=np.int64)]).astype(np.int64)
-    return ends.pairs(i, j)
+    return ends.pairs(*stream.random_pairs(len(ends.sources), len(ends.targets), probability))
 
 
 _FIXED: Mapping[str, Callable[[Ends], Pairs]] = {

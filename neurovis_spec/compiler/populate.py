@@ -112,20 +112,18 @@ def populate(
 def _owners(spec: Spec, built: list[_Built], findings: Findings) -> dict[str, str] | None:
     """Neuron name to group name; two declarations of one name are a finding."""
     owners: dict[str, str] = {}
-    groups = {item.group.name for item in built}
     clean = True
     for item in built:
-        for neuron in item.names:
-            other = owners.get(neuron)
-            if other is None and neuron in groups and neuron != item.group.name:
-                other = neuron
-            if other is not None and other != item.group.name:
+        name = item.group.name
+        # A group of several may not be called like a neuron of another one either: what would the name refer to?
+        for neuron in dict.fromkeys((*item.names, name)):
+            other = owners.setdefault(neuron, name)
+            if other != name:
                 first = key_span(spec, "neurons", other)
+                message = f"'{name}' and '{other}' (line {first.line}) both make the name '{neuron}'"
+                findings.error("duplicate-neuron", key_span(spec, "neurons", name), message)
                 clean = False
-                message = f"'{item.group.name}' and '{other}' (line {first.line}) both make the name '{neuron}'"
-                findings.error("duplicate-neuron", key_span(spec, "neurons", item.group.name), message)
                 break
-            owners[neuron] = item.group.name
     return owners if clean else None
 
 

@@ -6,24 +6,18 @@ In: a Network, inputs, a number of steps. Out: a Recording of steps 0 … steps 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.backend import Backend, prepare
 from neurovis_spec.runtime.inputs import STRETCH, InputReader
 from neurovis_spec.runtime.recording import Recording, recording_of
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.state import initial_state
 from neurovis_spec.runtime.watch import Watch
-
-
-class Progress(Protocol):
-    """Called now and then with the steps done and the steps there are."""
-
-    def __call__(self, done: int, total: int, /) -> None: ...  # noqa: D102
 
 
 def record(

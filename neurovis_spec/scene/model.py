@@ -14,6 +14,8 @@ from typing import ClassVar, Literal, Protocol, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec.progress import Progress
+
 Point: TypeAlias = tuple[float, float]
 
 
@@ -210,12 +212,6 @@ class RendererCapabilities:
 
     stills: frozenset[str] = frozenset()
     films: frozenset[str] = frozenset()
-
-
-class Progress(Protocol):
-    """Called now and then with what is done and what there is to do."""
-
-    def __call__(self, done: int, total: int) -> None: ...  # noqa: D102
 
 
 class Renderer(Protocol):

@@ -11,7 +11,8 @@ import warnings
 import numpy as np
 
 from neurovis_spec.compiler.network import FloatArray, Network
-from neurovis_spec.runtime.record import Progress, record
+from neurovis_spec.progress import Progress
+from neurovis_spec.runtime.record import record
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.scene.gains import Gains, choose_gains
 
