@@ -1,7 +1,7 @@
 """Every defective spec of tests/errors is answered at the right place, with the right code, and in words that help.
 
-The expected findings stand in the specs, beside the offending lines: ``# error: LINE:COLUMN CODE  WORDS``; the words must occur in
-the message or the hint.
+The expected findings stand in the specs, beside the offending lines: ``# error: LINE:COLUMN CODE  WORDS``; the words
+must occur in the message or the hint.
 """
 
 from __future__ import annotations

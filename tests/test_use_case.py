@@ -112,10 +112,13 @@ def test_the_weights_as_printed() -> None:
 
 def test_short_term_memory_stays_when_its_cause_has_gone() -> None:
     recording = nv.compile(SPECS / "short_term_memory.yaml").run()
-    assert recording["I"][39] == 0 and recording["I"][45] == 1 and (recording["I"][50:200] == 0).all()
+    assert recording["I"][39] == 0
+    assert recording["I"][45] == 1
+    assert (recording["I"][50:200] == 0).all()
     assert np.abs(recording["O"][:41]).max() == 0
     kept = recording["O"][70:200]
-    assert kept.min() > 0.7 and np.ptp(kept) < 0.01
+    assert kept.min() > 0.7
+    assert np.ptp(kept) < 0.01
     without = nv.compile(SPECS / "short_term_memory.yaml", loop=0).run()
     assert np.abs(without["O"][52:200]).max() == 0
 
@@ -144,7 +147,8 @@ def test_the_ring_keeps_a_direction_and_moves_it() -> None:
 def test_the_bell_comes_to_mean_food() -> None:
     recording = nv.compile(SPECS / "hebbian.yaml").run()
     weight = recording.weight("B -> S")
-    assert weight[0] == 0 and weight[600] > 0.9
+    assert weight[0] == 0
+    assert weight[600] > 0.9
     assert recording["S"][2:5].max() == 0  # the bell alone, before
     assert recording["S"][602:606].min() > 0.8  # the bell alone, after
     assert weight[899] < weight[620]

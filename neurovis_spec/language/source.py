@@ -90,7 +90,8 @@ class Packed:
 
     Cell ``c`` has ``kinds[c]`` (NULL, NUMBER or TEXT), ``numbers[c]`` (a float; NaN for null; the index into ``texts``
     for a text), and stands on line ``lines[c]`` from column ``columns[c]`` to ``ends[c]`` (1-based, exclusive).
-    ``integers`` says whether a number was written as an integer. Row ``r`` holds the cells ``rows[r]`` to ``rows[r + 1]``.
+    ``integers`` says whether a number was written as an integer. Row ``r`` holds the cells from ``rows[r]`` up to
+    ``rows[r + 1]``.
     """
 
     span: Span

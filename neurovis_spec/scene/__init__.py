@@ -3,6 +3,7 @@
 Renderers use what stands here; ``encode``, ``film`` and ``choose_gains`` are in the modules of these names.
 """
 
+from neurovis_spec.progress import Progress
 from neurovis_spec.scene.film import still
 from neurovis_spec.scene.model import (
     HEAD_MORE,
@@ -13,7 +14,6 @@ from neurovis_spec.scene.model import (
     Film,
     Group,
     Point,
-    Progress,
     Ramp,
     Rectangle,
     Renderer,

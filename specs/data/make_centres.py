@@ -1,8 +1,8 @@
 """Makes centres.csv: where the eight kernels of cpg_rbf.yaml sit.
 
-They are eight points of the oscillator's settled orbit, equally spaced in time, beginning where C1 passes through zero upward.
-Centres on the diagonal from -1 to 1 would not do: the orbit has an amplitude of 0.198, and hardly any kernel
-would ever be active.
+They are eight points of the oscillator's settled orbit, equally spaced in time, beginning where C1 passes through
+zero upward. Centres on the diagonal from -1 to 1 would not do: the orbit has an amplitude of 0.198, and hardly any
+kernel would ever be active.
 
 Run it in this folder: python make_centres.py
 """

@@ -1,0 +1,136 @@
+"""Golden files pin what the compiler, the layout and the encoding make of every example.
+
+``tests/golden/<spec>/network.json``, ``layout.<engine>.json`` and ``scene.json`` are compared value by value;
+``scene.svg`` lies beside them to be looked at, and must show the same items. After a wanted change: ``pytest
+tests/test_golden.py
+--update-golden``, then read the diff.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+import pytest
+
+import neurovis_spec as nv
+from neurovis_spec import pipeline
+from neurovis_spec.api import CompiledNetwork
+from neurovis_spec.scene import Scene
+
+HERE = Path(__file__).parent
+SPECS = sorted((HERE.parent / "specs").glob("*.yaml"))
+#: the step that the scene shows
+STEPS = {"cpg_rbf": 160, "mlp": 3, "hebbian": 250}
+Plain: TypeAlias = "bool | int | float | str | list[Plain] | dict[str, Plain] | None"
+
+
+def plain(value: object) -> Plain:
+    """Any of our values as JSON: records by their fields, arrays as lists, NaN as text."""
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else str(value)
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if is_dataclass(value) and not isinstance(value, type):
+        kind: dict[str, Plain] = {"kind": type(value).__name__}
+        return kind | {f.name: plain(getattr(value, f.name)) for f in fields(value) if f.name not in ("start", "end")}
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, tuple | list | frozenset):
+        return [plain(item) for item in (sorted(value) if isinstance(value, frozenset) else value)]
+    raise TypeError(f"no golden form for {type(value).__name__}")
+
+
+def network_of(compiled: CompiledNetwork) -> Plain:
+    network = compiled.network
+    program: list[Plain] = [
+        {
+            "operation": type(operation).__name__,
+            "reads": plain(operation.reads),
+            "writes": plain(operation.writes),
+        }
+        for operation in network.program
+    ]
+    described = {key: plain(value) for key, value in compiled.describe().items() if key != "hash"}
+    return {
+        **described,
+        "bounds": plain(np.stack([network.connections.low, network.connections.high], axis=1)),
+        "centres": plain(network.connections.centres),
+        "initial": plain(network.neurons.initial),
+        "blocks": plain(network.blocks),
+        "plasticity": plain(network.plasticity),
+        "program": program,
+    }
+
+
+def scene_of(compiled: CompiledNetwork) -> Scene:
+    step = STEPS.get(compiled.name, 100)
+    snapshot = compiled.run(step + 1).snapshot(step)
+    layout = compiled.layout().value
+    return pipeline.picture(compiled.network, layout, snapshot, compiled.gains, compiled.network.render)
+
+
+def same(one: Plain, other: Plain, path: str = "$") -> None:
+    """Equal but for the last bits of a float, which elementary functions owe to the platform."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        assert list(one) == list(other), path
+        for key in one:
+            same(one[key], other[key], f"{path}.{key}")
+    elif isinstance(one, list) and isinstance(other, list):
+        assert len(one) == len(other), path
+        for index, pair in enumerate(zip(one, other, strict=True)):
+            same(*pair, f"{path}[{index}]")
+    elif isinstance(one, float) and isinstance(other, float | int):
+        assert math.isclose(one, other, rel_tol=1e-12, abs_tol=1e-12), f"{path}: {one} is not {other}"
+    else:
+        assert one == other, path
+
+
+def compare(path: Path, value: Plain, update: bool) -> None:
+    text = json.dumps(value, indent=1, ensure_ascii=False) + "\n"
+    if update:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    assert path.exists(), f"{path.name} is missing: run with --update-golden and read the diff"
+    same(json.loads(text), json.loads(path.read_text(encoding="utf-8")))
+
+
+@pytest.fixture(scope="module", params=SPECS, ids=lambda path: path.stem)
+def compiled(request: pytest.FixtureRequest) -> CompiledNetwork:
+    return nv.compile(request.param)
+
+
+def test_every_spec_says_what_to_look_at() -> None:
+    assert {path.stem for path in SPECS} >= {"cpg_rbf", "cpg_printed", "short_term_memory", "mlp", "ring", "hebbian"}
+    for path in SPECS:
+        assert "# What to look at:" in path.read_text(encoding="utf-8"), path.name
+
+
+def test_network(compiled: CompiledNetwork, update_golden: bool) -> None:
+    compare(HERE / "golden" / compiled.name / "network.json", network_of(compiled), update_golden)
+
+
+def test_layout(compiled: CompiledNetwork, update_golden: bool) -> None:
+    layout = compiled.layout()
+    value = {"positions": plain(layout.positions), "routes": plain(layout.routes)}
+    compare(HERE / "golden" / compiled.name / f"layout.{layout.engine}.json", value, update_golden)
+
+
+def test_scene(compiled: CompiledNetwork, update_golden: bool) -> None:
+    scene = scene_of(compiled)
+    folder = HERE / "golden" / compiled.name
+    compare(folder / "scene.json", plain(scene), update_golden)
+    svg = pipeline.draw(scene, ".svg").decode()
+    if update_golden:
+        (folder / "scene.svg").write_text(svg, encoding="utf-8")
+    items = re.compile(r"<(\w+)|data-[\w-]+=\"[^\"]*\"")
+    shown = (folder / "scene.svg").read_text(encoding="utf-8")
+    assert [match.group() for match in items.finditer(shown)] == [match.group() for match in items.finditer(svg)]
