@@ -25,6 +25,10 @@ def json_schema() -> dict[str, object]:
         },
     }
     definitions["Connections"] = {"anyOf": [entries, {"type": "array", "items": entries}]}
+    properties = schema["properties"]
+    assert isinstance(properties, dict)
+    described = properties["connections"]["description"]
+    properties["connections"] = {"$ref": "#/$defs/Connections", "description": described}
     closed = {"$schema": DIALECT, "title": "NeuroVis spec, version 1", **_closed(schema)}
     closed["title"] = "NeuroVis spec, version 1"
     return closed

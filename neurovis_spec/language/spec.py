@@ -333,7 +333,7 @@ class Spec(Library):
     connections: Annotated[
         tuple[tuple[Annotated[Located[str], Leaf(_as_it_is, {})], ConnectionModel], ...],
         BeforeValidator(lambda node, info: _connections(node, info)),
-        WithJsonSchema({"$ref": "#/$defs/Connections"}),
+        WithJsonSchema({"title": "Connections"}),
     ] = Field(default=(), description="FROM -> TO: a weight or a body. Rows are sources, columns are targets.")
     outputs: Named[ReferenceField] = Field(default_factory=dict, description="Names for what leaves the network.")
     layout: LayoutModel | None = Field(None, description="How it is laid out.")
