@@ -11,6 +11,7 @@ import click
 from neurovis_spec.cli.files import STDIN, compiled, count
 from neurovis_spec.cli.options import examples
 from neurovis_spec.diagnostics import Diagnostic, SpecError
+from neurovis_spec.findings import printable, show_text, to_json
 
 
 @click.command(
@@ -54,7 +55,7 @@ def command(specs: tuple[str, ...], form: str, strict: bool, limit: int | None, 
         if form == "text" and not (strict and network.warnings):
             arrays = network.network
             size = f"{count(len(arrays.neurons), 'neuron')}, {count(len(arrays.connections), 'connection')}"
-            click.echo(f"{STDIN if spec == '-' else spec}: ok ({size})")
+            click.echo(f"{STDIN if spec == '-' else printable(spec)}: ok ({size})")
     if strict:
         found = [replace(finding, severity="error") for finding in found]
     _show(found, sources, form)
@@ -63,8 +64,6 @@ def command(specs: tuple[str, ...], form: str, strict: bool, limit: int | None, 
 
 
 def _show(found: Iterable[Diagnostic], sources: dict[str, str], form: str) -> None:
-    from neurovis_spec.findings import show_text, to_json
-
     if form == "json":
         click.echo(to_json(found))
     elif text := show_text(found, sources):
