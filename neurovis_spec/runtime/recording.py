@@ -146,6 +146,12 @@ class Recording:
 
         formats.save(self, path)
 
+    def _repr_svg_(self) -> str:
+        """Its traces, for a notebook."""
+        from neurovis_spec.runtime.traces import traces
+
+        return traces(self)
+
 
 def unknown(what: str, name: str, known: Iterable[str]) -> UnknownNameError:
     """An error that offers the nearest known names."""

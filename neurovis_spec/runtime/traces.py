@@ -1,0 +1,77 @@
+"""Traces: a recording as a small picture for a notebook, one line a neuron, one for each weight that changes.
+
+In: a Recording. Out: an SVG as text. It needs no network, so that a recording that was only loaded shows itself, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from neurovis_spec.runtime.recording import Recording
+
+WIDTH, ROW, LEFT, TOP = 720, 26, 96, 28
+#: most lines of each kind, and most points of a line (the lowest and the highest value of every column)
+MOST, COLUMNS = 24, 300
+
+
+def traces(recording: Recording) -> str:
+    """The activities and the changing weights over the steps; every line has its own range, which is written beside
+    it."""
+    names = [recording.connection_names[index] for index in recording.plastic[:MOST].tolist()]
+    rows = [
+        *_rows("activity", recording.neurons[:MOST], recording.activity, "#0072b2"),
+        *_rows("weight", names, recording.weights, "#b07d00"),
+    ]
+    height = TOP + ROW * len(rows) + 8
+    hidden = max(0, len(recording.neurons) - MOST) + max(0, len(recording.plastic) - MOST)
+    span = f"steps {recording.step[0]} … {recording.step[-1]}" if len(recording) else "no steps"
+    more = f" · {hidden} more" if hidden else ""
+    title = escape(f"{recording.network or 'recording'} · {span}{more}")
+    lines = [_line(top, *row) for top, row in zip(range(TOP, height, ROW), rows, strict=False)]
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" height="{height}" '
+        f'font-family="Arial,DejaVu Sans,sans-serif" font-size="11"><title>{title}</title>'
+        f'<rect width="100%" height="100%" fill="#ffffff"/><text x="8" y="17" font-weight="600">{title}</text>'
+        f"{''.join(lines)}</svg>"
+    )
+
+
+def _rows(
+    what: str, names: tuple[str, ...] | list[str], values: npt.NDArray[np.float64], colour: str
+) -> Iterator[tuple[str, str, npt.NDArray[np.float64], str]]:
+    return ((what, name, values[:, index], colour) for index, name in enumerate(names))
+
+
+def _line(top: int, what: str, name: str, values: npt.NDArray[np.float64], colour: str) -> str:
+    shown = name if len(name) <= 13 else name[:12] + "…"
+    finite = values[np.isfinite(values)]
+    low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
+    points = _points(np.nan_to_num(values, nan=low, posinf=high, neginf=low), low, high, top)
+    return (
+        f"<g><title>{escape(f'{what} of {name}: {low:.4g} … {high:.4g}')}</title>"
+        f'<text x="8" y="{top + 16}" fill="#1f2328">{escape(shown)}</text>'
+        f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1"/>'
+        f'<text x="{WIDTH - 8}" y="{top + 16}" fill="#6e7781" text-anchor="end">{low:.3g} … {high:.3g}</text></g>'
+    )
+
+
+def _points(values: npt.NDArray[np.float64], low: float, high: float, top: int) -> str:
+    """The line, by the lowest and the highest value of every column of pixels."""
+    if not len(values):
+        return ""
+    right = WIDTH - 108
+    edges = np.linspace(0, len(values), min(COLUMNS, len(values)) + 1).astype(np.int64)
+    scale = (ROW - 8) / (high - low) if high > low else 0.0
+    places = []
+    for first, last in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+        piece = values[first:last]
+        x = LEFT + (right - LEFT) * first / max(len(values) - 1, 1)
+        extremes = (piece.min(), piece.max()) if piece[0] <= piece[-1] else (piece.max(), piece.min())
+        places += [f"{x:.1f},{top + ROW - 4 - (value - low) * scale:.1f}" for value in dict.fromkeys(extremes)]
+    return " ".join(places)
