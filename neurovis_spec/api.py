@@ -109,7 +109,7 @@ def backends() -> list[tuple[str, bool, str]]:
     """Name, whether it is available, and a note, for each backend."""
     result = []
     for name in backends_module.names():
-        availability = backends_module.load(name).availability()
+        availability = backends_module.available(name)
         result.append((name, availability.available, availability.note))
     return result
 

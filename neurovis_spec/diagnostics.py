@@ -111,13 +111,16 @@ def nearest(name: str, known: Iterable[str], most: int = 3) -> tuple[str, ...]:
     for candidate in dict.fromkeys(known):
         other = candidate.casefold()
         score = SequenceMatcher(None, folded, other, autojunk=False).ratio()
+        if folded[:1] == other[:1]:
+            score += 0.05  # a first letter is seldom mistyped
         if folded and other and (other.startswith(folded) or folded.startswith(other)):
             score = max(score, 0.75)
         if _stem(folded) == _stem(other) != "":
             score = max(score, 0.7)
         if score >= 0.6:
             scored.append((-score, candidate))
-    return tuple(candidate for _, candidate in sorted(scored)[:most])
+    best = min(scored, default=(0.0, ""))[0]
+    return tuple(candidate for score, candidate in sorted(scored)[:most] if score <= best + 0.12)
 
 
 def _stem(name: str) -> str:

@@ -6,6 +6,8 @@ as anybody's. Nothing is listed or imported before somebody asks.
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Iterator
 from importlib.metadata import EntryPoint, entry_points
 
 LAYOUTS = "neurovis.layouts"
@@ -14,6 +16,10 @@ BACKENDS = "neurovis.backends"
 FORMATS = "neurovis.formats"
 #: packages with YAML files of activations, models and rules
 LIBRARIES = "neurovis.libraries"
+
+
+class PluginError(ValueError):
+    """What is installed under a name cannot be loaded: the fault is the plug-in's."""
 
 
 def _points(group: str) -> dict[str, EntryPoint]:
@@ -26,9 +32,22 @@ def names(group: str) -> tuple[str, ...]:
 
 
 def load(group: str, name: str) -> object:
-    """What is registered under this name, made. Raises KeyError where there is none."""
-    made: object = _points(group)[name].load()()
+    """What is registered under this name, made. Raises KeyError where there is none, PluginError where it fails."""
+    point = _points(group)[name]
+    try:
+        made: object = point.load()()
+    except Exception as error:  # whatever somebody's code raises while it is imported
+        raise PluginError(f"the plug-in '{name}' ({point.value}) cannot be loaded: {error!r}") from error
     return made
+
+
+def working(group: str) -> Iterator[object]:
+    """All of a group, one after the other; one that cannot be loaded does not stand in the way of the others."""
+    for name in names(group):
+        try:
+            yield load(group, name)
+        except PluginError as error:
+            warnings.warn(str(error), RuntimeWarning, stacklevel=2)
 
 
 def package(group: str, name: str) -> str:

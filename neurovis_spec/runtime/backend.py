@@ -87,11 +87,19 @@ def load(name: str) -> Backend:
     return made
 
 
+def available(name: str) -> Availability:
+    """Whether the backend of this name works here; one that cannot even be loaded does not."""
+    try:
+        return load(name).availability()
+    except plugins.PluginError as error:
+        return Availability(False, str(error))
+
+
 def listing() -> tuple[str, ...]:
     """A line for each backend: ``NAME available [note]`` or ``NAME unavailable: reason``."""
     lines = []
     for name in names():
-        found = load(name).availability()
+        found = available(name)
         lines.append(
             f"{name} available {found.note}".rstrip() if found.available else f"{name} unavailable: {found.note}"
         )

@@ -66,8 +66,7 @@ def for_path(path: str | os.PathLike[str]) -> Format:
     """The format that the suffix names. Raises RecordingError where there is none."""
     suffix = Path(path).suffix.lower()
     known: set[str] = set()
-    for name in plugins.names(plugins.FORMATS):
-        made = plugins.load(plugins.FORMATS, name)
+    for made in plugins.working(plugins.FORMATS):
         if isinstance(made, Format):
             if suffix in made.suffixes:
                 return made
