@@ -21,11 +21,10 @@ class RendererError(ValueError):
 def renderer_for(suffix: str, *, moving: bool) -> Renderer:
     """The first renderer, by name, that declares this suffix for stills or for films."""
     known: list[str] = []
-    for name in plugins.names(plugins.RENDERERS):
-        made = plugins.load(plugins.RENDERERS, name)
+    for made in plugins.working(plugins.RENDERERS):
         capabilities = getattr(made, "capabilities", None)
         if not isinstance(capabilities, RendererCapabilities):
-            raise RendererError(f"what is installed as renderer '{name}' is none")
+            raise RendererError(f"what is installed as renderer '{type(made).__name__}' is none")
         suffixes = capabilities.films if moving else capabilities.stills
         if suffix.lower() in suffixes:
             renderer: Renderer = made  # type: ignore[assignment]
