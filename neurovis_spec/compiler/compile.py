@@ -21,6 +21,7 @@ from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.limits import Limits
 from neurovis_spec.compiler.lower import make_blocks, make_plasticity, make_program
 from neurovis_spec.compiler.network import IntArray, Network
+from neurovis_spec.compiler.noise import make_noises
 from neurovis_spec.compiler.order import Cycle, levels
 from neurovis_spec.compiler.populate import Population, key_span, populate
 from neurovis_spec.compiler.sections import layout_settings, make_outputs, render_settings
@@ -64,6 +65,8 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
     by_name = {entry.name: entry for entry in inputs}
     connector = Connector(spec, population, by_name, constants, definitions, files, request.limits, seed)
     bundles = connector.connect()
+    noisy = tuple((group, spec.neurons[group.name].noise) for group in population.neurons.groups)
+    noises = make_noises(noisy, sum(entry.size for entry in inputs), constants)
     if not len(population.neurons):
         node = spec.source.entry("neurons")
         span = opening(spec.source) if node is None else node.key.span
@@ -91,6 +94,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         outputs,
         blocks,
         plasticity,
+        noises,
     )
     return Network(
         name=spec.name.value,
@@ -113,6 +117,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         layout=layout,
         render=render,
         hash=content,
+        noises=noises,
     )
 
 

@@ -58,7 +58,7 @@ class _Writer:
 
 
 #: Records whose ``start`` is content (an index), not a place in a text.
-_KEEP_START = frozenset({"Group", "Input"})
+_KEEP_START = frozenset({"Group", "Input", "Noise"})
 
 
 def digest(*parts: object) -> str:

@@ -114,6 +114,21 @@ class Input:
 
 
 @dataclass(frozen=True, slots=True)
+class Noise:
+    """Random numbers that are drawn anew at each step and added to the drive of a group's neurons.
+
+    ``expression`` is over i, n, k, t, dt, pi, e and ``parameters``; its draws come from the stream of ``name``. The
+    numbers of a step stand from ``start`` on in the vector that a step is given, behind all inputs, one a member.
+    """
+
+    name: str
+    members: IntArray
+    start: int
+    expression: Tree
+    parameters: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
 class Output:
     """A name for neurons whose activity leaves the network; ``scalar`` where it refers to a single neuron."""
 
@@ -332,6 +347,7 @@ class Network:
     layout: LayoutSettings
     render: RenderSettings
     hash: str
+    noises: tuple[Noise, ...] = ()
 
     @cached_property
     def neuron_index(self) -> Mapping[str, int]:
@@ -342,6 +358,20 @@ class Network:
     def input_size(self) -> int:
         """Length of the vector of all inputs."""
         return sum(entry.size for entry in self.inputs)
+
+    @cached_property
+    def vector_size(self) -> int:
+        """Length of the vector that a step is given: all inputs, then all noise."""
+        return self.input_size + sum(len(noise.members) for noise in self.noises)
+
+    @cached_property
+    def noise_index(self) -> IntArray:
+        """Where the noise of each neuron stands in that vector, −1 without noise; (n,)."""
+        result = np.full(len(self.neurons), -1, dtype=np.int64)
+        for noise in self.noises:
+            result[noise.members] = np.arange(noise.start, noise.start + len(noise.members))
+        frozen(result)
+        return result
 
     @cached_property
     def changing(self) -> IntArray:

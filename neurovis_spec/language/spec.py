@@ -98,8 +98,6 @@ def _position(node: Node, info: ValidationInfo) -> FileReference | Sequence | Pa
 class GroupModel(Model):
     """A group of neurons, or a single one."""
 
-    LATER: ClassVar[dict[str, str]] = {"noise": "a random number added at each step"}
-
     count: FormulaField | None = Field(None, description="How many neurons; K with count 3 makes K1, K2, K3.")
     first: FormulaField | None = Field(None, description="The number of the first neuron (default 1).")
     names: TextsField | None = Field(None, description="The names of the neurons, one by one.")
@@ -115,6 +113,9 @@ class GroupModel(Model):
     bias: FormulasField | None = Field(None, description="Added to the combined input (default 0).")
     initial: FormulasField | None = Field(None, description="The activity at step 0; without it step 0 is computed.")
     input: TextField | None = Field(None, description="An entry of inputs, added to the combined input.")
+    noise: FormulaField | None = Field(
+        None, description="An expression with normal(m, s) or uniform(a, b), drawn anew and added each step."
+    )
     position: Annotated[
         FileReference | Sequence | Packed | None,
         Leaf(_position, {"anyOf": [{"type": "array"}, {"type": "object"}]}),

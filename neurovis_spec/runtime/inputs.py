@@ -1,4 +1,4 @@
-"""Inputs: s[t] as one vector, from expressions, tables and what the caller supplies.
+"""Inputs: s[t] as one vector, from expressions, tables and what the caller supplies; behind them the noise.
 
 In: a Network and the caller's values. Out: for each step the vector of all inputs. Rows are made a stretch of steps
 at a time, the same stretches however one runs, so that stepping and running give the same bits.
@@ -11,9 +11,11 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.network import FloatArray, Input, Network
+from neurovis_spec.compiler.draws import Stream
+from neurovis_spec.compiler.network import FloatArray, Input, Network, Noise
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
+from neurovis_spec.language.expressions.tree import Draw
 from neurovis_spec.runtime.state import constants
 
 #: steps of a stretch
@@ -35,7 +37,7 @@ class InputReader:
         self.network = network
         self._supplied = {name: _whole(_entry(network, name), value) for name, value in (supplied or {}).items()}
         self._first = -1
-        self._rows: FloatArray = np.zeros((0, network.input_size))
+        self._rows: FloatArray = np.zeros((0, network.vector_size))
 
     def rows(self, first: int, stop: int) -> FloatArray:
         """The vectors of steps ``first`` … ``stop`` − 1, in one stretch: (stop − first, inputs), read-only."""
@@ -55,9 +57,11 @@ class InputReader:
 
     def _make(self, first: int) -> None:
         steps = np.arange(first, first + STRETCH)
-        rows = np.zeros((STRETCH, self.network.input_size))
+        rows = np.zeros((STRETCH, self.network.vector_size))
         for entry in self.network.inputs:
             rows[:, entry.start : entry.start + entry.size] = self._source(entry, steps)
+        for noise in self.network.noises:
+            rows[:, noise.start : noise.start + len(noise.members)] = self._drawn(noise, steps)
         rows.flags.writeable = False
         self._first, self._rows = first, rows
 
@@ -73,6 +77,20 @@ class InputReader:
         known: dict[str, float | FloatArray] = {**constants(dt), **self.network.parameters, "k": k, "t": k * dt}
         values = np.broadcast_to(evaluate_array(entry.expression, known), (len(steps),))
         return np.asarray(values, dtype=np.float64).reshape(-1, 1)
+
+    def _drawn(self, noise: Noise, steps: npt.NDArray[np.int64]) -> FloatArray | float:
+        """The noise of a stretch of steps: the counter of a number is (i, 0, step, number of the draw)."""
+        stream = Stream(self.network.seed, "noise", noise.name)
+        n = len(noise.members)
+        i, step = np.arange(n).reshape(1, -1), steps.reshape(-1, 1)
+        k, dt = step.astype(np.float64), self.network.dt
+        known: dict[str, float | FloatArray] = {**constants(dt), **noise.parameters, "k": k, "t": k * dt}
+        known |= {"i": i.astype(np.float64), "n": float(n)}
+
+        def draw(node: Draw, first: float | FloatArray, second: float | FloatArray) -> FloatArray:
+            return stream.drawn(node.kind, first, second, i, 0, step, node.index)
+
+        return evaluate_array(noise.expression, known, draw)
 
 
 def _entry(network: Network, name: str) -> Input:

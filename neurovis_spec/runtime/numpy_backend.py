@@ -30,7 +30,7 @@ class NumpyBackend:
     """Array code made from the update program."""
 
     name = "numpy"
-    capabilities = Capabilities()
+    capabilities = Capabilities(noise=True)
 
     def availability(self) -> Availability:
         """Always there."""

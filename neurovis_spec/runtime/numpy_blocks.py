@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from neurovis_spec.compiler.network import Block, Gather, Network, Update
+from neurovis_spec.compiler.network import Block, Gather, IntArray, Network, Update
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.runtime.numpy_code import Code, all_names, any_given
 from neurovis_spec.runtime.signals import SignalLayout
@@ -17,7 +17,7 @@ FIRST = "k == 0 and not state.continued"
 
 
 def emit_gather(code: Code, network: Network, layout: SignalLayout, operation: Gather) -> str:
-    """u[t] of a block: what arrives, combined, + bias + input. Gives the identifier of the drive."""
+    """u[t] of a block: what arrives, combined, + bias + input + noise. Gives the identifier of the drive."""
     block = network.blocks[operation.block]
     bias = network.neurons.bias[block.members]
     if len(block.incoming):
@@ -27,15 +27,16 @@ def emit_gather(code: Code, network: Network, layout: SignalLayout, operation: G
             drive = code.let("u", f"{drive} + {code.constant(bias.copy())}")
     else:
         drive = code.constant((1.0 if block.combine == "product" else 0.0) + bias)
-    return _with_input(code, network, block, drive)
+    drive = _with(code, network, network.neurons.input[block.members], drive)
+    return _with(code, network, network.noise_index[block.members], drive)
 
 
-def _with_input(code: Code, network: Network, block: Block, drive: str) -> str:
-    fed = network.neurons.input[block.members]
+def _with(code: Code, network: Network, fed: IntArray, drive: str) -> str:
+    """The drive and, for each member, the number of the step's vector that ``fed`` points to (−1: none)."""
     given = np.flatnonzero(fed >= 0)
     if not len(given):
         return drive
-    values = code.select("s", fed[given], network.input_size, broadcast=True)
+    values = code.select("s", fed[given], network.vector_size, broadcast=True)
     if len(given) == len(fed):
         return code.let("u", f"{drive} + {values}")
     drive = code.let("u", f"np.array({drive})")

@@ -80,7 +80,7 @@ def _seen(code: Code, network: Network, plasticity: Plasticity, depth: int) -> d
     seen = {name: code.let("a", make()) for name, make in made.items() if name in read}
     for signal, indices in plasticity.signals.items():
         if signal in read:
-            seen[signal] = code.let("a", _signal(code, indices, n, network.input_size))
+            seen[signal] = code.let("a", _signal(code, indices, n, network.vector_size))
     return seen
 
 

@@ -31,7 +31,7 @@ class ReferenceBackend:
     """Executes anything, slowly."""
 
     name = "reference"
-    capabilities = Capabilities()
+    capabilities = Capabilities(noise=True)
 
     def availability(self) -> Availability:
         """Always there."""
@@ -67,7 +67,7 @@ class ReferenceStepper:
         state.k += 1
 
     def gather(self, block: Block, state: State, inputs: FloatArray) -> list[float]:
-        """u[t] of each member: what arrives, combined, + bias + input (§5.2)."""
+        """u[t] of each member: what arrives, combined, + bias + input + noise (§5.2)."""
         connections, neurons = self.network.connections, self.network.neurons
         arriving: list[list[tuple[float, float]]] = [[] for _ in block.members]
         for connection, slot in zip(block.incoming.tolist(), block.slots.tolist(), strict=True):
@@ -78,6 +78,8 @@ class ReferenceStepper:
             drive = combined(block.combine, signals) + float(neurons.bias[neuron])
             if neurons.input[neuron] >= 0:
                 drive += float(inputs[neurons.input[neuron]])
+            if self.network.noise_index[neuron] >= 0:
+                drive += float(inputs[self.network.noise_index[neuron]])
             drives.append(drive)
         return drives
 

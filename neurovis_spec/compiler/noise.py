@@ -1,0 +1,38 @@
+"""Noise: what a group's neurons are given at random, anew at each step.
+
+In: the ``noise`` of the groups. Out: Noises, each with its place in the vector that a step is given.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from neurovis_spec.compiler.constants import CONSTANTS, Constants, parse_formula
+from neurovis_spec.compiler.network import Group, Noise, frozen
+from neurovis_spec.language.expressions.tree import draws
+from neurovis_spec.language.located import Formula
+
+
+def make_noises(
+    groups: tuple[tuple[Group, Formula | None], ...], inputs: int, constants: Constants
+) -> tuple[Noise, ...]:
+    """The noise of every group that has some; ``inputs`` is the length of the vector of all inputs."""
+    result: list[Noise] = []
+    start = inputs
+    for group, formula in groups:
+        if formula is None:
+            continue
+        known = (*constants.parameters, *constants.broken, *CONSTANTS, "dt", "k", "t", "i", "n")
+        tree = parse_formula(formula, known, constants.findings, random=True)
+        if tree is None:
+            continue
+        if not draws(tree):
+            message = "this noise draws nothing: it is the same at each run"
+            hint = "use normal(mean, deviation) or uniform(low, high); a constant belongs to 'bias'"
+            constants.findings.error("no-draw", formula.span, message, hint)
+            continue
+        members = np.arange(group.start, group.start + group.count, dtype=np.int64)
+        frozen(members)
+        result.append(Noise(group.name, members, start, tree, dict(constants.parameters)))
+        start += group.count
+    return tuple(result)
