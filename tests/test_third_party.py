@@ -28,7 +28,7 @@ time: {steps: 12}
 inputs: {push: {expression: sin(k)}}
 neurons: {A: {input: push}, B: {activation: {swish: {beta: 2}}}}
 connections:
-  A -> B: {weight: 0.5, delay: 0, plasticity: {anti_hebbian: {rate: 0.1}}}
+  A -> B: {weight: 0.5, delay: 0, plasticity: {unlearning: {rate: 0.1}}}
   B -> B: 0.25
 """
 
