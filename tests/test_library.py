@@ -468,11 +468,11 @@ inputs:
   warning: {expression: 1 if k % 100 >= 10 and k % 100 < 27 else 0}
   disturbance: {expression: 0.5 if k % 100 >= 25 and k % 100 < 27 else 0}
 neurons:
-  P: {input: warning, model: {leaky_integrator: {leak: 0.2}}}
+  P: {input: warning, model: {leaky_integrator: {leak: 0.5}}}
   A: {}
   R: {input: disturbance, activation: relu}
 connections:
-  P -> A: {weight: 0, delay: 0, plasticity: {input_correlation: {rate: 0.5, reflex: R}}, bounds: [0, 5]}
+  P -> A: {weight: 0, delay: 0, plasticity: {input_correlation: {rate: 0.3, reflex: R}}, bounds: [0, 5]}
   A -> R: {weight: -1, delay: 0}
 """
     run = on_both(text, steps=6000)
