@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,12 +18,14 @@ from neurovis_spec.compiler.connect import Bundle, Connector, join
 from neurovis_spec.compiler.constants import RESERVED, Constants, parse_formula
 from neurovis_spec.compiler.definitions import define
 from neurovis_spec.compiler.digest import digest
+from neurovis_spec.compiler.events import EventReader, with_phases
 from neurovis_spec.compiler.limits import Limits
 from neurovis_spec.compiler.lower import make_blocks, make_plasticity, make_program
 from neurovis_spec.compiler.network import IntArray, Network
 from neurovis_spec.compiler.noise import make_noises
 from neurovis_spec.compiler.order import Cycle, levels
 from neurovis_spec.compiler.populate import Population, key_span, populate
+from neurovis_spec.compiler.references import Directory
 from neurovis_spec.compiler.sections import layout_settings, make_outputs, render_settings
 from neurovis_spec.compiler.signals import make_inputs
 from neurovis_spec.compiler.tables import Files
@@ -45,7 +47,7 @@ class Request:
     limits: Limits = field(default_factory=Limits)
 
 
-def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | None:
+def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_events: bool = True) -> Network | None:
     """The network of a spec; None where it is at fault (the findings say why)."""
     before = findings.errors
     seed = request.seed if request.seed is not None else 0 if spec.seed is None else spec.seed.value
@@ -96,7 +98,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         plasticity,
         noises,
     )
-    return Network(
+    network = Network(
         name=spec.name.value,
         title=spec.name.value if spec.title is None else spec.title.value,
         description="" if spec.description is None else spec.description.value,
@@ -119,6 +121,29 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         hash=content,
         noises=noises,
     )
+    return _eventful(spec, request, network, directory, constants) if with_events else network
+
+
+def _eventful(
+    spec: Spec, request: Request, network: Network, directory: Directory, constants: Constants
+) -> Network | None:
+    """The network with the phases that its events make; its hash says that they are there."""
+    if not spec.events:
+        return network
+    findings = constants.findings
+    before = findings.errors
+    events = EventReader(network, directory, constants).read(spec.events)
+
+    def again(values: Mapping[str, float]) -> Network | None:
+        parameters = {**request.parameters, **values}
+        changed = Request(request.base, request.root, parameters, network.seed, request.limits)
+        return compile_spec(spec, changed, findings, with_events=False)
+
+    if findings.errors > before:
+        return None
+    entry = spec.source.entry("events")
+    made = with_phases(network, events, again, constants, opening(spec.source) if entry is None else entry.key.span)
+    return None if findings.errors > before else replace(made, hash=digest(network.hash, events))
 
 
 def _random(spec: Spec) -> bool:

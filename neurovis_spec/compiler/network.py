@@ -348,6 +348,10 @@ class Network:
     render: RenderSettings
     hash: str
     noises: tuple[Noise, ...] = ()
+    #: neurons whose activity is held at a value, whatever their model says
+    clamped: tuple[tuple[int, float], ...] = ()
+    #: events: the step from which on another network runs, with the same neurons and connections, ascending
+    phases: tuple[tuple[int, Network], ...] = ()
 
     @cached_property
     def neuron_index(self) -> Mapping[str, int]:
@@ -375,8 +379,11 @@ class Network:
 
     @cached_property
     def changing(self) -> IntArray:
-        """Indices of the connections whose weight can change in a run."""
-        result = np.flatnonzero(self.connections.rules >= 0).astype(np.int64)
+        """Indices of the connections whose weight can change in a run, by a rule or by an event (reached or not)."""
+        can = self.connections.rules >= 0
+        for _, phase in self.phases:
+            can = can | (phase.connections.weights != self.connections.weights)
+        result = np.flatnonzero(can).astype(np.int64)
         frozen(result)
         return result
 

@@ -211,6 +211,23 @@ class RuleModel(Model):
     description: TextField | None = Field(None, description="What it is, its equation and its source.")
 
 
+class EventModel(Model):
+    """Something that changes during a run."""
+
+    at: FormulaField | None = Field(None, description="The step from which on it applies (set, lesion).")
+    from_: FormulaField | None = Field(None, alias="from", description="The first step of a clamp.")
+    to: FormulaField | None = Field(None, description="The step before which a clamp ends; without it, it lasts.")
+    set: Named[FormulaField] = Field(default_factory=dict, description="{parameter: value} from this step on.")
+    clamp: Keyed[FormulaField] = Field(default_factory=dict, description="{neurons: activity}.")
+    lesion: TextsField = Field(default=(), description="Neurons and connections (FROM -> TO) that are removed.")
+
+
+def _items(node: Node, info: ValidationInfo) -> tuple[Node, ...]:
+    if isinstance(node, (Sequence, Packed)):
+        return node.items
+    refuse(info, node, "a list of events", "write each event behind a dash")
+
+
 class Spacing(Model):
     """Distances of the layout in its units."""
 
@@ -319,7 +336,6 @@ class Spec(Library):
         "include": "definitions from other files",
         "modules": "networks to be used several times",
         "instances": "uses of modules",
-        "events": "changes during a run",
     }
 
     name: IdentifierField = Field(description="The name of the network, an identifier.")
@@ -337,6 +353,9 @@ class Spec(Library):
         WithJsonSchema({"title": "Connections"}),
     ] = Field(default=(), description="FROM -> TO: a weight or a body. Rows are sources, columns are targets.")
     outputs: Named[ReferenceField] = Field(default_factory=dict, description="Names for what leaves the network.")
+    events: Annotated[tuple[EventModel, ...], BeforeValidator(lambda node, info: _items(node, info))] = Field(
+        default=(), description="What changes during a run: parameters set, neurons clamped, parts lesioned."
+    )
     layout: LayoutModel | None = Field(None, description="How it is laid out.")
     render: RenderModel | None = Field(None, description="How it is drawn.")
     ros: RosModel | None = Field(None, description="How it meets ROS.")

@@ -57,7 +57,13 @@ def _signals(code: Code, network: Network, layout: SignalLayout, number: int) ->
         inside = np.flatnonzero(kind.blocks == number)
         if len(inside):
             start, stop = (kind.start + kind.delay * int(i) for i in (inside[0], inside[-1] + 1))
-            parts[kind.delay] = _slots(code, start, stop, kind.delay)
+            slots = _slots(code, start, stop, kind.delay)
+            arriving = np.isin(kind.connections[inside], block.incoming)
+            if not arriving.any():  # a lesion: what is under way there never arrives
+                continue
+            if not arriving.all():
+                slots = code.select(code.let("g", slots), np.flatnonzero(arriving), len(arriving))
+            parts[kind.delay] = slots
     if len(parts) == 1:
         return code.let("g", next(iter(parts.values())))
     signals = code.let("g", f"np.empty({len(delays)})")
@@ -113,6 +119,11 @@ def emit_update(code: Code, network: Network, operation: Update, drive: str) -> 
     for name, value in new.items():
         code.line(f"{old[name]}[:] = {value}")
     code.line(f"activity{code.position(block.members, len(network.neurons))} = {activity}")
+    held = [(neuron, value) for neuron, value in network.clamped if neuron in block.members]
+    if held:
+        where = np.array([neuron for neuron, _ in held], dtype=np.int64)
+        values = code.constant(np.array([value for _, value in held], dtype=np.float64))
+        code.line(f"activity{code.position(where, len(network.neurons))} = {values}")
     ends = {q.name: q.each_episode for q in model.state if q.each_episode is not None}
     if network.episode is not None and ends:
         _end_episode(code, network, block, own | old, ends)

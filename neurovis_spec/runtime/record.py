@@ -5,7 +5,7 @@ In: a Network, inputs, a number of steps. Out: a Recording of steps 0 … steps 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.backend import Backend, prepare
 from neurovis_spec.runtime.inputs import STRETCH, InputReader
+from neurovis_spec.runtime.phases import go_over, segments
 from neurovis_spec.runtime.recording import Recording, recording_of
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.state import initial_state
@@ -37,27 +38,40 @@ def record(
     steps = network.steps if steps is None else steps
     if steps < 0 or every < 1:
         raise ValueError(f"{steps} steps, every {every}: at least 0 and at least 1 are needed")
-    stepper, reader, watch = prepare(network, backend), InputReader(network, inputs), Watch(network)
+    watch = Watch(network)
     state = initial_state(network) if start is None else resumed_state(network, start)
     kept = np.arange(0, steps, every, dtype=np.int64)
     activity = np.empty((len(kept), len(network.neurons)))
     weights = np.empty((len(kept), len(network.changing)))
     changing = _subscript(network.changing)
-    step, look, row = stepper.step, watch.look, 0
+    look, row, before = watch.look, 0, network
     with np.errstate(all="ignore"):
-        for first in range(0, steps, STRETCH):
-            for k, vector in enumerate(reader.rows(first, min(first + STRETCH, steps)), first):
-                keep = k % every == 0
-                if keep and changing is not None:
-                    weights[row] = state.weights[changing]
-                step(state, vector)
-                look(state)
-                if keep:
-                    activity[row] = state.activity
-                    row += 1
-            if progress is not None:
-                progress(min(first + STRETCH, steps), steps)
+        for phase, begin, end in segments(network, steps):
+            step, reader = prepare(phase, backend).step, InputReader(phase, inputs)
+            go_over(state, before, phase)
+            before = phase
+            for first, stop in _stretches(begin, end):
+                for k, vector in enumerate(reader.rows(first, stop), first):
+                    keep = k % every == 0
+                    if keep and changing is not None:
+                        weights[row] = state.weights[changing]
+                    step(state, vector)
+                    look(state)
+                    if keep:
+                        activity[row] = state.activity
+                        row += 1
+                if progress is not None:
+                    progress(stop, steps)
     return recording_of(network, kept, activity, weights, state.weights)
+
+
+def _stretches(begin: int, end: int) -> Iterator[tuple[int, int]]:
+    """The steps from ``begin`` to ``end`` in the stretches that an InputReader makes at a time."""
+    first = begin
+    while first < end:
+        stop = min(first - first % STRETCH + STRETCH, end)
+        yield first, stop
+        first = stop
 
 
 def _subscript(indices: npt.NDArray[np.int64]) -> slice | npt.NDArray[np.int64] | None:

@@ -164,7 +164,7 @@ def recording_of(
 ) -> Recording:
     """A recording with the structure of a network; ``all_weights`` (m,) gives those that stay."""
     connections = network.connections
-    static = np.flatnonzero(connections.rules < 0)
+    static = np.setdiff1d(np.arange(len(connections)), network.changing, assume_unique=True)
     groups = {g.name: (tuple(g.indices), False) for g in network.neurons.groups if g.name not in network.neuron_index}
     outputs = {o.name: (tuple(o.neurons.tolist()), o.scalar) for o in network.outputs}
     return Recording(

@@ -100,6 +100,9 @@ class ReferenceStepper:
                 state.activity[neuron] = initial
             else:
                 state.activity[neuron] = self.advance(number, position, drives[position], state)
+        for neuron, value in self.network.clamped:
+            if neuron in block.members:
+                state.activity[neuron] = value
 
     def advance(self, number: int, position: int, drive: float, state: State) -> float:
         """One neuron's step: its states are replaced, its activity is returned."""

@@ -16,6 +16,7 @@ from neurovis_spec.compiler.network import FloatArray, Network
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.runtime.backend import Backend, prepare
 from neurovis_spec.runtime.inputs import InputReader
+from neurovis_spec.runtime.phases import go_over, network_at
 from neurovis_spec.runtime.recording import Recording, unknown
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.state import State, initial_state
@@ -44,15 +45,21 @@ class Simulation:
     ) -> None:
         self._original, self._backend, self._rebind = network, backend, rebind
         self._begin = initial_state(network) if start is None else resumed_state(network, start)
+        go_over(self._begin, network, network_at(network, 0))
         self._chosen: dict[str, float] = {}
         self._use(network)
         self._watch = Watch(network)
         self._state = self._begin.copy()
 
-    def _use(self, network: Network) -> None:
-        self._stepper = prepare(network, self._backend)
-        self._reader = InputReader(network)
+    def _use(self, network: Network, step: int = 0) -> None:
+        """Run a network from a step on."""
         self.network = network
+        self._enter(network_at(network, step))
+
+    def _enter(self, phase: Network) -> None:
+        self._stepper = prepare(phase, self._backend)
+        self._reader = InputReader(phase)
+        self._phase = phase
 
     @property
     def k(self) -> int:
@@ -90,6 +97,11 @@ class Simulation:
         with np.errstate(all="ignore"):
             self._stepper.step(self._state, vector)
             self._watch.look(self._state)
+        # The events of the next step apply now, so that ``weights`` are those of the next step.
+        phase = network_at(self.network, self._state.k)
+        if phase is not self._phase:
+            go_over(self._state, self._phase, phase)
+            self._enter(phase)
         activity = self._state.activity
         return {
             entry.name: np.float64(activity[entry.neurons[0]]) if entry.scalar else activity[entry.neurons]
@@ -108,10 +120,9 @@ class Simulation:
         network = self._rebind(chosen)
         if not _same_structure(self.network, network):
             raise ParameterError("with these parameters the network has another structure")
-        before, after = self.network.connections.weights, network.connections.weights
-        follow = (network.connections.rules < 0) & (before != after)
-        self._use(network)
-        self._state.weights[follow] = after[follow]
+        before = self._phase
+        self._use(network, self._state.k)
+        go_over(self._state, before, self._phase)
         self._chosen = chosen
 
     def _checked(self, values: Mapping[str, float]) -> dict[str, float]:
@@ -140,8 +151,9 @@ class Simulation:
     def restore(self, state: State) -> None:
         """Go on from a state of this simulation. Parameters stay as they are, and so do the fixed weights."""
         restored = state.copy()
+        self._use(self.network, restored.k)
         fixed = self.network.connections.rules < 0
-        restored.weights[fixed] = self._state.weights[fixed]
+        restored.weights[fixed] = self._phase.connections.weights[fixed]
         self._state = restored
 
 

@@ -1,0 +1,224 @@
+"""Events: what changes during a run (§9), as a series of networks.
+
+In: the ``events`` section and the network as it begins. Out: the same network with ``phases``: for each step at which
+something changes, the network that runs from then on. A phase has the neurons, the connections and the weights'
+places of the first network; what is lesioned is left out of its blocks and rules, what is clamped is listed, what is
+set is compiled in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from neurovis_spec.compiler.constants import Constants
+from neurovis_spec.compiler.network import Block, IntArray, Learn, Network, Plasticity, frozen
+from neurovis_spec.compiler.references import Directory, resolve_end
+from neurovis_spec.diagnostics import Findings, Span, suggest
+from neurovis_spec.language.located import Formula, Located
+from neurovis_spec.language.source import Mapping as SourceMapping
+from neurovis_spec.language.source import Scalar
+from neurovis_spec.language.spec import EventModel
+
+#: Compiles the network anew with other parameters, without its events; None where that is at fault.
+Recompile = Callable[[Mapping[str, float]], Network | None]
+
+_KEYS = ("at", "from", "to", "set", "clamp", "lesion")
+#: Most steps at which something changes: each is a network of its own.
+MOST = 10_000
+
+
+@dataclass(frozen=True)
+class Event:
+    """One event, resolved: it applies from step ``at`` on; a clamp ends before step ``to``."""
+
+    at: int
+    to: int | None = None
+    set: Mapping[str, Formula] = field(default_factory=dict)
+    clamp: tuple[tuple[int, float], ...] = ()
+    neurons: tuple[int, ...] = ()
+    connections: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class EventReader:
+    """Reads the events of a spec."""
+
+    network: Network
+    directory: Directory
+    constants: Constants
+
+    @property
+    def findings(self) -> Findings:
+        """Where what is at fault is noted."""
+        return self.constants.findings
+
+    def read(self, models: tuple[EventModel, ...]) -> tuple[Event, ...]:
+        """All events, in the order written; those at fault are left out, and noted."""
+        events = [self._event(model) for model in models]
+        return tuple(event for event in events if event is not None)
+
+    def _event(self, model: EventModel) -> Event | None:
+        before = self.findings.errors
+        self._check_keys(model)
+        begin = model.at if model.at is not None else model.from_
+        if begin is None or self.findings.errors > before:
+            return None
+        at = self.constants.integer(begin, "the step of an event", 0)
+        to = None if model.to is None else self.constants.integer(model.to, "the end of a clamp", 1)
+        if at is not None and to is not None and model.to is not None and to <= at:
+            message = f"the clamp ends before it begins: from {at} to {to}, which is exclusive"
+            self.findings.error("out-of-range", model.to.span, message)
+        for name, formula in model.set.items():
+            self._check_set(model, name, formula)
+        clamps = [one for name, formula in model.clamp.items() for one in self._clamp(model, name, formula)]
+        neurons: list[int] = []
+        connections: list[int] = []
+        for text in model.lesion:
+            self._lesion(text, neurons, connections)
+        if at is None or self.findings.errors > before:
+            return None
+        return Event(at, to, model.set, tuple(clamps), tuple(neurons), tuple(connections))
+
+    def _check_keys(self, model: EventModel) -> None:
+        """``set`` and ``lesion`` go with ``at``, ``clamp`` with ``from`` and perhaps ``to``."""
+        source = model.source
+
+        def wrong(key: str, message: str, hint: str | None = None) -> None:
+            entry = source.entry(key)
+            span = source.span if entry is None else entry.key.span
+            self.findings.error("bad-event", span, message, hint)
+
+        actions = [name for name in ("set", "clamp", "lesion") if source.entry(name) is not None]
+        if not actions and all(entry.name in _KEYS for entry in source.entries):
+            first = source.entries[0].key.span if source.entries else source.span
+            self.findings.error("bad-event", first, "this event does nothing", "give it set, clamp or lesion")
+        if not actions:
+            return
+        timed = {name for name in ("at", "from", "to") if source.entry(name) is not None}
+        if "clamp" in actions:
+            if "at" in timed:
+                wrong("at", "a clamp lasts: it has 'from', and perhaps 'to'", "write from: instead of at:")
+            elif "from" not in timed:
+                wrong("clamp", "a clamp needs 'from'")
+            if len(actions) > 1:
+                wrong("clamp", "a clamp is an event of its own", "make it an entry of its own")
+        elif timed & {"from", "to"}:
+            wrong(min(timed & {"from", "to"}), f"'{actions[0]}' takes 'at' alone", "write at: STEP")
+        elif "at" not in timed:
+            wrong(actions[0], "at which step? 'at' is missing")
+
+    def _key(self, model: EventModel, section: str, name: str) -> Located[str]:
+        node = model.source.get(section)
+        entry = node.entry(name) if isinstance(node, SourceMapping) else None
+        return Located(name, Scalar(name, model.source.span) if entry is None else entry.key)
+
+    def _check_set(self, model: EventModel, name: str, formula: Formula) -> None:
+        span = self._key(model, "set", name).span
+        if name not in self.network.parameters:
+            hint = suggest(name, self.network.parameters, "parameters") or "the spec has no parameters"
+            self.findings.error("unknown-parameter", span, f"there is no parameter '{name}' to be set", hint)
+        elif name in self.network.structural:
+            message = f"'{name}' cannot be set in a run: the structure of the network depends on it"
+            self.findings.error("structural-parameter", span, message)
+        self.constants.scalar(formula)
+
+    def _clamp(self, model: EventModel, name: str, formula: Formula) -> list[tuple[int, float]]:
+        neurons = resolve_end(self._key(model, "clamp", name), self.directory, self.findings)
+        value = self.constants.scalar(formula)
+        return [] if neurons is None or value is None else [(neuron, value) for neuron in neurons]
+
+    def _lesion(self, text: Located[str], neurons: list[int], connections: list[int]) -> None:
+        left, arrow, right = text.value.partition("->")
+        if not arrow:
+            neurons.extend(resolve_end(text, self.directory, self.findings) or ())
+            return
+        ends = []
+        for start, piece in ((0, left), (len(left) + 2, right)):
+            span = text.node.at(start, start + len(piece))
+            inner = 0 if span != text.span else None
+            ends.append(resolve_end(Located(piece, Scalar(piece, span, inner)), self.directory, self.findings))
+        if ends[0] is None or ends[1] is None:
+            return
+        wires = self.network.connections
+        found = np.flatnonzero(np.isin(wires.sources, ends[0]) & np.isin(wires.targets, ends[1])).tolist()
+        if not found:
+            self.findings.error("no-connection", text.span, f"there is no connection '{text.value}'")
+        connections.extend(found)
+
+
+def with_phases(
+    network: Network, events: tuple[Event, ...], recompile: Recompile, constants: Constants, place: Span
+) -> Network:
+    """The network with a phase for each step at which something changes. An expression that is set sees the values that
+    the parameters have by then, not those of the other parameters that are set in the same step."""
+    ends = {event.to for event in events if event.clamp and event.to is not None}
+    steps = sorted({event.at for event in events} | ends)
+    if len(steps) > MOST:
+        constants.findings.error(
+            "too-many", place, f"the events change something at {len(steps):,} steps; {MOST:,} are possible"
+        )
+        return network
+    phases: list[tuple[int, Network]] = []
+    base, chosen = network, dict[str, float]()
+    for step in steps:
+        due = {name: formula for event in events if event.at == step for name, formula in event.set.items()}
+        if due:
+            now = replace(constants, parameters=dict(base.parameters))
+            values = {name: now.scalar(formula) for name, formula in due.items()}
+            chosen = chosen | {name: value for name, value in values.items() if value is not None}
+            made = recompile(chosen)
+            if made is None:
+                return network
+            base = made
+        phases.append((step, _altered(base, events, step)))
+    return replace(network, phases=tuple(phases))
+
+
+def _altered(base: Network, events: tuple[Event, ...], step: int) -> Network:
+    """A network as it is at a step: without what is lesioned by then, with the clamps that hold."""
+    begun = [event for event in events if event.at <= step]
+    neurons = np.array(sorted({neuron for event in begun for neuron in event.neurons}), dtype=np.int64)
+    wires = base.connections
+    gone = np.isin(wires.sources, neurons) | np.isin(wires.targets, neurons)
+    for event in begun:
+        gone[list(event.connections)] = True
+    clamps = {neuron: value for event in begun if event.to is None or step < event.to for neuron, value in event.clamp}
+    clamps.update(dict.fromkeys(neurons.tolist(), 0.0))
+    plasticity = tuple(_kept_rule(entry, gone) for entry in base.plasticity)
+    idle = {number for number, entry in enumerate(plasticity) if not len(entry.members)}
+    return replace(
+        base,
+        blocks=tuple(_kept_block(block, gone) for block in base.blocks),
+        plasticity=plasticity,
+        program=tuple(op for op in base.program if not (isinstance(op, Learn) and op.plasticity in idle)),
+        clamped=tuple(sorted(clamps.items())),
+        phases=(),
+    )
+
+
+def _kept(array: IntArray, keep: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> IntArray:
+    result = array[keep]
+    frozen(result)
+    return result
+
+
+def _kept_block(block: Block, gone: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> Block:
+    keep = ~gone[block.incoming]
+    if keep.all():
+        return block
+    return replace(block, incoming=_kept(block.incoming, keep), slots=_kept(block.slots, keep))
+
+
+def _kept_rule(entry: Plasticity, gone: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> Plasticity:
+    keep = ~gone[entry.members]
+    if keep.all():
+        return entry
+    return replace(
+        entry,
+        members=_kept(entry.members, keep),
+        parameters={name: values[keep] for name, values in entry.parameters.items()},
+        signals={name: _kept(values, keep) for name, values in entry.signals.items()},
+    )

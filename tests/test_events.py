@@ -1,0 +1,207 @@
+"""Events: what is set, clamped and lesioned during a run, on both backends, held to plain computations."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import neurovis_spec as nv
+from neurovis_spec.runtime.recording import Recording
+
+HEAD = "neurovis: 1\nname: x\ntime: {steps: 20}\n"
+CHAIN = (
+    HEAD
+    + """
+parameters: {gain: 2, push: 1}
+inputs: {s: {expression: push}}
+neurons: {A: {input: s}, B: {}, C: {}}
+connections:
+  A -> B: gain
+  B -> C: {weight: 0.5, delay: 3}
+"""
+)
+BACKENDS = pytest.mark.parametrize("backend", ["reference", "numpy"])
+
+
+def run(text: str, backend: str, steps: int = 20) -> Recording:
+    """The run, which must be the same step by step."""
+    network = nv.compile_text(text)
+    recording = network.run(steps, backend=backend)
+    simulation = network.simulator(backend)
+    for k in range(steps):
+        simulation.step()
+        np.testing.assert_array_equal(simulation.activity, recording.activity[k])
+        if k + 1 < steps:
+            np.testing.assert_array_equal(simulation.weights, recording.weights[k + 1])
+    return recording
+
+
+@BACKENDS
+def test_a_parameter_is_set_from_a_step_on(backend: str) -> None:
+    recording = run(CHAIN + "events: [{at: 5, set: {gain: 3}}, {at: 9, set: {push: 10*gain}}]", backend)
+    # The signal w·a is formed when it leaves: with the new gain at step 5, so it arrives at step 6.
+    assert recording["A"].tolist() == [1.0] * 9 + [30.0] * 11
+    assert recording["B"].tolist() == [0.0] + [2.0] * 5 + [3.0] * 4 + [90.0] * 10
+    assert recording["C"][3:].tolist() == (0.5 * recording["B"][:-3]).tolist()
+    assert recording.weight("A -> B")[[4, 5]].tolist() == [2.0, 3.0]  # it can change: the record holds it
+    assert "A -> B" in [recording.connection_names[index] for index in recording.plastic]
+
+
+@BACKENDS
+def test_a_clamp_lasts_until_its_end_and_the_state_goes_on(backend: str) -> None:
+    text = (
+        HEAD
+        + """
+inputs: {s: {expression: 1}}
+neurons: {A: {input: s, model: {leaky_integrator: {leak: 0.5}}}, B: {}}
+connections: {A -> B: 1}
+events:
+  - {from: 3, to: 6, clamp: {A: -1}}
+  - {from: 10, clamp: {B: 7}}
+"""
+    )
+    recording = run(text, backend)
+    free = 1 - 0.5 ** np.arange(1, 21)
+    expected = np.where((np.arange(20) >= 3) & (np.arange(20) < 6), -1.0, free)
+    np.testing.assert_allclose(recording["A"], expected, rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(recording["B"][10:], 7.0)
+    np.testing.assert_array_equal(recording["B"][1:10], recording["A"][:9])
+
+
+@BACKENDS
+def test_a_clamp_goes_before_initial(backend: str) -> None:
+    text = HEAD + "neurons: {A: {initial: 0.5, bias: 2}}\nevents: [{from: 0, to: 2, clamp: {A: 3}}]"
+    assert run(text, backend)["A"][:4].tolist() == [3.0, 3.0, 2.0, 2.0]
+
+
+@BACKENDS
+def test_a_lesion_drops_what_is_under_way(backend: str) -> None:
+    recording = run(CHAIN + "events: [{at: 8, lesion: [B -> C]}]", backend)
+    assert recording["C"][:8].tolist() == [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0]
+    assert recording["C"][8:].tolist() == [0.0] * 12
+    assert (recording.weight("B -> C") == 0.5).all()
+
+
+@BACKENDS
+def test_a_lesioned_neuron_is_silent_and_so_are_its_connections(backend: str) -> None:
+    recording = run(CHAIN + "events: [{at: 8, lesion: B}]", backend)
+    assert recording["B"][7] == 2
+    assert (recording["B"][8:] == 0).all()
+    assert (recording["C"][8:] == 0).all()
+
+
+@BACKENDS
+def test_a_lesion_is_no_factor_and_no_term(backend: str) -> None:
+    text = (
+        HEAD
+        + """
+neurons: {A: {count: 2, bias: 3}, P: {combine: product}, D: {combine: distance}}
+connections:
+  A -> P: {weight: 1, delay: 0}
+  A -> D: {centre: 1, delay: 0}
+events: [{at: 4, lesion: A2}]
+"""
+    )
+    recording = run(text, backend)
+    assert recording["P"][[3, 4]].tolist() == [9.0, 3.0]
+    np.testing.assert_allclose(recording["D"][[3, 4]], [np.sqrt(8), 2.0])
+
+
+@BACKENDS
+def test_what_is_lesioned_of_a_rule_keeps_its_weights_and_the_rest_goes_on(backend: str) -> None:
+    text = (
+        HEAD
+        + """
+rules:
+  counting:
+    state: {total: {each_step: total + pre}}
+    weight: {each_step: weight + 0.01 * total}
+neurons: {A: {count: 3, bias: i + 1}, O: {}}
+connections:
+  A -> O: {weight: 0, delay: 2, plasticity: counting}
+events: [{at: 6, lesion: A3 -> O}]
+"""
+    )
+    recording = run(text, backend)
+    for i, name in enumerate(("A1 -> O", "A2 -> O", "A3 -> O")):
+        weight, total, expected = 0.0, 0.0, []
+        for k in range(20):
+            expected.append(weight)
+            if name == "A3 -> O" and k >= 6:
+                continue
+            pre = i + 1.0 if k >= 2 else 0.0
+            weight, total = weight + 0.01 * total, total + pre
+        np.testing.assert_allclose(recording.weight(name), expected, rtol=0, atol=1e-14)
+
+
+@BACKENDS
+def test_plastic_weights_stay_when_a_parameter_is_set(backend: str) -> None:
+    text = (
+        HEAD
+        + """
+parameters: {rate: 0.1, first: 0.5}
+neurons: {A: {bias: 1}, O: {}}
+connections: {A -> O: {weight: first, plasticity: {hebbian: {rate: rate}}}}
+events: [{at: 5, set: {rate: 0, first: 9}}]
+"""
+    )
+    weight = run(text, backend).weight("A -> O")
+    assert weight[5] > weight[2] > 0.4
+    assert (weight[5:] == weight[5]).all()
+
+
+def test_events_show_in_the_hash_and_in_what_can_change(tmp_path: Path) -> None:
+    plain = nv.compile_text(CHAIN)
+    later, sooner = (nv.compile_text(CHAIN + f"events: [{{at: {at}, set: {{gain: 3}}}}]") for at in (5000, 50))
+    assert len({plain.hash, later.hash, sooner.hash}) == 3
+    assert later.run(10).plastic.tolist() == [0]  # an event that is not reached counts, too
+    later.run(10).save(tmp_path / "x.npz")
+    assert nv.load(tmp_path / "x.npz").weights.shape == (10, 1)
+
+
+def test_setting_by_hand_and_by_an_event_go_together() -> None:
+    simulation = nv.compile_text(CHAIN + "events: [{at: 5, set: {gain: 3}}]").simulator()
+    for _ in range(3):
+        simulation.step()
+    simulation.set(push=2)
+    for _ in range(5):
+        simulation.step()
+    assert simulation.weight("A -> B") == 3
+    assert simulation.activity[:2].tolist() == [2.0, 6.0]
+    simulation.reset()
+    simulation.step()
+    assert simulation.activity[0] == 1
+    assert simulation.weight("A -> B") == 2
+
+
+@pytest.mark.parametrize(
+    ("event", "code", "column"),
+    [
+        ("{at: 5, set: {gian: 3}}", "unknown-parameter", 24),
+        ("{at: -1, set: {gain: 3}}", "out-of-range", 15),
+        ("{from: 5, set: {gain: 3}}", "bad-event", 11),
+        ("{at: 5}", "bad-event", 11),
+        ("{at: 5, clamp: {A: 0}}", "bad-event", 11),
+        ("{from: 5, to: 4, clamp: {A: 0}}", "out-of-range", 24),
+        ("{from: 5, clamp: {Q: 0}}", "unknown-neuron", 28),
+        ("{at: 5, lesion: [A -> Q]}", "unknown-neuron", 32),
+        ("{at: 5, lesion: [A -> C]}", "no-connection", 27),
+        ("{at: 5, sett: {gain: 3}}", "unknown-key", 18),
+        ("{set: {gain: 3}}", "bad-event", 11),
+    ],
+)
+def test_findings(event: str, code: str, column: int) -> None:
+    with pytest.raises(nv.SpecError) as caught:
+        nv.compile_text(CHAIN + f"events: [{event}]")
+    found = [(d.code, d.span.column) for d in caught.value.diagnostics]
+    assert found[0] == (code, column)
+    assert caught.value.diagnostics[0].span.line == 11
+
+
+def test_structural_parameters_cannot_be_set() -> None:
+    text = HEAD + "parameters: {d: 2}\nneurons: {A: {}, B: {}}\nconnections: {A -> B: {delay: d}}\n"
+    with pytest.raises(nv.SpecError) as caught:
+        nv.compile_text(text + "events: [{at: 1, set: {d: 3}}]")
+    assert [d.code for d in caught.value.diagnostics] == ["structural-parameter"]
