@@ -27,7 +27,7 @@ from neurovis_spec.scene import Scene
 HERE = Path(__file__).parent
 SPECS = sorted((HERE.parent / "specs").glob("*.yaml"))
 #: the step that the scene shows
-STEPS = {"cpg_rbf": 160, "mlp": 3, "hebbian": 250}
+STEPS = {"cpg_rbf": 160, "mlp": 3, "hebbian": 250, "reward": 630}
 Plain: TypeAlias = "bool | int | float | str | list[Plain] | dict[str, Plain] | None"
 
 
