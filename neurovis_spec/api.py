@@ -121,7 +121,7 @@ def _request(
     seed: int | None,
     limit: int | None,
 ) -> Request:
-    limits = Limits() if limit is None else Limits(connections=limit)
+    limits = Limits.of(limit)
     values = {name: float(value) for name, value in parameters.items()}
     return Request(folder, folder if root is None else Path(root), values, seed, limits)
 

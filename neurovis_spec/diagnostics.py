@@ -56,10 +56,12 @@ class Findings:
 
     sources: dict[str, str] = field(default_factory=dict)
     _items: list[Diagnostic] = field(default_factory=list)
+    _errors: int = 0
 
     def error(self, code: str, span: Span, message: str, hint: str | None = None) -> None:
         """Note a mistake."""
         self._items.append(Diagnostic(code, message, span, "error", hint))
+        self._errors += 1
 
     def warning(self, code: str, span: Span, message: str, hint: str | None = None) -> None:
         """Note something legal that is surely not meant."""
@@ -68,12 +70,12 @@ class Findings:
     @property
     def failed(self) -> bool:
         """Whether there is an error among the findings."""
-        return any(item.severity == "error" for item in self._items)
+        return self._errors > 0
 
     @property
     def errors(self) -> int:
         """How many errors there are so far: a stage compares it before and after."""
-        return sum(item.severity == "error" for item in self._items)
+        return self._errors
 
     def sorted(self) -> tuple[Diagnostic, ...]:
         """All findings by place, each once.

@@ -1,7 +1,8 @@
 """The compiler: from a Spec to a Network, one stage after the other.
 
-In: a Spec, the folder of its data files, parameters to set. Out: a Network, or None with findings. A stage whose
-input is at fault is not begun; all others are, so that findings come at once.
+In: a Spec, as far as it could be read, the folder of its data files, parameters to set. Out: a Network, or None with
+findings. All findings come at once: what is at fault is left out or stands in, and what would follow from it (``gaps``)
+is held back.
 """
 
 from __future__ import annotations
@@ -15,25 +16,26 @@ import numpy as np
 
 from neurovis_spec.compiler.builtin import builtin_definitions
 from neurovis_spec.compiler.connect import Bundle, Connector, join
-from neurovis_spec.compiler.constants import RESERVED, Constants, parse_formula
+from neurovis_spec.compiler.constants import RESERVED, Constants
 from neurovis_spec.compiler.definitions import define
 from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.events import EventReader, with_phases
-from neurovis_spec.compiler.limits import Limits
+from neurovis_spec.compiler.gaps import gaps_of
+from neurovis_spec.compiler.limits import MOST_SIGNALS, Limits, amount
 from neurovis_spec.compiler.lower import make_blocks, make_plasticity, make_program
 from neurovis_spec.compiler.network import IntArray, Network
 from neurovis_spec.compiler.noise import make_noises
 from neurovis_spec.compiler.order import Cycle, levels
 from neurovis_spec.compiler.populate import Population, key_span, populate
 from neurovis_spec.compiler.references import Directory
-from neurovis_spec.compiler.sections import layout_settings, make_outputs, render_settings
+from neurovis_spec.compiler.sections import check_ros, layout_settings, make_outputs, render_settings
 from neurovis_spec.compiler.signals import make_inputs
 from neurovis_spec.compiler.tables import Files
-from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError, suggest
+from neurovis_spec.diagnostics import Diagnostic, Findings, Span, SpecError, suggest
 from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.model import opening
-from neurovis_spec.language.source import Mapping as SourceMapping
 from neurovis_spec.language.spec import Spec
+from neurovis_spec.language.values import Parameter
 
 
 @dataclass(frozen=True)
@@ -51,15 +53,21 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
     """The network of a spec; None where it is at fault (the findings say why)."""
     before = findings.errors
     seed = request.seed if request.seed is not None else 0 if spec.seed is None else spec.seed.value
-    definitions = define(spec, findings, builtin_definitions())
-    constants = Constants({}, 1.0, findings)
-    _evaluate_parameters(spec, constants, request.parameters)
+    gaps = gaps_of(spec)
+    constants = Constants(
+        {}, 1.0, findings, broken=set(gaps.names["parameters"]), incomplete="parameters" in gaps.sections
+    )
+    _step_length(spec, constants)
+    definitions = define(spec, findings, builtin_definitions(), constants.dt)
+    _parameters(spec, constants, request.parameters)
     steps, episode = _clock(spec, constants)
     files = Files(request.base, request.root, findings)
     inputs = make_inputs(spec, constants, files)
-    population = populate(spec, constants, definitions, inputs or (), files, request.limits, seed)
+    population = populate(spec, constants, definitions, inputs, files, request.limits, seed)
     render = render_settings(spec.render, findings)
-    if population is None or inputs is None:
+    check_ros(spec.ros, findings)
+    if not len(population.neurons):
+        _report_no_neurons(spec, population, findings)
         return None
     directory = population.directory
     outputs = make_outputs(spec, directory, findings)
@@ -69,11 +77,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
     bundles = connector.connect()
     noisy = tuple((group, spec.neurons[group.name].noise) for group in population.neurons.groups)
     noises = make_noises(noisy, sum(entry.size for entry in inputs), constants)
-    if not len(population.neurons):
-        node = spec.source.entry("neurons")
-        span = opening(spec.source) if node is None else node.key.span
-        findings.error("no-neurons", span, "a network needs at least one neuron", "add a group under 'neurons'")
-    if bundles is None or findings.errors > before:
+    if bundles is None or findings.errors > before or not _under_way(bundles, findings):
         return None
     plasticity, rules = make_plasticity(bundles)
     connections = join(bundles, rules)
@@ -88,7 +92,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
         spec.name.value,
         constants.dt,
         episode,
-        seed if _random(spec) else 0,
+        seed,
         constants.parameters,
         population.neurons,
         connections,
@@ -146,22 +150,45 @@ def _eventful(
     return None if findings.errors > before else replace(made, hash=digest(network.hash, events))
 
 
-def _random(spec: Spec) -> bool:
-    """Whether the seed is written: two spellings of the same default seed are the same network."""
-    return spec.seed is not None and spec.seed.value != 0
+def _report_no_neurons(spec: Spec, population: Population, findings: Findings) -> None:
+    """Without neurons nothing else can be looked at; if that is because groups are at fault, it is said already."""
+    gaps = population.directory.gaps
+    if "neurons" in gaps.sections or gaps.names["neurons"]:
+        return
+    node = spec.source.entry("neurons")
+    span = opening(spec.source) if node is None else node.key.span
+    findings.error("no-neurons", span, "a network needs at least one neuron", "add a group under 'neurons'")
 
 
-def _evaluate_parameters(spec: Spec, constants: Constants, given: Mapping[str, float]) -> None:
-    """dt, then the parameters in the order written; what is set replaces the value, within its bounds."""
+def _under_way(bundles: tuple[Bundle, ...], findings: Findings) -> bool:
+    """Whether the signals under way fit into memory: delays of all connections together."""
+    total = 0
+    for bundle in bundles:
+        total += int(bundle.delays.sum())
+        if total > MOST_SIGNALS:
+            message = f"{amount(total)} signals would be under way at once (connections times delay); "
+            findings.error("too-many", bundle.key, f"{message}{MOST_SIGNALS:,} are the most")
+            return False
+    return True
+
+
+def _step_length(spec: Spec, constants: Constants) -> None:
+    """dt, before anything else: parameters may use it, so it uses none of them."""
+    if spec.time is None or spec.time.dt is None:
+        return
+    dt = constants.scalar(spec.time.dt)
+    if dt is not None and not dt > 0:
+        message = f"'dt' is seconds a step and above 0, this is {dt:g}"
+        constants.findings.error("out-of-range", spec.time.dt.span, message)
+    elif dt is not None:
+        constants.dt = dt
+
+
+def _parameters(spec: Spec, constants: Constants, given: Mapping[str, float]) -> None:
+    """The parameters in the order written; what is set replaces the value, within its bounds."""
     findings = constants.findings
-    if spec.time is not None and spec.time.dt is not None:
-        # Parameters may use dt, so dt uses none of them: the constants hold no parameter yet.
-        dt = constants.scalar(spec.time.dt)
-        if dt is not None and not dt > 0:
-            findings.error("out-of-range", spec.time.dt.span, f"'dt' is seconds a step and above 0, this is {dt:g}")
-        elif dt is not None:
-            constants.dt = dt
-    _parameters(spec, constants, given)
+    for name, parameter in spec.parameters.items():
+        _parameter(name, parameter, key_span(spec, "parameters", name), constants, given)
     for name in given:
         if name not in spec.parameters:
             node = spec.source.entry("parameters")
@@ -170,37 +197,37 @@ def _evaluate_parameters(spec: Spec, constants: Constants, given: Mapping[str, f
             findings.error("unknown-parameter", span, f"there is no parameter '{name}' to be set", hint)
 
 
-def _parameters(spec: Spec, constants: Constants, given: Mapping[str, float]) -> None:
+def _parameter(name: str, parameter: Parameter, span: Span, constants: Constants, given: Mapping[str, float]) -> None:
     findings = constants.findings
-    for name, parameter in spec.parameters.items():
-        span = key_span(spec, "parameters", name)
-        if name in RESERVED:
-            message = f"a parameter may not be called '{name}': the language gives this name a meaning of its own"
-            findings.error("reserved-name", span, message)
-        known = (*constants.parameters, *constants.broken, "pi", "e", "dt")
-        tree = parse_formula(parameter.value, known, findings, what="parameters before this one, and constants")
-        constants.uses[name] = frozenset() if tree is None or name in given else names(tree)
-        value = constants.scalar(parameter.value) if tree is not None else None
-        low = None if parameter.minimum is None else constants.scalar(parameter.minimum)
-        high = None if parameter.maximum is None else constants.scalar(parameter.maximum)
-        if name in given:
-            value = float(given[name])
-            if not math.isfinite(value):
-                findings.error("not-finite", span, f"the parameter '{name}' is set to {value}")
-        if value is None:
-            constants.broken.add(name)
-            continue
-        constants.parameters[name] = value
-        if (low is not None and value < low) or (high is not None and value > high):
-            shown = f"{'-∞' if low is None else f'{low:g}'} to {'∞' if high is None else f'{high:g}'}"
-            where = span if name in given else parameter.value.span
-            findings.error("out-of-range", where, f"'{name}' is {value:g}; its bounds are {shown}")
+    if name in RESERVED:
+        message = f"a parameter may not be called '{name}': the language gives this name a meaning of its own"
+        findings.error("reserved-name", span, message)
+    tree = constants.tree(parameter.value, what="parameters before this one, and constants")
+    constants.uses[name] = frozenset() if tree is None or name in given else names(tree)
+    value = None if tree is None else constants.scalar(parameter.value)
+    low = None if parameter.minimum is None else constants.scalar(parameter.minimum)
+    high = None if parameter.maximum is None else constants.scalar(parameter.maximum)
+    if name in given:
+        value = float(given[name])
+        if not math.isfinite(value):
+            findings.error("not-finite", span, f"the parameter '{name}' is set to {value}")
+            value = None
+    if value is None:
+        constants.broken.add(name)
+        return
+    constants.parameters[name] = value
+    if (low is not None and value < low) or (high is not None and value > high):
+        bounds = f"{'-∞' if low is None else f'{low:g}'} to {'∞' if high is None else f'{high:g}'}"
+        where = span if name in given else parameter.value.span
+        findings.error("out-of-range", where, f"'{name}' is {value:g}; its bounds are {bounds}")
 
 
 def _clock(spec: Spec, constants: Constants) -> tuple[int, int | None]:
     """The default run length and the length of an episode."""
     time = spec.time
-    steps = None if time is None or time.steps is None else constants.integer(time.steps, "'steps'", 1)
+    steps = None
+    if time is not None and time.steps is not None:
+        steps = constants.integer(time.steps, "'steps'", 1, structural=False)
     episode = None if time is None or time.episode is None else constants.integer(time.episode, "'episode'", 1)
     return (1000 if steps is None else steps), episode
 
@@ -234,6 +261,3 @@ def rebind(spec: Spec, request: Request, network: Network, changes: Mapping[str,
     if not same or not np.array_equal(made.connections.delays, network.connections.delays):
         raise SpecError((Diagnostic("structural-parameter", "this would change the structure", opening(spec.source)),))
     return made
-
-
-__all__ = ["Request", "SourceMapping", "compile_spec", "rebind"]

@@ -14,17 +14,19 @@ import numpy as np
 from neurovis_spec.compiler.constants import Constants, Randomness
 from neurovis_spec.compiler.definitions import Definitions
 from neurovis_spec.compiler.draws import Stream
-from neurovis_spec.compiler.edges import EdgeReader
+from neurovis_spec.compiler.edges import EdgeReader, delay_of
 from neurovis_spec.compiler.learning import Learning, learning_of
-from neurovis_spec.compiler.limits import Limits
-from neurovis_spec.compiler.matrices import Grid, fit, grid_of
+from neurovis_spec.compiler.limits import Limits, amount
+from neurovis_spec.compiler.matrices import Grid, grid_of
 from neurovis_spec.compiler.network import Connections, FloatArray, Input, IntArray, frozen
 from neurovis_spec.compiler.patterns import Ends, all_to_all, pairs_of
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import resolve_end
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.diagnostics import Span
-from neurovis_spec.language.located import Formula, Located
+from neurovis_spec.language.expressions.tree import names
+from neurovis_spec.language.located import Formula, Located, shown
+from neurovis_spec.language.source import Scalar
 from neurovis_spec.language.spec import ConnectionModel, Spec
 from neurovis_spec.language.values import FileReference, Rows
 
@@ -88,25 +90,20 @@ class Connector:
         findings = self.constants.findings
         before = findings.errors
         ends = self._ends(key)
-        if ends is None:
+        if ends is None or body.lost:  # a body without what is at fault in it would be another one
             return None
         name = _normal(key.value)
         seen[name] = seen.get(name, 0) + 1
         if seen[name] > 1:
             name = f"{name} ({seen[name]})"
         sources, targets = ends
-        if total + len(sources) * len(targets) > self.limits.connections and _dense(body):
-            count = total + len(sources) * len(targets)
-            message = f"this makes up to {count:,} connections; the limit is {self.limits.connections:,}"
-            findings.error("too-many", key.span, message, "raise it with --limit")
-            return None
-        return _EntryBuilder(self, key, body, name, sources, targets).build(before)
+        return _EntryBuilder(self, key, body, name, sources, targets, self.limits.connections - total).build(before)
 
     def _ends(self, key: Located[str]) -> tuple[IntArray, IntArray] | None:
         findings = self.constants.findings
         left, arrow, right = key.value.partition("->")
         if not arrow or "->" in right:
-            message = f"'{key.value}' is no connection"
+            message = f"'{shown(key.value)}' is no connection"
             findings.error("bad-connection", key.span, message, "write FROM -> TO")
             return None
         offset = len(left) + len(arrow)
@@ -120,8 +117,6 @@ class Connector:
 
 def _piece(key: Located[str], start: int, end: int) -> Located[str]:
     """A part of a key as a text of its own, with its place."""
-    from neurovis_spec.language.source import Scalar
-
     span = key.node.at(start, end)
     inner = 0 if span != key.node.span else None
     return Located(key.value[start:end], Scalar(key.value[start:end], span, inner))
@@ -134,10 +129,6 @@ def _normal(text: str) -> str:
     return " -> ".join(ends)
 
 
-def _dense(body: ConnectionModel) -> bool:
-    return body.edges is None
-
-
 @dataclass(frozen=True)
 class _EntryBuilder:
     """Builds one entry, step by step: its shape, its weights, its rule."""
@@ -148,6 +139,8 @@ class _EntryBuilder:
     name: str
     sources: IntArray
     targets: IntArray
+    #: how many connections it may make
+    room: int
 
     @property
     def constants(self) -> Constants:
@@ -159,13 +152,17 @@ class _EntryBuilder:
     def build(self, before: int) -> Bundle | None:
         body, findings = self.body, self.constants.findings
         self._conflicts()
-        delay = 1 if body.delay is None else self.constants.integer(body.delay, "a delay", 0)
+        delay = 1 if body.delay is None else delay_of(body.delay, self.constants)
+        if findings.errors > before:
+            return None
         centre = self._centre_grid()
         shape = self._shape(centre)
         if shape is None or delay is None or findings.errors > before:
             return None
         if not len(shape.i):
             findings.error("no-connection", self.key.span, "this entry makes no connection at all")
+            return None
+        if not self._fits(len(shape.i)):
             return None
         weights = shape.weights if shape.weights is not None else self._weights(shape)
         centres = self._centres(centre, shape)
@@ -192,24 +189,40 @@ class _EntryBuilder:
 
     def _conflicts(self) -> None:
         """What excludes each other: each pair is one finding, at the second key."""
+        body, findings = self.body, self.constants.findings
         pairs = [
             ("matrix", "weight"),
             ("matrix", "edges"),
             ("matrix", "pattern"),
             ("edges", "weight"),
             ("edges", "pattern"),
-            ("edges", "centre"),
         ]
+        table = isinstance(body.centre, (Rows, FileReference))
+        if table:
+            pairs += [("edges", "centre"), ("centre", "pattern")]
         for first, second in pairs:
-            one, other = self.body.source.entry(first), self.body.source.entry(second)
+            one, other = body.source.entry(first), body.source.entry(second)
             if one is not None and other is not None:
                 later = max(one, other, key=lambda entry: entry.key.span)
                 message = f"'{second}' beside '{first}': the {first} says it already"
-                self.constants.findings.error("conflicting-keys", later.key.span, message, f"remove '{second}'")
-        rows = self.body.source.entry("rows")
-        if rows is not None and self.body.matrix is None and not isinstance(self.body.centre, (Rows, FileReference)):
+                findings.error("conflicting-keys", later.key.span, message, f"remove '{second}'")
+        rows = body.source.entry("rows")
+        if rows is not None and body.matrix is None and not table:
             message = "'rows' says how a matrix is read; there is no matrix"
-            self.constants.findings.error("useless-key", rows.key.span, message)
+            findings.error("useless-key", rows.key.span, message)
+        loops = body.source.entry("self")
+        if loops is not None and (body.matrix is not None or body.edges is not None or table):
+            message = "'self' says what a pattern may do; here every connection is written"
+            findings.error("useless-key", loops.key.span, message)
+
+    def _fits(self, count: int) -> bool:
+        """Whether there is room for so many connections; a finding where there is not."""
+        if count <= self.room:
+            return True
+        limit = self.connector.limits.connections
+        message = f"this makes {amount(limit - self.room + count)} connections; the limit is {limit:,}"
+        self.constants.findings.error("too-many", self.key.span, message, "raise it with --limit")
+        return False
 
     def _centre_grid(self) -> Grid | None:
         centre = self.body.centre
@@ -218,11 +231,9 @@ class _EntryBuilder:
         return self._grid(centre, "centre")
 
     def _grid(self, matrix: Rows | FileReference, purpose: str) -> Grid | None:
-        grid = grid_of(matrix, self.constants, self.connector.files, self.stream(purpose))
-        if grid is None:
-            return None
         by_target = self.body.rows is not None and self.body.rows.value == "to"
-        return fit(grid, len(self.sources), len(self.targets), by_target, self.constants.findings)
+        n, m = len(self.sources), len(self.targets)
+        return grid_of(matrix, n, m, by_target, self.constants, self.connector.files, self.stream(purpose))
 
     def _shape(self, centre: Grid | None) -> _Shape | None:
         body = self.body
@@ -240,12 +251,14 @@ class _EntryBuilder:
                 return None
             i, j = np.nonzero(centre.present)
             return _Shape(i, j)
-        loops = body.self is not None and body.self.value
+        return self._pattern()
+
+    def _pattern(self) -> _Shape | None:
         n, m = len(self.sources), len(self.targets)
-        single_loop = n == 1 and m == 1
-        ends = Ends(self.sources, self.targets, loops or single_loop)
-        if body.pattern is not None:
-            pairs = pairs_of(body.pattern, ends, self.constants, self.stream("edges"))
+        loops: bool | None = True if n == m == 1 else None
+        ends = Ends(self.sources, self.targets, loops if self.body.self is None else self.body.self.value)
+        if self.body.pattern is not None:
+            pairs = pairs_of(self.body.pattern, ends, self.constants, self.stream("edges"), self._fits)
             return None if pairs is None else _Shape(*pairs)
         if n > 1 and m > 1:
             message = f"{n} neurons to {m} neurons: how are they connected?"
@@ -255,9 +268,9 @@ class _EntryBuilder:
         return _Shape(*all_to_all(ends))
 
     def _edges(self) -> _Shape | None:
-        names = self.connector.population.neurons.names
-        sources = {names[neuron]: place for place, neuron in enumerate(self.sources.tolist())}
-        targets = {names[neuron]: place for place, neuron in enumerate(self.targets.tolist())}
+        called = self.connector.population.neurons.names
+        sources = {called[neuron]: place for place, neuron in enumerate(self.sources.tolist())}
+        targets = {called[neuron]: place for place, neuron in enumerate(self.targets.tolist())}
         reader = EdgeReader(sources, targets, self.constants, self.connector.files, self.stream("weight"))
         assert self.body.edges is not None
         edges = reader.read(self.body.edges)
@@ -271,14 +284,19 @@ class _EntryBuilder:
             "n_from": float(len(self.sources)),
             "n_to": float(len(self.targets)),
         }
-        position = self.connector.population.neurons.position
-        apart = position[self.sources[shape.i]] - position[self.targets[shape.j]]
-        if np.isfinite(apart).all():
+        tree = None
+        if isinstance(formula.value, str):
+            tree = self.constants.tree(formula, (*extra, "distance"), random=True)
+            if tree is None:
+                return None
+        if tree is not None and "distance" in names(tree):
+            position = self.connector.population.neurons.position
+            apart = position[self.sources[shape.i]] - position[self.targets[shape.j]]
+            if not np.isfinite(apart).all():
+                message = "'distance' needs a position of every neuron of both ends"
+                self.constants.findings.error("no-position", formula.span, message, "give the groups a 'position'")
+                return None
             extra["distance"] = np.hypot(apart[:, 0], apart[:, 1])
-        elif isinstance(formula.value, str) and "distance" in formula.value:
-            message = "'distance' needs a position of every neuron of both ends"
-            self.constants.findings.error("no-position", formula.span, message, "give the groups a 'position'")
-            return None
         value = self.constants.value(formula, extra, Randomness(self.stream(purpose), shape.i, shape.j))
         return None if value is None else np.broadcast_to(np.asarray(value, dtype=np.float64), shape.i.shape).copy()
 
@@ -291,9 +309,7 @@ class _EntryBuilder:
         centre = self.body.centre
         if centre is None:
             return np.zeros(len(shape.i))
-        groups = self.connector.population.neurons.groups
-        combine = [group.combine for group in groups for _ in range(group.count)]
-        if all(combine[target] != "distance" for target in self.targets.tolist()):
+        if not self._measures_distance():
             entry = self.body.source.entry("centre")
             span = self.key.span if entry is None else entry.key.span
             message = "'centre' has no effect: none of the targets combines by distance"
@@ -303,6 +319,15 @@ class _EntryBuilder:
             return np.ascontiguousarray(grid.values[shape.i, shape.j])
         assert isinstance(centre, Located)
         return self._values(centre, shape, "centre")
+
+    def _measures_distance(self) -> bool:
+        """Whether any of the targets combines by distance, or may, where what it says of that is at fault."""
+        written = self.connector.spec.neurons
+        for group in self.connector.population.neurons.groups:
+            may = group.combine == "distance" or "combine" in written[group.name].lost
+            if may and ((self.targets >= group.start) & (self.targets < group.start + group.count)).any():
+                return True
+        return False
 
     def _bounds(self, weights: FloatArray | None) -> tuple[float, float] | None:
         bounds = self.body.bounds

@@ -7,8 +7,9 @@ arrays, or findings at the very character. ``used`` notes on which parameters so
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
@@ -17,43 +18,91 @@ from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.network import FloatArray, IntArray
 from neurovis_spec.diagnostics import Findings, suggest
 from neurovis_spec.language.expressions.arrays import Drawing, evaluate_array
-from neurovis_spec.language.expressions.parser import ExpressionError, parse
-from neurovis_spec.language.expressions.tree import Draw, Name, Tree, names, walk
-from neurovis_spec.language.located import Formula
+from neurovis_spec.language.expressions.functions import CONSTANTS, FUNCTIONS
+from neurovis_spec.language.expressions.parser import DRAWS, ExpressionError, parse, unknown_names
+from neurovis_spec.language.expressions.tree import Draw, Number, Tree, draws, names
+from neurovis_spec.language.located import Formula, shown
 
 Value: TypeAlias = float | FloatArray
 
-#: Names that an expression may always use, besides dt.
-CONSTANTS: Mapping[str, float] = {"pi": math.pi, "e": math.e}
+#: Names that an expression may always use.
+ALWAYS = (*CONSTANTS, "dt")
 #: Names that no parameter may have (§6).
 RESERVED = frozenset({"t", "k", "dt", "i", "j", "n", "pi", "e"})
+#: Names that mean something elsewhere, and why not here.
+_ELSEWHERE: Mapping[str, str] = {
+    "k": "the step is known in a run; this value is worked out once, before it",
+    "t": "the time is known in a run; this value is worked out once, before it",
+    "i": "'i' is known within a group (the neuron's index) and a connection (the source's)",
+    "j": "'j' is known within a connection (the target's index)",
+    "n": "'n' is known within a group (its count); a connection has n_from and n_to",
+    "n_from": "'n_from' is known in the weight and the centre of a connection",
+    "n_to": "'n_to' is known in the weight and the centre of a connection",
+    "distance": "'distance' is known in the weight and the centre of a connection",
+}
+_NOT_FINITE = "look for a division by zero, an overflow, or a root or logarithm of a negative number"
+
+
+@lru_cache(maxsize=4096)
+def _parsed(text: str, random: bool, functions: tuple[tuple[str, int], ...]) -> Tree:
+    """The tree of a text. A list may hold the same one a hundred thousand times."""
+    return parse(text, random=random, extra_functions=dict(functions))
 
 
 def parse_formula(
     formula: Formula,
-    known: Iterable[str],
+    known: Collection[str],
     findings: Findings,
     *,
     random: bool = False,
     functions: Mapping[str, int] | None = None,
     what: str = "known here",
+    incomplete: bool = False,
 ) -> Tree | None:
-    """The tree of a formula whose names are all known; else findings at the characters at fault."""
-    from neurovis_spec.language.expressions.tree import Number
+    """The tree of a formula whose names are all known; else findings at the characters at fault.
 
+    ``incomplete``: not all known names could be read, so that an unknown one is no finding; the tree is None.
+    """
     if not isinstance(formula.value, str):
         return Number(float(formula.value))
     try:
-        tree = parse(formula.value, random=random, extra_functions=functions or {})
+        tree = _parsed(formula.value, random, tuple((functions or {}).items()))
     except ExpressionError as error:
         findings.error(error.code, formula.node.at(error.start, error.end), error.message, error.hint)
         return None
-    known = tuple(known)
-    unknown = [node for node in walk(tree) if isinstance(node, Name) and node.name not in known]
-    for node in unknown:
+    unknown = unknown_names(tree, known)
+    for node in () if incomplete else unknown:
         place = formula.node.at(node.start, node.end)
-        findings.error("unknown-name", place, f"unknown name '{node.name}'", suggest(node.name, known, what))
+        message, hint = _unknown(node.name, known, functions or {}, what)
+        findings.error("unknown-name", place, message, hint)
     return None if unknown else tree
+
+
+def _unknown(name: str, known: Collection[str], functions: Mapping[str, int], what: str) -> tuple[str, str | None]:
+    """The message and the hint for a name that means nothing here."""
+    usage = FUNCTIONS[name].usage if name in FUNCTIONS else DRAWS.get(name)
+    if name in functions:
+        usage = f"{name}(x)"
+    if usage is not None:
+        return f"'{name}' is a function, not a value", f"write {usage}"
+    message = f"unknown name '{shown(name)}'"
+    if name in _ELSEWHERE:
+        return message, _ELSEWHERE[name]
+    return message, suggest(name, known, what)
+
+
+def is_constant(tree: Tree, constants: Collection[str] = ALWAYS) -> bool:
+    """Whether a tree holds no name but constants, and draws nothing: its value is known before a run."""
+    return names(tree) <= frozenset(constants) and not draws(tree)
+
+
+def check_finite(value: Value, formula: Formula, findings: Findings) -> bool:
+    """Whether a value is finite everywhere; a finding where it is not."""
+    if np.all(np.isfinite(value)):
+        return True
+    what = f"{value}" if np.ndim(value) == 0 else "not finite everywhere"
+    findings.error("not-finite", formula.span, f"the value of this expression is {what}", _NOT_FINITE)
+    return False
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +126,36 @@ class Constants:
     structural: set[str] = field(default_factory=set)
     #: parameters whose own formulas are at fault: no follow-up findings about these
     broken: set[str] = field(default_factory=set)
+    #: whether there may be parameters that could not be read at all
+    incomplete: bool = False
+
+    def tree(
+        self, formula: Formula, extra: Iterable[str] = (), random: bool = False, what: str = "known here"
+    ) -> Tree | None:
+        """The tree of a formula over the parameters and ``extra``, for a caller that evaluates it; else findings."""
+        known = dict.fromkeys((*extra, *self.parameters, *self.broken, *ALWAYS))
+        tree = parse_formula(formula, known, self.findings, random=random, what=what, incomplete=self.incomplete)
+        return None if tree is None or names(tree) & self.broken else tree
+
+    def unchecked(
+        self,
+        formula: Formula,
+        extra: Mapping[str, Value] | None = None,
+        randomness: Randomness | None = None,
+        structural: bool = False,
+    ) -> Value | None:
+        """The value of a formula, finite or not: a float, or an array where ``extra`` or the draws hold arrays."""
+        extra = extra or {}
+        if not isinstance(formula.value, str):
+            return float(formula.value)
+        tree = self.tree(formula, extra, randomness is not None)
+        if tree is None:
+            return None
+        if structural:
+            self.depend(names(tree))
+        values: dict[str, Value] = {**self.parameters, **CONSTANTS, "dt": self.dt, **extra}
+        result = evaluate_array(tree, values, draw=None if randomness is None else _drawing(randomness))
+        return float(result) if np.ndim(result) == 0 else np.asarray(result, dtype=np.float64)
 
     def value(
         self,
@@ -85,49 +164,39 @@ class Constants:
         randomness: Randomness | None = None,
         structural: bool = False,
     ) -> Value | None:
-        """The value of a formula: a float, or an array where ``extra`` or the draws hold arrays."""
-        extra = extra or {}
-        if not isinstance(formula.value, str):
-            return float(formula.value)
-        known = (*extra, *self.parameters, *self.broken, *CONSTANTS, "dt")
-        tree = parse_formula(formula, known, self.findings, random=randomness is not None)
-        if tree is None or names(tree) & self.broken:
-            return None
-        if structural:
-            self.depend(names(tree))
-        values: dict[str, Value] = {**self.parameters, **CONSTANTS, "dt": self.dt, **extra}
-        result = evaluate_array(tree, values, draw=None if randomness is None else _drawing(randomness))
-        if not np.all(np.isfinite(result)):
-            shown = f"{result}" if np.ndim(result) == 0 else "not finite everywhere"
-            hint = "look for a division by zero, an overflow, or a root or logarithm of a negative number"
-            self.findings.error("not-finite", formula.span, f"the value of this expression is {shown}", hint)
-            return None
-        return float(result) if np.ndim(result) == 0 else np.asarray(result, dtype=np.float64)
+        """The value of a formula, which must be finite everywhere."""
+        result = self.unchecked(formula, extra, randomness, structural)
+        return result if result is not None and check_finite(result, formula, self.findings) else None
 
     def scalar(self, formula: Formula, structural: bool = False) -> float | None:
         """The value of a formula that is one number."""
         value = self.value(formula, structural=structural)
         return None if value is None else float(value)
 
-    def integer(self, formula: Formula, what: str, least: int, structural: bool = True) -> int | None:
-        """The value of a formula that must be an integer of at least ``least``."""
+    def integer(
+        self, formula: Formula, what: str, least: int, most: int = 2**53, structural: bool = True
+    ) -> int | None:
+        """The value of a formula that must be an integer from ``least`` to ``most``."""
         value = self.scalar(formula, structural=structural)
         if value is None:
             return None
         if value != math.floor(value):
             self.findings.error("not-an-integer", formula.span, f"{what} must be an integer, this is {value:g}")
             return None
-        if value < least:
-            self.findings.error("out-of-range", formula.span, f"{what} must be at least {least}, this is {int(value)}")
+        if not least <= value <= most:
+            bound = f"at least {least}" if value < least else f"at most {most:,}"
+            self.findings.error("out-of-range", formula.span, f"{what} must be {bound}, this is {value:.15g}")
             return None
         return int(value)
 
     def depend(self, used: Iterable[str]) -> None:
         """Something of the structure depends on these parameters, and so on those behind them."""
-        for name in used:
+        waiting = list(used)
+        while waiting:
+            name = waiting.pop()
             if name in self.parameters and name not in self.structural:
                 self.structural.add(name)
-                self.depend(self.uses.get(name, ()))
+                waiting += self.uses.get(name, ())
 
 
 def _drawing(randomness: Randomness) -> Drawing:

@@ -32,13 +32,15 @@ class _Writer:
         elif isinstance(value, np.ndarray):
             kind = "<f8" if value.dtype.kind == "f" else "<i8"
             self.put(f"array{value.shape}{kind}", np.ascontiguousarray(value, dtype=kind).tobytes())
-        elif isinstance(value, (bool, int, float)):
-            self.put("number", float(value).hex().encode())
+        elif isinstance(value, (bool, int)):
+            self.put("integer", str(int(value)).encode())
+        elif isinstance(value, float):
+            self.put("number", value.hex().encode())
         elif isinstance(value, str):
             self.put("text", value.encode())
         elif isinstance(value, Mapping):
             self.put("mapping", str(len(value)).encode())
-            for key, item in value.items():
+            for key, item in sorted(value.items()):  # no mapping of a network has an order that matters
                 self.value(str(key))
                 self.value(item)
         elif is_dataclass(value) and not isinstance(value, type):

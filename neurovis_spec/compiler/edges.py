@@ -11,14 +11,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neurovis_spec.compiler.constants import Constants, Randomness
+from neurovis_spec.compiler.cells import Cells, Pairs, cells_of, values_of
+from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.draws import Stream
+from neurovis_spec.compiler.limits import LONGEST_DELAY, PATIENCE
 from neurovis_spec.compiler.network import FloatArray, IntArray
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.diagnostics import Span, suggest
-from neurovis_spec.language.located import formula_of
-from neurovis_spec.language.source import NUMBER, TEXT, Node, Packed, Scalar, Sequence
+from neurovis_spec.language.located import Formula, formula_of, shown
+from neurovis_spec.language.source import NULL, TEXT
 from neurovis_spec.language.values import EdgeRows, FileReference
+
+_AN_EDGE = "an edge is [from, to], [from, to, weight] or [from, to, weight, delay]"
 
 
 @dataclass(frozen=True)
@@ -48,104 +52,104 @@ class EdgeReader:
         if len(edges.node) == 0:
             self.constants.findings.error("wrong-size", edges.node.span, "there is no edge in this list")
             return None
-        return self._packed(edges.node) or self._written(edges.node)
+        cells = cells_of(edges.node, self.constants.findings, _AN_EDGE)
+        return None if cells is None else self._written(cells)
 
-    def _packed(self, node: Sequence | Packed) -> EdgeList | None:
-        """Rows ``from, to, number`` that are all in order; whatever else goes the way that explains it."""
-        if not isinstance(node, Packed) or node.rows is None:
-            return None
-        starts = np.array(node.rows, dtype=np.int64)
-        if not (np.diff(starts) == 3).all():
-            return None
-        kinds = np.array(node.kinds, dtype=np.int64).reshape(-1, 3)
-        if not (kinds == (TEXT, TEXT, NUMBER)).all():
-            return None
-        numbers = np.array(node.numbers, dtype=np.float64).reshape(-1, 3)
-        sources = np.array([self.sources.get(text, -1) for text in node.texts], dtype=np.int64)
-        targets = np.array([self.targets.get(text, -1) for text in node.texts], dtype=np.int64)
-        i, j = sources[numbers[:, 0].astype(np.int64)], targets[numbers[:, 1].astype(np.int64)]
-        weights = np.ascontiguousarray(numbers[:, 2])
-        if (i < 0).any() or (j < 0).any() or not np.isfinite(weights).all():
-            return None
-        return EdgeList(i, j, weights, np.full(len(i), -1, dtype=np.int64))
-
-    def _written(self, node: Sequence | Packed) -> EdgeList | None:
-        rows = [self._edge(row) for row in node.items]
-        if any(row is None for row in rows):
-            return None
-        return _gathered([row for row in rows if row is not None])
-
-    def _edge(self, row: Node) -> tuple[int, int, float, int] | None:
+    def _written(self, cells: Cells) -> EdgeList | None:
         findings = self.constants.findings
-        if not isinstance(row, (Sequence, Packed)) or not 2 <= len(row) <= 4:
-            findings.error(
-                "wrong-type", row.span, "an edge is [from, to], [from, to, weight] or [from, to, weight, delay]"
-            )
+        widths = cells.widths
+        wrong = np.flatnonzero((widths < 2) | (widths > 4))
+        for row in wrong[:PATIENCE].tolist():
+            findings.error("wrong-type", cells.row_span(row), _AN_EDGE)
+        if len(wrong):
             return None
-        items = row.items
-        i = self._end(items[0], self.sources, "source")
-        j = self._end(items[1], self.targets, "target")
-        weight: float | None = 1.0
-        if i is not None and j is not None and len(items) > 2:
-            weight = self._weight(items[2], i, j)
-        delay: int | None = -1
-        if len(items) > 3:
-            formula = formula_of(items[3], findings)
-            delay = None if formula is None else self.constants.integer(formula, "a delay", 0)
-        if i is None or j is None or weight is None or delay is None:
+        first = cells.starts[:-1]
+        i, j = self._ends(cells, first, self.sources, "source"), self._ends(cells, first + 1, self.targets, "target")
+        if i is None or j is None:
             return None
-        return (i, j, weight, delay)
+        weighted, delayed = np.flatnonzero(widths >= 3), np.flatnonzero(widths == 4)
+        weights = np.ones(len(widths))
+        given = self._given(cells, first[weighted] + 2, i[weighted], j[weighted])
+        later = self._delays(cells, first[delayed] + 3)
+        if given is None or later is None:
+            return None
+        weights[weighted] = given
+        delays = np.full(len(widths), -1, dtype=np.int64)
+        delays[delayed] = later
+        return EdgeList(i, j, weights, delays)
 
-    def _weight(self, node: Node, i: int, j: int) -> float | None:
-        formula = formula_of(node, self.constants.findings)
-        if formula is None:
-            return None
-        value = self.constants.value(formula, {"i": float(i), "j": float(j)}, Randomness(self.stream, i, j))
-        return None if value is None else float(value)
-
-    def _end(self, node: Node, known: Mapping[str, int], what: str) -> int | None:
+    def _ends(self, cells: Cells, which: IntArray, known: Mapping[str, int], what: str) -> IntArray | None:
+        """The positions of the neurons that these cells name."""
         findings = self.constants.findings
-        if not isinstance(node, Scalar) or not isinstance(node.value, str):
-            findings.error("wrong-type", node.span, f"the {what} of an edge is the name of a neuron")
+        no_names = which[cells.kinds[which] != TEXT]
+        for cell in no_names[:PATIENCE].tolist():
+            findings.error("wrong-type", cells.node(cell).span, f"the {what} of an edge is the name of a neuron")
+        if len(no_names):
             return None
-        return self._lookup(node.value, node.span, known, what)
+        texts = cells.numbers[which].astype(np.int64)
+        positions = np.array([known.get(text, -1) for text in cells.texts], dtype=np.int64)[texts]
+        unknown = np.flatnonzero(positions < 0)
+        _, once = np.unique(texts[unknown], return_index=True)
+        for place in sorted(unknown[once].tolist())[:PATIENCE]:
+            self._outside(cells.texts[int(texts[place])], cells.node(int(which[place])).span, known, what)
+        return None if len(unknown) else positions
 
-    def _lookup(self, name: str, span: Span, known: Mapping[str, int], what: str) -> int | None:
-        position = known.get(name)
-        if position is None:
-            hint = suggest(name, known, f"{what}s of this entry")
-            message = f"'{name}' is not among the {what}s of this entry"
-            self.constants.findings.error("edge-outside", span, message, hint)
-        return position
+    def _given(self, cells: Cells, which: IntArray, i: IntArray, j: IntArray) -> FloatArray | None:
+        """The weights in these cells."""
+        missing = which[cells.kinds[which] == NULL]
+        for cell in missing[:PATIENCE].tolist():
+            formula_of(cells.node(cell), self.constants.findings)
+        if len(missing):
+            return None
+        sizes = {"n_from": float(len(self.sources)), "n_to": float(len(self.targets))}
+        return values_of(cells, which, self.constants, Pairs(i, j, sizes, self.stream))
+
+    def _delays(self, cells: Cells, which: IntArray) -> IntArray | None:
+        """The delays in these cells: few distinct ones, each looked at once."""
+        found: dict[tuple[int, float], int | None] = {}
+        result = np.zeros(len(which), dtype=np.int64)
+        for place, cell in enumerate(which.tolist()):
+            key = int(cells.kinds[cell]), float(cells.numbers[cell]) if cells.kinds[cell] != NULL else 0.0
+            if key not in found:
+                formula = formula_of(cells.node(cell), self.constants.findings)
+                found[key] = None if formula is None else delay_of(formula, self.constants)
+            result[place] = found[key] or 0
+        return None if None in found.values() else result
+
+    def _outside(self, name: str, span: Span, known: Mapping[str, int], what: str, where: str = "") -> None:
+        hint = suggest(name, known, f"{what}s of this entry")
+        message = f"'{shown(name)}'{where} is not among the {what}s of this entry"
+        self.constants.findings.error("edge-outside", span, message, hint)
 
     def _from_file(self, reference: FileReference) -> EdgeList | None:
         table = self.files.edges(reference.path)
         if table is None:
             return None
         span = reference.path.span
-        rows: list[tuple[int, int, float, int]] = []
-        failed = False
-        for source, target, weight, delay in zip(
-            table.sources, table.targets, table.weights.tolist(), table.delays, strict=True
-        ):
-            i = self._lookup(source, span, self.sources, "source")
-            j = self._lookup(target, span, self.targets, "target")
-            if i is None or j is None:
-                failed = True
-                continue
-            rows.append((i, j, weight, -1 if delay is None else delay))
-        if failed:
-            return None
-        if not rows:
+        if not table.sources:
             self.constants.findings.error("wrong-size", span, "there is no edge in this file")
             return None
-        return _gathered(rows)
+        i = self._named(table.sources, table.rows, self.sources, "source", span)
+        j = self._named(table.targets, table.rows, self.targets, "target", span)
+        if i is None or j is None:
+            return None
+        delays = np.array([-1 if delay is None else delay for delay in table.delays], dtype=np.int64)
+        if delays.max() > LONGEST_DELAY:
+            message = f"row {table.rows[int(delays.argmax())]} of the file: a delay must be at most {LONGEST_DELAY:,}"
+            self.constants.findings.error("out-of-range", span, message)
+            return None
+        return EdgeList(i, j, np.asarray(table.weights, dtype=np.float64), delays)
+
+    def _named(
+        self, names: tuple[str, ...], rows: tuple[int, ...], known: Mapping[str, int], what: str, span: Span
+    ) -> IntArray | None:
+        positions = np.array([known.get(name, -1) for name in names], dtype=np.int64)
+        unknown = {names[place]: rows[place] for place in reversed(np.flatnonzero(positions < 0).tolist())}
+        for name in sorted(unknown, key=unknown.__getitem__)[:PATIENCE]:
+            self._outside(name, span, known, what, f" (row {unknown[name]} of the file)")
+        return None if unknown else positions
 
 
-def _gathered(rows: list[tuple[int, int, float, int]]) -> EdgeList:
-    return EdgeList(
-        np.array([row[0] for row in rows], dtype=np.int64),
-        np.array([row[1] for row in rows], dtype=np.int64),
-        np.array([row[2] for row in rows], dtype=np.float64),
-        np.array([row[3] for row in rows], dtype=np.int64),
-    )
+def delay_of(formula: Formula, constants: Constants) -> int | None:
+    """A delay in steps; None, and a finding, where it is none."""
+    return constants.integer(formula, "a delay", 0, LONGEST_DELAY)

@@ -16,9 +16,9 @@ from neurovis_spec.compiler.definitions import Definitions
 from neurovis_spec.compiler.network import FloatArray, Input, IntArray, Rule
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import resolve_end
-from neurovis_spec.compiler.settings import choose, parameters
+from neurovis_spec.compiler.settings import check_initials, choose, parameters
 from neurovis_spec.diagnostics import suggest
-from neurovis_spec.language.located import Located
+from neurovis_spec.language.located import Located, shown
 from neurovis_spec.language.source import Entry, Scalar
 from neurovis_spec.language.values import Choice
 
@@ -43,12 +43,12 @@ def learning_of(
     constants: Constants,
 ) -> Learning | None:
     """The rule of an entry whose connection c goes to the ``targets[c]``-th of ``target_count`` targets."""
-    found = choose(choice, definitions.rules, "rule", constants)
+    found = choose(choice, definitions.rules, "rule", definitions, constants.findings)
     if found is None:
         return None
     rule, defaults = found
     n = len(targets)
-    values = parameters(choice.settings, defaults, n, constants, rule.signals)
+    values = parameters(choice, defaults, n, constants, rule.signals)
     signals: dict[str, IntArray] = {}
     failed = values is None
     entries = {entry.name: entry for entry in choice.settings}
@@ -59,12 +59,12 @@ def learning_of(
             constants.findings.error("missing-signal", choice.name.span, message, hint)
             failed = True
             continue
-        where = _signal(entries[signal], targets, target_count, population, inputs, constants)
+        where = _signal(entries[signal], targets, target_count, population, inputs, definitions, constants)
         if where is None:
             failed = True
         else:
             signals[signal] = where
-    if failed or values is None:
+    if failed or values is None or not check_initials(rule.state, values, choice, constants):
         return None
     return Learning(rule, values, signals, _title(rule, values, entries))
 
@@ -75,6 +75,7 @@ def _signal(
     target_count: int,
     population: Population,
     inputs: Mapping[str, Input],
+    definitions: Definitions,
     constants: Constants,
 ) -> IntArray | None:
     findings = constants.findings
@@ -89,9 +90,11 @@ def _signal(
     if name in inputs:
         source = inputs[name]
         where = np.arange(n + source.start, n + source.start + source.size, dtype=np.int64)
+    elif definitions.gaps.cover("inputs", name) or population.directory.gaps.cover_reference(name):
+        return None
     elif population.directory.find(name) is None and ".." not in name and "+" not in name:
         hint = suggest(name, (*population.directory.known, *inputs), "neurons and inputs")
-        findings.error("unknown-signal", node.span, f"there is no neuron, group or input '{name}'", hint)
+        findings.error("unknown-signal", node.span, f"there is no neuron, group or input '{shown(name)}'", hint)
         return None
     else:
         neurons = resolve_end(Located(node.value, node), population.directory, findings)

@@ -1,8 +1,16 @@
-"""Limits: how large a network may become, checked before memory is taken."""
+"""Limits: how large a network may become, checked before memory is taken.
+
+The findings of one list are limited as well: a hundred thousand wrong cells are one mistake.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+#: Findings in one list of values, after which the rest of the list is not looked at.
+PATIENCE = 20
+#: The longest delay in steps, and the most signals under way (delays of all connections together).
+LONGEST_DELAY, MOST_SIGNALS = 1_000_000, 250_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -11,3 +19,26 @@ class Limits:
 
     neurons: int = 1_000_000
     connections: int = 10_000_000
+
+    @staticmethod
+    def of(limit: int | None) -> Limits:
+        """The limits where ``limit`` connections are allowed, and as many neurons if that is more than a million."""
+        return Limits() if limit is None else Limits(max(Limits().neurons, limit), limit)
+
+
+def amount(number: int) -> str:
+    """A number of things, to read.
+
+    >>> amount(1234567), amount(10**30)
+    ('1,234,567', '1e+30')
+    """
+    return f"{number:,}" if number < 10**15 else f"{number:.3g}"
+
+
+def plural(number: int, noun: str) -> str:
+    """A number with its noun.
+
+    >>> plural(1, "neuron"), plural(0, "neuron")
+    ('1 neuron', '0 neurons')
+    """
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

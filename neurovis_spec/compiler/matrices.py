@@ -10,13 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.constants import Constants, Randomness
+from neurovis_spec.compiler.cells import Pairs, cells_of, values_of
+from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.draws import Stream
+from neurovis_spec.compiler.limits import PATIENCE, plural
 from neurovis_spec.compiler.network import FloatArray
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.diagnostics import Findings, Span
-from neurovis_spec.language.located import formula_of
-from neurovis_spec.language.source import NULL, NUMBER, Node, Packed, Scalar, Sequence
+from neurovis_spec.language.source import NULL
 from neurovis_spec.language.values import FileReference, Matrix, Rows
 
 
@@ -38,8 +39,13 @@ class Grid:
         return Grid(self.values.T, self.present.T, self.span)
 
 
-def grid_of(matrix: Matrix, constants: Constants, files: Files, stream: Stream) -> Grid | None:
-    """The numbers of a matrix; None where it is at fault. ``i`` and ``j`` are known in its cells."""
+def grid_of(
+    matrix: Matrix, n: int, m: int, by_target: bool, constants: Constants, files: Files, stream: Stream
+) -> Grid | None:
+    """The numbers of a matrix from n sources to m targets; None where it is at fault.
+
+    In its cells ``i`` is the source and ``j`` the target, also where ``by_target`` its rows are targets.
+    """
     if isinstance(matrix, FileReference):
         if matrix.key is not None:
             constants.findings.error(
@@ -47,76 +53,36 @@ def grid_of(matrix: Matrix, constants: Constants, files: Files, stream: Stream) 
             )
             return None
         table = files.table(matrix.path)
-        return None if table is None else Grid(table.values, table.present, matrix.path.span)
-    return _packed(matrix.node) or _written(matrix, constants, stream)
+        grid = None if table is None else Grid(table.values, table.present, matrix.path.span)
+        return None if grid is None else fit(grid, n, m, by_target, constants.findings)
+    return _written(matrix, n, m, by_target, constants, stream)
 
 
-def _packed(node: Sequence | Packed) -> Grid | None:
-    """The fast path: long lists of equal rows that hold numbers and nulls alone."""
-    if not isinstance(node, Packed) or node.rows is None:
+def _written(matrix: Rows, n: int, m: int, by_target: bool, constants: Constants, stream: Stream) -> Grid | None:
+    findings = constants.findings
+    cells = cells_of(matrix.node, findings, "a row of a matrix is a list")
+    if cells is None:
         return None
-    kinds = np.frombuffer(node.kinds, dtype=np.int8)
-    ends = np.frombuffer(node.rows, dtype=np.dtype(node.rows.typecode))
-    widths = np.diff(ends)
-    values = np.array(node.numbers, dtype=np.float64)
-    regular = len(widths) > 0 and bool((widths == widths[0]).all()) and widths[0] > 0
-    if not regular or not np.isin(kinds, (NULL, NUMBER)).all():
+    widths = cells.widths
+    if not len(widths) or not widths[0]:
+        span = cells.row_span(0) if len(widths) else matrix.span
+        findings.error("wrong-size", span, "a matrix needs at least one row, and a row at least one cell")
         return None
-    present = kinds == NUMBER
-    if not np.isfinite(values[present]).all():
+    uneven = np.flatnonzero(widths != widths[0])
+    for row in uneven[:PATIENCE].tolist():
+        message = f"this row has {plural(int(widths[row]), 'cell')}, the first has {widths[0]}"
+        findings.error("ragged-matrix", cells.row_span(row), message)
+    if len(uneven):
+        return None
+    rows, columns = cells.rows(), cells.columns()
+    i, j = (columns, rows) if by_target else (rows, columns)
+    pairs = Pairs(i, j, {"n_from": float(n), "n_to": float(m)}, stream)
+    values = values_of(cells, np.arange(len(rows)), constants, pairs)
+    if values is None:
         return None
     shape = (len(widths), int(widths[0]))
-    return Grid(values.reshape(shape), present.reshape(shape), node.span)
-
-
-def _written(matrix: Rows, constants: Constants, stream: Stream) -> Grid | None:
-    findings = constants.findings
-    rows = matrix.node.items
-    if not rows:
-        findings.error("wrong-size", matrix.span, "a matrix needs at least one row")
-        return None
-    cells: list[list[float | None]] = []
-    failed = False
-    for i, row in enumerate(rows):
-        if not isinstance(row, (Sequence, Packed)):
-            findings.error("wrong-type", row.span, "a row of a matrix is a list")
-            return None
-        values, clean = _row(row, i, constants, stream)
-        failed = failed or not clean
-        if cells and len(values) != len(cells[0]):
-            message = f"this row has {len(values)} cells, the first has {len(cells[0])}"
-            findings.error("ragged-matrix", row.span, message)
-            failed = True
-        cells.append(values)
-    if failed:
-        return None
-    if not cells[0]:
-        findings.error("wrong-size", matrix.span, "the rows of a matrix need at least one cell")
-        return None
-    present = np.array([[cell is not None for cell in row] for row in cells])
-    numbers = np.array([[np.nan if cell is None else cell for cell in row] for row in cells], dtype=np.float64)
-    return Grid(numbers, present, matrix.span)
-
-
-def _row(row: Sequence | Packed, i: int, constants: Constants, stream: Stream) -> tuple[list[float | None], bool]:
-    values: list[float | None] = []
-    clean = True
-    for j, cell in enumerate(row.items):
-        if isinstance(cell, Scalar) and cell.value is None:
-            values.append(None)
-            continue
-        number = _cell(cell, i, j, constants, stream)
-        clean = clean and number is not None
-        values.append(number)
-    return values, clean
-
-
-def _cell(cell: Node, i: int, j: int, constants: Constants, stream: Stream) -> float | None:
-    formula = formula_of(cell, constants.findings)
-    if formula is None:
-        return None
-    value = constants.value(formula, {"i": float(i), "j": float(j)}, Randomness(stream, i, j))
-    return None if value is None else float(value)
+    grid = Grid(values.reshape(shape), (cells.kinds != NULL).reshape(shape), matrix.span)
+    return fit(grid, n, m, by_target, findings)
 
 
 def fit(grid: Grid, n: int, m: int, by_target: bool, findings: Findings) -> Grid | None:

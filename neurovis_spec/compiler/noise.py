@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from neurovis_spec.compiler.constants import CONSTANTS, Constants, parse_formula
+from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.network import Group, Noise, frozen
 from neurovis_spec.language.expressions.tree import draws
 from neurovis_spec.language.located import Formula
@@ -22,8 +22,7 @@ def make_noises(
     for group, formula in groups:
         if formula is None:
             continue
-        known = (*constants.parameters, *constants.broken, *CONSTANTS, "dt", "k", "t", "i", "n")
-        tree = parse_formula(formula, known, constants.findings, random=True)
+        tree = constants.tree(formula, ("k", "t", "i", "n"), random=True)
         if tree is None:
             continue
         if not draws(tree):

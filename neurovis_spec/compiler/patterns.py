@@ -16,7 +16,7 @@ from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.network import IntArray
 from neurovis_spec.diagnostics import suggest
-from neurovis_spec.language.located import formula_of
+from neurovis_spec.language.located import formula_of, shown
 from neurovis_spec.language.values import Choice
 
 Pairs: TypeAlias = tuple[IntArray, IntArray]
@@ -27,15 +27,17 @@ LATER = ("fixed_indegree", "fixed_outdegree", "nearest", "small_world", "band")
 
 @dataclass(frozen=True)
 class Ends:
-    """The neurons of both ends, in the order of the reference, and whether a neuron may connect to itself."""
+    """The neurons of both ends, in the order of the reference, and whether a neuron may connect to itself, where the
+    author says so."""
 
     sources: IntArray
     targets: IntArray
-    loops: bool
+    loops: bool | None = None
 
-    def pairs(self, i: IntArray, j: IntArray) -> Pairs:
-        """The pairs, without a neuron's connection to itself unless that is allowed."""
-        if not self.loops:
+    def pairs(self, i: IntArray, j: IntArray, loops: bool = False) -> Pairs:
+        """The pairs, without a neuron's connection to itself unless that is allowed (by ``loops`` where nothing is
+        said)."""
+        if not (loops if self.loops is None else self.loops):
             keep = self.sources[i] != self.targets[j]
             i, j = i[keep], j[keep]
         return i, j
@@ -50,19 +52,19 @@ def all_to_all(ends: Ends) -> Pairs:
 def one_to_one(ends: Ends) -> Pairs:
     """The first with the first and so on; within a group this makes self-loops, which is what was asked for."""
     index = np.arange(len(ends.sources), dtype=np.int64)
-    return index, index
+    return ends.pairs(index, index, loops=True)
 
 
 def chain(ends: Ends) -> Pairs:
     """i to i + 1."""
     index = np.arange(len(ends.sources) - 1, dtype=np.int64)
-    return index, index + 1
+    return ends.pairs(index, index + 1)
 
 
 def ring(ends: Ends) -> Pairs:
     """i to i + 1, and the last to the first."""
     index = np.arange(len(ends.sources), dtype=np.int64)
-    return index, np.roll(index, -1)
+    return ends.pairs(index, np.roll(index, -1))
 
 
 def random(ends: Ends, probability: float, stream: Stream) -> Pairs:
@@ -79,8 +81,13 @@ _FIXED: Mapping[str, Callable[[Ends], Pairs]] = {
 PATTERNS = (*_FIXED, "random")
 
 
-def pairs_of(choice: Choice, ends: Ends, constants: Constants, stream: Stream) -> Pairs | None:
-    """The pairs of a pattern as the author wrote it; None where it is at fault, which is noted."""
+def pairs_of(
+    choice: Choice, ends: Ends, constants: Constants, stream: Stream, fits: Callable[[int], bool]
+) -> Pairs | None:
+    """The pairs of a pattern as the author wrote it; None where it is at fault, which is noted.
+
+    ``fits`` says, before they are made, whether there is room for so many.
+    """
     findings = constants.findings
     name = choice.name.value
     span = choice.name.span
@@ -89,12 +96,13 @@ def pairs_of(choice: Choice, ends: Ends, constants: Constants, stream: Stream) -
         findings.error("unsupported", span, f"the pattern '{name}' is not read by this version yet")
         return None
     if name not in PATTERNS:
-        findings.error("unknown-pattern", span, f"there is no pattern '{name}'", suggest(name, PATTERNS, "patterns"))
+        hint = suggest(name, PATTERNS, "patterns")
+        findings.error("unknown-pattern", span, f"there is no pattern '{shown(name)}'", hint)
         return None
     for entry in choice.settings:
         if entry.name not in allowed:
             hint = suggest(entry.name, allowed, "known here") or f"'{name}' has no settings"
-            findings.error("unknown-parameter", entry.key.span, f"there is no setting '{entry.name}'", hint)
+            findings.error("unknown-parameter", entry.key.span, f"there is no setting '{shown(entry.name)}'", hint)
             return None
     if name != "random":
         n, m = len(ends.sources), len(ends.targets)
@@ -102,11 +110,13 @@ def pairs_of(choice: Choice, ends: Ends, constants: Constants, stream: Stream) -
             message = f"'{name}' needs ends of equal size; these have {n} and {m} neurons"
             findings.error("wrong-size", span, message)
             return None
-        return _FIXED[name](ends)
-    return _random(choice, ends, constants, stream)
+        return _FIXED[name](ends) if fits(n * m if name == "all_to_all" else n) else None
+    return _random(choice, ends, constants, stream, fits)
 
 
-def _random(choice: Choice, ends: Ends, constants: Constants, stream: Stream) -> Pairs | None:
+def _random(
+    choice: Choice, ends: Ends, constants: Constants, stream: Stream, fits: Callable[[int], bool]
+) -> Pairs | None:
     findings = constants.findings
     if not choice.settings:
         message = "'random' needs a probability"
@@ -119,4 +129,7 @@ def _random(choice: Choice, ends: Ends, constants: Constants, stream: Stream) ->
     if not 0 <= probability <= 1:
         findings.error("out-of-range", formula.span, f"a probability lies between 0 and 1, this is {probability:g}")
         return None
-    return random(ends, probability, stream)
+    n, m = len(ends.sources), len(ends.targets)
+    # So many there are at the least, but for one case in a million; who has made them is asked again.
+    least = n * m * probability - 5 * (n * m * probability * (1 - probability)) ** 0.5
+    return random(ends, probability, stream) if fits(max(0, int(least))) else None

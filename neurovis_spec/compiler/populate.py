@@ -13,9 +13,10 @@ from typing import cast
 import numpy as np
 
 from neurovis_spec.compiler.constants import Constants
-from neurovis_spec.compiler.definitions import Definitions
+from neurovis_spec.compiler.definitions import Defaults, Definitions
 from neurovis_spec.compiler.draws import Stream
-from neurovis_spec.compiler.limits import Limits
+from neurovis_spec.compiler.gaps import Gaps
+from neurovis_spec.compiler.limits import Limits, amount, plural
 from neurovis_spec.compiler.network import (
     Activation,
     Combine,
@@ -30,10 +31,10 @@ from neurovis_spec.compiler.network import (
 )
 from neurovis_spec.compiler.positions import positions_of
 from neurovis_spec.compiler.references import Directory
-from neurovis_spec.compiler.settings import choose, parameters, spread
+from neurovis_spec.compiler.settings import check_initials, choose, parameters, spread
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.diagnostics import Findings, Span, suggest
-from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name
+from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, shown
 from neurovis_spec.language.source import Mapping as SourceMapping
 from neurovis_spec.language.source import Scalar
 from neurovis_spec.language.spec import GroupModel, Spec
@@ -89,30 +90,27 @@ def populate(
     files: Files,
     limits: Limits,
     seed: int,
-) -> Population | None:
-    """Make every neuron. None where a group is at fault; the others are still looked at."""
-    findings = constants.findings
+) -> Population:
+    """Make every neuron. A group that is at fault is made as far as its names are known, so that what refers to it can
+    be looked at."""
     builder = _Builder(spec, constants, definitions, {entry.name: entry for entry in inputs}, files, limits, seed)
     built: list[_Built] = []
-    failed = False
+    lost = set(definitions.gaps.names["neurons"])
     start = 0
     for name, model in spec.neurons.items():
         group = builder.group(name, model, start)
         if group is None:
-            failed = True
+            lost.add(name)
             continue
         built.append(group)
         start += group.group.count
-    owners = _owners(spec, built, findings)
-    if failed or owners is None:
-        return None
-    return _join(built)
+    _owners(spec, built, constants.findings)
+    return _join(built, definitions.gaps.with_names("neurons", lost))
 
 
-def _owners(spec: Spec, built: list[_Built], findings: Findings) -> dict[str, str] | None:
-    """Neuron name to group name; two declarations of one name are a finding."""
+def _owners(spec: Spec, built: list[_Built], findings: Findings) -> None:
+    """Two declarations of one name are a finding: of two groups, or of a neuron and an input."""
     owners: dict[str, str] = {}
-    clean = True
     for item in built:
         name = item.group.name
         # A group of several may not be called like a neuron of another one either: what would the name refer to?
@@ -122,12 +120,15 @@ def _owners(spec: Spec, built: list[_Built], findings: Findings) -> dict[str, st
                 first = key_span(spec, "neurons", other)
                 message = f"'{name}' and '{other}' (line {first.line}) both make the name '{neuron}'"
                 findings.error("duplicate-neuron", key_span(spec, "neurons", name), message)
-                clean = False
                 break
-    return owners if clean else None
+            if neuron in spec.inputs and neuron != name:
+                first = key_span(spec, "inputs", neuron)
+                message = f"the neuron '{neuron}' of '{name}' is called like an input (line {first.line})"
+                findings.error("duplicate-name", key_span(spec, "neurons", name), message)
+                break
 
 
-def _join(built: list[_Built]) -> Population:
+def _join(built: list[_Built], gaps: Gaps) -> Population:
     names = tuple(name for item in built for name in item.names)
     empty = np.zeros(0)
     neurons = Neurons(
@@ -145,6 +146,7 @@ def _join(built: list[_Built]) -> Population:
         {item.group.name: item.group for item in built},
         {name: index for index, name in enumerate(names)},
         {item.group.name: item.first for item in built if item.first is not None},
+        gaps,
     )
     return Population(neurons, directory, tuple(item.kind for item in built))
 
@@ -160,29 +162,25 @@ class _Builder:
     seed: int
 
     def group(self, name: str, model: GroupModel, start: int) -> _Built | None:
-        """One group; None where something about it is at fault."""
+        """One group; None where it is not known which neurons it has."""
         findings = self.constants.findings
-        before = findings.errors
-        if name in self.inputs and not IDENTIFIER.fullmatch(name):
-            return None
-        if name in self.inputs:
+        if name in self.spec.inputs and IDENTIFIER.fullmatch(name):
             first = key_span(self.spec, "inputs", name)
             message = f"'{name}' is an input already (line {first.line}); groups and inputs share their names"
             findings.error("duplicate-name", key_span(self.spec, "neurons", name), message)
-        names, first_number = self._names(name, model, start)
+        names, first_number = None, None
+        if name not in self.definitions.gaps.names["neurons"]:
+            names, first_number = self._names(name, model, start)
         if names is None:
+            self._choices(model)
             return None
         n = len(names)
         kind = self._kind(model, n)
-        bias = np.zeros(n) if model.bias is None else self._drawn(model.bias, n, "bias", name)
-        initial = np.full(n, np.nan) if model.initial is None else self._drawn(model.initial, n, "initial", name)
+        bias = None if model.bias is None else self._drawn(model.bias, n, "bias", name)
+        initial = None if model.initial is None else self._drawn(model.initial, n, "initial", name)
         input_index = self._input(model, n)
         position = positions_of(model.position, n, self.constants, self.files)
         labels = self._labels(model, names)
-        if kind is None or bias is None or initial is None or input_index is None or position is None or labels is None:
-            return None
-        if findings.errors > before:
-            return None
         group = Group(
             name=name,
             start=start,
@@ -197,7 +195,17 @@ class _Builder:
             role=None if model.role is None else cast(Role, model.role.value),
             description=None if model.description is None else model.description.value,
         )
-        return _Built(group, kind, names, labels, bias, initial, input_index, position, first_number)
+        return _Built(
+            group=group,
+            kind=kind,
+            names=names,
+            labels=labels or names,
+            bias=np.zeros(n) if bias is None else bias,
+            initial=np.full(n, np.nan) if initial is None else initial,
+            input=np.full(n, -1, dtype=np.int64) if input_index is None else input_index,
+            position=np.full((n, 2), np.nan) if position is None else position,
+            first=first_number,
+        )
 
     def _names(self, name: str, model: GroupModel, start: int) -> tuple[tuple[str, ...] | None, int | None]:
         findings = self.constants.findings
@@ -206,10 +214,12 @@ class _Builder:
             count = self.constants.integer(model.count, "'count'", 1)
             if count is None:
                 return None, None
-            if start + count > self.limits.neurons:
-                message = f"this makes {start + count:,} neurons; the limit is {self.limits.neurons:,}"
-                findings.error("too-many", model.count.span, message, "raise it with --limit")
-                return None, None
+        span = key_span(self.spec, "neurons", name) if model.count is None else model.count.span
+        total = start + (count or len(model.names or ()) or 1)
+        if total > self.limits.neurons:
+            message = f"this makes {amount(total)} neurons; the limit is {self.limits.neurons:,}"
+            findings.error("too-many", span, message, "raise it with --limit")
+            return None, None
         if model.names is not None:
             return self._listed(model, count), None
         if model.first is not None and count is None:
@@ -240,59 +250,75 @@ class _Builder:
                 return None
             seen[item.value] = item
         if not seen or (count is not None and count != len(seen)):
-            wanted = "at least one name" if count is None else f"{count} names"
-            span = model.names[0].span if model.names else model.source.span
-            findings.error("wrong-size", span, f"'names' has {len(seen)} names, {wanted} are wanted")
+            wanted = "at least one is wanted" if count is None else f"'count' says {count}"
+            node = model.source.get("names")
+            span = model.names[0].span if model.names else model.source.span if node is None else node.span
+            findings.error("wrong-size", span, f"'names' has {plural(len(seen), 'name')}, {wanted}")
             return None
         return tuple(seen)
 
-    def _kind(self, model: GroupModel, n: int) -> Kind | None:
-        activation = choose(
-            model.activation or _default("identity", model), self.definitions.activations, "activation", self.constants
+    def _choices(self, model: GroupModel) -> tuple[tuple[Activation, Defaults] | None, tuple[Model, Defaults] | None]:
+        """The definitions that a group names."""
+        known, findings = self.definitions, self.constants.findings
+        activation = model.activation or _default("identity", model)
+        neuron = model.model or _default("static", model)
+        return (
+            choose(activation, known.activations, "activation", known, findings),
+            choose(neuron, known.models, "model", known, findings),
         )
-        neuron = choose(model.model or _default("static", model), self.definitions.models, "model", self.constants)
-        first = activation and parameters(
-            model.activation.settings if model.activation else (), activation[1], n, self.constants
-        )
-        second = neuron and parameters(model.model.settings if model.model else (), neuron[1], n, self.constants)
-        if activation is None or neuron is None or first is None or second is None:
-            return None
-        return Kind(activation[0], first, neuron[0], second)
+
+    def _kind(self, model: GroupModel, n: int) -> Kind:
+        """What the neurons are; identity and static in the place of what is at fault."""
+        activation, neuron = self._choices(model)
+        activity: dict[str, FloatArray] | None = None
+        settings: dict[str, FloatArray] | None = None
+        if activation is not None:
+            activity = parameters(model.activation or _default("identity", model), activation[1], n, self.constants)
+        if neuron is not None:
+            choice = model.model or _default("static", model)
+            settings = parameters(choice, neuron[1], n, self.constants)
+            if settings is not None:
+                check_initials(neuron[0].state, settings, choice, self.constants)
+        if activation is None or activity is None:
+            activation, activity = self.definitions.activations["identity"], {}
+        if neuron is None or settings is None:
+            neuron, settings = self.definitions.models["static"], {}
+        return Kind(activation[0], activity, neuron[0], settings)
 
     def _drawn(self, formulas: Formula | FormulaList, n: int, purpose: str, name: str) -> FloatArray | None:
         return spread(formulas, n, self.constants, f"'{purpose}'", Stream(self.seed, purpose, name))
 
     def _input(self, model: GroupModel, n: int) -> IntArray | None:
         if model.input is None:
-            return np.full(n, -1, dtype=np.int64)
-        found = self.inputs.get(model.input.value)
+            return None
+        name = model.input.value
+        found = self.inputs.get(name)
         findings = self.constants.findings
         if found is None:
             known = tuple(self.spec.inputs)
-            if model.input.value not in known:
-                hint = suggest(model.input.value, known, "inputs") or "no inputs are declared; add it under 'inputs'"
-                findings.error("unknown-input", model.input.span, f"there is no input '{model.input.value}'", hint)
+            if name not in known and not self.definitions.gaps.cover("inputs", name):
+                hint = suggest(name, known, "inputs") or "no inputs are declared; add it under 'inputs'"
+                findings.error("unknown-input", model.input.span, f"there is no input '{shown(name)}'", hint)
             return None
         if found.size == 1:
             return np.full(n, found.start, dtype=np.int64)
         if found.size == n:
             return np.arange(found.start, found.start + n, dtype=np.int64)
-        message = (
-            f"the input '{found.name}' has {found.size} components, the group has {n} neuron{'s' if n != 1 else ''}"
-        )
+        message = f"the input '{found.name}' has {found.size} components, the group has {plural(n, 'neuron')}"
         findings.error("wrong-size", model.input.span, message, "an input has one component, or one for each neuron")
         return None
 
     def _labels(self, model: GroupModel, names: tuple[str, ...]) -> tuple[str, ...] | None:
         if model.label is None:
-            return names
+            return None
+        node = model.source.get("label")
         labels = tuple(item.value for item in model.label)
+        if node is None or isinstance(node, Scalar):
+            return labels * len(names)
         if len(labels) == len(names):
             return labels
-        if len(labels) == 1:
-            return labels * len(names)
-        message = f"'label' has {len(labels)} texts for {len(names)} neurons"
-        self.constants.findings.error("wrong-size", model.label[0].span, message)
+        message = f"'label' has {plural(len(labels), 'text')} for {plural(len(names), 'neuron')}"
+        self.constants.findings.error("wrong-size", model.label[0].span if model.label else node.span, message)
         return None
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from neurovis_spec.compiler.constants import Constants
+from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import FloatArray
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.language.located import formula_of
@@ -48,7 +49,7 @@ def positions_of(
     if n == 1 and items and not isinstance(items[0], (Sequence, Packed)):
         items = (Sequence(items, node.span),)
     if len(items) != n:
-        message = f"{len(items)} positions for {n} neuron{'s' if n != 1 else ''}"
+        message = f"{plural(len(items), 'position')} for {plural(n, 'neuron')}"
         constants.findings.error("wrong-size", node.span, message)
         return None
     points = [_point(item, constants) for item in items]

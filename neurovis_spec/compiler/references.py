@@ -7,13 +7,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
+from neurovis_spec.compiler.gaps import Gaps
+from neurovis_spec.compiler.limits import PATIENCE
 from neurovis_spec.compiler.network import Group
 from neurovis_spec.diagnostics import Findings, Span, suggest
-from neurovis_spec.language.located import Located
+from neurovis_spec.language.located import Located, shown
 
+#: A neuron's number as its name has it: without leading zeros.
+_NUMBER = re.compile(r"0|[1-9][0-9]{0,63}")
 _RANGE = re.compile(r"\s*(?P<low>\S+?)\s*\.\.\s*(?P<high>\S+)\s*")
 
 
@@ -25,6 +29,7 @@ class Directory:
     neurons: Mapping[str, int]
     #: the number of the first neuron of each counted group
     first: Mapping[str, int]
+    gaps: Gaps = field(default_factory=Gaps)
 
     @cached_property
     def known(self) -> tuple[str, ...]:
@@ -43,7 +48,7 @@ class Directory:
         """The neurons of a counted group from one of its numbers to another; a text says why not."""
         for name in sorted((g for g in self.first if low.startswith(g)), key=len, reverse=True):
             start, stop = low[len(name) :], high[len(name) :]
-            if not (high.startswith(name) and start.isdecimal() and stop.isdecimal()):
+            if not (high.startswith(name) and _NUMBER.fullmatch(start) and _NUMBER.fullmatch(stop)):
                 continue
             group, first = self.groups[name], self.first[name]
             a, b = int(start) - first, int(stop) - first
@@ -78,16 +83,17 @@ def resolve_part(name: str, span: Span, directory: Directory, findings: Findings
     if match:
         found = directory.range(match["low"], match["high"])
         if isinstance(found, str):
-            findings.error("bad-range", span, f"'{name}' is no range: {found}")
+            if not directory.gaps.cover_reference(match["low"]):
+                findings.error("bad-range", span, f"'{shown(name)}' is no range: {found}")
             return None
         return found
     result = directory.find(name)
     if result is None:
         if not name:
             findings.error("empty-reference", span, "a reference is missing here", "name a group, a neuron or a range")
-        else:
+        elif not directory.gaps.cover_reference(name):
             hint = suggest(name, directory.known, "groups and neurons")
-            findings.error("unknown-neuron", span, f"there is no neuron or group '{name}'", hint)
+            findings.error("unknown-neuron", span, f"there is no neuron or group '{shown(name)}'", hint)
     return result
 
 
@@ -95,15 +101,18 @@ def resolve(texts: tuple[Located[str], ...], directory: Directory, findings: Fin
     """Several references, in the order written; a neuron named twice is a finding."""
     result: list[int] = []
     seen: set[int] = set()
+    before = findings.errors
     failed = False
     for text in texts:
         for name, span in parts(text):
+            if findings.errors - before >= PATIENCE:
+                return None
             found = resolve_part(name, span, directory, findings)
             if found is None:
                 failed = True
                 continue
-            if seen.intersection(found):
-                findings.error("repeated-reference", span, f"'{name}' names neurons that are named before it")
+            if not seen.isdisjoint(found):
+                findings.error("repeated-reference", span, f"'{shown(name)}' names neurons that are named before it")
                 failed = True
             seen.update(found)
             result.extend(found)

@@ -11,13 +11,15 @@ from typing import TypeVar
 
 import numpy as np
 
-from neurovis_spec.compiler.constants import CONSTANTS, Constants, Randomness, Value
-from neurovis_spec.compiler.definitions import Defaults
+from neurovis_spec.compiler.constants import Constants, Randomness, Value
+from neurovis_spec.compiler.definitions import Defaults, Definitions, check_bounds
 from neurovis_spec.compiler.draws import Stream
-from neurovis_spec.compiler.network import FloatArray
-from neurovis_spec.diagnostics import suggest
+from neurovis_spec.compiler.limits import PATIENCE, plural
+from neurovis_spec.compiler.network import FloatArray, Quantity
+from neurovis_spec.diagnostics import Findings, suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
-from neurovis_spec.language.located import Formula, formula_of
+from neurovis_spec.language.expressions.functions import CONSTANTS
+from neurovis_spec.language.located import Formula, formula_of, shown
 from neurovis_spec.language.source import Entry, Packed, Sequence
 from neurovis_spec.language.values import Choice, FormulaList
 
@@ -25,14 +27,14 @@ T = TypeVar("T")
 
 
 def choose(
-    choice: Choice, known: Mapping[str, tuple[T, Defaults]], what: str, constants: Constants
+    choice: Choice, known: Mapping[str, tuple[T, Defaults]], what: str, definitions: Definitions, findings: Findings
 ) -> tuple[T, Defaults] | None:
     """The definition that a choice names; an unknown name is answered with the nearest ones."""
     name = choice.name
     found = known.get(name.value)
-    if found is None:
+    if found is None and not definitions.gaps.cover(f"{what}s", name.value):
         hint = suggest(name.value, known, "known")
-        constants.findings.error(f"unknown-{what}", name.span, f"there is no {what} '{name.value}'", hint)
+        findings.error(f"unknown-{what}", name.span, f"there is no {what} '{shown(name.value)}'", hint)
     return found
 
 
@@ -53,36 +55,74 @@ def spread(
 
 def _listed(formulas: FormulaList, n: int, constants: Constants, what: str, stream: Stream | None) -> FloatArray | None:
     if len(formulas.items) != n:
-        message = f"{what} has {len(formulas.items)} values for {n} neuron{'s' if n != 1 else ''}"
+        message = f"{what} has {plural(len(formulas.items), 'value')} for {plural(n, 'neuron')}"
         constants.findings.error("wrong-size", formulas.span, message)
         return None
     result: list[float] = []
+    before = constants.findings.errors
     for position, item in enumerate(formulas.items):
+        if not isinstance(item.value, str):
+            result.append(float(item.value))
+            continue
         randomness = None if stream is None else Randomness(stream, position)
         value = constants.value(item, {"i": float(position), "n": float(n)}, randomness)
         if value is not None:
             result.append(float(value))
+        elif constants.findings.errors - before >= PATIENCE:
+            return None
     return np.array(result, dtype=np.float64) if len(result) == n else None
 
 
 def _formulas(entry: Entry, constants: Constants) -> Formula | FormulaList | None:
     node = entry.value
-    if isinstance(node, (Sequence, Packed)):
-        items = [formula_of(item, constants.findings) for item in node.items]
-        if any(item is None for item in items):
+    if not isinstance(node, (Sequence, Packed)):
+        return formula_of(node, constants.findings)
+    items: list[Formula] = []
+    before = constants.findings.errors
+    for item in node.items:
+        formula = formula_of(item, constants.findings)
+        if formula is not None:
+            items.append(formula)
+        elif constants.findings.errors - before >= PATIENCE:
             return None
-        return FormulaList(tuple(item for item in items if item is not None), node.span)
-    return formula_of(node, constants.findings)
+    return FormulaList(tuple(items), node.span) if len(items) == len(node) else None
 
 
 def parameters(
-    entries: tuple[Entry, ...], defaults: Defaults, n: int, constants: Constants, allowed: tuple[str, ...] = ()
+    choice: Choice, defaults: Defaults, n: int, constants: Constants, allowed: tuple[str, ...] = ()
 ) -> dict[str, FloatArray] | None:
     """The value of every parameter of a definition for n neurons or connections.
 
     ``allowed`` are further keys (signals) that the caller reads itself.
     """
-    names = tuple(name for name, _ in defaults)
+    given = _given(choice.settings, defaults, n, constants, allowed)
+    if given is None:
+        return None
+    findings = constants.findings
+    entries = {entry.name: entry for entry in choice.settings}
+    values: dict[str, Value] = {**CONSTANTS, "dt": constants.dt}
+    result: dict[str, FloatArray] = {}
+    for default in defaults:
+        name = default.name
+        value = given.get(name)
+        if value is None:
+            value = np.broadcast_to(np.asarray(evaluate_array(default.value, values), dtype=np.float64), (n,)).copy()
+            if not np.isfinite(value).all():
+                message = f"with these settings the default of '{name}' is not a finite number"
+                findings.error("not-finite", choice.name.span, message)
+                return None
+        values[name] = result[name] = value
+        span = entries[name].value.span if name in entries else choice.name.span
+        if not check_bounds(value, default, values, span, findings):
+            return None
+    return result
+
+
+def _given(
+    entries: tuple[Entry, ...], defaults: Defaults, n: int, constants: Constants, allowed: tuple[str, ...]
+) -> dict[str, FloatArray] | None:
+    """The settings as written; None where one of them is at fault."""
+    names = tuple(default.name for default in defaults)
     given: dict[str, FloatArray] = {}
     failed = False
     for entry in entries:
@@ -96,15 +136,19 @@ def parameters(
             failed = True
             known = (*names, *allowed)
             hint = suggest(entry.name, known, "known here") or "it has no parameters"
-            constants.findings.error("unknown-parameter", entry.key.span, f"there is no parameter '{entry.name}'", hint)
-    if failed:
-        return None
-    values: dict[str, Value] = {**CONSTANTS, "dt": constants.dt}
-    result: dict[str, FloatArray] = {}
-    for name, tree in defaults:
-        value = given.get(name)
-        if value is None:
-            value = np.broadcast_to(np.asarray(evaluate_array(tree, values), dtype=np.float64), (n,)).copy()
-        values[name] = value
-        result[name] = value
-    return result
+            message = f"there is no parameter '{shown(entry.name)}'"
+            constants.findings.error("unknown-parameter", entry.key.span, message, hint)
+    return None if failed else given
+
+
+def check_initials(
+    states: tuple[Quantity, ...], values: Mapping[str, FloatArray], choice: Choice, constants: Constants
+) -> bool:
+    """Whether the states of a definition begin with finite numbers; a finding where one does not."""
+    known: dict[str, Value] = {**CONSTANTS, "dt": constants.dt, **values}
+    for state in states:
+        if not np.isfinite(evaluate_array(state.initial, known)).all():
+            message = f"with these settings the state '{state.name}' does not begin with a finite number"
+            constants.findings.error("not-finite", choice.name.span, message)
+            return False
+    return True

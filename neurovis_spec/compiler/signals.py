@@ -7,45 +7,45 @@ from __future__ import annotations
 
 import numpy as np
 
-from neurovis_spec.compiler.constants import CONSTANTS, Constants, parse_formula
+from neurovis_spec.compiler.cells import cells_of, values_of
+from neurovis_spec.compiler.constants import ALWAYS, Constants, is_constant
+from neurovis_spec.compiler.limits import PATIENCE, amount, plural
 from neurovis_spec.compiler.network import FloatArray, Input, frozen
 from neurovis_spec.compiler.populate import key_span
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.language.expressions.tree import Tree
-from neurovis_spec.language.located import formula_of
-from neurovis_spec.language.source import Packed, Sequence
+from neurovis_spec.language.located import Formula, formula_of
+from neurovis_spec.language.source import NULL, Packed, Sequence
 from neurovis_spec.language.spec import InputModel, Spec
 
 _SOURCES = ("expression", "file", "values", "size")
 
 
-def make_inputs(spec: Spec, constants: Constants, files: Files) -> tuple[Input, ...] | None:
-    """All inputs; None where one is at fault."""
+def make_inputs(spec: Spec, constants: Constants, files: Files) -> tuple[Input, ...]:
+    """All inputs that are not at fault."""
     result: list[Input] = []
-    failed = False
     start = 0
     for name, model in spec.inputs.items():
         made = _make(name, model, start, spec, constants, files)
-        if made is None:
-            failed = True
-        else:
+        if made is not None:
             result.append(made)
             start += made.size
-    return None if failed else tuple(result)
+    return tuple(result)
 
 
 def _make(name: str, model: InputModel, start: int, spec: Spec, constants: Constants, files: Files) -> Input | None:
     findings = constants.findings
+    if model.lost:
+        return None
     given = [key for key in _SOURCES if getattr(model, key) is not None]
     if len(given) > 1:
         entry = model.source.entry(given[1])
         span = model.source.span if entry is None else entry.key.span
         message = f"'{given[1]}' beside '{given[0]}': an input has one source"
-        findings.error("conflicting-keys", span, message, "keep one of " + ", ".join(_SOURCES))
+        findings.error("conflicting-keys", span, message, f"keep '{given[0]}' or '{given[1]}'")
         return None
     if model.expression is not None:
-        known = (*constants.parameters, *constants.broken, *CONSTANTS, "dt", "k", "t")
-        tree: Tree | None = parse_formula(model.expression, known, findings)
+        tree = _expression(model.expression, constants)
         return None if tree is None else Input(name, start, 1, expression=tree)
     if model.file is not None:
         table = files.table(model.file)
@@ -68,6 +68,13 @@ def _make(name: str, model: InputModel, start: int, spec: Spec, constants: Const
     return None if size is None else Input(name, start, size)
 
 
+def _expression(formula: Formula, constants: Constants) -> Tree | None:
+    tree = constants.tree(formula, ("k", "t"))
+    if tree is not None and is_constant(tree, (*ALWAYS, *constants.parameters)):
+        constants.value(formula)
+    return tree
+
+
 def _tabled(name: str, start: int, table: FloatArray) -> Input:
     frozen(table)
     return Input(name, start, table.shape[1], table=table)
@@ -75,20 +82,23 @@ def _tabled(name: str, start: int, table: FloatArray) -> Input:
 
 def _inline(node: Sequence | Packed, constants: Constants) -> FloatArray | None:
     """Rows of numbers; a bare number is a row of one."""
-    rows: list[list[float]] = []
-    for item in node.items:
-        cells = item.items if isinstance(item, (Sequence, Packed)) else (item,)
-        formulas = [formula_of(cell, constants.findings) for cell in cells]
-        values = [None if formula is None else constants.scalar(formula) for formula in formulas]
-        if any(value is None for value in values):
-            return None
-        row = [value for value in values if value is not None]
-        if not row or (rows and len(row) != len(rows[0])):
-            wanted = f"{len(rows[0])} numbers, as in the first row" if rows else "at least one number"
-            constants.findings.error("wrong-size", item.span, f"a row of {len(row)} numbers; expected {wanted}")
-            return None
-        rows.append(row)
-    if not rows:
-        constants.findings.error("wrong-size", node.span, "an input needs at least one row")
+    findings = constants.findings
+    cells = cells_of(node, findings, "")
+    if cells is None:
         return None
-    return np.array(rows, dtype=np.float64)
+    widths = cells.widths
+    if not len(widths):
+        findings.error("wrong-size", node.span, "an input needs at least one row")
+        return None
+    missing = np.flatnonzero(cells.kinds == NULL)
+    for cell in missing[:PATIENCE].tolist():
+        formula_of(cells.node(cell), findings)
+    uneven = np.flatnonzero((widths != widths[0]) if widths[0] else widths == 0)
+    for row in () if len(missing) else uneven[:PATIENCE].tolist():
+        wanted = f"{amount(int(widths[0]))}, as in the first row" if widths[0] else "at least one"
+        message = f"a row of {plural(int(widths[row]), 'number')}; expected {wanted}"
+        findings.error("wrong-size", cells.row_span(row), message)
+    if len(uneven) or len(missing):
+        return None
+    values = values_of(cells, np.arange(len(cells.kinds)), constants)
+    return None if values is None else values.reshape(len(widths), int(widths[0]))

@@ -17,7 +17,7 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import PydanticCustomError, core_schema
 
-from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.diagnostics import Findings, Span, nearest, suggest
 from neurovis_spec.language.source import Node, Packed, Scalar, Sequence, describe
 
 T = TypeVar("T")
@@ -103,10 +103,14 @@ def as_identifier(node: Node, info: ValidationInfo) -> Located[str]:
 NAME_RULE = "a name is a letter or underscore, then letters, digits and underscores, 64 at most"
 
 
+def shown(text: str) -> str:
+    """A text of the author's in a finding: the beginning of a long one."""
+    return text if len(text) <= 40 else text[:37] + "…"
+
+
 def bad_name(name: str) -> str:
     """The sentence for a name that is none."""
-    shown = name if len(name) <= 40 else name[:37] + "…"
-    return f"'{shown}' is not a name"
+    return f"'{shown(name)}' is not a name"
 
 
 def as_bool(node: Node, info: ValidationInfo) -> Located[bool]:
@@ -146,9 +150,9 @@ def as_formula(node: Node, info: ValidationInfo) -> Formula:
 
 def as_number(node: Node, info: ValidationInfo) -> Located[float]:
     """A finite number as such, no expression."""
-    formula = as_formula(node, info)
-    if isinstance(formula.value, str):
+    if not isinstance(node, Scalar) or isinstance(node.value, (str, bool)) or node.value is None:
         refuse(info, node, "a number")
+    formula = as_formula(node, info)
     return Located(float(formula.value), formula.node)
 
 
@@ -172,12 +176,11 @@ def one_of(*words: str) -> Callable[[Node, ValidationInfo], Located[str]]:
     """A validator for a choice between words; a misspelling is answered with the nearest ones."""
 
     def check(node: Node, info: ValidationInfo) -> Located[str]:
-        from neurovis_spec.diagnostics import suggest
-
         text = as_text(node, info)
         if text.value not in words:
-            message = f"'{text.value}' is not one of {', '.join(words)}"
-            findings_of(info).error("unknown-value", node.span, message, suggest(text.value, words))
+            message = f"'{shown(text.value)}' is not one of {', '.join(words)}"
+            hint = suggest(text.value, words) if nearest(text.value, words) else None
+            findings_of(info).error("unknown-value", node.span, message, hint)
             give_up()
         return text
 

@@ -1,20 +1,23 @@
 """The base of all models of the language: a mapping with known keys.
 
-In: a dict as ``shape.plain`` makes it: its values are nodes, and under ``$`` stands the Mapping itself. Out: the
-model, its ``source`` the Mapping. Unknown keys are answered with the nearest known ones, missing ones with what is
-missing; both are findings, and the rest of the mapping is still looked at.
+In: a Mapping of the document. Out: the model, its ``source`` the Mapping. Unknown keys are answered with the nearest
+known ones, missing ones with what is missing. A key whose value is at fault is noted and left out, and so is an entry
+of a mapping of the author's names: all others are still read, so that later stages have something to look at. What was
+left out is what stands in ``source`` and not in the model (``lost``).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from typing import Annotated, ClassVar, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, WrapValidator, model_validator
+from pydantic.fields import FieldInfo
 from pydantic.json_schema import SkipJsonSchema
 
-from neurovis_spec.diagnostics import Span, suggest
-from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Leaf, bad_name, findings_of, give_up, refuse
-from neurovis_spec.language.source import Mapping, Node, Scalar
+from neurovis_spec.diagnostics import Findings, Span, nearest, suggest
+from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Leaf, bad_name, findings_of, give_up, refuse, shown
+from neurovis_spec.language.source import Entry, Mapping, Node, Scalar, ScalarValue
 
 V = TypeVar("V")
 
@@ -30,50 +33,103 @@ class Model(BaseModel):
 
     #: keys that belong to the language but not yet to this version, with what they are
     LATER: ClassVar[dict[str, str]] = {}
+    #: what a mapping of this kind is called in a finding, for keys that are written elsewhere
+    PLACE: ClassVar[str] = ""
+    #: what required keys are taken for where they are missing or at fault, to go on looking
+    STAND_INS: ClassVar[dict[str, ScalarValue]] = {}
 
     source: SkipJsonSchema[Annotated[Mapping, Leaf(_as_it_is, {})]] = Field(alias="$", exclude=True, repr=False)
 
-    @model_validator(mode="before")
+    @model_validator(mode="wrap")
     @classmethod
-    def _keys(cls, data: object, info: ValidationInfo) -> object:
+    def _read(cls, data: object, handler: Callable[[object], Model], info: ValidationInfo) -> Model:
         if not isinstance(data, Mapping):
             assert not isinstance(data, (str, int, float, dict))
-            refuse(info, data, "a mapping")  # type: ignore[arg-type]
-        findings = findings_of(info)
-        known = {field.alias or name: field for name, field in cls.model_fields.items() if name != "source"}
+            hint = "write {} where there is nothing to say" if isinstance(data, Scalar) and data.value is None else None
+            refuse(info, data, "a mapping", hint)  # type: ignore[arg-type]
+        values = cls._keys(data, findings_of(info))
+        for _ in range(2):
+            try:
+                return handler(values)
+            except ValidationError as error:
+                faulty = _first_parts(error)
+                for key in map(str, faulty):
+                    values.pop(key, None)
+                    if cls._fields()[key].is_required():
+                        if key not in cls.STAND_INS:
+                            give_up()
+                        values[key] = Scalar(cls.STAND_INS[key], data.span)
+        give_up()
+
+    @classmethod
+    def _fields(cls) -> dict[str, FieldInfo]:
+        return {field.alias or name: field for name, field in cls.model_fields.items() if name != "source"}
+
+    @classmethod
+    def _keys(cls, data: Mapping, findings: Findings) -> dict[str, object]:
+        """The values by key, under ``$`` the Mapping itself; what is missing or unknown is noted."""
+        fields = cls._fields()
         result: dict[str, object] = {"$": data}
+        perhaps: set[str] = set()
         for entry in data.entries:
-            if entry.name in known:
-                if (
-                    isinstance(entry.value, Scalar)
-                    and entry.value.value is None
-                    and not known[entry.name].is_required()
-                ):
-                    if cls._null_is_mapping(entry.name):
-                        result[entry.name] = Mapping((), entry.value.span)
-                    else:
-                        message = f"'{entry.name}' has no value"
-                        findings.error("no-value", entry.key.span, message, "leave the key out, or give it a value")
-                    continue
-                result[entry.name] = entry.value
-            elif entry.name in cls.LATER:
-                message = f"'{entry.name}' ({cls.LATER[entry.name]}) is not read by this version yet"
-                findings.error("unsupported", entry.key.span, message)
+            field = fields.get(entry.name)
+            if field is None:
+                perhaps.update(cls._unknown(entry, fields, findings))
+            elif isinstance(entry.value, Scalar) and entry.value.value is None and not field.is_required():
+                message = f"'{entry.name}' has no value"
+                findings.error("no-value", entry.key.span, message, "leave the key out, or give it a value")
             else:
-                shown = entry.name if len(entry.name) <= 40 else entry.name[:37] + "…"
-                hint = suggest(entry.name, known, "known here")
-                findings.error("unknown-key", entry.key.span, f"unknown key '{shown}'", hint)
-        missing = [name for name, field in known.items() if field.is_required() and data.entry(name) is None]
-        for name in missing:
-            findings.error("missing-key", opening(data), f"the key '{name}' is missing")
-        if missing:
+                result[entry.name] = entry.value
+        hopeless = False
+        for name, field in fields.items():
+            if field.is_required() and name not in result:
+                if name not in perhaps:
+                    findings.error("missing-key", opening(data), f"the key '{name}' is missing")
+                if name in cls.STAND_INS:
+                    result[name] = Scalar(cls.STAND_INS[name], opening(data))
+                else:
+                    hopeless = True
+        if hopeless:
             give_up()
         return result
 
     @classmethod
-    def _null_is_mapping(cls, key: str) -> bool:
-        """Whether an empty value stands for an empty mapping (``neurons:`` with nothing below it does not)."""
-        return False
+    def _unknown(cls, entry: Entry, fields: dict[str, FieldInfo], findings: Findings) -> tuple[str, ...]:
+        """Note a key that is not known here; the known ones that it may be meant for."""
+        name, span = entry.name, entry.key.span
+        if name in cls.LATER:
+            message = f"'{name}' ({cls.LATER[name]}) is not read by this version yet"
+            findings.error("unsupported", span, message)
+            return ()
+        close = nearest(name, fields)
+        homes = () if close else tuple(dict.fromkeys(model.PLACE for model in _models() if name in model._fields()))
+        hint = suggest(name, fields, "known here")
+        if any(homes):
+            hint = f"'{name}' is a key of {' and of '.join(home for home in homes if home)}"
+        findings.error("unknown-key", span, f"unknown key '{shown(name)}'", hint)
+        return close
+
+    @property
+    def lost(self) -> frozenset[str]:
+        """The keys of the source that are not in the model: unknown ones, and those whose value is at fault."""
+        taken = {
+            field.alias or name for name, field in type(self).model_fields.items() if name in self.model_fields_set
+        }
+        return frozenset(entry.name for entry in self.source.entries) - taken
+
+
+def _models() -> Iterator[type[Model]]:
+    """All models of the language."""
+    waiting: list[type[Model]] = [Model]
+    while waiting:
+        model = waiting.pop(0)
+        yield model
+        waiting += model.__subclasses__()
+
+
+def _first_parts(error: ValidationError) -> set[str | int]:
+    """The keys, names or indices under which a validation failed."""
+    return {item["loc"][0] for item in error.errors(include_url=False, include_context=False, include_input=False)}
 
 
 def opening(mapping: Mapping) -> Span:
@@ -84,22 +140,35 @@ def opening(mapping: Mapping) -> Span:
     return Span(span.file, span.line, span.column, span.line, span.column + 1)
 
 
-def _named(node: Node, info: ValidationInfo) -> dict[str, Node]:
+def lost_names(source: Mapping, section: str, kept: dict[str, V]) -> tuple[str, ...]:
+    """The names of a section that were left out because what they name is at fault."""
+    node = source.get(section)
+    entries = node.entries if isinstance(node, Mapping) else ()
+    return tuple(entry.name for entry in entries if entry.name not in kept)
+
+
+def _named(node: Node, handler: Callable[[object], dict[str, V]], info: ValidationInfo) -> dict[str, V]:
     if not isinstance(node, Mapping):
         refuse(info, node, "a mapping")
     for entry in node.entries:
         if not IDENTIFIER.fullmatch(entry.name):
             findings_of(info).error("bad-name", entry.key.span, bad_name(entry.name), NAME_RULE)
-    return {entry.name: entry.value for entry in node.entries}
+    return _keyed(node, handler, info)
 
 
-def _keyed(node: Node, info: ValidationInfo) -> dict[str, Node]:
+def _keyed(node: Node, handler: Callable[[object], dict[str, V]], info: ValidationInfo) -> dict[str, V]:
     if not isinstance(node, Mapping):
         refuse(info, node, "a mapping")
-    return {entry.name: entry.value for entry in node.entries}
+    values = {entry.name: entry.value for entry in node.entries}
+    try:
+        return handler(values)
+    except ValidationError as error:
+        for name in _first_parts(error):
+            values.pop(str(name), None)
+        return handler(values)
 
 
 #: A mapping whose keys are references or free texts: ``Keyed[PointField]``.
-Keyed = Annotated[dict[str, V], BeforeValidator(_keyed)]
+Keyed = Annotated[dict[str, V], WrapValidator(_keyed)]
 #: A mapping whose keys are names of the author's: ``Named[Group]``.
-Named = Annotated[dict[str, V], BeforeValidator(_named)]
+Named = Annotated[dict[str, V], WrapValidator(_named)]

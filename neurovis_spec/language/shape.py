@@ -1,6 +1,7 @@
 """From a SourceDocument to a Spec: the shape is checked, nothing is resolved.
 
-In: a SourceDocument and Findings. Out: the Spec, or None where its shape is at fault (the Findings say what is wrong).
+In: a SourceDocument and Findings. Out: the Spec, without what is at fault in it (the Findings say what that is), so
+that the compiler can look at the rest; None where nothing can be said, as in another version of the language.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ M = TypeVar("M", bound=Model)
 
 
 def read_shape(document: SourceDocument, model: type[M], findings: Findings) -> M | None:
-    """Check a document against a model. All findings are noted; the result is None where there is an error."""
+    """Check a document against a model. All findings are noted; the result holds what could be read, None where that
+    is too little to go on."""
     before = findings.errors
     try:
         result = model.model_validate(document.root, context=findings)
@@ -29,7 +31,7 @@ def read_shape(document: SourceDocument, model: type[M], findings: Findings) -> 
                 keys = ".".join(str(part) for part in item["loc"])
                 findings.error("wrong-shape", opening(document.root), f"{keys}: {item['msg']}")
         return None
-    return result if findings.errors == before else None
+    return result
 
 
 def read_spec(document: SourceDocument, findings: Findings) -> Spec | None:

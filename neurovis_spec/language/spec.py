@@ -29,7 +29,7 @@ from neurovis_spec.language.located import (
     refuse,
 )
 from neurovis_spec.language.model import Keyed, Model, Named
-from neurovis_spec.language.source import Mapping, Node, Packed, Scalar, Sequence
+from neurovis_spec.language.source import Entry, Mapping, Node, Packed, Scalar, ScalarValue, Sequence
 from neurovis_spec.language.values import (
     CentreField,
     ChoiceField,
@@ -50,7 +50,7 @@ LANGUAGE_VERSION = 1
 def _version(node: Node, info: ValidationInfo) -> Located[int]:
     version = as_integer(node, info)
     if version.value != LANGUAGE_VERSION:
-        message = f"this is written in version {version.value} of the language; this program reads version 1"
+        message = f"this is written in version {version.value:g} of the language; this program reads version 1"
         findings_of(info).error("language-version", node.span, message, "write neurovis: 1")
         give_up()
     return version
@@ -62,6 +62,8 @@ def _words(*words: str) -> Leaf[Node]:
 
 class Time(Model):
     """The clock of a run."""
+
+    PLACE: ClassVar[str] = "'time'"
 
     dt: FormulaField | None = Field(None, description="Seconds a step (default 1).")
     steps: FormulaField | None = Field(None, description="Default run length in steps (default 1000).")
@@ -76,6 +78,8 @@ def _table(node: Node, info: ValidationInfo) -> FileReference | Sequence | Packe
 
 class InputModel(Model):
     """A signal that comes from outside the network."""
+
+    PLACE: ClassVar[str] = "an input"
 
     expression: FormulaField | None = Field(None, description="A formula of k (the step), t (seconds) and parameters.")
     file: TextField | None = Field(None, description="A .csv or .npy file, one row a step; the last row stays.")
@@ -97,6 +101,8 @@ def _position(node: Node, info: ValidationInfo) -> FileReference | Sequence | Pa
 
 class GroupModel(Model):
     """A group of neurons, or a single one."""
+
+    PLACE: ClassVar[str] = "a group of neurons"
 
     count: FormulaField | None = Field(None, description="How many neurons; K with count 3 makes K1, K2, K3.")
     first: FormulaField | None = Field(None, description="The number of the first neuron (default 1).")
@@ -130,6 +136,8 @@ class GroupModel(Model):
 
 class ConnectionModel(Model):
     """The body of a connection; a bare weight is read as ``{weight: …}``."""
+
+    PLACE: ClassVar[str] = "a connection"
 
     LATER: ClassVar[dict[str, str]] = {"scale": "weights scaled when they are made"}
 
@@ -214,6 +222,8 @@ class RuleModel(Model):
 class EventModel(Model):
     """Something that changes during a run."""
 
+    PLACE: ClassVar[str] = "an event"
+
     at: FormulaField | None = Field(None, description="The step from which on it applies (set, lesion).")
     from_: FormulaField | None = Field(None, alias="from", description="The first step of a clamp.")
     to: FormulaField | None = Field(None, description="The step before which a clamp ends; without it, it lasts.")
@@ -231,6 +241,8 @@ def _items(node: Node, info: ValidationInfo) -> tuple[Node, ...]:
 class Spacing(Model):
     """Distances of the layout in its units."""
 
+    PLACE: ClassVar[str] = "'layout: spacing'"
+
     neuron: NumberField | None = Field(None, description="Between neighbours of a rank (default 1).")
     rank: NumberField | None = Field(None, description="Between ranks (default 2).")
 
@@ -240,6 +252,8 @@ ENGINES = ("auto", "layered", "organic", "large", "circular", "grid", "spatial",
 
 class LayoutModel(Model):
     """How the network is laid out."""
+
+    PLACE: ClassVar[str] = "'layout'"
 
     LATER: ClassVar[dict[str, str]] = {
         "mirror": "mirror images",
@@ -264,6 +278,8 @@ class LayoutModel(Model):
 class Gain(Model):
     """The scaling factors γ of Eqs. 2–5; those not given suit the network's range."""
 
+    PLACE: ClassVar[str] = "'render: gain'"
+
     activity: NumberField | None = Field(None, description="γ_NC, Eq. 2: colour of neurons.")
     signal: NumberField | None = Field(None, description="γ_CC, Eq. 3: colour of connections.")
     thickness: NumberField | None = Field(None, description="γ_CT, Eq. 4: thickness of connections, pixels a unit.")
@@ -272,6 +288,8 @@ class Gain(Model):
 
 class RenderModel(Model):
     """How the network is drawn."""
+
+    PLACE: ClassVar[str] = "'render'"
 
     gain: Gain | None = Field(None, description="The scaling factors γ of Eqs. 2–5.")
     theme: Annotated[Located[str], _words("default", "dark", "print", "paper")] | None = Field(
@@ -315,6 +333,8 @@ class RosModel(Model):
 class Library(Model):
     """A file of definitions, as the built-in ones ship."""
 
+    STAND_INS: ClassVar[dict[str, ScalarValue]] = {"neurovis": LANGUAGE_VERSION}
+
     neurovis: Annotated[Located[int], Leaf(_version, {"const": 1})] = Field(
         description="The version of the language: 1."
     )
@@ -331,6 +351,9 @@ def _as_it_is(value: Located[str], info: ValidationInfo) -> Located[str]:
 
 class Spec(Library):
     """A whole spec."""
+
+    PLACE: ClassVar[str] = "the top level"
+    STAND_INS: ClassVar[dict[str, ScalarValue]] = {"neurovis": LANGUAGE_VERSION, "name": "unnamed"}
 
     LATER: ClassVar[dict[str, str]] = {
         "include": "definitions from other files",
@@ -361,32 +384,36 @@ class Spec(Library):
     ros: RosModel | None = Field(None, description="How it meets ROS.")
 
 
+#: Findings of one list, after which the rest of it is not looked at.
+_PATIENCE = 20
+
+
 def _connections(node: Node, info: ValidationInfo) -> list[tuple[Located[str], object]]:
-    """One mapping, or a list of mappings: in both cases the entries in the order written."""
+    """One mapping, or a list of mappings: in both cases the entries in the order written. What is at fault is noted and
+    left out."""
     mappings = node.items if isinstance(node, (Sequence, Packed)) else (node,)
     result: list[tuple[Located[str], object]] = []
+    before = findings_of(info).errors
     for mapping in mappings:
-        if not isinstance(mapping, Mapping):
-            refuse(info, mapping, "a mapping FROM -> TO: weight, or a list of such")
-        for entry in mapping.entries:
-            key = Located(entry.name, entry.key)
-            value = entry.value
-            if isinstance(value, Scalar) and value.value is None:
-                result.append((key, Mapping((), entry.key.span)))
-            elif isinstance(value, Mapping):
-                result.append((key, value))
-            else:
-                with suppress(PydanticCustomError):  # noted; the other entries are still looked at
-                    result.append((key, _weight_body(value, info)))
+        if findings_of(info).errors - before >= _PATIENCE:
+            break
+        with suppress(PydanticCustomError):
+            if not isinstance(mapping, Mapping):
+                refuse(info, mapping, "a mapping FROM -> TO: weight, or a list of such")
+            for entry in mapping.entries:
+                with suppress(PydanticCustomError):
+                    result.append((Located(entry.name, entry.key), _body(entry, info)))
     return result
 
 
-def _weight_body(node: Node, info: ValidationInfo) -> Mapping:
-    """A bare weight is short for a body with a weight."""
-    from neurovis_spec.language.source import Entry as SourceEntry
-
+def _body(entry: Entry, info: ValidationInfo) -> Mapping:
+    """A body as it is; a bare weight is short for a body with a weight, and nothing for an empty one."""
+    node = entry.value
+    if isinstance(node, Mapping):
+        return node
     if not isinstance(node, Scalar):
         hint = "write {matrix: …}" if isinstance(node, (Sequence, Packed)) else None
         refuse(info, node, "a weight or a mapping", hint)
-    key = Scalar("weight", node.span, None)
-    return Mapping((SourceEntry(key, node),), node.span)
+    if node.value is None:
+        return Mapping((), entry.key.span)
+    return Mapping((Entry(Scalar("weight", node.span, None), node),), node.span)

@@ -10,19 +10,22 @@ from typing import Annotated, TypeAlias
 
 from pydantic import ValidationInfo
 
-from neurovis_spec.diagnostics import Span, suggest
+from neurovis_spec.diagnostics import Span, nearest, suggest
 from neurovis_spec.language.located import (
     Formula,
     Leaf,
     Located,
     as_bool,
     as_formula,
+    as_number,
     as_text,
     as_texts,
     findings_of,
     give_up,
     refuse,
+    shown,
 )
+from neurovis_spec.language.model import opening
 from neurovis_spec.language.source import Entry, Mapping, Node, Packed, Scalar, Sequence
 
 FORMULA = {"anyOf": [{"type": "number"}, {"type": "string"}]}
@@ -47,14 +50,17 @@ def as_choice(node: Node, info: ValidationInfo) -> Choice:
         refuse(info, node, "a name, or {name: {parameter: value}}")
     if len(node.entries) != 1:
         span = node.entries[1].key.span if node.entries else node.span
-        findings_of(info).error("one-key", span, f"expected one name here, found {len(node.entries)}")
+        hint = "write name, or {name: {parameter: value}}"
+        findings_of(info).error("one-key", span, f"expected one name here, found {len(node.entries)}", hint)
         give_up()
     entry = node.entries[0]
     name = Located(entry.name, entry.key)
     if isinstance(entry.value, Scalar) and entry.value.value is None:
         return Choice(name, ())
     if not isinstance(entry.value, Mapping):
-        refuse(info, entry.value, f"a mapping of the settings of '{entry.name}'", "write {name: {parameter: value}}")
+        refuse(
+            info, entry.value, f"a mapping of the settings of '{shown(entry.name)}'", "write {name: {parameter: value}}"
+        )
     return Choice(name, entry.value.entries)
 
 
@@ -101,11 +107,12 @@ def as_file(node: Mapping, info: ValidationInfo) -> FileReference:
     known = ("file", "key")
     for entry in node.entries:
         if entry.name not in known:
-            message = f"unknown key '{entry.name}'"
+            message = f"unknown key '{shown(entry.name)}'"
             findings_of(info).error("unknown-key", entry.key.span, message, suggest(entry.name, known))
     path = node.get("file")
     if path is None:
-        findings_of(info).error("missing-key", node.span, "the key 'file' is missing")
+        if not any(nearest(entry.name, ("file",)) for entry in node.entries):
+            findings_of(info).error("missing-key", opening(node), "the key 'file' is missing")
         give_up()
     key = node.get("key")
     return FileReference(as_text(path, info), None if key is None else as_text(key, info), node.span)
@@ -208,11 +215,12 @@ def as_parameter(node: Node, info: ValidationInfo) -> Parameter:
     known = ("value", "min", "max", "description")
     for entry in node.entries:
         if entry.name not in known:
-            message = f"unknown key '{entry.name}'"
+            message = f"unknown key '{shown(entry.name)}'"
             findings_of(info).error("unknown-key", entry.key.span, message, suggest(entry.name, known))
     value, low, high, text = (node.get(name) for name in known)
     if value is None:
-        findings_of(info).error("missing-key", node.span, "the key 'value' is missing")
+        if not any(nearest(entry.name, ("value",)) for entry in node.entries):
+            findings_of(info).error("missing-key", opening(node), "the key 'value' is missing")
         give_up()
     return Parameter(
         as_formula(value, info),
@@ -276,8 +284,6 @@ class Point:
 
 def as_point(node: Node, info: ValidationInfo) -> Point:
     """``[x, y]``: two finite numbers."""
-    from neurovis_spec.language.located import as_number
-
     if not isinstance(node, Sequence) or len(node.items) != 2:
         refuse(info, node, "a position [x, y]")
     x, y = (as_number(item, info).value for item in node.items)

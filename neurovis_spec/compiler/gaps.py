@@ -1,0 +1,66 @@
+"""Gaps: names whose declarations are at fault, so that nobody complains that they are unknown as well.
+
+In: a Spec as far as it could be read. Out: for each section the names that it declares and that were left out, and the
+sections that are at fault as a whole, or that a misspelled key may have been meant for. One cause, one finding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+from neurovis_spec.diagnostics import nearest
+from neurovis_spec.language.model import lost_names
+from neurovis_spec.language.spec import GroupModel, Library, Spec
+
+SECTIONS = ("parameters", "inputs", "neurons", "activations", "models", "rules")
+_NAMING = frozenset({"count", "first", "names"})
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """What may have been declared: names by section, and sections of which nothing is known."""
+
+    names: Mapping[str, frozenset[str]] = field(default_factory=lambda: dict.fromkeys(SECTIONS, frozenset()))
+    sections: frozenset[str] = frozenset()
+
+    def cover(self, section: str, name: str) -> bool:
+        """Whether a name that is unknown in a section may be one whose declaration is at fault."""
+        return section in self.sections or name in self.names[section]
+
+    def with_names(self, section: str, names: Iterable[str]) -> Gaps:
+        """The same, with these names of a section."""
+        return replace(self, names={**self.names, section: frozenset(names)})
+
+    def cover_reference(self, name: str) -> bool:
+        """The same for a reference: a group at fault may make any neuron that begins with its name."""
+        groups = self.names["neurons"]
+        return "neurons" in self.sections or any(name.startswith(group) for group in groups)
+
+
+def _names_neurons(key: str) -> bool:
+    """Whether a key of a group that was left out may have said which neurons there are."""
+    if key in GroupModel.model_fields or key in GroupModel.LATER:
+        return key in _NAMING
+    close = nearest(key, GroupModel.model_fields)
+    return not close or not _NAMING.isdisjoint(close)
+
+
+def gaps_of(library: Library) -> Gaps:
+    """The gaps of a spec, or of a file of definitions."""
+    whole = set(library.lost.intersection(SECTIONS))
+    for key in library.lost.difference(SECTIONS):
+        whole.update(nearest(key, SECTIONS))
+    if library.lost & {"instances", "modules", "include"}:
+        whole.update(SECTIONS)
+    names: dict[str, frozenset[str]] = {}
+    for section in SECTIONS:
+        kept: dict[str, object] = getattr(library, section, {})
+        names[section] = frozenset(lost_names(library.source, section, kept))
+    if isinstance(library, Spec):
+        for name, group in library.neurons.items():
+            if any(_names_neurons(key) for key in group.lost):
+                names["neurons"] |= {name}
+        if any("names" in group.lost for group in library.neurons.values()):
+            whole.add("neurons")
+    return Gaps(names, frozenset(whole))
