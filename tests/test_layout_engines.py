@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 import os
 import subprocess
 import sys
@@ -69,6 +70,23 @@ def test_self_loops_turn_away_from_the_neighbour() -> None:
     layout = lay_out_problem(suite.use_case_one(), "layered")
     assert min(x for x, _ in layout.routes["C1 -> C1"]) < layout.positions["C1"][0] - 0.3
     assert max(x for x, _ in layout.routes["C2 -> C2"]) > layout.positions["C2"][0] + 0.3
+
+
+@pytest.mark.parametrize("direction", ["down", "up", "right", "left"])
+def test_a_self_loops_legs_keep_off_the_other_edges_of_its_neuron(direction: Direction) -> None:
+    layout = lay_out_problem(suite.use_case_one(direction), "layered")
+    for neuron in ("C1", "C2"):
+        loop, place = layout.routes[f"{neuron} -> {neuron}"], layout.positions[neuron]
+        legs = [_angle(place, loop[1]), _angle(place, loop[2])]
+        others = [_angle(place, r[1]) for n, r in layout.routes.items() if n.startswith(neuron) and r is not loop]
+        others += [_angle(place, r[-2]) for n, r in layout.routes.items() if n.endswith(neuron) and r is not loop]
+        assert len(others) == 10
+        gaps = [abs((leg - other + 180) % 360 - 180) for leg in legs for other in others]
+        assert min(gaps) > 14  # at the rim of a disc, wider than an arrowhead
+
+
+def _angle(centre: Point, towards: Point) -> float:
+    return math.degrees(math.atan2(towards[1] - centre[1], towards[0] - centre[0]))
 
 
 def test_arrivals_come_in_the_order_of_their_sources() -> None:

@@ -20,8 +20,8 @@ def test_all_four_ingredients_of_use_case_1_show() -> None:
     gains = choose_gains(CASE.network, RenderSettings(), *CASE.peaks)
     activity, weights, signals, changes = CASE.peaks
     groups = [activity[g.start : g.start + g.count].max() for g in CASE.network.neurons.groups]
-    assert all(0.35 <= gains.activity * peak <= 3 for peak in groups)
-    assert gains.signal * signals[4:20].max() >= 0.5
+    assert all(0.6 <= gains.activity * peak <= 3.5 for peak in groups)
+    assert gains.signal * signals[4:20].max() >= 0.75
     assert gains.signal * signals[20:].max() <= 3
     assert weights.max() * gains.thickness <= 9
     assert weights[20:].max() * gains.thickness >= 1.2
@@ -54,6 +54,15 @@ def test_a_small_group_is_not_drowned_by_a_big_one() -> None:
     one = np.ones(1)
     gains = choose_gains(made, RenderSettings(), peaks, one, one, one)
     assert gains.activity * 0.1 > 0.25
+
+
+def test_a_few_strong_neurons_do_not_take_the_colour_of_a_big_group() -> None:
+    made = network([numbered("A", 100)], [C("A1", "A2")])
+    peaks = np.array([0.1] * 95 + [1.0] * 5)
+    one = np.ones(1)
+    assert choose_gains(made, RenderSettings(), peaks, one, one, one).activity == 10.0
+    few = network([numbered("A", 8)], [C("A1", "A2")])
+    assert choose_gains(few, RenderSettings(), np.array([0.1] * 7 + [1.0]), one, one, one).activity == 1.0
 
 
 peak = st.one_of(st.floats(0, 1e300), st.sampled_from([float("nan"), float("inf"), 0.0, 5e-324]))

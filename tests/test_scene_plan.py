@@ -16,6 +16,7 @@ from neurovis_spec.scene.encode import encode
 from neurovis_spec.scene.film import film
 from neurovis_spec.scene.gains import Gains, choose_gains
 from neurovis_spec.scene.geometry import Rect, overlap, sample
+from neurovis_spec.scene.legend import nice_weights
 
 CASE = use_case_1(400)
 GAINS = choose_gains(CASE.network, RenderSettings(), *CASE.peaks)
@@ -293,6 +294,19 @@ def test_glows_lie_beneath_the_lines_that_cannot_glow() -> None:
     lines = [g for g in picture().groups if "connection" in g.data]
     plastic = [place for place, g in enumerate(lines) if g.data["to"] == "O"]
     assert plastic == list(range(8))
+
+
+def test_strong_lines_lie_above_weak_ones() -> None:
+    made = network([numbered("A", 4)], [C("A1", "A2", -3.0), C("A1", "A3", 0.5), C("A1", "A4", 1.0)])
+    scene = small(made, straight_layout(made, {"A1": (0, 0), "A2": (0, 2), "A3": (1, 2), "A4": (2, 2)}))
+    assert [g.data["to"] for g in scene.groups if "connection" in g.data] == ["A3", "A4", "A2"]
+
+
+def test_the_legend_shows_no_weight_heavier_than_the_networks() -> None:
+    assert nice_weights(4.0, 1.01) == [0.2, 0.5, 1.0]
+    assert nice_weights(-4.0) == [0.5, 1.0, 2.0]
+    assert nice_weights(15.0, 0.1) == [0.05, 0.1]
+    assert nice_weights(1.0, 0.01)[-1] == 5.0  # all lines are as thin as can be: what a thick one would mean
 
 
 def test_every_step_has_the_same_geometry_and_a_films_frames_are_the_stills() -> None:

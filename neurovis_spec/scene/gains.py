@@ -2,12 +2,11 @@
 
 In: the peaks of a probe run. Out: Gains. A gain is chosen from the peaks of groups of neurons and entries of
 connections rather than of single ones, so that one big group does not drown a small one: the value at which a colour is
-full is the geometric mean of the weakest and the strongest group.
+full lies between the weakest and the strongest group, nearer to the weakest, so that quiet groups have colour too.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,8 +19,14 @@ IntArray = npt.NDArray[np.int64]
 
 #: groups whose peak is below this share of the strongest are not looked at: they are silent
 _SILENT = 1 / 32
+#: of a group with many members: the share of them that do not saturate
+_MOST = 0.9
+#: where between the weakest (0) and the strongest group (1) a colour is full, on a logarithmic scale
+_BETWEEN = 0.25
 #: how wide, in user units, the strongest and a typical line are to be in a small network
 _WIDEST, _TYPICAL = 9.0, 4.5
+#: with more lines than this they get thinner
+_CROWD = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +58,8 @@ def choose_gains(
     entries = network.connections.entry
     changes = _peaks(change_peaks, np.arange(len(change_peaks)))
     chosen = Gains(
-        activity=_full_at(_peaks(activity_peaks, groups)),
-        signal=_full_at(_peaks(signal_peaks, entries)),
+        activity=_full_at(_peaks(activity_peaks, groups, _MOST)),
+        signal=_full_at(_peaks(signal_peaks, entries, _MOST)),
         thickness=_thickness(_peaks(weight_peaks, entries), len(network.connections)),
         change=1 / _nice(float(np.median(changes))) if len(changes) else 1.0,
     )
@@ -66,11 +71,14 @@ def choose_gains(
     )
 
 
-def _peaks(values: FloatArray, members: IntArray) -> FloatArray:
-    """The peak of every group of values that is not silent, finite and above zero."""
+def _peaks(values: FloatArray, members: IntArray, share: float = 1.0) -> FloatArray:
+    """The peak of every group of values that is not silent, finite and above zero: the value that a ``share`` of its
+    members do not exceed."""
     finite = np.where(np.isfinite(values), np.abs(values), 0.0)
-    peaks = np.zeros(int(members.max(initial=-1)) + 1)
-    np.maximum.at(peaks, members, finite)
+    order = np.lexsort((finite, members))
+    first = np.flatnonzero(np.diff(members[order], prepend=-1))
+    count = np.diff(first, append=len(members))
+    peaks = finite[order][first + np.ceil(share * (count - 1)).astype(int)]
     result: FloatArray = peaks[(peaks > 1e-12) & (peaks >= _SILENT * peaks.max(initial=0.0)) & (peaks < 1e12)]
     return result
 
@@ -78,14 +86,15 @@ def _peaks(values: FloatArray, members: IntArray) -> FloatArray:
 def _full_at(peaks: FloatArray) -> float:
     if not len(peaks):
         return 1.0
-    return 1 / _nice(math.sqrt(float(peaks.min()) * float(peaks.max())))
+    low, high = float(peaks.min()), float(peaks.max())
+    return 1 / _nice(low * (high / low) ** _BETWEEN)
 
 
 def _thickness(peaks: FloatArray, connections: int) -> float:
-    """Thinner where there are many lines: at 400 half as wide as at 40."""
+    """Thinner where there are many lines: half as wide at 160 as at 10."""
     if not len(peaks):
         return _TYPICAL
-    crowd = min(1.0, (40 / max(connections, 1)) ** 0.3)
+    crowd = min(1.0, (_CROWD / max(connections, 1)) ** 0.25)
     return _nice(crowd * min(_WIDEST / float(peaks.max()), _TYPICAL / float(np.median(peaks))))
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from neurovis_spec.scene import texts
-from neurovis_spec.scene.encoding import glow_width
+from neurovis_spec.scene.encoding import THINNEST, glow_width
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.geometry import Point
 from neurovis_spec.scene.model import Group, Ramp, Shape, Spline, Text, Theme
@@ -24,7 +24,7 @@ _HEADING, _SMALL = 11.5, 11.0
 _ENTRY_HEIGHT, _ROW_GAP, _ENTRY_GAP = 58.0, 10.0, 24.0
 _SAMPLE_Y, _FIRST_Y, _SECOND_Y = 20.0, 41.0, 55.0
 _RAMP, _STRIPES = 150.0, 75
-_STROKE, _STROKE_GAP = 36.0, 10.0
+_STROKE, _STROKE_GAP, _WIDEST = 36.0, 10.0, 8.6
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +41,8 @@ class Contents:
 
     lines: bool
     learns: bool
+    #: the largest weight of a fixed connection, infinite without any
+    heaviest: float
     #: what the dotted lines are, '' without any
     teaches: str
 
@@ -49,7 +51,7 @@ def entries(contents: Contents, gains: Gains, theme: Theme) -> list[Entry]:
     """The entries that this picture needs."""
     result = [_colour(contents, gains, theme)]
     if contents.lines and gains.thickness:
-        result.append(_thickness(gains, theme))
+        result.append(_thickness(contents, gains, theme))
     if contents.learns and gains.change:
         result.append(_glow(gains, theme))
     if contents.teaches:
@@ -136,9 +138,9 @@ def _ends(gain: float) -> tuple[str, str]:
     return ("−" + full, "+" + full) if gain >= 0 else ("+" + full, "−" + full)
 
 
-def _thickness(gains: Gains, theme: Theme) -> Entry:
+def _thickness(contents: Contents, gains: Gains, theme: Theme) -> Entry:
     shapes: list[Shape] = [_heading("Thickness", theme)]
-    values = nice_weights(gains.thickness)
+    values = nice_weights(gains.thickness, contents.heaviest)
     for place, value in enumerate(values):
         x = place * (_STROKE + _STROKE_GAP)
         shapes.append(_stroke(x, _STROKE, theme.muted, abs(gains.thickness) * value))
@@ -148,14 +150,22 @@ def _thickness(gains: Gains, theme: Theme) -> Entry:
     return Entry(tuple(shapes), across)
 
 
-def nice_weights(gain: float) -> list[float]:
-    """Weights that are 1, 2 or 5 times a power of ten, whose lines are thin, middling and thick with this gain.
+def nice_weights(gain: float, heaviest: float = math.inf) -> list[float]:
+    """Up to three weights that are 1, 2 or 5 times a power of ten, the largest at most ``heaviest`` and drawn no wider
+    than a legend has room for, the smallest no thinner than a line can be.
 
-    >>> nice_weights(4.0), nice_weights(15.0)
-    ([0.2, 1.0, 2.0], [0.1, 0.2, 0.5])
+    >>> nice_weights(4.0), nice_weights(4.0, 1.01), nice_weights(15.0, 0.1)
+    ([0.5, 1.0, 2.0], [0.2, 0.5, 1.0], [0.05, 0.1])
     """
-    thin, middling, thick = (_nice_below(width / abs(gain)) for width in (1.7, 4.0, 8.6))
-    return sorted({thin, middling, thick})
+    widest = _WIDEST / abs(gain)
+    value = _nice_below(min(widest, heaviest) if heaviest * abs(gain) >= THINNEST else widest)
+    values = [value]
+    while len(values) < 3:
+        value = _nice_below(value * 0.6)
+        if value * abs(gain) < THINNEST:
+            break
+        values.append(value)
+    return values[::-1]
 
 
 def _nice_below(value: float) -> float:

@@ -91,7 +91,7 @@ class Arrowhead:
 
 
 #: How the half width of a head follows from its length and the width of its line.
-HEAD_OF_LENGTH, HEAD_OF_WIDTH, HEAD_MORE = 0.28, 0.42, 0.6
+HEAD_OF_LENGTH, HEAD_OF_WIDTH, HEAD_MORE = 0.3, 0.6, 0.6
 
 
 def head_half_width(width: float, length: float) -> float:

@@ -71,7 +71,7 @@ def plan(network: Network, layout: Layout, gains: Gains, settings: RenderSetting
     title, items, frame = _frame(network, gains, settings, theme, teachers, _extent(positions, routes, boxes))
     centres = frame.map(positions)
     radius = RADIUS * frame.scale
-    gap, head = min(1.5, 0.1 * radius), min(8.5, 0.45 * radius)
+    gap, head = min(1.5, 0.1 * radius), min(10.0, 0.5 * radius)
     lines = trimmed([frame.map(route) for route in routes], radius, gap, head)
     obstacles = Obstacles([_dots(line) for line in lines], centres, radius, 2.5)
     dots = [(teacher, dotted(teacher, centres, radius, gap, head, obstacles)) for teacher in teachers]
@@ -142,6 +142,7 @@ def _frame(
         contents = legend.Contents(
             lines=len(network.connections) > 0,
             learns=len(network.changing) > 0,
+            heaviest=_heaviest(network),
             teaches=label_of(teachers) if teachers else "",
         )
         items = legend.entries(contents, gains, theme)
@@ -165,15 +166,25 @@ def _frame(
     )
 
 
+def _heaviest(network: Network) -> float:
+    fixed = np.delete(np.abs(network.connections.weights), network.changing)
+    fixed = fixed[np.isfinite(fixed) & (fixed > 0)]
+    return float(fixed.max()) if len(fixed) else np.inf
+
+
 def _header(title: str, frame: Frame, theme: Theme) -> Group:
     text = texts.shorten(title, _TITLE, frame.width - 2 * MARGIN, 600)
     return Group((Text((MARGIN, _TITLE_Y), text, _TITLE, theme.ink, weight=600),), id="title")
 
 
 def _order(network: Network) -> tuple[int, ...]:
-    """Lines that can glow come first, so that their glow lies beneath all others; else as in the network."""
-    changing = set(network.changing.tolist())
-    return tuple(sorted(range(len(network.connections)), key=lambda index: (index not in changing, index)))
+    """Lines that can glow come first, so that their glow lies beneath all others; then weak ones before strong ones, so
+    that what matters is seen in a dense picture; else as in the network."""
+    weights = np.nan_to_num(np.abs(network.connections.weights), posinf=np.inf)
+    fixed = np.ones(len(weights), bool)
+    fixed[network.changing] = False
+    order = np.lexsort((np.arange(len(weights)), np.where(fixed, weights, 0.0), fixed))
+    return tuple(order.tolist())
 
 
 def _dots(line: Line) -> FloatArray:

@@ -13,20 +13,26 @@ from neurovis_spec.layout.geometry import distance
 from neurovis_spec.layout.model import Point, Route
 
 _DIAGONAL = math.sqrt(0.5)
-#: Sides first, then what lies along the direction, then diagonals: the order decides between equals.
-_WAYS: tuple[Point, ...] = (
-    (1.0, 0.0),
-    (-1.0, 0.0),
-    (0.0, -1.0),
-    (0.0, 1.0),
-    (_DIAGONAL, -_DIAGONAL),
-    (-_DIAGONAL, -_DIAGONAL),
-    (_DIAGONAL, _DIAGONAL),
-    (-_DIAGONAL, _DIAGONAL),
+#: Cosine and sine of an eighth of a half turn.
+_FLAT, _STEEP = math.sqrt(0.5 + _DIAGONAL / 2), math.sqrt(0.5 - _DIAGONAL / 2)
+#: Ways and what they cost: sides, sides tilted up or down, along the direction, diagonals; the first of equals is taken.
+_WAYS: tuple[tuple[Point, float], ...] = (
+    ((1.0, 0.0), 0.0),
+    ((-1.0, 0.0), 0.0),
+    ((_FLAT, -_STEEP), 0.06),
+    ((-_FLAT, -_STEEP), 0.06),
+    ((_FLAT, _STEEP), 0.06),
+    ((-_FLAT, _STEEP), 0.06),
+    ((0.0, -1.0), 0.15),
+    ((0.0, 1.0), 0.15),
+    ((_DIAGONAL, -_DIAGONAL), 0.2),
+    ((-_DIAGONAL, -_DIAGONAL), 0.2),
+    ((_DIAGONAL, _DIAGONAL), 0.2),
+    ((-_DIAGONAL, _DIAGONAL), 0.2),
 )
-_ALONG = 0.15
-_DIAGONALLY = 0.25
 _CROWDED = 0.35
+#: An edge within some 50° of a loop's way runs along one of its legs, which stand 30° to either side.
+_LEGS = 0.64
 #: Length of the handles: three quarters of it is how far the loop reaches.
 _HANDLES = (1.05, 0.74)
 
@@ -48,9 +54,8 @@ def best_loop(
     """The loop with most room. ``near`` are neighbours' centres, ``tangents`` unit vectors in which other edges leave
     or arrive; ``turn`` counts the loops that this neuron has already: each further one is drawn around the first."""
     ranked: list[tuple[float, int, Route]] = []
-    for place, way in enumerate(_WAYS):
-        crowd = _crowd(centre, way, near) + _traffic(way, tangents)
-        crowd += _ALONG if place in (2, 3) else _DIAGONALLY if place > 3 else 0.0
+    for place, (way, cost) in enumerate(_WAYS):
+        crowd = _crowd(centre, way, near) + _traffic(way, tangents) + cost
         for smaller, handle in enumerate(_HANDLES):
             route = loop(centre, way, handle * (1 + 0.3 * turn), 0.59 + 0.1 * turn)
             clearance = obstacles.clearance(route, (index, index))
@@ -69,6 +74,6 @@ def _crowd(centre: Point, way: Point, near: Sequence[Point]) -> float:
 
 
 def _traffic(way: Point, tangents: Sequence[Point]) -> float:
-    """How many edges would run through the loop: those within some 35° of its way."""
-    inside = [max(0.0, way[0] * x + way[1] * y - 0.82) for x, y in tangents]
-    return min(1.5, 2.5 * sum(inside))
+    """How many edges would run through the loop or along its legs."""
+    inside = [max(0.0, way[0] * x + way[1] * y - _LEGS) for x, y in tangents]
+    return min(1.5, 2.0 * sum(inside))
