@@ -16,6 +16,7 @@ from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.limits import LONGEST_DELAY, PATIENCE
 from neurovis_spec.compiler.network import FloatArray, IntArray
+from neurovis_spec.compiler.references import few
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.diagnostics import Span, suggest
 from neurovis_spec.language.located import Formula, formula_of, shown
@@ -117,7 +118,7 @@ class EdgeReader:
         return None if None in found.values() else result
 
     def _outside(self, name: str, span: Span, known: Mapping[str, int], what: str, where: str = "") -> None:
-        hint = suggest(name, known, f"{what}s of this entry")
+        hint = suggest(name, few(name, known), f"{what}s of this entry")
         message = f"'{shown(name)}'{where} is not among the {what}s of this entry"
         self.constants.findings.error("edge-outside", span, message, hint)
 

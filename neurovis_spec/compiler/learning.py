@@ -15,7 +15,7 @@ from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.definitions import Definitions
 from neurovis_spec.compiler.network import FloatArray, Input, IntArray, Rule
 from neurovis_spec.compiler.populate import Population
-from neurovis_spec.compiler.references import resolve_end
+from neurovis_spec.compiler.references import few, resolve_end
 from neurovis_spec.compiler.settings import check_initials, choose, parameters
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.located import Located, shown
@@ -93,7 +93,8 @@ def _signal(
     elif definitions.gaps.cover("inputs", name) or population.directory.gaps.cover_reference(name):
         return None
     elif population.directory.find(name) is None and ".." not in name and "+" not in name:
-        hint = suggest(name, (*population.directory.known, *inputs), "neurons and inputs")
+        names = (*inputs, *population.directory.known)
+        hint = suggest(name, few(name, names), "inputs and neurons")
         findings.error("unknown-signal", node.span, f"there is no neuron, group or input '{shown(name)}'", hint)
         return None
     else:

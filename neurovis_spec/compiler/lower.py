@@ -7,6 +7,8 @@ In: the Population, the connections, the levels. Out: Blocks (neurons that are u
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -27,39 +29,42 @@ from neurovis_spec.compiler.network import (
 )
 from neurovis_spec.compiler.populate import Kind, Population
 
+#: What the neurons of a block have in common: level, activation, model, combination.
+_Key: TypeAlias = tuple[int, str, str, Combine]
+
 
 def make_blocks(population: Population, sources: IntArray, targets: IntArray, levels: IntArray) -> tuple[Block, ...]:
     """Neurons of the same level, activation, model and combination, in the order of the levels."""
-    members: dict[tuple[int, str, str, Combine], list[int]] = {}
-    kinds: dict[tuple[int, str, str, Combine], list[Kind]] = {}
-    rows: dict[tuple[int, str, str, Combine], list[int]] = {}
+    parts: dict[_Key, list[_Part]] = {}
     for group, kind in zip(population.neurons.groups, population.kinds, strict=True):
-        for row, neuron in enumerate(group.indices):
-            key = (int(levels[neuron]), kind.activation.name, kind.model.name, group.combine)
-            members.setdefault(key, []).append(neuron)
-            kinds.setdefault(key, []).append(kind)
-            rows.setdefault(key, []).append(row)
-    order = sorted(members, key=lambda key: (key[0], members[key][0]))
+        own = levels[group.start : group.start + group.count]
+        for level in np.unique(own).tolist():
+            key = (level, kind.activation.name, kind.model.name, group.combine)
+            parts.setdefault(key, []).append(_Part(kind, group.start, np.flatnonzero(own == level)))
+    order = sorted(parts, key=lambda key: (key[0], parts[key][0].members[0]))
     home = np.full(len(population.neurons), -1, dtype=np.int64)
     slot = np.zeros(len(population.neurons), dtype=np.int64)
+    members = {key: np.concatenate([part.members for part in parts[key]]) for key in order}
     for number, key in enumerate(order):
         home[members[key]] = number
         slot[members[key]] = np.arange(len(members[key]))
-    owner = home[targets] if len(targets) else np.zeros(0, dtype=np.int64)
+    owner = home[targets]
+    by_owner = np.argsort(owner, kind="stable")
+    ends = np.searchsorted(owner[by_owner], np.arange(len(order) + 1))
     blocks = []
     for number, key in enumerate(order):
-        first = kinds[key][0]
-        incoming = np.flatnonzero(owner == number).astype(np.int64)
+        first = parts[key][0].kind
+        incoming = by_owner[ends[number] : ends[number + 1]].astype(np.int64)
         block = Block(
             level=key[0],
-            members=np.array(members[key], dtype=np.int64),
+            members=members[key],
             combine=key[3],
             activation=first.activation,
-            activation_parameters=_column([k.activation_parameters for k in kinds[key]], rows[key]),
+            activation_parameters=_column([(p.kind.activation_parameters, p.rows) for p in parts[key]]),
             model=first.model,
-            model_parameters=_column([k.model_parameters for k in kinds[key]], rows[key]),
+            model_parameters=_column([(p.kind.model_parameters, p.rows) for p in parts[key]]),
             incoming=incoming,
-            slots=slot[targets[incoming]] if len(incoming) else incoming,
+            slots=slot[targets[incoming]],
         )
         for array in (block.members, block.incoming, block.slots):
             frozen(array)
@@ -67,11 +72,24 @@ def make_blocks(population: Population, sources: IntArray, targets: IntArray, le
     return tuple(blocks)
 
 
-def _column(parameters: list[Mapping[str, FloatArray]], rows: list[int]) -> Mapping[str, FloatArray]:
-    """The parameters of several neurons, each from a row of its group's arrays."""
+@dataclass(frozen=True)
+class _Part:
+    """The neurons of one group that belong to one block, by their rows within the group."""
+
+    kind: Kind
+    start: int
+    rows: IntArray
+
+    @property
+    def members(self) -> IntArray:
+        return self.start + self.rows
+
+
+def _column(parts: list[tuple[Mapping[str, FloatArray], IntArray]]) -> Mapping[str, FloatArray]:
+    """The parameters of a block, each from rows of its groups' arrays."""
     result: dict[str, FloatArray] = {}
-    for name in parameters[0]:
-        values = np.array([one[name][row] for one, row in zip(parameters, rows, strict=True)], dtype=np.float64)
+    for name in parts[0][0]:
+        values = np.concatenate([parameters[name][rows] for parameters, rows in parts])
         frozen(values)
         result[name] = values
     return result

@@ -6,9 +6,10 @@ In: the groups and neuron names of a network. Out: tuples of indices, or a findi
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import islice
 
 from neurovis_spec.compiler.gaps import Gaps
 from neurovis_spec.compiler.limits import PATIENCE
@@ -16,6 +17,8 @@ from neurovis_spec.compiler.network import Group
 from neurovis_spec.diagnostics import Findings, Span, suggest
 from neurovis_spec.language.located import Located, shown
 
+#: How many names are looked through for one that is like another: it takes a while.
+_MANY = 1000
 #: A neuron's number as its name has it: without leading zeros.
 _NUMBER = re.compile(r"0|[1-9][0-9]{0,63}")
 _RANGE = re.compile(r"\s*(?P<low>\S+?)\s*\.\.\s*(?P<high>\S+)\s*")
@@ -35,6 +38,16 @@ class Directory:
     def known(self) -> tuple[str, ...]:
         """Every name that a reference may use; groups first."""
         return tuple(dict.fromkeys([*self.groups, *self.neurons]))
+
+    def hint(self, name: str) -> str | None:
+        """What an unknown name may be meant for: the nearest names, and the numbers that its group has."""
+        hint = suggest(name, few(name, self.known), "groups and neurons")
+        stem = name.rstrip("0123456789")
+        if stem in self.first and stem != name:
+            first = self.first[stem]
+            numbers = f"'{stem}' has the numbers {first} to {first + self.groups[stem].count - 1}"
+            hint = numbers if hint is None else f"{hint} {numbers}"
+        return hint
 
     def find(self, name: str) -> tuple[int, ...] | None:
         """The neurons of a group, or one neuron."""
@@ -59,6 +72,14 @@ class Directory:
                 return "the range runs backwards"
             return tuple(range(group.start + a, group.start + b + 1))
         return "both ends of a range must be neurons of one counted group"
+
+
+def few(name: str, known: Collection[str]) -> Collection[str]:
+    """The names among which to look for one like ``name``: of very many those that begin like it."""
+    if len(known) <= _MANY:
+        return known
+    begin = name[: max(1, len(name.rstrip("0123456789")) // 2)]
+    return tuple(islice((other for other in known if other.startswith(begin)), _MANY))
 
 
 def parts(text: Located[str]) -> Iterator[tuple[str, Span]]:
@@ -92,8 +113,8 @@ def resolve_part(name: str, span: Span, directory: Directory, findings: Findings
         if not name:
             findings.error("empty-reference", span, "a reference is missing here", "name a group, a neuron or a range")
         elif not directory.gaps.cover_reference(name):
-            hint = suggest(name, directory.known, "groups and neurons")
-            findings.error("unknown-neuron", span, f"there is no neuron or group '{shown(name)}'", hint)
+            message = f"there is no neuron or group '{shown(name)}'"
+            findings.error("unknown-neuron", span, message, directory.hint(name))
     return result
 
 
