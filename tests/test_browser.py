@@ -130,7 +130,7 @@ def similarity(one: Image.Image, other: Image.Image, window: int = 8) -> float:
 @pytest.mark.parametrize(("theme", "step"), [("default", 160), ("dark", 1180)])
 def test_the_raster_shows_the_same_picture(browser: Browser, tmp_path: Path, theme: str, step: int) -> None:
     drawn = scene(step, theme)
-    size = (int(drawn.width), int(drawn.height))
+    size = drawn.pixels
     theirs = shot(browser, tmp_path, SvgRenderer().draw(drawn, ".svg"), size)
     ours = Image.open(io.BytesIO(PillowRenderer().draw(drawn, ".png"))).convert("RGB")
     assert ours.size == theirs.size == size
@@ -236,7 +236,7 @@ def test_with_reduced_motion_a_film_stands_still_at_its_first_frame(browser: Bro
 def test_a_film_moves_inside_img_and_there_shows_its_frames(browser: Browser, tmp_path: Path) -> None:
     """The picture after some time is one of the film's frames, and not always the same."""
     made = moving()
-    size = (int(made.scene.width), int(made.scene.height))
+    size = made.scene.pixels
     svg = AnimatedSvgRenderer().animate(made, ".svg")
     seen = [shot(browser, tmp_path, svg, size, wait) for wait in (0.3, 0.7, 1.2)]
     frames = [

@@ -85,11 +85,11 @@ def test_what_lies_outside_is_cut_off() -> None:
 def test_discs_have_the_scenes_colour_at_a_pixel_beside_their_label(theme: str) -> None:
     drawn = scene(theme=theme)
     pixels = np.asarray(Image.open(io.BytesIO(PillowRenderer().draw(drawn, ".png"))).convert("RGB"))
-    assert pixels.shape[:2] == (drawn.height, drawn.width)
+    assert pixels.shape[:2] == drawn.pixels[::-1]
     discs = [s for s in drawn.shapes() if isinstance(s, Disc)]
     assert len(discs) == 12
     for disc in discs:
-        x, y = int(disc.centre[0]), int(disc.centre[1] - 0.72 * disc.radius)
+        x, y = int(drawn.density * disc.centre[0]), int(drawn.density * (disc.centre[1] - 0.72 * disc.radius))
         assert tuple(pixels[y, x]) == channels(disc.fill)
     assert tuple(pixels[0, 0]) == channels(drawn.theme.background)
 
@@ -99,7 +99,7 @@ def test_stills_open_in_the_right_size(suffix: str) -> None:
     drawn = scene()
     data = PillowRenderer().draw(drawn, suffix)
     with Image.open(io.BytesIO(data)) as picture:
-        assert picture.size == (drawn.width, drawn.height)
+        assert picture.size == drawn.pixels
         assert f".{(picture.format or '').lower()}" == suffix
     assert data == PillowRenderer().draw(drawn, suffix)
 

@@ -217,8 +217,18 @@ def test_title_true_false_or_a_text() -> None:
 def test_the_size_is_what_the_author_says() -> None:
     for size in ((300, 200), (1920, 1080), (64, 64)):
         scene = picture(settings=RenderSettings(size=size))
-        assert (scene.width, scene.height) == size
+        assert scene.pixels == size
         check_inside(scene)
+
+
+def test_a_picture_with_room_to_spare_has_more_pixels_for_each_unit() -> None:
+    natural = picture()
+    assert natural.density > 1
+    assert natural.pixels == (natural.width * natural.density, natural.height * natural.density)
+    large = picture(settings=RenderSettings(size=(1920, 1080)))
+    assert large.density > 1.8
+    assert large.height == pytest.approx(natural.height, abs=8)  # its texts have grown with it
+    assert picture(settings=RenderSettings(size=(300, 200))).density == 1  # rather smaller discs than smaller texts
 
 
 def grid(columns: int, rows: int) -> Case:
@@ -234,8 +244,8 @@ def grid(columns: int, rows: int) -> Case:
 def test_a_large_network_stays_within_1280_by_960_and_drops_labels_rather_than_piling_them() -> None:
     case = grid(60, 12)
     scene = encode(case.network, case.layout, case.snapshot(0), PLAIN, RenderSettings())
-    assert scene.width <= 1280
-    assert scene.height <= 960
+    assert scene.pixels <= (1280, 960)
+    assert scene.pixels[1] <= 960
     assert len(with_data(scene, "neuron")) == 720
     check_texts(scene)
     check_inside(scene)

@@ -105,7 +105,7 @@ def box_title(box: Box, rect: Rect, obstacles: Obstacles, theme: Theme, picture:
     for penalty, wanted in ((0, box.title), (1, box.name)):
         text = texts.shorten(wanted, _SIZE, picture[2] - picture[0])
         width = texts.width(text, _SIZE)
-        for rank, (x, y) in enumerate(_places(rect, width)):
+        for rank, (x, y) in enumerate(_places(rect, width, picture)):
             x = min(max(x, picture[0]), picture[2] - width)
             taken = (x - 2, y - _SIZE, x + width + 2, y + 0.3 * _SIZE)
             if taken[1] < picture[1] or taken[3] > picture[3]:
@@ -123,7 +123,7 @@ def box_title(box: Box, rect: Rect, obstacles: Obstacles, theme: Theme, picture:
     return best[2]
 
 
-def _places(rect: Rect, width: float) -> list[tuple[float, float]]:
+def _places(rect: Rect, width: float, picture: Rect) -> list[tuple[float, float]]:
     """Starts of the baseline, best first."""
     x0, y0, x1, y1 = rect
     left, right = x0 + 10, x1 - 10 - width
@@ -138,5 +138,6 @@ def _places(rect: Rect, width: float) -> list[tuple[float, float]]:
         if right > left
     ]
     outside = [(x0 + 2, above), (x0 + 2, below), (x1 - 2 - width, above), (x1 - 2 - width, below)]
-    beside = [(x, y) for y in (y0 + 13, y1 - 5) for x in (x0 - 8 - width, x1 + 8)]
+    sides = [x for x in (x0 - 8 - width, x1 + 8) if picture[0] <= x <= picture[2] - width]
+    beside = [(x, y) for y in (y0 + 13, y1 - 5) for x in sides]
     return corners + outside + slid + beside

@@ -73,6 +73,7 @@ def paint(
     return Scene(
         width=planned.frame.width,
         height=planned.frame.height,
+        density=planned.frame.density,
         theme=planned.theme,
         title=f"{planned.title}, {words}",
         groups=(

@@ -1,7 +1,8 @@
-"""The frame: how big a picture is, and how layout units become user units.
+"""The frame: how big a picture is, how layout units become user units, and these pixels.
 
-In: the extent of what a layout holds, room for header and legend, the size that the author asks for. Out: a Frame with
-the scale, the offset and the whole size; without a stated size at most 1280 × 960.
+In: the extent of what a layout holds, room for header and legend, the size that the author asks for. Out: a Frame.
+Texts and lines have the same size in user units in every picture; a picture that has room to spare has more pixels for
+each instead, so that its texts grow with its discs. Without a stated size a picture has at most 1280 × 960 pixels.
 """
 
 from __future__ import annotations
@@ -17,17 +18,23 @@ from neurovis_spec.scene.geometry import FloatArray, Rect
 UNIT = 66.0
 MOST = (1280.0, 960.0)
 MARGIN = 26.0
+#: Pixels for a user unit: without a stated size the first with which the picture is small enough. Multiples of
+#: ``_WHOLE`` units are whole pixels with each.
+_DENSITIES, _WHOLE = (1.5, 1.25, 1.0), 4
+#: With a stated size at most this, and layout units at most so much larger than ``UNIT``.
+_DENSEST, _LARGEST = 4.0, 1.4
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """``user = layout * scale + (left, top)``; the picture is ``width`` by ``height``."""
+    """``user = layout * scale + (left, top)``; the picture is ``width`` by ``height``, ``density`` pixels a unit."""
 
     width: float
     height: float
     scale: float
     left: float
     top: float
+    density: float
 
     def map(self, points: FloatArray) -> FloatArray:
         """Layout units (…, 2) to user units."""
@@ -35,31 +42,63 @@ class Frame:
         return result
 
 
-def fit(
-    extent: Rect,
-    header: tuple[float, float],
-    footer: Callable[[float], float],
-    narrowest: float,
-    size: tuple[int, int] | None,
-) -> Frame:
-    """Fit ``extent`` (layout units) between a header (width and height) and a footer as high as ``footer(width)``."""
+@dataclass(frozen=True, slots=True)
+class Wishes:
+    """What stands around the layout: a header (width and height), a footer as high as ``footer(width)``, and how wide
+    the picture should be for their sake."""
+
+    header: tuple[float, float]
+    footer: Callable[[float], float]
+    narrowest: float
+
+
+def fit(extent: Rect, wishes: Wishes, size: tuple[int, int] | None) -> Frame:
+    """Fit ``extent`` (layout units) between header and footer, into ``size`` pixels or what it needs."""
     x0, y0, x1, y1 = extent
     across, down = max(x1 - x0, 1e-9), max(y1 - y0, 1e-9)
-    most_wide, most_high = MOST if size is None else (float(size[0]), float(size[1]))
-    wide = most_wide
+    if size is None:
+        wide, high, scale, density = _natural(across, down, wishes)
+    else:
+        wide, high, scale, density = _within(across, down, wishes, (float(size[0]), float(size[1])))
+    free = high - wishes.header[1] - wishes.footer(wide) - down * scale
+    left, top = (wide - across * scale) / 2, wishes.header[1] + max(free, 0.0) / 2
+    return Frame(wide, high, scale, left - x0 * scale, top - y0 * scale, density)
+
+
+def _natural(across: float, down: float, wishes: Wishes) -> tuple[float, float, float, float]:
+    """Width, height, scale and density from the layout."""
+    wide = MOST[0]
     scale = UNIT
     for _ in range(3):  # the footer's height depends on the width, the width on the scale, the scale on the height left
-        room = most_high - header[1] - footer(wide) - 2 * MARGIN
-        scale = min(UNIT if size is None else 3 * UNIT, (most_wide - 2 * MARGIN) / across, max(room, 8.0) / down)
-        scale = max(scale, 1e-9)
-        if size is None:
-            natural = max(across * scale + 2 * MARGIN, header[0] + 2 * MARGIN, narrowest)
-            wide = min(most_wide, float(np.ceil(natural)))
-    content = down * scale
-    high = most_high
-    if size is None:
-        high = min(most_high, float(np.ceil(header[1] + content + footer(wide) + 2 * MARGIN)))
-    free = high - header[1] - footer(wide) - content
-    return Frame(
-        wide, high, scale, (wide - across * scale) / 2 - x0 * scale, header[1] + max(free, 0.0) / 2 - y0 * scale
-    )
+        scale = min(UNIT, _scale(across, down, wishes, (MOST[0], MOST[1]), wishes.footer(wide)))
+        natural = max(across * scale + 2 * MARGIN, wishes.header[0] + 2 * MARGIN, wishes.narrowest)
+        wide = min(MOST[0], _whole(natural))
+    high = min(MOST[1], _whole(wishes.header[1] + down * scale + wishes.footer(wide) + 2 * MARGIN))
+    density = next(d for d in _DENSITIES if d == 1 or (wide * d <= MOST[0] and high * d <= MOST[1]))
+    return wide, high, scale, density
+
+
+def _whole(value: float) -> float:
+    return float(np.ceil(value / _WHOLE)) * _WHOLE
+
+
+def _within(across: float, down: float, wishes: Wishes, size: tuple[float, float]) -> tuple[float, float, float, float]:
+    """Width, height, scale and density for this many pixels: as dense as leaves the layout its usual size."""
+
+    def at(density: float) -> float:
+        wide, high = size[0] / density, size[1] / density
+        return _scale(across, down, wishes, (wide, high), wishes.footer(wide))
+
+    low, high = 1.0, max(1.0, min(_DENSEST, size[0] / wishes.narrowest))
+    if at(high) >= UNIT:
+        low = high
+    for _ in range(24):
+        middle = (low + high) / 2
+        low, high = (middle, high) if at(middle) >= UNIT else (low, middle)
+    return size[0] / low, size[1] / low, min(_LARGEST * UNIT, at(low)), low
+
+
+def _scale(across: float, down: float, wishes: Wishes, room: tuple[float, float], footer: float) -> float:
+    """The most user units for a layout unit."""
+    left = room[1] - wishes.header[1] - footer - 2 * MARGIN
+    return max(1e-9, min((room[0] - 2 * MARGIN) / across, max(left, 8.0) / down))

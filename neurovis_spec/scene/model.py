@@ -2,7 +2,7 @@
 
 In: nothing; these are the values that ``scene.encode`` makes and that renderers read. A renderer knows nothing of
 networks: items are discs, splines, texts and rectangles, in groups that carry an opaque id, data
-attributes and a tooltip. Lengths are user units (pixels at scale 1), x right, y down. Colours are ``#rrggbb``.
+attributes and a tooltip. Lengths are user units (``Scene.density`` pixels), x right, y down. Colours are ``#rrggbb``.
 """
 
 from __future__ import annotations
@@ -153,13 +153,20 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """A picture: groups from back to front on a background."""
+    """A picture: groups from back to front on a background. ``width`` and ``height`` are user units."""
 
     width: float
     height: float
     theme: Theme
     title: str
     groups: tuple[Group, ...]
+    #: pixels for a user unit where the picture is shown in its own size
+    density: float = 1.0
+
+    @property
+    def pixels(self) -> tuple[int, int]:
+        """Width and height of the picture in its own size."""
+        return max(1, round(self.width * self.density)), max(1, round(self.height * self.density))
 
     def shapes(self) -> Iterator[Shape]:
         """All shapes from back to front."""

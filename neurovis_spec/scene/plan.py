@@ -1,7 +1,7 @@
 """The plan of a picture: all that does not change from step to step.
 
 In: a network, its layout, gains and settings. Out: a Plan: the frame, discs, lines, boxes, labels, title and legend, in
-user units (pixels at scale 1). ``encode`` and ``film`` paint activities and weights on it, so every step of a network
+user units. ``encode`` and ``film`` paint activities and weights on it, so every step of a network
 has the same geometry.
 """
 
@@ -16,7 +16,7 @@ from neurovis_spec.compiler.network import Network, RenderSettings
 from neurovis_spec.layout.model import RADIUS, Layout
 from neurovis_spec.scene import legend, texts
 from neurovis_spec.scene.boxes import Box, box_title, boxes_of
-from neurovis_spec.scene.frame import MARGIN, MOST, Frame, fit
+from neurovis_spec.scene.frame import MARGIN, MOST, Frame, Wishes, fit
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.geometry import FloatArray, Point, Rect, bounds, sample
 from neurovis_spec.scene.labels import Label, labels_of
@@ -156,14 +156,9 @@ def _frame(
     def footer(width: float) -> float:
         return legend.height(items, width - 2 * MARGIN) + (0.9 * MARGIN if items else 0.0)
 
-    narrowest = legend.row_width(items) + 2 * MARGIN
-    return (
-        title,
-        items,
-        fit(
-            extent, (min(header[0], 560.0), header[1]), footer, min(max(narrowest, 120.0), _LEGEND_ROOM), settings.size
-        ),
-    )
+    narrowest = min(max(legend.row_width(items) + 2 * MARGIN, 120.0), _LEGEND_ROOM)
+    wishes = Wishes((min(header[0], 560.0), header[1]), footer, narrowest)
+    return title, items, fit(extent, wishes, settings.size)
 
 
 def _heaviest(network: Network) -> float:

@@ -155,10 +155,11 @@ def open_group(group: Group, attributes: str = "") -> str:
 def document(scene: Scene, body: str, style: str = "", attributes: Mapping[str, str] | None = None) -> bytes:
     """A whole file around ``body``."""
     width, height = num(scene.width), num(scene.height)
+    across, down = scene.pixels
     families = ",".join(f"'{name}'" if " " in name else name for name in FAMILIES)
     more = "".join(f" {key}={quoted(value)}" for key, value in (attributes or {}).items())
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{across}" height="{down}" '
         f'role="img" fill="none" font-family="{families}"{more}>\n'
         f"<title>{escape(scene.title)}</title>\n{style}"
         f'<rect width="{width}" height="{height}" fill="{scene.theme.background}"/>\n{body}</svg>\n'

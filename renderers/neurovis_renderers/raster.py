@@ -1,13 +1,14 @@
 """Raster pictures: a Scene as PNG, GIF or WebP, the same picture as the SVG.
 
-In: a Scene or a Film. Out: the bytes of a file, one pixel a user unit. Shapes are drawn by coverage (``coverage``),
-texts and file formats are Pillow's. What does not change from frame to frame is computed once.
+In: a Scene or a Film. Out: the bytes of a file, with the pixels that the scene states. Shapes are drawn by coverage
+(``coverage``), texts and file formats are Pillow's. What does not change from frame to frame is computed once.
 """
 
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -21,6 +22,7 @@ from neurovis_spec.scene import (
     Arrowhead,
     Disc,
     Film,
+    Point,
     Progress,
     Ramp,
     Rectangle,
@@ -46,7 +48,7 @@ class PillowRenderer:
     capabilities = RendererCapabilities(stills=frozenset({".png", ".gif", ".webp"}), films=frozenset({".gif", ".webp"}))
 
     def draw(self, scene: Scene, suffix: str) -> bytes:
-        """The picture as a file; one pixel a user unit."""
+        """The picture as a file."""
         picture = Image.fromarray(Canvas(scene).paint(scene))
         buffer = io.BytesIO()
         if suffix == ".webp":
@@ -80,7 +82,8 @@ class Canvas:
     """Draws scenes of one size; remembers the masks of shapes it has seen."""
 
     def __init__(self, scene: Scene) -> None:
-        self._size: Size = (round(scene.width), round(scene.height))
+        self._size: Size = scene.pixels
+        self._density = scene.density
         self._masks: dict[object, Mask] = {}
         self._fields: dict[object, tuple[float, Field]] = {}
 
@@ -93,29 +96,39 @@ class Canvas:
         return np.rint(picture).astype(np.uint8).reshape(high, wide, 3)
 
     def _draw(self, picture: FloatArray, shape: Shape) -> None:
-        size = self._size
+        size, density = self._size, self._density
         match shape:
             case Spline():
                 self._stroke(shape).onto(picture, channels(shape.stroke), shape.opacity)
             case Arrowhead():
-                mask = self._kept(shape.points, lambda: coverage.polygon(shape.points, size))
+                mask = self._kept(shape.points, lambda: coverage.polygon(self._pixels(shape.points), size))
                 mask.onto(picture, channels(shape.fill))
-            case Disc(centre, radius):
+            case Disc():
+                (centre,), radius = self._pixels((shape.centre,)), shape.radius * density
                 mask = self._kept(("disc", centre, radius), lambda: coverage.disc(centre, radius, size))
                 mask.onto(picture, channels(shape.fill))
-                width = shape.stroke_width
+                width = shape.stroke_width * density
                 rim = self._kept(("ring", centre, radius), lambda: coverage.ring(centre, radius, width, size))
                 rim.onto(picture, channels(shape.stroke))
-            case Rectangle(corner, wide, high, radius):
-                extent = (wide, high)
+            case Rectangle():
+                (corner,), extent = self._pixels((shape.corner,)), (shape.width * density, shape.height * density)
+                radius = shape.radius * density
                 coverage.rectangle(corner, extent, radius, size).onto(picture, channels(shape.fill))
-                edge = coverage.outline(corner, extent, radius, shape.stroke_width, size)
+                edge = coverage.outline(corner, extent, radius, shape.stroke_width * density, size)
                 edge.onto(picture, channels(shape.stroke))
             case Ramp():
                 self._ramp(picture, shape)
             case Text():
                 key = (shape.point, shape.text, shape.size, shape.weight, shape.subscript, shape.anchor)
-                self._kept(key, lambda: lettering(shape, size)).onto(picture, channels(shape.fill))
+                self._kept(key, lambda: self._lettering(shape)).onto(picture, channels(shape.fill))
+
+    def _pixels(self, points: Sequence[Point]) -> list[Point]:
+        """User units to pixels."""
+        return [(x * self._density, y * self._density) for x, y in points]
+
+    def _lettering(self, text: Text) -> Mask:
+        (point,) = self._pixels((text.point,))
+        return lettering(replace(text, point=point, size=text.size * self._density), self._size)
 
     def _kept(self, key: object, make: Callable[[], Mask]) -> Mask:
         mask = self._masks.get(key)
@@ -127,20 +140,22 @@ class Canvas:
 
     def _stroke(self, shape: Spline) -> Mask:
         """Another width of a line costs no geometry, as long as it is not wider than any before."""
+        width = shape.width * self._density
         if shape.dash:
-            key = (shape.points, shape.width, shape.dash)
-            return self._kept(key, lambda: coverage.dashed(shape.points, shape.width, shape.dash, self._size))
+            key, dash = (shape.points, width, shape.dash), [part * self._density for part in shape.dash]
+            return self._kept(key, lambda: coverage.dashed(self._pixels(shape.points), width, dash, self._size))
         widest, field = self._fields.get(shape.points, (0.0, None))
-        if field is None or shape.width > widest:
-            widest = 1.5 * shape.width
-            field = coverage.stroke_field(shape.points, widest, self._size)
+        if field is None or width > widest:
+            widest = 1.5 * width
+            field = coverage.stroke_field(self._pixels(shape.points), widest, self._size)
             self._fields[shape.points] = (widest, field)
-        return field.mask(shape.width)
+        return field.mask(width)
 
     def _ramp(self, picture: FloatArray, shape: Ramp) -> None:
         """Stripes without seams: each is drawn to the end of the ramp, over the one before."""
-        (x, y), step = shape.corner, shape.width / len(shape.colours)
+        near, far = self._pixels((shape.corner, (shape.corner[0] + shape.width, shape.corner[1] + shape.height)))
+        step = (far[0] - near[0]) / len(shape.colours)
         for place, colour in enumerate(shape.colours):
-            left = round(x + place * step)
-            extent = (round(x + shape.width) - left, round(y + shape.height) - round(y))
-            coverage.rectangle((left, round(y)), extent, 0, self._size).onto(picture, channels(colour))
+            corner = (round(near[0] + place * step), round(near[1]))
+            extent = (round(far[0]) - corner[0], round(far[1]) - corner[1])
+            coverage.rectangle(corner, extent, 0, self._size).onto(picture, channels(colour))

@@ -15,7 +15,7 @@ from neurovis_spec.layout.model import Point, Route
 _DIAGONAL = math.sqrt(0.5)
 #: Cosine and sine of an eighth of a half turn.
 _FLAT, _STEEP = math.sqrt(0.5 + _DIAGONAL / 2), math.sqrt(0.5 - _DIAGONAL / 2)
-#: Ways and what they cost: sides, sides tilted up or down, along the direction, diagonals; the first of equals is taken.
+#: Ways and what they cost: sides, sides tilted up or down, along the direction, diagonals; the first of equals wins.
 _WAYS: tuple[tuple[Point, float], ...] = (
     ((1.0, 0.0), 0.0),
     ((-1.0, 0.0), 0.0),
