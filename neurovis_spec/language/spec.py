@@ -6,6 +6,7 @@ and no expression is parsed here. The descriptions are what an editor shows, and
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import suppress
 from typing import Annotated, ClassVar
 
@@ -232,10 +233,26 @@ class EventModel(Model):
     lesion: TextsField = Field(default=(), description="Neurons and connections (FROM -> TO) that are removed.")
 
 
-def _items(node: Node, info: ValidationInfo) -> tuple[Node, ...]:
-    if isinstance(node, (Sequence, Packed)):
-        return node.items
-    refuse(info, node, "a list of events", "write each event behind a dash")
+#: Findings of one list, after which the rest of it is not looked at.
+_PATIENCE = 20
+
+
+def _mappings(node: Node, info: ValidationInfo, wanted: str) -> Iterator[Mapping]:
+    """The mappings of a list; what is none is noted."""
+    findings = findings_of(info)
+    before = findings.errors
+    for item in node.items if isinstance(node, (Sequence, Packed)) else (node,):
+        if isinstance(item, Mapping):
+            yield item
+        elif findings.errors - before < _PATIENCE:
+            with suppress(PydanticCustomError):
+                refuse(info, item, wanted)
+
+
+def _events(node: Node, info: ValidationInfo) -> tuple[Mapping, ...]:
+    if not isinstance(node, (Sequence, Packed)):
+        refuse(info, node, "a list of events", "write each event behind a dash")
+    return tuple(_mappings(node, info, "an event, that is a mapping"))
 
 
 class Spacing(Model):
@@ -376,7 +393,7 @@ class Spec(Library):
         WithJsonSchema({"title": "Connections"}),
     ] = Field(default=(), description="FROM -> TO: a weight or a body. Rows are sources, columns are targets.")
     outputs: Named[ReferenceField] = Field(default_factory=dict, description="Names for what leaves the network.")
-    events: Annotated[tuple[EventModel, ...], BeforeValidator(lambda node, info: _items(node, info))] = Field(
+    events: Annotated[tuple[EventModel, ...], BeforeValidator(lambda node, info: _events(node, info))] = Field(
         default=(), description="What changes during a run: parameters set, neurons clamped, parts lesioned."
     )
     layout: LayoutModel | None = Field(None, description="How it is laid out.")
@@ -384,25 +401,14 @@ class Spec(Library):
     ros: RosModel | None = Field(None, description="How it meets ROS.")
 
 
-#: Findings of one list, after which the rest of it is not looked at.
-_PATIENCE = 20
-
-
 def _connections(node: Node, info: ValidationInfo) -> list[tuple[Located[str], object]]:
     """One mapping, or a list of mappings: in both cases the entries in the order written. What is at fault is noted and
     left out."""
-    mappings = node.items if isinstance(node, (Sequence, Packed)) else (node,)
     result: list[tuple[Located[str], object]] = []
-    before = findings_of(info).errors
-    for mapping in mappings:
-        if findings_of(info).errors - before >= _PATIENCE:
-            break
-        with suppress(PydanticCustomError):
-            if not isinstance(mapping, Mapping):
-                refuse(info, mapping, "a mapping FROM -> TO: weight, or a list of such")
-            for entry in mapping.entries:
-                with suppress(PydanticCustomError):
-                    result.append((Located(entry.name, entry.key), _body(entry, info)))
+    for mapping in _mappings(node, info, "a mapping FROM -> TO: weight, or a list of such"):
+        for entry in mapping.entries:
+            with suppress(PydanticCustomError):
+                result.append((Located(entry.name, entry.key), _body(entry, info)))
     return result
 
 
