@@ -142,6 +142,7 @@ def _plain(value: object) -> object:
 def _finish(document: SourceDocument | None, request: Request, findings: Findings, file: str) -> CompiledNetwork:
     spec = None if document is None else pipeline.shape(document, findings)
     network = None if spec is None else pipeline.build(spec, request, findings)
+    pipeline.allow(findings)
     findings.check()
     if spec is None or network is None:
         span = Span(file, 1, 1, 1, 2)

@@ -7,7 +7,7 @@ are shown (text, JSON) is in ``neurovis_spec.findings``.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import SequenceMatcher
 from typing import Literal
@@ -57,15 +57,21 @@ class Findings:
     sources: dict[str, str] = field(default_factory=dict)
     _items: list[Diagnostic] = field(default_factory=list)
     _errors: int = 0
+    _faults: set[Span] = field(default_factory=set)
 
     def error(self, code: str, span: Span, message: str, hint: str | None = None) -> None:
         """Note a mistake."""
         self._items.append(Diagnostic(code, message, span, "error", hint))
         self._errors += 1
+        self._faults.add(span)
 
     def warning(self, code: str, span: Span, message: str, hint: str | None = None) -> None:
         """Note something legal that is surely not meant."""
         self._items.append(Diagnostic(code, message, span, "warning", hint))
+
+    def drop(self, unwanted: Callable[[Diagnostic], bool]) -> None:
+        """Forget warnings that the author has allowed; errors stay."""
+        self._items = [item for item in self._items if item.severity == "error" or not unwanted(item)]
 
     @property
     def failed(self) -> bool:
@@ -76,6 +82,10 @@ class Findings:
     def errors(self) -> int:
         """How many errors there are so far: a stage compares it before and after."""
         return self._errors
+
+    def at_fault(self, span: Span) -> bool:
+        """Whether there is an error about exactly this stretch of a text."""
+        return span in self._faults
 
     def sorted(self) -> tuple[Diagnostic, ...]:
         """All findings by place, each once.

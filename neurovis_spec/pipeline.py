@@ -20,6 +20,7 @@ import numpy.typing as npt
 from neurovis_spec.compiler.compile import Request, compile_spec
 from neurovis_spec.compiler.network import Network, RenderSettings
 from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.allow import silence
 from neurovis_spec.language.reader import read_file, read_text
 from neurovis_spec.language.shape import read_spec
 from neurovis_spec.language.source import SourceDocument
@@ -55,6 +56,11 @@ def shape(document: SourceDocument, findings: Findings) -> Spec | None:
 def build(spec: Spec, request: Request, findings: Findings) -> Network | None:
     """Expand, connect, check, lower: frozen arrays and an update program."""
     return compile_spec(spec, request, findings)
+
+
+def allow(findings: Findings) -> None:
+    """Take out the warnings that comments allow on their lines."""
+    silence(findings)
 
 
 def simulate(

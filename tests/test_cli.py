@@ -252,7 +252,7 @@ def test_validate_limit_and_root(folder: Path) -> None:
     (folder / "data").mkdir()
     (folder / "data" / "w.csv").write_text("1,2\n", encoding="utf-8")
     (folder / "below").mkdir()
-    spec = "neurovis: 1\nname: x\nneurons: {A: {}, B: {count: 2}}\n"
+    spec = "neurovis: 1\nname: x\nneurons: {A: {bias: 1}, B: {count: 2}}\n"
     spec += "connections: {A -> B: {matrix: {file: ../data/w.csv}}}\n"
     (folder / "below" / "x.yaml").write_text(spec, encoding="utf-8")
     assert "path-outside" in call("validate", "below/x.yaml").stderr

@@ -22,6 +22,7 @@ from neurovis_spec.version import __version__
 COMMANDS: Final[Mapping[str, str]] = {
     "new": "Write a commented starter spec.",
     "validate": "Show all errors and warnings of specs at once.",
+    "explain": "Explain the code of a finding, with examples.",
     "inspect": "Show groups, connections, delays, rules and choices.",
     "schema": "Print the JSON Schema of the language, for editors.",
     "layout": "Compute and write the layout.",

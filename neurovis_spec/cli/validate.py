@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,17 +13,20 @@ from neurovis_spec.cli.options import examples
 from neurovis_spec.diagnostics import Diagnostic, SpecError
 from neurovis_spec.findings import printable, show_text, to_json
 
+FORMATS = ("text", "json", "sarif", "github")
+
 
 @click.command(
     epilog=examples(
         "neurovis validate first.yaml",
         "neurovis validate specs/*.yaml --strict",
         "cat first.yaml | neurovis validate - --format json",
+        "neurovis validate first.yaml --format sarif > findings.sarif",
     )
 )
 @click.argument("specs", metavar="SPEC...", nargs=-1, required=True)
 @click.option(
-    "--format", "form", type=click.Choice(["text", "json"]), default="text", help="text (default) or a JSON array."
+    "--format", "form", type=click.Choice(FORMATS), default="text", help="How findings are shown: text is the default."
 )
 @click.option("--strict", is_flag=True, help="Take warnings for errors.")
 @click.option("--limit", type=click.IntRange(min=1), metavar="N", help="The most connections; default ten million.")
@@ -36,8 +39,9 @@ from neurovis_spec.findings import printable, show_text, to_json
 def command(specs: tuple[str, ...], form: str, strict: bool, limit: int | None, root: Path | None) -> None:
     """Show all errors and warnings of specs at once.
 
-    Findings go to standard error, and a line for each spec without errors to standard output; with --format json the
-    findings go to standard output. The status is 1 if there is an error.
+    Findings go to standard error, and a line for each spec without errors to standard output. The other formats go to
+    standard output: json is an array, sarif is SARIF 2.1.0 for code scanning, github are workflow commands for GitHub
+    Actions. The status is 1 if there is an error.
     """
     if specs.count("-") > 1:
         raise click.UsageError("standard input (-) can be read only once")
@@ -64,7 +68,21 @@ def command(specs: tuple[str, ...], form: str, strict: bool, limit: int | None, 
 
 
 def _show(found: Iterable[Diagnostic], sources: dict[str, str], form: str) -> None:
-    if form == "json":
-        click.echo(to_json(found))
-    elif text := show_text(found, sources):
-        click.echo(text, err=True)
+    if form == "text":
+        if text := show_text(found, sources):
+            click.echo(text, err=True)
+        return
+    if written := _writer(form)(found):
+        click.echo(written)
+
+
+def _writer(form: str) -> Callable[[Iterable[Diagnostic]], str]:
+    if form == "sarif":
+        from neurovis_spec.findings_sarif import to_sarif
+
+        return to_sarif
+    if form == "github":
+        from neurovis_spec.findings_github import to_github
+
+        return to_github
+    return to_json

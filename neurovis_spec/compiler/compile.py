@@ -31,6 +31,7 @@ from neurovis_spec.compiler.references import Directory
 from neurovis_spec.compiler.sections import check_ros, layout_settings, make_outputs, render_settings
 from neurovis_spec.compiler.signals import make_inputs
 from neurovis_spec.compiler.tables import Files
+from neurovis_spec.compiler.warnings import warn
 from neurovis_spec.diagnostics import Diagnostic, Findings, Span, SpecError, suggest
 from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.model import opening
@@ -125,7 +126,12 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
         hash=content,
         noises=noises,
     )
-    return _eventful(spec, request, network, directory, constants) if with_events else network
+    if not with_events:
+        return network
+    made = _eventful(spec, request, network, directory, constants)
+    if made is not None:
+        warn(spec, made, bundles, findings)
+    return made
 
 
 def _eventful(

@@ -76,8 +76,9 @@ class Model(BaseModel):
             if field is None:
                 perhaps.update(cls._unknown(entry, fields, findings))
             elif isinstance(entry.value, Scalar) and entry.value.value is None and not field.is_required():
-                message = f"'{entry.name}' has no value"
-                findings.error("no-value", entry.key.span, message, "leave the key out, or give it a value")
+                if not findings.at_fault(entry.value.span):  # such as an alias, which is refused and read as nothing
+                    message = f"'{entry.name}' has no value"
+                    findings.error("no-value", entry.key.span, message, "leave the key out, or give it a value")
             else:
                 result[entry.name] = entry.value
         hopeless = False
