@@ -171,6 +171,34 @@ def test_a_teacher_has_a_dotted_line_and_a_place_in_the_legend() -> None:
     assert "T is the target of delta" in taught[0].title
 
 
+def test_a_signal_that_takes_several_steps_has_a_bead_and_a_place_in_the_legend() -> None:
+    made = network([numbered("A", 3)], [C("A1", "A2", 1.0, 0), C("A2", "A3", 1.0, 1), C("A1", "A3", 1.0, 20)])
+    scene = small(made, straight_layout(made, {"A1": (0, 0), "A2": (1, 2), "A3": (0, 4)}))
+    lines = with_data(scene, "connection")
+    beads = {name: [s for s in g.shapes if isinstance(s, Rectangle)] for name, g in lines.items()}
+    assert {name: len(found) for name, found in beads.items()} == {"A1 -> A2": 0, "A2 -> A3": 0, "A1 -> A3": 1}
+    (bead,) = beads["A1 -> A3"]
+    line = next(s for s in lines["A1 -> A3"].shapes if isinstance(s, Spline))
+    middle = sample(line.points, 2)[1]
+    assert (bead.corner[0] + bead.radius, bead.corner[1] + bead.radius) == pytest.approx(tuple(middle))
+    assert bead.width == bead.height == 2 * bead.radius
+    assert {"Bead", "delay: 20 steps"} <= {t.text for t in all_texts(scene)}
+
+
+def test_a_title_that_finds_no_room_is_shortened_rather_than_crossed() -> None:
+    boxed = replace(numbered("B", 3), box="a box with quite a long name that nobody can place")
+    made = network([G("A", ("A",)), boxed], [C("A", f"B{i}") for i in (1, 2, 3)])
+    scene = small(made, straight_layout(made, {"A": (1, 0), "B1": (0, 2), "B2": (1, 2), "B3": (2, 2)}))
+    (title,) = next(g for g in scene.groups if g.id.startswith("title:")).shapes
+    assert isinstance(title, Text)
+    assert title.text.startswith("a box")
+    x0, y0, x1, y1 = text_rect(title)
+    for shape in scene.shapes():
+        if isinstance(shape, Spline):
+            dots = sample(shape.points, 60)
+            assert not ((dots[:, 0] > x0) & (dots[:, 0] < x1) & (dots[:, 1] > y0) & (dots[:, 1] < y1)).any()
+
+
 def test_the_legend_explains_what_there_is_and_nothing_else() -> None:
     words = {t.text for t in all_texts(picture())}
     assert {"Colour", "Thickness", "Glow", "Dotted"} <= words
@@ -178,7 +206,7 @@ def test_the_legend_explains_what_there_is_and_nothing_else() -> None:
     layout = straight_layout(made, {"A1": (0, 0), "A2": (0, 2)})
     words = {t.text for t in all_texts(small(made, layout))}
     assert {"Colour", "Thickness"} <= words
-    assert not {"Glow", "Dotted"} & words
+    assert not {"Glow", "Dotted", "Bead"} & words
     assert not all_texts(small(made, layout, RenderSettings(legend=False, labels=False, title=False)))
 
 

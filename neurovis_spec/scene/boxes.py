@@ -15,7 +15,7 @@ from neurovis_spec.scene.geometry import FloatArray, Rect, bounds, overlap, samp
 from neurovis_spec.scene.model import Text, Theme
 from neurovis_spec.scene.obstacles import Obstacles
 
-_PAD_ACROSS, _PAD_DOWN = 0.62, 0.55
+_PAD_ACROSS, _PAD_DOWN = 0.62, 0.6
 _TIGHT = 0.42
 _SIZE = 11.5
 
@@ -100,10 +100,13 @@ def _computes(group: Group) -> str:
 
 def box_title(box: Box, rect: Rect, obstacles: Obstacles, theme: Theme, picture: Rect) -> Text | None:
     """The title where nothing crosses it: first inside the corners, then just outside; the name alone where the whole
-    finds no room. ``rect`` and ``picture``: the box and what may be drawn on, in user units."""
+    finds no room, or as much of the name as finds it. ``rect`` and ``picture``: the box and what may be drawn on, in
+    user units."""
     best: tuple[int, int, Text, Rect] | None = None
-    for penalty, wanted in ((0, box.title), (1, box.name)):
-        text = texts.shorten(wanted, _SIZE, picture[2] - picture[0])
+    room = picture[2] - picture[0]
+    shorter = [texts.shorten(box.name, _SIZE, share * min(room, rect[2] - rect[0])) for share in (1, 0.7, 0.5, 0.35)]
+    fitting = [text for text in shorter if len(text) > 3]
+    for penalty, text in enumerate([*(texts.shorten(name, _SIZE, room) for name in (box.title, box.name)), *fitting]):
         width = texts.width(text, _SIZE)
         for rank, (x, y) in enumerate(_places(rect, width, picture)):
             x = min(max(x, picture[0]), picture[2] - width)
@@ -127,7 +130,7 @@ def _places(rect: Rect, width: float, picture: Rect) -> list[tuple[float, float]
     """Starts of the baseline, best first."""
     x0, y0, x1, y1 = rect
     left, right = x0 + 10, x1 - 10 - width
-    inside_top, inside_bottom, above, below = y0 + 17, y1 - 8, y0 - 6, y1 + 15
+    inside_top, inside_bottom, above, below = y0 + 14, y1 - 6, y0 - 6, y1 + 15
     corners = [
         (x, y) for y in (inside_top, inside_bottom, above, below) for x in ((left, right) if right > left else (left,))
     ]

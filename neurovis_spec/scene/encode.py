@@ -111,6 +111,8 @@ def _connections(planned: Plan, seen: Looks, glowing: npt.NDArray[np.bool_], tit
         shapes: tuple[Shape, ...] = (Spline(line.points, strokes[index], width), head)
         if glowing[index]:
             shapes = (Spline(line.points, planned.theme.glow, glows[index], glow=True), *shapes)
+        if index in planned.beads:
+            shapes = (*shapes, planned.beads[index])
         groups.append(Group(shapes, f"c{index}", attributes[index], titles[index]))
     return groups
 

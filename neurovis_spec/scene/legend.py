@@ -1,4 +1,4 @@
-"""The legend: what colour, thickness, glow and dotted lines mean, with their scales.
+"""The legend: what colour, thickness, glow, dotted lines and beads mean, with their scales.
 
 In: gains, a theme and what the picture holds. Out: entries, which flow into rows at the foot of a picture. An entry is
 a heading, a sample and two lines of text.
@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from neurovis_spec.scene import texts
+from neurovis_spec.scene.delays import bead
 from neurovis_spec.scene.encoding import THINNEST, glow_width
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.geometry import Point
-from neurovis_spec.scene.model import Group, Ramp, Shape, Spline, Text, Theme
+from neurovis_spec.scene.model import Group, Ramp, Rectangle, Shape, Spline, Text, Theme
 from neurovis_spec.scene.teachers import dash
 from neurovis_spec.scene.themes import colours
 
@@ -45,6 +46,8 @@ class Contents:
     heaviest: float
     #: what the dotted lines are, '' without any
     teaches: str
+    #: how long delays are, '' without any of several steps
+    delays: str = ""
 
 
 def entries(contents: Contents, gains: Gains, theme: Theme) -> list[Entry]:
@@ -56,6 +59,8 @@ def entries(contents: Contents, gains: Gains, theme: Theme) -> list[Entry]:
         result.append(_glow(gains, theme))
     if contents.teaches:
         result.append(_dotted(contents.teaches, theme))
+    if contents.delays:
+        result.append(_bead(contents.delays, theme))
     return result
 
 
@@ -106,6 +111,8 @@ def _moved(shape: Shape, x: float, y: float) -> Shape:
         case Spline():
             points = tuple(move(point) for point in shape.points)
             return Spline(points, shape.stroke, shape.width, shape.dash, shape.glow, shape.opacity)
+        case Rectangle():
+            return replace(shape, corner=move(shape.corner))
         case _:
             raise TypeError(f"no {type(shape).__name__} in a legend")
 
@@ -199,6 +206,19 @@ def _dotted(words: str, theme: Theme) -> Entry:
         line,
         Text((0, _FIRST_Y), first, _SMALL, theme.muted),
         Text((0, _SECOND_Y), second, _SMALL, theme.muted),
+    )
+    return Entry(shapes, across)
+
+
+def _bead(words: str, theme: Theme) -> Entry:
+    first = "signal on its way"
+    across = max(texts.width(first, _SMALL), texts.width(words, _SMALL))
+    shapes = (
+        _heading("Bead", theme),
+        _stroke(0, 64, theme.muted, 2.0),
+        bead((32, _SAMPLE_Y), 3.2, theme),
+        Text((0, _FIRST_Y), first, _SMALL, theme.muted),
+        Text((0, _SECOND_Y), words, _SMALL, theme.muted),
     )
     return Entry(shapes, across)
 

@@ -7,14 +7,14 @@ has the same geometry.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from neurovis_spec.compiler.network import Network, RenderSettings
 from neurovis_spec.layout.model import RADIUS, Layout
-from neurovis_spec.scene import legend, texts
+from neurovis_spec.scene import delays, legend, texts
 from neurovis_spec.scene.boxes import Box, box_title, boxes_of
 from neurovis_spec.scene.frame import MARGIN, MOST, Frame, Wishes, fit
 from neurovis_spec.scene.gains import Gains
@@ -48,6 +48,8 @@ class Plan:
     centres: tuple[Point, ...]
     lines: tuple[Line, ...]
     order: tuple[int, ...]
+    #: on connections whose signal takes several steps, by index
+    beads: Mapping[int, Rectangle]
     labels: tuple[Label | None, ...]
     #: beneath the lines, and above the discs
     back: tuple[Group, ...]
@@ -80,7 +82,7 @@ def plan(network: Network, layout: Layout, gains: Gains, settings: RenderSetting
     header = _header(title, frame, theme) if title is not None else None
     top = _HEADER if header else 4.0
     bottom = frame.height - legend.height(items, frame.width - 2 * MARGIN) - (MARGIN if items else 4.0)
-    picture = (6.0, top, frame.width - 6.0, bottom)
+    picture = (6.0, top, frame.width - 6.0, bottom - (8.0 if items else 0.0))
     spots: list[Point] = [(x, y) for x, y in centres.tolist()]
     labels = labels_of(network, spots, radius, obstacles, picture) if settings.labels else [None] * len(spots)
     titles = _box_titles(boxes, frame, obstacles, theme, picture)
@@ -99,6 +101,7 @@ def plan(network: Network, layout: Layout, gains: Gains, settings: RenderSetting
         centres=tuple(spots),
         lines=tuple(lines),
         order=_order(network),
+        beads=delays.beads(network, lines, radius, theme),
         labels=tuple(labels),
         back=(*_box_frames(boxes, frame, theme), *_dotted_groups(network, dots, theme)),
         front=tuple(front),
@@ -144,6 +147,7 @@ def _frame(
             learns=len(network.changing) > 0,
             heaviest=_heaviest(network),
             teaches=label_of(teachers) if teachers else "",
+            delays=delays.label_of(network),
         )
         items = legend.entries(contents, gains, theme)
         widest = max(item.width for item in items)

@@ -122,14 +122,14 @@ def _spline(shape: Spline) -> str:
 
 def _ramp(shape: Ramp) -> str:
     """Stripes rather than a gradient: a gradient needs an id, and two pictures in one page would share it. Each stripe
-    reaches a little beneath the next, so that there are no seams."""
+    reaches a little beneath the next, and none has soft edges, so that there are no seams."""
     (x, y), step = shape.corner, shape.width / len(shape.colours)
     down = num(shape.height)
-    result = ""
+    result = '<g shape-rendering="crispEdges">'
     for place, fill in enumerate(shape.colours):
         across = step if place == len(shape.colours) - 1 else step + 0.75
         result += f'<path d="M{num(x + place * step)} {num(y)}h{num(across)}v{down}h{num(-across)}z" fill="{fill}"/>'
-    return result
+    return result + "</g>"
 
 
 def _text(shape: Text, attributes: str, content: str) -> str:

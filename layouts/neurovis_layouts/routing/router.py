@@ -130,7 +130,7 @@ def _bows(
     for (source, target), equal in between.items():
         start, end = centres[source], centres[target]
         reciprocal = (target, source) in between
-        base = 0.2 + 0.05 * distance(start, end)
+        base = 0.13 + 0.035 * distance(start, end)
         left = right = 0.0
         for place, i in enumerate(equal):
             # each further one outside those before it, wherever obstacles have sent these
