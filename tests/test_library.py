@@ -378,7 +378,7 @@ neurovis: 1
 name: one_target
 time: {{steps: 10{episode}}}
 inputs: {{x: {{size: 2}}, one: {{}}, two: {{}}}}
-neurons: {{X: {{count: 2, input: x}}, Y: {{}}, Z: {{input: two}}}}
+neurons: {{X: {{count: 2, input: x}}, Y: {{}}, Z: {{input: two}}, W: {{input: one}}}}
 connections: {{X -> Y: {{weight: 0.3 - 0.5*i, delay: {delay}, plasticity: {rule}}}}}
 """
 

@@ -24,6 +24,7 @@ COMMANDS: Final[Mapping[str, str]] = {
     "validate": "Show all errors and warnings of specs at once.",
     "explain": "Explain the code of a finding, with examples.",
     "inspect": "Show groups, connections, delays, rules and choices.",
+    "docs": "Explain a built-in, a key of the language, a function or a pattern.",
     "schema": "Print the JSON Schema of the language, for editors.",
     "layout": "Compute and write the layout.",
     "run": "Run a network and write a recording.",

@@ -112,10 +112,12 @@ class GroupModel(Model):
         None, description="Activation function, name or {name: {parameter: value}} (default identity)."
     )
     model: ChoiceField | None = Field(
-        None, description="How the activity follows from the input, name or {name: {…}} (default static, Eq. 1)."
+        None,
+        description="How the activity follows from the input, name or {name: {…}}; static is Eq. 1 (default static).",
     )
     combine: Annotated[Located[str], _words("sum", "product", "distance")] | None = Field(
-        None, description="sum or product of w·a, or distance √Σ(w·a − c)² to the connections' centre (default sum)."
+        None,
+        description="What arrives is combined by sum or product of w·a, or by distance √Σ(w·a − c)² (default sum).",
     )
     bias: FormulasField | None = Field(None, description="Added to the combined input (default 0).")
     initial: FormulasField | None = Field(None, description="The activity at step 0; without it step 0 is computed.")
@@ -130,7 +132,7 @@ class GroupModel(Model):
     label: TextsField | None = Field(None, description="Display text; a counted group may give a list.")
     box: TextField | None = Field(None, description="The named box of the picture that holds the group.")
     role: Annotated[Located[str], _words("input", "hidden", "output")] | None = Field(
-        None, description="input, hidden or output."
+        None, description="What the picture and the layout take it for: input, hidden or output."
     )
     description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
 
@@ -149,13 +151,14 @@ class ConnectionModel(Model):
     matrix: MatrixField | None = Field(None, description="Dense rows, rows are sources; null means no connection.")
     edges: EdgesField | None = Field(None, description="[[from, to, weight, delay], …], the last two optional.")
     pattern: ChoiceField | None = Field(
-        None, description="all_to_all, one_to_one, chain, ring, {random: {probability: p}}, …"
+        None,
+        description="Which pairs are connected: all_to_all, one_to_one, chain, ring, {random: {probability: p}}, ….",
     )
     self: BoolField | None = Field(
         None, description="Whether a neuron may connect to itself in a pattern (default false)."
     )
     rows: Annotated[Located[str], _words("from", "to")] | None = Field(
-        None, description="Whether the rows of a matrix are sources (from, the default) or targets (to)."
+        None, description="Whether the rows of a matrix are sources (from) or targets (to) (default from)."
     )
     delay: FormulaField | None = Field(
         None, description="Steps the signal travels; 0 is within the same step (default 1)."
@@ -279,10 +282,10 @@ class LayoutModel(Model):
     }
 
     engine: TextField | None = Field(
-        None, description="auto (default), layered, circular, grid, manual, or a plug-in's."
+        None, description="What lays it out: auto, layered, circular, grid, manual, or a plug-in (default auto)."
     )
     direction: Annotated[Located[str], _words("down", "up", "right", "left")] | None = Field(
-        None, description="Where the signals go: down (default), up, right, left."
+        None, description="Where the signals go: down, up, right, left (default down)."
     )
     positions: Keyed[PointField] = Field(default_factory=dict, description="Pins: {neuron: [x, y]}.")
     arrange: Keyed[Annotated[Located[str], _words("row", "column", "grid", "ring", "arc")]] = Field(
@@ -310,7 +313,7 @@ class RenderModel(Model):
 
     gain: Gain | None = Field(None, description="The scaling factors γ of Eqs. 2–5.")
     theme: Annotated[Located[str], _words("default", "dark", "print", "paper")] | None = Field(
-        None, description="default, dark, print or paper."
+        None, description="The colours: default, dark, print or paper (default default)."
     )
     size: Annotated[
         tuple[IntegerField, IntegerField] | None,
@@ -319,7 +322,9 @@ class RenderModel(Model):
     ] = Field(None, description="[width, height] in pixels.")
     labels: BoolField | None = Field(None, description="Whether neurons show their labels (default true).")
     legend: BoolField | None = Field(None, description="Whether there is a legend (default true).")
-    title: TitleField | None = Field(None, description="true, false or a text.")
+    title: TitleField | None = Field(
+        None, description="Whether there is a title, or another text for it (default true)."
+    )
 
 
 def _size(node: Node, info: ValidationInfo) -> tuple[Node, Node]:

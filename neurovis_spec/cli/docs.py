@@ -1,0 +1,38 @@
+"""``neurovis docs``: what a built-in, a key, a function or a pattern is."""
+
+from __future__ import annotations
+
+import click
+
+from neurovis_spec.cli.options import examples
+
+
+@click.command(
+    epilog=examples(
+        "neurovis docs",
+        "neurovis docs izhikevich",
+        "neurovis docs connections.delay",
+        "neurovis docs tanh",
+    )
+)
+@click.argument("name", metavar="[NAME]", required=False)
+def command(name: str | None) -> None:
+    """Explain a built-in, a key of the language, a function or a pattern.
+
+    NAME is an activation, a model, a rule, a pattern, a function or name of expressions, or a key, with its section
+    (connections.delay) or without (delay). What several things are called is explained for all of them. Without NAME
+    there is a table of contents.
+    """
+    from neurovis_spec.cli.topics import contents, text_of
+    from neurovis_spec.manual.topics import find, near
+
+    if name is None:
+        click.echo(contents())
+        return
+    found = find(name)
+    if not found:
+        from neurovis_spec.cli.failure import fault
+        from neurovis_spec.language.located import shown
+
+        raise fault(f"there is nothing about '{shown(name)}'", near(name), "unknown-name")
+    click.echo(text_of(found))

@@ -1,0 +1,100 @@
+"""The built-in definitions as they ship: description, parameters, and the YAML itself.
+
+In: the library files, ours and those of packages. Out: a Builtin for each activation, model and rule.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Literal, TypeAlias
+
+from neurovis_spec import plugins
+from neurovis_spec.compiler.builtin import libraries
+from neurovis_spec.language.source import Entry, Mapping
+from neurovis_spec.language.spec import ActivationModel, Library, ModelModel, RuleModel
+from neurovis_spec.language.values import Parameter
+
+Kind: TypeAlias = Literal["activation", "model", "rule"]
+_Definition: TypeAlias = ActivationModel | ModelModel | RuleModel
+
+
+@dataclass(frozen=True, slots=True)
+class Builtin:
+    """A definition that needs no declaration. ``parameters``: name, default, meaning; ``yaml``: the definition as it
+    stands in its file, its description left out."""
+
+    kind: Kind
+    name: str
+    about: str
+    parameters: tuple[tuple[str, str, str], ...]
+    signals: tuple[str, ...]
+    yaml: str
+
+    @property
+    def use(self) -> str:
+        """How it is written where it is used, with all that may be set."""
+        settings = [f"{name}: {default}" for name, default, _ in self.parameters]
+        settings += [f"{signal}: T" for signal in self.signals]
+        choice = f"{{{self.name}: {{{', '.join(settings)}}}}}" if settings else self.name
+        if self.kind == "rule":
+            return f"connections: {{K -> O: {{weight: 0.1, plasticity: {choice}}}}}"
+        return f"neurons: {{K: {{{self.kind}: {choice}}}}}"
+
+
+@cache
+def builtins() -> tuple[Builtin, ...]:
+    """All of them: activations, then models, then rules, each in the order of the files."""
+    found = [builtin for library in libraries() for builtin in _of(library)]
+    order = ("activation", "model", "rule")
+    return tuple(sorted(found, key=lambda builtin: order.index(builtin.kind)))
+
+
+def _of(library: Library) -> list[Builtin]:
+    text = _text(library.source.span.file)
+    result: list[Builtin] = []
+    for name, activation in library.activations.items():
+        result.append(_builtin("activation", name, activation, (), text, library))
+    for name, model in library.models.items():
+        result.append(_builtin("model", name, model, (), text, library))
+    for name, rule in library.rules.items():
+        signals = tuple(signal.value for signal in rule.signals)
+        result.append(_builtin("rule", name, rule, signals, text, library))
+    return result
+
+
+def _text(file: str) -> list[str]:
+    """The lines of a library file, which is named by its entry point and its own name."""
+    package, _, name = file.partition("/")
+    folder = files(plugins.package(plugins.LIBRARIES, package))
+    return folder.joinpath(name).read_text(encoding="utf-8").splitlines()
+
+
+def _builtin(
+    kind: Kind, name: str, model: _Definition, signals: tuple[str, ...], text: list[str], library: Library
+) -> Builtin:
+    section = library.source.get(f"{kind}s")
+    entry = section.entry(name) if isinstance(section, Mapping) else None
+    assert entry is not None
+    about = "" if model.description is None else " ".join(model.description.value.split())
+    parameters = tuple((key, *_shown(parameter)) for key, parameter in model.parameters.items())
+    return Builtin(kind, name, about, parameters, signals, _excerpt(entry, text))
+
+
+def _shown(parameter: Parameter) -> tuple[str, str]:
+    value = parameter.value.value
+    return (value if isinstance(value, str) else f"{value:g}", parameter.description or "")
+
+
+def _excerpt(entry: Entry, text: list[str]) -> str:
+    """The lines of an entry: as far as they stand further to the right than its key. The description is shown apart."""
+    first = entry.key.span.line - 1
+    margin = entry.key.span.column - 1
+    lines = [text[first][margin:]]
+    for line in text[first + 1 :]:
+        if line.strip() and len(line) - len(line.lstrip()) <= margin:
+            break
+        lines.append(line[margin:])
+    return re.sub(r"^  description:.*\n?(^ {3,}.*\n?)*", "", "\n".join(lines), flags=re.MULTILINE).rstrip()

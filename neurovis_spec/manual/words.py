@@ -1,0 +1,128 @@
+"""The words of expressions and the patterns of connections, with what they mean.
+
+In: the tables of functions and of patterns. Out: Words, and Patterns with those that this version does not read yet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from neurovis_spec.compiler.patterns import PATTERNS
+from neurovis_spec.language.expressions.functions import FUNCTIONS
+
+FUNCTION_TEXTS: Mapping[str, str] = MappingProxyType(
+    {
+        "abs": "The absolute value.",
+        "sign": "−1, 0 or 1.",
+        "min": "The least of two or more.",
+        "max": "The greatest of two or more.",
+        "clip": "x, held between two bounds.",
+        "floor": "The integer below.",
+        "ceil": "The integer above.",
+        "round": "The nearest integer; halves go to the even one.",
+        "sqrt": "The square root.",
+        "exp": "e to the power of x.",
+        "log": "The natural logarithm.",
+        "log1p": "log(1 + x), exact for small x.",
+        "expm1": "exp(x) − 1, exact for small x.",
+        "pow": "x to the power of the exponent, as x^exponent.",
+        "sin": "The sine; angles are in radians.",
+        "cos": "The cosine.",
+        "tan": "The tangent.",
+        "asin": "The angle with this sine, from −π/2 to π/2.",
+        "acos": "The angle with this cosine, from 0 to π.",
+        "atan": "The angle with this tangent, from −π/2 to π/2.",
+        "atan2": "The angle of the point (x, y), from −π to π.",
+        "sinh": "The hyperbolic sine.",
+        "cosh": "The hyperbolic cosine.",
+        "tanh": "The hyperbolic tangent, from −1 to 1.",
+        "sigmoid": "1 / (1 + exp(−x)), from 0 to 1.",
+        "step": "1 from 0 on, else 0.",
+    }
+)
+NAMES: Mapping[str, str] = MappingProxyType(
+    {
+        "pi": "3.14159…",
+        "e": "2.71828…",
+        "dt": "Seconds a step (time.dt, by default 1).",
+        "k": "The step, from 0; in inputs, noise and definitions.",
+        "t": "The seconds, k·dt; in inputs, noise and definitions.",
+        "i": "The index from 0: of a neuron in its group; in a connection, of the source in its reference.",
+        "j": "In a connection, the index from 0 of the target in its reference.",
+        "n": "The number of neurons of the group.",
+        "n_from": "In a connection, the number of sources.",
+        "n_to": "In a connection, the number of targets.",
+        "distance": "In a connection, how far apart the positions of both neurons are.",
+        "x": "In an activation, the combined input.",
+        "drive": "In a model, the combined input with bias, input and noise: u[t].",
+        "f": "In the activity of a model, the neuron's activation: f(v).",
+        "pre": "In a rule, what reaches the synapse: the source's activity d steps ago, d being the delay.",
+        "sent": "In a rule, the source's activity of this step.",
+        "post": "In a rule, the target's activity of this step.",
+        "weight": "In a rule, the weight before the step.",
+    }
+)
+DRAW_TEXTS: Mapping[str, str] = MappingProxyType(
+    {
+        "normal(mean, sd)": "A normally distributed random number.",
+        "uniform(low, high)": "An evenly distributed random number.",
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """A function (``usage`` with its arguments) or a name of expressions."""
+
+    name: str
+    usage: str
+    about: str
+
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    """Which pairs of neurons a pattern connects; ``use`` is how it is written."""
+
+    name: str
+    use: str
+    about: str
+
+    @property
+    def later(self) -> bool:
+        """Whether this version does not read it yet."""
+        return self.name not in PATTERNS
+
+
+ALL_PATTERNS = (
+    Pattern("all_to_all", "all_to_all", "Every source with every target."),
+    Pattern("one_to_one", "one_to_one", "The first with the first, the second with the second, …; equal sizes."),
+    Pattern("chain", "chain", "i with i + 1; equal sizes, or one group."),
+    Pattern("ring", "ring", "As chain, and the last with the first."),
+    Pattern("random", "{random: {probability: 0.1}}", "Every pair with this probability, drawn from the seed."),
+    Pattern(
+        "fixed_indegree", "{fixed_indegree: {count: 3}}", "So many sources, drawn from the seed, for every target."
+    ),
+    Pattern(
+        "fixed_outdegree", "{fixed_outdegree: {count: 3}}", "So many targets, drawn from the seed, for every source."
+    ),
+    Pattern("nearest", "{nearest: {count: 3}}", "The nearest by position, without positions by index."),
+    Pattern(
+        "small_world",
+        "{small_world: {degree: 4, rewire: 0.1}}",
+        "A ring of neighbours, some of whose connections are drawn anew (Watts and Strogatz 1998).",
+    ),
+    Pattern("band", "{band: {width: 1}}", "All pairs with |i − j| up to the width."),
+)
+
+
+def functions() -> tuple[Word, ...]:
+    """The functions of expressions, in the order of the language reference."""
+    return tuple(Word(name, function.usage, FUNCTION_TEXTS[name]) for name, function in FUNCTIONS.items())
+
+
+def names() -> tuple[Word, ...]:
+    """What expressions may name beside parameters, and the draws."""
+    draws = tuple(Word(usage.partition("(")[0], usage, about) for usage, about in DRAW_TEXTS.items())
+    return (*(Word(name, name, about) for name, about in NAMES.items()), *draws)
