@@ -59,7 +59,7 @@ def _parameters(spec: Spec, findings: Findings) -> None:
     used: set[str] = set()
     for entry in spec.source.entries:
         # a definition sees its own parameters only
-        if entry.name not in _DEFINITIONS:
+        if entry.name not in _NO_EXPRESSIONS.union(_DEFINITIONS):
             for text in _texts(entry.value, _NO_EXPRESSIONS):
                 used.update(_WORD.findall(text))
     for name in spec.parameters:

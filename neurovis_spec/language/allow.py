@@ -104,11 +104,11 @@ def silence(findings: Findings) -> None:
         if allow.code != USELESS:
             _judge(allow, there, complete, findings)
     useless = {_key(item) for item in findings.sorted() if item.code == USELESS}
+    wanted = {(allow.span.file, allow.span.line, allow.code) for allow in asked}
+    findings.drop(lambda item: _key(item) in wanted)
     for allow in asked:
         if allow.code == USELESS:
             _judge(allow, useless, complete, findings)
-    wanted = {(allow.span.file, allow.span.line, allow.code) for allow in asked}
-    findings.drop(lambda item: item.severity == "warning" and _key(item) in wanted)
 
 
 def _key(item: Diagnostic) -> tuple[str, int, str]:

@@ -6,6 +6,7 @@ that the compiler can look at the rest; None where nothing can be said, as in an
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import TypeVar
 
 from pydantic import ValidationError
@@ -13,7 +14,7 @@ from pydantic import ValidationError
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.located import REPORTED
 from neurovis_spec.language.model import Model, opening
-from neurovis_spec.language.source import SourceDocument
+from neurovis_spec.language.source import Mapping, SourceDocument
 from neurovis_spec.language.spec import Library, Spec
 
 M = TypeVar("M", bound=Model)
@@ -23,6 +24,8 @@ def read_shape(document: SourceDocument, model: type[M], findings: Findings) -> 
     """Check a document against a model. All findings are noted; the result holds what could be read, None where that
     is too little to go on."""
     before = findings.errors
+    if _foreign(document, findings):
+        return None
     try:
         result = model.model_validate(document.root, context=findings)
     except ValidationError as error:
@@ -32,6 +35,21 @@ def read_shape(document: SourceDocument, model: type[M], findings: Findings) -> 
                 findings.error("wrong-shape", opening(document.root), f"{keys}: {item['msg']}")
         return None
     return result
+
+
+def _foreign(document: SourceDocument, findings: Findings) -> bool:
+    """Whether the document is written in another version of the language, which is noted. Of its other keys nothing can
+    be said then: they would all be follow-ups."""
+    entry = document.root.entry("neurovis")
+    if entry is None:
+        return False
+    head = Findings()
+    with suppress(ValidationError):
+        Library.model_validate(Mapping((entry,), document.root.span), context=head)
+    for found in head.sorted():
+        if found.code == "language-version":
+            findings.error(found.code, found.span, found.message, found.hint)
+    return any(found.code == "language-version" for found in head.sorted())
 
 
 def read_spec(document: SourceDocument, findings: Findings) -> Spec | None:

@@ -1,0 +1,330 @@
+"""Warnings: each where it belongs, none where something may be meant, and silent where the author says so."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from hypothesis import given
+from hypothesis import strategies as st
+
+import neurovis_spec as nv
+from neurovis_spec.cli.commands import neurovis
+from neurovis_spec.codes import catalogue
+from neurovis_spec.language.allow import allows
+
+ROOT = Path(__file__).parents[1]
+SPECS = sorted((ROOT / "specs").glob("*.yaml"))
+PAIR = "neurons: {A: {bias: 1}, B: {}}\n"
+
+
+def warnings(body: str) -> list[tuple[str, str]]:
+    """Code and the text at fault of every warning of a spec."""
+    text = f"neurovis: 1\nname: x\n{body}"
+    lines = text.split("\n")
+    found = nv.compile_text(text).warnings
+    assert all(item.severity == "warning" for item in found)
+    return [(item.code, lines[item.span.line - 1][item.span.column - 1 : item.span.end_column - 1]) for item in found]
+
+
+@pytest.mark.parametrize("path", SPECS, ids=lambda path: path.stem)
+def test_examples_are_free_of_warnings(path: Path) -> None:
+    assert nv.compile(path).warnings == ()
+
+
+# Inputs
+
+
+def test_an_input_that_nothing_reads() -> None:
+    assert warnings("inputs: {s: {}, r: {size: 2}}\nneurons: {A: {input: s}}\n") == [("unused-input", "r")]
+
+
+def test_a_rule_reads_an_input() -> None:
+    rule = "connections: {A -> B: {plasticity: {delta: {target: s}}}}\n"
+    assert warnings(f"inputs: {{s: {{}}}}\n{PAIR}{rule}") == []
+
+
+# Parameters
+
+
+def test_a_parameter_that_nothing_uses() -> None:
+    body = "parameters: {a: 1, b: 2*a, c: 3}\nneurons: {A: {bias: b}}\n"
+    assert warnings(body) == [("unused-parameter", "c")]
+
+
+def test_texts_for_people_use_nothing() -> None:
+    body = "title: of gain\ndescription: gain\nparameters: {gain: 1}\nneurons: {A: {label: gain}}\n"
+    assert warnings(body) == [("unused-parameter", "gain")]
+
+
+def test_a_definition_sees_its_own_parameters() -> None:
+    body = "parameters: {beta: 1}\n"
+    body += "activations: {swish: {parameters: {beta: 1}, value: x * sigmoid(beta * x)}}\n"
+    body += "neurons: {A: {activation: swish, bias: 1}}\n"
+    assert warnings(body) == [("unused-parameter", "beta")]
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        "neurons: {A: {bias: p}}",
+        "neurons: {A: {count: p}}",
+        "neurons: {A: {count: 2, bias: [1, p]}}",
+        "neurons: {A: {initial: -p}}",
+        'neurons: {A: {noise: "normal(0, p)"}}',
+        "neurons: {A: {activation: {gaussian: {sigma: p}}}}",
+        "neurons: {A: {model: {leaky_integrator: {leak: p/2}}}}",
+        "neurons: {A: {position: [p, 0]}}",
+        "time: {dt: 1, steps: 10*p}\nneurons: {A: {}}",
+        "inputs: {s: {expression: p*k}}\nneurons: {A: {input: s}}",
+        "inputs: {s: {size: p}}\nneurons: {A: {input: s}}",
+        "inputs: {s: {values: [[0], [p]]}}\nneurons: {A: {input: s}}",
+        "neurons: {A: {bias: 1}}\nconnections: {A -> A: p}",
+        "neurons: {A: {bias: 1}}\nconnections: {A -> A: {delay: p}}",
+        "neurons: {A: {bias: 1}}\nconnections: {A -> A: {matrix: [[p]]}}",
+        "neurons: {A: {bias: 1}}\nconnections: {A -> A: {edges: [[A, A, p]]}}",
+        "neurons: {A: {bias: 1}}\nconnections: {A -> A: {plasticity: {hebbian: {rate: p}}}}",
+        "neurons: {A: {bias: 1}}\nconnections: {A -> A: {plasticity: hebbian, bounds: [-p, p]}}",
+        "neurons: {A: {count: 9, bias: 1}}\nconnections: {A -> A: {pattern: {random: {probability: p/2}}}}",
+        "neurons: {A: {bias: 1}}\nevents: [{from: 3, clamp: {A: p}}]",
+    ],
+)
+def test_every_place_of_an_expression_uses_a_parameter(use: str) -> None:
+    assert warnings(f"parameters: {{p: 1}}\n{use}\n") == []
+
+
+# Definitions
+
+
+@pytest.mark.parametrize(
+    ("kind", "body"),
+    [
+        ("activation", "activations: {cube: {value: x^3}}"),
+        ("model", "models: {cube: {activity: f(drive)^3}}"),
+        ("rule", "rules: {cube: {weight: {each_step: weight + pre^3}}}"),
+    ],
+)
+def test_a_definition_that_nobody_uses(kind: str, body: str) -> None:
+    assert warnings(f"{body}\n{PAIR}") == [("unused-definition", "cube")]
+    if kind == "rule":
+        assert warnings(f"{body}\n{PAIR}connections: {{A -> B: {{plasticity: cube}}}}\n") == []
+    else:
+        assert warnings(f"{body}\nneurons: {{A: {{{kind}: cube, bias: 1}}}}\n") == []
+
+
+def test_a_default_that_is_replaced_is_used() -> None:
+    body = "activations: {identity: {value: 2*x}}\nneurons: {A: {bias: 1}}\n"
+    assert warnings(body) == [("replaces-builtin", "identity")]
+
+
+# Idle neurons
+
+
+def test_a_neuron_that_stays_at_zero() -> None:
+    assert warnings("neurons: {A: {}, B: {}}\nconnections: {A -> B: 1}\n") == [("idle-neuron", "A")]
+    assert warnings("neurons: {A: {}}\noutputs: {a: A}\n") == [("idle-neuron", "A")]
+    rule = "connections: {A -> B: {plasticity: {delta: {target: T}}}}\n"
+    assert warnings("neurons: {A: {bias: 1}, B: {}, T: {}}\n" + rule) == [("idle-neuron", "T")]
+
+
+@pytest.mark.parametrize("model", ["leaky_integrator", "adaptive", "hysteresis", "integrate_and_fire"])
+def test_a_state_that_nothing_drives_stays(model: str) -> None:
+    body = f"neurons: {{A: {{model: {model}, activation: tanh}}, B: {{}}}}\nconnections: {{A -> B: 1}}\n"
+    run = nv.compile_text(f"neurovis: 1\nname: x\n{body}").run(50)
+    assert not run["A"].any()
+    assert warnings(body) == [("idle-neuron", "A")]
+
+
+@pytest.mark.parametrize(
+    "neuron",
+    [
+        "bias: 1",
+        "bias: 0",
+        "initial: 0.1",
+        "initial: 0",
+        'noise: "normal(0, 1)"',
+        "input: s",
+        "activation: cos",
+        "activation: sigmoid",
+        "activation: step",
+        "combine: product",
+        "activation: gaussian, combine: distance",
+        "model: izhikevich",
+        "model: clock",
+    ],
+)
+def test_a_neuron_that_may_be_active_is_let_be(neuron: str) -> None:
+    body = "inputs: {s: {}}\nmodels: {clock: {activity: f(k)}}\n"
+    body += f"neurons: {{A: {{{neuron}}}, B: {{}}, S: {{input: s}}, C: {{model: clock}}}}\nconnections: {{A -> B: 1}}\n"
+    assert warnings(body) == []
+
+
+def test_a_neuron_of_which_nothing_depends_is_let_be() -> None:
+    assert warnings("neurons: {A: {}}\n") == []
+
+
+def test_what_feeds_itself_is_reached() -> None:
+    assert warnings("neurons: {A: {}, B: {}}\nconnections: {A -> A: 1, A -> B: 1}\n") == []
+
+
+def test_a_clamp_is_a_source() -> None:
+    body = "neurons: {A: {}, B: {}}\nconnections: {A -> B: 1}\n"
+    assert warnings(body + "events: [{from: 3, to: 5, clamp: {A: 1}}]\n") == []
+    assert warnings(body + "events: [{at: 3, lesion: A}]\n") == [("idle-neuron", "A")]
+
+
+def test_one_finding_for_a_group() -> None:
+    body = "neurons: {K: {count: 900}, O: {}}\nconnections: {K -> O: 1}\n"
+    assert warnings(body) == [("idle-neuron", "K")]
+    body = "neurons: {K: {count: 9}, O: {bias: 1}}\nconnections: [{K -> O: 1}, {O -> K2..K8: 1}]\n"
+    (found,) = nv.compile_text(f"neurovis: 1\nname: x\n{body}").warnings
+    assert "'K1', 'K9'" in found.message
+
+
+# Rates
+
+
+def test_a_rate_of_zero() -> None:
+    body = f"{PAIR}connections: {{A -> B: {{plasticity: {{hebbian: {{rate: 0}}}}}}}}\n"
+    assert warnings(body) == [("zero-rate", "0")]
+    rule = "rules: {mine: {parameters: {rate: 0}, weight: {each_step: weight + rate * pre}}}\n"
+    assert warnings(f"{rule}{PAIR}connections: {{A -> B: {{plasticity: mine}}}}\n") == [("zero-rate", "mine")]
+
+
+@pytest.mark.parametrize(
+    "rule",
+    ["{hebbian: {rate: eta}}", "{hebbian: {rate: 1e-9}}", "hebbian", "{mine: {rate: 0}}", "{late: {rate: 0}}"],
+)
+def test_a_rule_that_may_learn_is_let_be(rule: str) -> None:
+    body = "parameters: {eta: 0}\nrules:\n"
+    body += "  mine: {parameters: {rate: 1, loss: 0.1}, weight: {each_step: weight + rate * pre - loss * weight}}\n"
+    body += "  late: {parameters: {rate: 1}, weight: {each_step: weight + rate * pre, each_episode: weight / 2}}\n"
+    body += "neurons: {A: {bias: eta + 1}, B: {}}\nconnections:\n"
+    body += f"  A -> B: {{plasticity: {rule}}}\n  B -> A: {{plasticity: mine}}\n  B -> B: {{plasticity: late}}\n"
+    assert warnings(body) == []
+
+
+# Where there is an error there are no warnings of these kinds
+
+
+def test_errors_come_alone() -> None:
+    with pytest.raises(nv.SpecError) as caught:
+        nv.compile_text("neurovis: 1\nname: x\nparameters: {a: 1, b: c}\nneurons: {A: {}}\n")
+    assert [found.code for found in caught.value.diagnostics] == ["unknown-name"]
+
+
+def test_strict(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "x.yaml").write_text("neurovis: 1\nname: x\nparameters: {a: 1}\nneurons: {A: {}}\n", encoding="utf-8")
+    plain = CliRunner().invoke(neurovis, ["validate", "x.yaml"])
+    assert (plain.exit_code, plain.stdout) == (0, "x.yaml: ok (1 neuron, 0 connections)\n")
+    assert "x.yaml:3:14: warning[unused-parameter]: no expression uses the parameter 'a'" in plain.stderr
+    strict = CliRunner().invoke(neurovis, ["validate", "x.yaml", "--strict"])
+    assert (strict.exit_code, strict.stdout) == (1, "")
+    assert "x.yaml:3:14: error[unused-parameter]" in strict.stderr
+
+
+# Comments that allow
+
+
+def test_an_allowed_warning_is_silent() -> None:
+    assert warnings("parameters:\n  a: 1   # neurovis: allow unused-parameter\nneurons: {A: {}}\n") == []
+    assert warnings("parameters:\n  a: 1   #neurovis:allow unused-parameter\nneurons: {A: {}}\n") == []
+    assert warnings("parameters:\n  a: 1   # neurovis: allow unused-parameter # for later\nneurons: {A: {}}\n") == []
+    assert warnings("parameters:\n  a: 1   # for later  # neurovis: allow unused-parameter\nneurons: {A: {}}\n") == []
+
+
+def test_several_codes() -> None:
+    line = "activations: {relu: {value: x}}   # neurovis: allow unused-definition, replaces-builtin\n"
+    assert warnings(f"{line}neurons: {{A: {{}}}}\n") == []
+
+
+def test_only_its_line_and_its_code() -> None:
+    body = (
+        "parameters:   # neurovis: allow unused-parameter\n  a: 1   # neurovis: allow unused-input\nneurons: {A: {}}\n"
+    )
+    assert warnings(body) == [
+        ("useless-allow", "unused-parameter"),
+        ("unused-parameter", "a"),
+        ("useless-allow", "unused-input"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("comment", "place", "words"),
+    [
+        ("# neurovis: allow idle-neuron", "idle-neuron", "there is no warning 'idle-neuron' on this line"),
+        ("# neurovis: allow unknown-name", "unknown-name", "is an error; only warnings can be allowed"),
+        ("# neurovis: allow idle-neurons", "idle-neurons", "did you mean 'idle-neuron'?"),
+        ("# neurovis: allow", "# neurovis: allow", "this comment allows nothing"),
+        ("# neurovis: allow useless-allow", "useless-allow", "there is no warning 'useless-allow' on this line"),
+    ],
+)
+def test_an_allow_for_nothing_is_a_warning(comment: str, place: str, words: str) -> None:
+    body = f"neurons: {{A: {{}}}}   {comment}\n"
+    assert warnings(body) == [("useless-allow", place)]
+    (found,) = nv.compile_text(f"neurovis: 1\nname: x\n{body}").warnings
+    assert words in f"{found.message}; {found.hint}"
+
+
+def test_a_useless_allow_can_be_allowed() -> None:
+    assert warnings("neurons: {A: {}}   # neurovis: allow idle-neuron, useless-allow\n") == []
+
+
+def test_an_error_is_not_silenced() -> None:
+    with pytest.raises(nv.SpecError) as caught:
+        nv.compile_text("neurovis: 1\nname: x\nneurons: {A: {bias: c}}   # neurovis: allow unknown-name, idle-neuron\n")
+    # whether there would be a warning without the error, nobody knows
+    assert [found.code for found in caught.value.diagnostics] == ["unknown-name", "useless-allow"]
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        "'# neurovis: allow unused-parameter'",
+        '"# neurovis: allow unused-parameter"',
+        "a#neurovis:allow unused-parameter",
+        "'two\n\n  # neurovis: allow unused-parameter lines'",
+        "|\n  # neurovis: allow unused-parameter\n  and more",
+        ">-\n  # neurovis: allow unused-parameter",
+    ],
+)
+def test_a_text_is_no_comment(value: str) -> None:
+    assert warnings(f"title: {value}\nneurons: {{A: {{}}}}\n") == []
+    assert warnings(f"parameters: {{a: 1}}\ndescription: {value}\nneurons: {{A: {{}}}}\n") == [
+        ("unused-parameter", "a")
+    ]
+
+
+def test_a_comment_behind_a_text_is_one() -> None:
+    text = "a: 'x # neurovis: allow a'   # neurovis: allow b\nc: |   # neurovis: allow d\n  # neurovis: allow e\nf: x\n"
+    assert [(allow.code, allow.span.line) for allow in allows(text, "f")] == [("b", 1), ("d", 2)]
+
+
+def test_line_ends_of_windows() -> None:
+    body = (
+        "neurovis: 1\r\nname: x\r\nparameters:\r\n  a: 1   # neurovis: allow unused-parameter\r\nneurons: {A: {}}\r\n"
+    )
+    assert nv.compile_text(body).warnings == ()
+
+
+def test_every_warning_of_the_catalogue_can_be_allowed() -> None:
+    for code in catalogue().values():
+        if code.severity == "warning" and code.name != "useless-allow":
+            assert code.bad is not None
+            (found,) = nv.compile_text(code.bad).warnings
+            lines = code.bad.split("\n")
+            lines[found.span.line - 1] += f"   # neurovis: allow {code.name}"
+            assert nv.compile_text("\n".join(lines)).warnings == (), code.name
+
+
+@given(st.text(max_size=60), st.text(max_size=20))
+def test_any_text_can_be_searched(before: str, codes: str) -> None:
+    for allow in allows(f"{before}\nx: 1  # neurovis: allow {codes}", "f"):
+        assert allow.span.column >= 1
+        assert not set(allow.code) & set(" ,#\r\n")
+
+
+def test_a_commented_spec_is_no_allow() -> None:
+    assert warnings("neurons: {A: {}}\n# neurovis: 1\n# neurovis: allowance\n") == []
