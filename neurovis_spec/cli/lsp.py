@@ -1,0 +1,25 @@
+"""``neurovis lsp``: the language server for editors."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+import click
+
+from neurovis_spec.cli.failure import fault
+from neurovis_spec.cli.options import examples
+
+
+@click.command(epilog=examples("neurovis lsp"))
+@click.option("--stdio", is_flag=True, help="Accepted and not needed: many editors add it.")
+def command(stdio: bool) -> None:
+    """Answer an editor over standard input and output.
+
+    Findings while typing, completion, hover, go to definition, rename, symbols. An editor starts it; docs/editors.md
+    says how to set it up.
+    """
+    if find_spec("pygls") is None:
+        raise fault("the language server needs pygls; in a clone of the repository: pip install '.[lsp]'")
+    from neurovis_spec.lsp.server import serve
+
+    serve()

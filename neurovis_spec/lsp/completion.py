@@ -1,0 +1,224 @@
+"""What may be written at a place: keys with what they mean, names that fit there, words.
+
+In: a Document and a place in it. Out: Completions, each with the stretch of the text that it replaces. The text is most
+often broken when somebody types, so all goes by ``tolerant.where``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from neurovis_spec import plugins
+from neurovis_spec.compiler.constants import ALWAYS
+from neurovis_spec.diagnostics import Span
+from neurovis_spec.lsp.definitions import Definition, known
+from neurovis_spec.lsp.document import Document
+from neurovis_spec.lsp.index import Index
+from neurovis_spec.lsp.names import Name
+from neurovis_spec.lsp.outline import Path
+from neurovis_spec.lsp.roles import Role, Scope, role_of
+from neurovis_spec.lsp.shapes import keys_at, words_at
+from neurovis_spec.lsp.text import Place
+from neurovis_spec.lsp.tolerant import Where, where
+from neurovis_spec.lsp.words import GIVEN, PATTERN_SETTINGS, PATTERNS, THEMES, functions
+
+_WORD = re.compile(r"(?:(?<![\w.])[A-Za-z_]\w*\.(?!\.))*(?:(?<!\w)[A-Za-z_]\w*)?$", re.ASCII)
+_REST = re.compile(r"\w*", re.ASCII)
+#: Of a larger group only the first and the last neuron are offered.
+_FEW = 40
+#: A path that no document has, for asking what a key of a mapping is.
+_ANY = "\0"
+
+Sort = Literal["key", "neuron", "parameter", "input", "function", "constant", "definition", "word", "module", "local"]
+
+
+@dataclass(frozen=True, slots=True)
+class Completion:
+    """A text to be offered: ``insert`` replaces ``span``. ``detail`` is short, ``documentation`` Markdown."""
+
+    label: str
+    sort: Sort
+    insert: str
+    span: Span
+    detail: str = ""
+    documentation: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Offer:
+    """A completion that does not know yet where it stands."""
+
+    label: str
+    sort: Sort
+    detail: str = ""
+    documentation: str = ""
+
+
+def complete(document: Document, place: Place) -> tuple[Completion, ...]:
+    """Everything that fits at a place, in the order in which it is offered; nothing within a block of text."""
+    at = where(document.text, place)
+    if at is None:
+        return ()
+    index = document.index
+    result: list[Completion] = []
+    if at.mapping is not None:
+        result += _keys(at, at.mapping, place, document.file, index)
+        result += _offers(at, place, document, index, (*at.mapping, _ANY), True)
+    if at.value is not None:
+        result += _offers(at, place, document, index, at.value, False)
+    return tuple({(item.label, item.insert): item for item in reversed(result)}.values())[::-1]
+
+
+def _keys(at: Where, mapping: Path, place: Place, file: str, index: Index) -> Iterator[Completion]:
+    """The keys of the language that are not written yet, the required ones first."""
+    own = (*mapping, at.typed + at.rest)
+    span = _span(file, place, at.typed, at.rest)
+    for key in sorted(keys_at(mapping), key=lambda key: not key.required):
+        path = (*mapping, key.name)
+        if path == own or path not in index.keys:
+            yield Completion(key.name, "key", key.name if at.colon else key.name + ": ", span, "", key.description)
+
+
+def _offers(
+    at: Where, place: Place, document: Document, index: Index, path: Path, is_key: bool
+) -> Iterator[Completion]:
+    role, scope = role_of(path, is_key)
+    word = at.typed
+    rest = at.rest
+    if role is not None and role.use in ("formula", "references", "ends", "setting value"):
+        match = _WORD.search(at.typed)
+        word = "" if match is None else match[0].rpartition(".")[2]
+        following = _REST.match(at.rest)
+        rest = "" if following is None else following[0]
+    span = _span(document.file, place, word, rest)
+    front = at.typed[: len(at.typed) - len(word)]
+    colon = ": " if is_key and not at.colon and role is not None and role.use != "ends" else ""
+    for offer in _of_role(role, scope, path, front, index, place):
+        label = offer.label
+        yield Completion(label, offer.sort, label + colon, span, offer.detail, offer.documentation)
+    for label in () if is_key else words_at(path):
+        yield Completion(label, "word", label, span, THEMES.get(label, "") if path[-1] == "theme" else "")
+
+
+def _span(file: str, place: Place, typed: str, rest: str) -> Span:
+    return Span(file, place.line, place.column - len(typed), place.line, place.column + len(rest))
+
+
+def _of_role(role: Role | None, scope: Scope, path: Path, front: str, index: Index, place: Place) -> Iterator[_Offer]:
+    """What fits where a text has this role; ``front`` is what stands before the word that is being typed."""
+    if role is None:
+        return
+    match role.use:
+        case "formula":
+            yield from _formula(role, scope, index, place)
+        case "ends" | "references":
+            yield from _neurons(scope, front, index, single=path[-2:-1] == ("positions",))
+        case "choice":
+            assert role.kind is not None
+            yield from _definitions(known(role.kind, index.items).values())
+        case "setting" | "setting value":
+            yield from _settings(role, scope, path, front, index, place)
+        case "pattern":
+            yield from _patterns(path)
+        case "engine":
+            yield from (_Offer(name, "word") for name in ("auto", *plugins.names(plugins.LAYOUTS)))
+        case "names" if role.kind == "input":
+            module = index.module_of(str(path[1])) if path[0] == "instances" else scope.module
+            yield from (_Offer(name.text, "input") for name in index.declared("input", module))
+        case "names" if role.kind == "parameter":
+            module = index.module_of(str(path[1])) if path[0] == "instances" else scope.module
+            yield from _parameters(index.declared("parameter", module), index)
+        case "names" if role.kind == "module":
+            yield from (_Offer(name.text, "module") for name in index.declared("module"))
+
+
+def _formula(role: Role, scope: Scope, index: Index, place: Place) -> Iterator[_Offer]:
+    """Parameters, what is given here, functions. A parameter may use those before it."""
+    if scope.definition is None:
+        names = index.declared("parameter", scope.module)
+        earlier = [name for name in names if (name.span.end_line, name.span.end_column) <= (place.line, place.column)]
+        within = any(_surrounds(name, place) for name in names)
+        yield from _parameters([name for name in earlier if not _surrounds(name, place)] if within else names, index)
+    else:
+        for name in index.locals(*scope.definition):
+            yield _Offer(name.text, "local", str(name.item.path[2]))
+    for given in (*role.given, *ALWAYS):
+        yield _Offer(given, "constant", GIVEN.get(given, ""))
+    for function, (usage, meaning) in functions(role.random, role.functions).items():
+        yield _Offer(function, "function", usage, meaning)
+
+
+def _surrounds(name: Name, place: Place) -> bool:
+    whole = name.item.whole
+    return whole.line <= place.line <= whole.end_line
+
+
+def _parameters(names: Iterable[Name], index: Index) -> Iterator[_Offer]:
+    for name in names:
+        value = index.attribute(name, "value") or index.values.get(name.item.path)
+        description = index.attribute(name, "description")
+        yield _Offer(
+            name.text,
+            "parameter",
+            "" if value is None else f"= {value.text}",
+            "" if description is None else description.text,
+        )
+
+
+def _neurons(scope: Scope, front: str, index: Index, single: bool = False, signals: bool = False) -> Iterator[_Offer]:
+    """Groups, then neurons; behind a dot those of the instance's module. ``single`` leaves groups of several out."""
+    module: str | None = scope.module
+    instance = re.search(r"([A-Za-z_]\w*)\.$", front)
+    if instance:
+        module = index.module_of(instance[1])
+        if module is None:
+            return
+    groups = index.declared("neuron", module)
+    for group in groups:
+        numbers = index.numbers(group)
+        if not (single and (numbers is not None or (*group.item.path, "names") in index.keys)):
+            description = index.attribute(group, "description")
+            many = "" if numbers is None or len(numbers) > 999_999 else f"{len(numbers)} neurons"
+            yield _Offer(group.text, "neuron", many, "" if description is None else description.text)
+    if not instance:
+        yield from (_Offer(name.text, "module", "instance") for name in index.declared("instance", module))
+    if signals:
+        yield from (_Offer(name.text, "input", "input") for name in index.declared("input", module))
+        return
+    for group in groups:
+        numbers = index.numbers(group) or range(0)
+        if len(numbers) <= 999_999:
+            few = numbers if len(numbers) <= _FEW else (numbers[0], numbers[-1])
+            yield from (_Offer(f"{group.text}{number}", "neuron", f"of {group.text}") for number in few)
+
+
+def _definitions(found: Iterable[Definition]) -> Iterator[_Offer]:
+    for definition in found:
+        yield _Offer(definition.name, "definition", definition.usage, definition.markdown)
+
+
+def _settings(role: Role, scope: Scope, path: Path, front: str, index: Index, place: Place) -> Iterator[_Offer]:
+    """The settings of a definition; the value of one: a reference for a signal, else an expression."""
+    assert role.kind is not None
+    definition = known(role.kind, index.items).get(str(path[-2]))
+    if role.use == "setting":
+        for parameter in () if definition is None else definition.parameters:
+            yield _Offer(parameter.name, "parameter", f"= {parameter.default}", parameter.description)
+        for signal in () if definition is None else definition.signals:
+            yield _Offer(signal, "input", "signal: neurons or an input")
+    elif definition is not None and path[-1] in definition.signals:
+        yield from _neurons(scope, front, index, signals=True)
+    else:
+        yield from _formula(role, Scope(scope.module), index, place)
+
+
+def _patterns(path: Path) -> Iterator[_Offer]:
+    settings = PATTERN_SETTINGS.get(str(path[-2]), ()) if path[-3:-2] == ("pattern",) else ()
+    if path[-3:-2] == ("pattern",):
+        yield from (_Offer(name, "parameter") for name in settings)
+        return
+    for name, meaning in PATTERNS.items():
+        yield _Offer(name, "definition", meaning)

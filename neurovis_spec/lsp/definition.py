@@ -1,0 +1,103 @@
+"""Where something is declared.
+
+In: a Document and a place in it. Out: the file and the span of the declaration: a group for ``K3``, a parameter for its
+name in an expression, an own definition or that of an included file, the YAML of a built-in, a data file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+
+from neurovis_spec import plugins
+from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.language.data_files import locate
+from neurovis_spec.language.reader import read_file
+from neurovis_spec.lsp.document import Document
+from neurovis_spec.lsp.names import Name
+from neurovis_spec.lsp.outline import Item, outline
+from neurovis_spec.lsp.outline import Path as Keys
+from neurovis_spec.lsp.roles import SECTIONS
+from neurovis_spec.lsp.text import Place
+
+
+@dataclass(frozen=True, slots=True)
+class Location:
+    """A stretch of a file; ``path`` is None for the document itself."""
+
+    path: Path | None
+    span: Span
+
+
+def definition(document: Document, place: Place) -> Location | None:
+    """The declaration of what stands at a place; None where there is none that could be shown."""
+    name = document.name_at(place)
+    if name is None:
+        item = document.item_at(place)
+        return None if item is None else _file(document, item)
+    found = document.index.find(name)
+    if found is not None:
+        return Location(None, found.declaration.span)
+    return _elsewhere(document, name)
+
+
+def _file(document: Document, item: Item) -> Location | None:
+    """The beginning of a file that is named: data, or one that is included."""
+    if item.is_key or not (item.path[-1] == "file" or item.path[0] == "include"):
+        return None
+    path = _located(document, item)
+    return None if path is None or not path.is_file() else Location(path, Span(str(path), 1, 1, 1, 1))
+
+
+def _located(document: Document, item: Item) -> Path | None:
+    return locate(item.text, document.folder, document.folder, item.span, Findings())
+
+
+def _elsewhere(document: Document, name: Name) -> Location | None:
+    """A definition or a module of another file: an included one, else one that ships."""
+    wanted: list[Keys]
+    if name.kind == "local" and name.scope.definition is not None:
+        section, owner = name.scope.definition
+        wanted = [(section, owner, part, name.text) for part in ("parameters", "state", "let")]
+    elif name.kind in ("activation", "model", "rule"):
+        wanted = [(SECTIONS[name.kind], name.text)]
+    elif name.kind == "module":
+        wanted = [("modules", name.text)]
+    else:
+        return None
+    for path in (*_included(document), *_shipped()):
+        source = read_file(path, str(path), Findings())
+        for item in () if source is None else outline(source.root):
+            signal = not item.is_key and item.path[2:3] == ("signals",) and item.text == name.text
+            if (item.is_key and item.path in wanted) or (signal and item.path[:2] == wanted[0][:2]):
+                return Location(path, item.span)
+    return None
+
+
+def _included(document: Document) -> Iterator[Path]:
+    """The included files, and those that they include."""
+    waiting = [item for item in document.items if item.path[0] == "include" and not item.is_key]
+    seen: set[Path] = set()
+    folder = document.folder
+    places = [(item.text, folder, item.span) for item in waiting]
+    while places:
+        text, base, span = places.pop(0)
+        path = locate(text, folder, base, span, Findings())
+        if path is None or path in seen or not path.is_file():
+            continue
+        seen.add(path)
+        yield path
+        source = read_file(path, str(path), Findings())
+        for item in () if source is None else outline(source.root):
+            if item.path[0] == "include" and not item.is_key:
+                places.append((item.text, path.parent, item.span))
+
+
+def _shipped() -> Iterator[Path]:
+    """The library files, where they are files that an editor can open."""
+    for name in plugins.names(plugins.LIBRARIES):
+        folder = files(plugins.package(plugins.LIBRARIES, name))
+        if isinstance(folder, Path):
+            yield from sorted(folder.glob("*.yaml"))

@@ -1,0 +1,121 @@
+"""Activations, models and rules as an editor shows them: parameters, equations, description.
+
+In: Items of a spec, or of the library files that ship. Out: Definitions; those of the spec and the built-in ones look
+the same, since they are written in the same language.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+
+from neurovis_spec.compiler.builtin import libraries
+from neurovis_spec.lsp.outline import Item, outline
+from neurovis_spec.lsp.roles import DEFINITIONS, SECTIONS, Kind
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A parameter of a definition, with its default as it is written."""
+
+    name: str
+    default: str
+    description: str
+
+
+@dataclass(frozen=True, slots=True)
+class Definition:
+    """An activation, a model or a rule. ``equations`` are lines ``name = expression``."""
+
+    kind: Kind
+    name: str
+    parameters: tuple[Parameter, ...]
+    signals: tuple[str, ...]
+    equations: tuple[str, ...]
+    description: str
+
+    @property
+    def usage(self) -> str:
+        """How its settings look: ``gaussian(sigma = 1)``."""
+        settings = [f"{p.name} = {p.default}" for p in self.parameters] + list(self.signals)
+        return f"{self.name}({', '.join(settings)})" if settings else self.name
+
+    @property
+    def markdown(self) -> str:
+        """Name, equations, description and parameters."""
+        parts = [f"**{self.usage}** ({self.kind})"]
+        if self.equations:
+            parts.append("```\n" + "\n".join(self.equations) + "\n```")
+        if self.description:
+            parts.append(self.description)
+        told = [f"- `{p.name}`: {p.description}" for p in self.parameters if p.description]
+        return "\n\n".join([*parts, "\n".join(told)]) if told else "\n\n".join(parts)
+
+
+def definitions(items: Iterable[Item]) -> Mapping[tuple[str, str], Definition]:
+    """The definitions among the items, by section and name."""
+    texts: dict[tuple[str, str], dict[tuple[str, ...], str]] = {}
+    for item in items:
+        if len(item.path) > 1 and item.path[0] in DEFINITIONS:
+            path = tuple(str(part) for part in item.path)
+            below = texts.setdefault((path[0], path[1]), {})
+            if not item.is_key:
+                below[path[2:]] = item.text
+            elif len(path) > 2:
+                below.setdefault(path[2:], "")
+    return {(section, name): _definition(section, name, below) for (section, name), below in texts.items()}
+
+
+@cache
+def builtin() -> Mapping[tuple[str, str], Definition]:
+    """The definitions that ship with the package and with plug-ins."""
+    return {key: value for library in libraries() for key, value in definitions(outline(library.source)).items()}
+
+
+@cache
+def builtin_signals() -> Mapping[str, tuple[str, ...]]:
+    """The signals of the built-in rules."""
+    return {name: definition.signals for (section, name), definition in builtin().items() if section == "rules"}
+
+
+def known(kind: Kind, items: Iterable[Item]) -> Mapping[str, Definition]:
+    """All definitions of a kind in reach, an author's own before the built-in ones."""
+    section = SECTIONS[kind]
+    both = {**builtin(), **definitions(items)}
+    return {name: definition for (where, name), definition in both.items() if where == section}
+
+
+def _definition(section: str, name: str, texts: Mapping[tuple[str, ...], str]) -> Definition:
+    parameters = []
+    for path, text in texts.items():
+        if len(path) == 2 and path[0] == "parameters":
+            default = texts.get((*path, "value"), text)
+            parameters.append(Parameter(path[1], default, texts.get((*path, "description"), "")))
+    signals = tuple(text for path, text in texts.items() if path[0] == "signals" and text)
+    description = " ".join(texts.get(("description",), "").split())
+    return Definition(DEFINITIONS[section], name, tuple(parameters), signals, _equations(section, texts), description)
+
+
+def _equations(section: str, texts: Mapping[tuple[str, ...], str]) -> tuple[str, ...]:
+    lines: list[str] = []
+    late: list[str] = []
+    for path, text in texts.items():
+        match path:
+            case ("let", name):
+                lines.append(f"{name} = {text}")
+            case ("state", name, "initial"):
+                late.append(f"{name} = {text} at the beginning")
+            case ("state", name, "each_step"):
+                lines.append(f"{name} = {text}")
+            case ("state", name, "each_episode"):
+                late.append(f"{name} = {text} at an episode's end")
+            case ("value",) if section == "activations":
+                lines.append(f"f(x) = {text}")
+            case ("activity",):
+                lines.append(f"activity = {text}")
+            case ("weight", "each_step"):
+                lines.append(f"weight = {text}")
+            case ("weight", "each_episode"):
+                late.append(f"weight = {text} at an episode's end")
+    return tuple(lines + late)

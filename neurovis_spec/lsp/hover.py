@@ -1,0 +1,186 @@
+"""What stands under the pointer, explained.
+
+In: a Document and a place. Out: Markdown and the stretch it is about: a group's size, activation and model, a
+parameter's value, the equation and the description of a definition as shipped, the meaning of a key.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from neurovis_spec.diagnostics import Span
+from neurovis_spec.lsp.definitions import known
+from neurovis_spec.lsp.document import Document
+from neurovis_spec.lsp.index import Found
+from neurovis_spec.lsp.names import Name
+from neurovis_spec.lsp.outline import Item
+from neurovis_spec.lsp.roles import DEFINITIONS, Role, role_of
+from neurovis_spec.lsp.shapes import key_at
+from neurovis_spec.lsp.text import Place, holds
+from neurovis_spec.lsp.words import GIVEN, PATTERN_SETTINGS, PATTERNS, functions
+
+_WORD = re.compile(r"[A-Za-z_]\w*", re.ASCII)
+
+
+@dataclass(frozen=True, slots=True)
+class Hover:
+    """Markdown about a stretch of the text."""
+
+    markdown: str
+    span: Span
+
+
+def hover(document: Document, place: Place) -> Hover | None:
+    """What there is to say of a place; None where there is nothing."""
+    name = document.name_at(place)
+    if name is not None:
+        told = _name(document, name)
+        return None if told is None else Hover(told, name.span)
+    item = document.item_at(place)
+    if item is None:
+        return None
+    role, _ = role_of(item.path, item.is_key)
+    if role is not None and role.use in ("formula", "setting value") and not item.is_key:
+        return _given(item, role, place)
+    if role is not None and role.use == "pattern" and item.text in PATTERNS:
+        settings = ", ".join(PATTERN_SETTINGS.get(item.text, ()))
+        return Hover(
+            f"**{item.text}** (pattern): {PATTERNS[item.text]}" + (f" ({settings})" * bool(settings)), item.span
+        )
+    key = key_at(item.path) if item.is_key else None
+    return None if key is None else Hover(f"**{key.name}**: {key.description}", item.span)
+
+
+def _given(item: Item, role: Role, place: Place) -> Hover | None:
+    """A function or a constant in an expression."""
+    if item.scalar.inner is None:
+        return None
+    called = functions(role.random, role.functions)
+    for match in _WORD.finditer(item.text):
+        span = item.scalar.at(match.start(), match.end())
+        if not holds(span, place):
+            continue
+        if match[0] in called and item.text[match.end() :].lstrip().startswith("("):
+            usage, meaning = called[match[0]]
+            return Hover(f"`{usage}`" + (f": {meaning}" if meaning else ""), span)
+        if match[0] in GIVEN:
+            return Hover(f"`{match[0]}`: {GIVEN[match[0]]}", span)
+    return None
+
+
+def _name(document: Document, name: Name) -> str | None:
+    if name.kind in ("activation", "model", "rule"):
+        definition = known(name.kind, document.items).get(name.text)
+        return None if definition is None else definition.markdown
+    found = document.index.find(name)
+    if found is None:
+        return _setting(document, name) if name.kind == "local" else None
+    match found.declaration.kind:
+        case "neuron":
+            return _group(document, name, found)
+        case "parameter":
+            return _parameter(document, found.declaration)
+        case "local":
+            return _setting(document, found.declaration)
+        case "input":
+            return _input(document, found.declaration)
+        case "instance":
+            module = document.index.attribute(found.declaration, "module")
+            numbers = document.index.numbers(found.declaration)
+            many = f" ({len(numbers)} of them)" if numbers is not None and len(numbers) < 1_000_000 else ""
+            return (
+                f"**{found.declaration.text}**{many}: instance of the module `{'' if module is None else module.text}`"
+            )
+        case kind:
+            return _described(document, found.declaration, f"**{found.declaration.text}** ({kind})")
+
+
+def _described(document: Document, declaration: Name, head: str) -> str:
+    description = document.index.attribute(declaration, "description")
+    return head if description is None else f"{head}\n\n{description.text}"
+
+
+def _group(document: Document, name: Name, found: Found) -> str:
+    """A group's size, activation and model: those of the network as it last was, else as written."""
+    group, index = found.declaration, document.index
+    if not group.item.is_key:  # one of the names of a group
+        owner = group.item.path[:-2]
+        group = next((other for other in index.declarations if other.item.path == owner), group)
+    numbers = index.numbers(group)
+    named = [item for path, item in index.values.items() if path[:-1] == (*group.item.path, "names")]
+    if named:
+        size = f"{len(named)} neurons ({named[0].text} … {named[-1].text})"
+    elif numbers is None:
+        size = "a single neuron"
+    elif len(numbers) < 1_000_000:
+        ends = f"{group.text}{numbers[0]} … {group.text}{numbers[-1]}" if numbers else ""
+        size = f"{len(numbers)} neurons ({ends})" if len(numbers) != 1 else f"1 neuron ({ends})"
+    else:
+        count = index.attribute(group, "count")
+        size = f"{'' if count is None else count.text} neurons"
+    facts = {key: _choice(document, group, key) for key in ("activation", "model", "combine", "input", "bias")}
+    facts = {"activation": "identity", "model": "static", "combine": "sum"} | {k: v for k, v in facts.items() if v}
+    lines = [f"- {key}: `{value}`" for key, value in facts.items()]
+    head = f"**{group.text}**: {size}"
+    if name.text != group.text:
+        head = f"**{name.text}**, a neuron of {head}"
+    return _described(document, group, "\n".join([head, "", *lines]))
+
+
+def _choice(document: Document, group: Name, key: str) -> str:
+    """A choice as it is written, with its settings: ``gaussian(sigma = 40)``."""
+    path, index = (*group.item.path, key), document.index
+    plain = index.values.get(path)
+    if plain is not None:
+        return plain.text
+    chosen = next((entry for entry in index.keys if entry[:-1] == path), None)
+    if chosen is None:
+        return ""
+    settings = [f"{p[-1]} = {item.text}" for p, item in index.values.items() if p[:-1] == chosen]
+    return f"{chosen[-1]}({', '.join(settings)})" if settings else str(chosen[-1])
+
+
+def _parameter(document: Document, declaration: Name) -> str:
+    index, network = document.index, document.network
+    value = index.attribute(declaration, "value") or index.values.get(declaration.item.path)
+    written = "" if value is None else value.text
+    head = f"**{declaration.text}** = `{written}`"
+    if network is not None and declaration.scope.module is None and isinstance(value and value.scalar.value, str):
+        known_value = network.parameters.get(declaration.text)
+        head += "" if known_value is None else f" = {known_value:g}"
+    low, high = index.attribute(declaration, "min"), index.attribute(declaration, "max")
+    if low is not None or high is not None:
+        head += f" (from {'-∞' if low is None else low.text} to {'∞' if high is None else high.text})"
+    return _described(document, declaration, head)
+
+
+def _input(document: Document, declaration: Name) -> str:
+    index = document.index
+    expression, file = index.attribute(declaration, "expression"), index.attribute(declaration, "file")
+    source = f"`{expression.text}`" if expression else f"the file `{file.text}`" if file else "from outside"
+    if any(path[:3] == (*declaration.item.path, "values") for path in index.values):
+        source = "values, one row a step"
+    size = None
+    if document.network is not None and declaration.scope.module is None:
+        size = next((entry.size for entry in document.network.inputs if entry.name == declaration.text), None)
+    head = f"**{declaration.text}** (input{'' if size is None else f', size {size}'}): {source}"
+    return _described(document, declaration, head)
+
+
+def _setting(document: Document, name: Name) -> str | None:
+    """A parameter, signal, state or intermediate value of a definition."""
+    if name.scope.definition is None:
+        return None
+    section, owner = name.scope.definition
+    definition = known(DEFINITIONS[section], document.items).get(owner)
+    if definition is None:
+        return None
+    for parameter in definition.parameters:
+        if parameter.name == name.text:
+            told = f"**{name.text}** (parameter of {owner}, default `{parameter.default}`)"
+            return f"{told}\n\n{parameter.description}" if parameter.description else told
+    if name.text in definition.signals:
+        return f"**{name.text}** (signal of {owner}): neurons or an input, of size 1 or of the size of the target"
+    lines = [line for line in definition.equations if line.startswith(f"{name.text} =")]
+    return f"**{name.text}** of {owner}\n\n```\n" + "\n".join(lines) + "\n```" if lines else None

@@ -1,0 +1,158 @@
+"""Who is called what in a document: declarations, and to which of them a name leads.
+
+In: the Items and Names of a document. Out: for a name its declaration and the part of it that is the declared one (the
+``K`` of ``K3``); all names that lead to a declaration. Groups, inputs and instances of a module share their names.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Final
+
+from neurovis_spec.diagnostics import Span
+from neurovis_spec.lsp.names import Lookup, Name, names_of
+from neurovis_spec.lsp.outline import Item
+from neurovis_spec.lsp.roles import Kind
+from neurovis_spec.lsp.text import Text
+
+_NUMBER = re.compile(r"0|[1-9][0-9]*")
+#: The kinds that share one namespace.
+SHARED: Final[tuple[Kind, ...]] = ("neuron", "input", "instance")
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """Where a name leads: its declaration, and the place in the name that bears the declared one."""
+
+    declaration: Name
+    part: Span
+
+
+@dataclass(frozen=True)
+class Index:
+    """The names of one document. ``sizes`` are those of groups whose ``count`` is no plain number, as far as they are
+    known; ``builtin_signals`` the signals of the built-in rules."""
+
+    items: tuple[Item, ...]
+    text: Text
+    sizes: Mapping[str, int] = field(default_factory=dict)
+    builtin_signals: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    @cached_property
+    def values(self) -> Mapping[tuple[str | int, ...], Item]:
+        """The values by their paths."""
+        return {item.path: item for item in self.items if not item.is_key}
+
+    @cached_property
+    def keys(self) -> Mapping[tuple[str | int, ...], Item]:
+        """The keys by their paths."""
+        return {item.path: item for item in self.items if item.is_key}
+
+    @cached_property
+    def names(self) -> tuple[Name, ...]:
+        """All names, in the order of the document."""
+        return tuple(names_of(self.items, self.text, Lookup(self.module_of, self._is_signal)))
+
+    @cached_property
+    def declarations(self) -> tuple[Name, ...]:
+        """Those names that declare something."""
+        return tuple(name for name in self.names if name.declares)
+
+    @cached_property
+    def _declared(self) -> Mapping[tuple[Kind, str | None, tuple[str, str] | None, str], Name]:
+        result: dict[tuple[Kind, str | None, tuple[str, str] | None, str], Name] = {}
+        for name in self.declarations:
+            result.setdefault((name.kind, name.scope.module, name.scope.definition, name.text), name)
+        return result
+
+    def declared(self, kind: Kind, module: str | None = None) -> tuple[Name, ...]:
+        """The declarations of a kind in a module (None: the spec itself)."""
+        return tuple(name for name in self.declarations if name.kind == kind and name.scope.module == module)
+
+    def locals(self, section: str, definition: str) -> tuple[Name, ...]:
+        """What an own definition declares: parameters, states, signals, intermediate values."""
+        wanted = (section, definition)
+        return tuple(n for n in self.declarations if n.kind == "local" and n.scope.definition == wanted)
+
+    def find(self, name: Name) -> Found | None:
+        """Where a name leads; None where nothing in this document declares it."""
+        if name.declares:
+            return Found(name, name.span)
+        kinds: tuple[Kind, ...] = SHARED if name.kind == "neuron" else (name.kind,)
+        for kind in kinds:
+            exact = self._declared.get((kind, name.scope.module, name.scope.definition, name.text))
+            if exact is not None:
+                return Found(exact, name.span)
+        for kind in kinds:
+            if kind in ("neuron", "instance"):
+                counted = self._counted(kind, name.text, name.scope.module)
+                if counted is not None:
+                    return Found(counted, _head(name, len(counted.text)))
+        return None
+
+    def uses(self, declaration: Name) -> Iterator[tuple[Name, Span]]:
+        """All names that lead to a declaration, itself among them, with the part that bears the declared name."""
+        for name in self.names:
+            found = self.find(name)
+            if found is not None and found.declaration is declaration:
+                yield name, found.part
+
+    def attribute(self, declaration: Name, key: str) -> Item | None:
+        """The value of a key of what a name declares."""
+        return self.values.get((*declaration.item.path, key))
+
+    def numbers(self, declaration: Name) -> range | None:
+        """The numbers of a counted group or instance; None where it is single or has names. An open end is far away."""
+        path = declaration.item.path
+        if (*path, "count") not in self.keys or not declaration.item.is_key:
+            return None
+        start = self._integer((*path, "first"), 0 if (*path, "first") in self.keys else 1)
+        count = self._integer((*path, "count"), -1)
+        if count < 0:
+            count = self.sizes.get(declaration.text, 1_000_000) if declaration.scope.module is None else 1_000_000
+        return range(start, start + count)
+
+    def _integer(self, path: tuple[str | int, ...], otherwise: int) -> int:
+        item = self.values.get(path)
+        value = None if item is None else item.scalar.value
+        return value if isinstance(value, int) and not isinstance(value, bool) else otherwise
+
+    def _counted(self, kind: Kind, text: str, module: str | None) -> Name | None:
+        """The counted group (or instance) of which this is a neuron: the longest name that fits."""
+        for length in range(len(text) - 1, 0, -1):
+            group = self._declared.get((kind, module, None, text[:length]))
+            if group is None or not _NUMBER.fullmatch(text, length):
+                continue
+            numbers = self.numbers(group)
+            if numbers is not None and int(text[length : length + 12]) in numbers:
+                return group
+        return None
+
+    @cached_property
+    def _modules(self) -> Mapping[str, str]:
+        """The modules of the instances, by the instances' names."""
+        return {
+            str(path[1]): item.text
+            for path, item in self.values.items()
+            if len(path) == 3 and path[0] == "instances" and path[2] == "module"
+        }
+
+    def module_of(self, instance: str) -> str | None:
+        """The module of an instance, or of one of a counted one (``left2``)."""
+        module = self._modules.get(instance)
+        return self._modules.get(instance.rstrip("0123456789")) if module is None else module
+
+    def _is_signal(self, rule: str, setting: str) -> bool:
+        own = [path for path in self.keys if path[:2] == ("rules", rule)]
+        if not own:
+            return setting in self.builtin_signals.get(rule, ())
+        wanted = ("rules", rule, "signals")
+        return any(path[:3] == wanted and item.text == setting for path, item in self.values.items())
+
+
+def _head(name: Name, length: int) -> Span:
+    """The first characters of a name."""
+    return name.span.within(0, length) if name.exact else name.span

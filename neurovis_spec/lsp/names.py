@@ -1,0 +1,149 @@
+"""Every name in a document, at its very characters: where it is declared, and wherever it is used.
+
+In: Items. Out: Names, in the order of the document: those in references (``K3``, ``K3..K5``, ``left1.K -> O``), in
+expressions, and those that are a whole value or key.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import partial
+
+from neurovis_spec.compiler.constants import ALWAYS
+from neurovis_spec.diagnostics import Span
+from neurovis_spec.lsp.outline import Item
+from neurovis_spec.lsp.roles import SECTIONS, Kind, Role, Scope, role_of
+from neurovis_spec.lsp.text import Text
+
+#: A name in a reference, with those of the instances in front of it.
+_REFERENCE = re.compile(r"[A-Za-z_]\w*(?:\.(?!\.)[A-Za-z_]\w*)*", re.ASCII)
+#: A name in an expression, and the parenthesis behind the name of a function.
+_IN_FORMULA = re.compile(r"(?<![\w.])([A-Za-z_]\w*)(\s*\()?", re.ASCII)
+_WORDS = frozenset({"and", "or", "not", "if", "else"})
+
+
+@dataclass(frozen=True, slots=True)
+class Name:
+    """A name where it stands. ``exact`` says whether its span is exactly its characters (it is not in a text with
+    escapes); ``via`` is the name of the instance in front of it."""
+
+    kind: Kind
+    text: str
+    span: Span
+    scope: Scope
+    item: Item
+    declares: bool = False
+    exact: bool = True
+    via: Name | None = None
+
+
+@dataclass(frozen=True)
+class Lookup:
+    """What the reading of some names needs to know of others: the module of an instance, whether a setting of a rule
+    is a signal."""
+
+    module_of: Callable[[str], str | None]
+    is_signal: Callable[[str, str], bool]
+
+
+def names_of(items: Iterable[Item], text: Text, lookup: Lookup) -> Iterator[Name]:
+    """All names of the items."""
+    for item in items:
+        role, scope = role_of(item.path, item.is_key)
+        if role is not None and (item.is_key or isinstance(item.scalar.value, str)):
+            yield from _names(item, role, scope, text, lookup)
+
+
+def _names(item: Item, role: Role, scope: Scope, text: Text, lookup: Lookup) -> Iterator[Name]:
+    match role.use:
+        case "formula":
+            yield from _formula(item, role, scope, text)
+        case "setting value":
+            rule, setting = str(item.path[-2]), str(item.path[-1])
+            if lookup.is_signal(rule, setting):
+                yield from _references(item, scope, text, lookup)
+            else:
+                yield from _formula(item, role, scope, text)
+        case "ends" | "references":
+            yield from _references(item, scope, text, lookup)
+        case "setting":
+            assert role.kind is not None
+            definition = Scope(None, (SECTIONS[role.kind], str(item.path[-2])))
+            yield _whole(item, "local", definition, text)
+        case "choice" | "names" | "declares":
+            assert role.kind is not None
+            if role.use == "choice":
+                scope = Scope()
+            elif item.path[0] == "instances" and item.is_key and len(item.path) > 2:
+                scope = Scope(lookup.module_of(str(item.path[1])))
+            declares = role.use == "declares"
+            if role.kind in ("module", "activation", "model", "rule"):
+                scope = Scope()
+            yield _whole(item, role.kind, scope, text, declares)
+
+
+def _whole(item: Item, kind: Kind, scope: Scope, text: Text, declares: bool = False) -> Name:
+    place = _inside(item, text, [(0, len(item.text))])
+    span, exact = place[0]
+    return Name(kind, item.text, span, scope, item, declares, exact)
+
+
+def _formula(item: Item, role: Role, scope: Scope, text: Text) -> Iterator[Name]:
+    """The names of an expression that somebody declares: no constants, no functions, nothing that is given here."""
+    found = [match for match in _IN_FORMULA.finditer(item.text) if match[1] not in _WORDS]
+    places = _inside(item, text, [match.span(1) for match in found])
+    local = scope.definition is not None
+    for match, (span, exact) in zip(found, places, strict=True):
+        if match[2] is None and match[1] not in ALWAYS and match[1] not in role.given:
+            yield Name("local" if local else "parameter", match[1], span, scope, item, False, exact)
+
+
+def _references(item: Item, scope: Scope, text: Text, lookup: Lookup) -> Iterator[Name]:
+    found = list(_REFERENCE.finditer(item.text))
+    parts: list[tuple[int, int]] = []
+    for match in found:
+        at = match.start()
+        for part in match[0].split("."):
+            parts.append((at, at + len(part)))
+            at += len(part) + 1
+    places = iter(_inside(item, text, parts))
+    for match in found:
+        via: Name | None = None
+        here: Scope | None = Scope(scope.module)
+        *instances, last = match[0].split(".")
+        for part in instances:
+            span, exact = next(places)
+            if here is not None:
+                via = Name("instance", part, span, here, item, False, exact, via)
+                yield via
+                module = lookup.module_of(part)
+                here = None if module is None else Scope(module)
+        span, exact = next(places)
+        if here is not None:
+            yield Name("neuron", last, span, here, item, False, exact, via)
+
+
+def _inside(item: Item, text: Text, parts: list[tuple[int, int]]) -> list[tuple[Span, bool]]:
+    """The places of parts of an item's text, and whether each is exact.
+
+    Where the characters do not stand one by one in the source (several lines, escapes), names are looked for in order
+    in what is written; if others are found there, the whole item is given.
+    """
+    scalar = item.scalar
+    if scalar.inner is not None and scalar.span.line == scalar.span.end_line:
+        return [(scalar.at(start, end), True) for start, end in parts]
+    raw = text.part(scalar.span)
+    first = text.index(scalar.span.line, scalar.span.column)
+    result: list[tuple[Span, bool]] = []
+    at = 0
+    locate = partial(text.span, scalar.span.file)
+    for start, end in parts:
+        wanted = item.text[start:end]
+        match = re.compile(rf"(?<!\w){re.escape(wanted)}(?!\w)").search(raw, at)
+        if match is None or "\\" in raw:
+            return [(scalar.span, False)] * len(parts)
+        result.append((locate(first + match.start(), first + match.end()), True))
+        at = match.end()
+    return result

@@ -1,0 +1,192 @@
+"""The server: answers an editor over standard input and output.
+
+In: requests and notifications of the language server protocol. Out: answers, and findings a moment after each change.
+One thread compiles, one document at a time; what has been overtaken by a later change is not published.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Final
+
+from lsprotocol import types
+from pygls.exceptions import JsonRpcInvalidParams
+from pygls.lsp.server import LanguageServer
+from pygls.uris import from_fs_path, to_fs_path
+
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.lsp import wire
+from neurovis_spec.lsp.completion import complete
+from neurovis_spec.lsp.definition import definition
+from neurovis_spec.lsp.document import Document, check
+from neurovis_spec.lsp.hover import hover
+from neurovis_spec.lsp.rename import RenameError, prepare, rename
+from neurovis_spec.lsp.symbols import symbols
+from neurovis_spec.lsp.text import Text
+from neurovis_spec.version import __version__
+
+#: Seconds without a change until findings are looked for.
+PAUSE: Final = 0.3
+_log = logging.getLogger(__name__)
+
+
+class SpecServer(LanguageServer):
+    """The open documents: what they last compiled to, and the checks that are under way."""
+
+    def __init__(self, pause: float = PAUSE) -> None:
+        # Whole texts: pygls counts the lines of changes in a way of its own.
+        super().__init__("neurovis", __version__, text_document_sync_kind=types.TextDocumentSyncKind.Full)
+        self._pause = pause
+        self._networks: dict[str, Network] = {}
+        self._documents: dict[str, Document] = {}
+        self._checks: dict[str, asyncio.Task[None]] = {}
+        self._compiler = ThreadPoolExecutor(max_workers=1)
+
+    def document(self, uri: str) -> Document:
+        """An open document as it is now; the same object until it changes."""
+        source = self.workspace.get_text_document(uri).source
+        known = self._documents.get(uri)
+        network = self._networks.get(uri)
+        if known is None or known.source != source or known.network is not network:
+            path = to_fs_path(uri) if uri.startswith("file:") else None
+            folder = Path.cwd() if path is None else Path(path).parent
+            known = Document(source, path or uri, folder, network, str(self._encoding))
+            self._documents[uri] = known
+        return known
+
+    @property
+    def _encoding(self) -> str:
+        encoding = self.workspace.position_encoding
+        return encoding.value if isinstance(encoding, types.PositionEncodingKind) else encoding or "utf-16"
+
+    def changed(self, uri: str, pause: float | None = None) -> None:
+        """Look for findings, once nothing has changed for a moment."""
+        self._forget_check(uri)
+        wait = self._pause if pause is None else pause
+        self._checks[uri] = asyncio.get_running_loop().create_task(self._check(uri, wait))
+
+    def closed(self, uri: str) -> None:
+        """Forget a document, and take its findings away."""
+        self._forget_check(uri)
+        self._documents.pop(uri, None)
+        self._networks.pop(uri, None)
+        self.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri, []))
+
+    def _forget_check(self, uri: str) -> None:
+        task = self._checks.pop(uri, None)
+        if task is not None:
+            task.cancel()
+
+    async def _check(self, uri: str, pause: float) -> None:
+        await asyncio.sleep(pause)
+        document = self.document(uri)
+        version = self.workspace.get_text_document(uri).version
+        try:
+            checked = await asyncio.get_running_loop().run_in_executor(self._compiler, check, document)
+        except Exception:  # a mistake of ours must not end the server: the editor would restart it for ever
+            _log.exception("the check of %s has failed", uri)
+            return
+        if checked.network is not None:
+            self._networks[uri] = checked.network
+        found = wire.diagnostics(document, checked.findings)
+        self.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri, found, version))
+
+
+def make_server(pause: float = PAUSE) -> SpecServer:
+    """A server with all that it answers."""
+    server = SpecServer(pause)
+    _follow(server)
+    _answer(server)
+    _edit(server)
+    return server
+
+
+def _follow(server: SpecServer) -> None:
+    """Open, change, close."""
+
+    @server.feature(types.TEXT_DOCUMENT_DID_OPEN)
+    async def did_open(params: types.DidOpenTextDocumentParams) -> None:
+        server.changed(params.text_document.uri, 0.0)
+
+    @server.feature(types.TEXT_DOCUMENT_DID_CHANGE)
+    async def did_change(params: types.DidChangeTextDocumentParams) -> None:
+        server.changed(params.text_document.uri)
+
+    @server.feature(types.TEXT_DOCUMENT_DID_SAVE)
+    async def did_save(params: types.DidSaveTextDocumentParams) -> None:
+        server.changed(params.text_document.uri, 0.0)
+
+    @server.feature(types.TEXT_DOCUMENT_DID_CLOSE)
+    async def did_close(params: types.DidCloseTextDocumentParams) -> None:
+        server.closed(params.text_document.uri)
+
+
+def _answer(server: SpecServer) -> None:
+    """Completion, hover, definition, symbols."""
+
+    @server.feature(types.TEXT_DOCUMENT_COMPLETION, types.CompletionOptions(trigger_characters=list(" {[,.>+(:")))
+    def completion(params: types.CompletionParams) -> types.CompletionList:
+        document = server.document(params.text_document.uri)
+        return wire.completion_list(document, complete(document, wire.place_of(document, params.position)))
+
+    @server.feature(types.TEXT_DOCUMENT_HOVER)
+    def on_hover(params: types.HoverParams) -> types.Hover | None:
+        document = server.document(params.text_document.uri)
+        found = hover(document, wire.place_of(document, params.position))
+        return None if found is None else wire.hover_of(document, found)
+
+    @server.feature(types.TEXT_DOCUMENT_DEFINITION)
+    def on_definition(params: types.DefinitionParams) -> types.Location | None:
+        document = server.document(params.text_document.uri)
+        found = definition(document, wire.place_of(document, params.position))
+        if found is None:
+            return None
+        if found.path is None:
+            return types.Location(params.text_document.uri, wire.range_of(document.text, found.span))
+        uri = from_fs_path(str(found.path))
+        if uri is None:
+            return None
+        return types.Location(uri, wire.range_of(_text_of(found.path, document.encoding), found.span))
+
+    @server.feature(types.TEXT_DOCUMENT_DOCUMENT_SYMBOL)
+    def document_symbol(params: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
+        document = server.document(params.text_document.uri)
+        return [wire.symbol_of(document, symbol) for symbol in symbols(document)]
+
+
+def _edit(server: SpecServer) -> None:
+    """Rename. A refusal is an error with a sentence, which editors show."""
+
+    @server.feature(types.TEXT_DOCUMENT_PREPARE_RENAME)
+    def prepare_rename(params: types.PrepareRenameParams) -> types.PrepareRenamePlaceholder:
+        document = server.document(params.text_document.uri)
+        try:
+            span, name = prepare(document, wire.place_of(document, params.position))
+        except RenameError as error:
+            raise JsonRpcInvalidParams(str(error)) from None
+        return types.PrepareRenamePlaceholder(wire.range_of(document.text, span), name)
+
+    @server.feature(types.TEXT_DOCUMENT_RENAME)
+    def on_rename(params: types.RenameParams) -> types.WorkspaceEdit:
+        document = server.document(params.text_document.uri)
+        try:
+            edits = rename(document, wire.place_of(document, params.position), params.new_name)
+        except RenameError as error:
+            raise JsonRpcInvalidParams(str(error)) from None
+        return wire.workspace_edit(document, params.text_document.uri, edits)
+
+
+def _text_of(path: Path, encoding: str) -> Text:
+    """The text of a file, for counting its columns; empty where it cannot be read (then only the line is right)."""
+    try:
+        return Text(path.read_text(encoding="utf-8"), encoding)
+    except (OSError, UnicodeDecodeError):
+        return Text("", encoding)
+
+
+def serve() -> None:
+    """Answer on standard input and output until the client ends it."""
+    make_server().start_io()

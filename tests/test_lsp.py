@@ -1,0 +1,210 @@
+"""The language server as an editor sees it: a real client, over standard input and output."""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+import sys
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import pytest
+from lsprotocol import types
+from pygls.exceptions import JsonRpcException
+from pytest_lsp import ClientServerConfig, LanguageClient
+from test_lsp_answers import BASE, REST
+
+SPEC = BASE + REST
+
+
+class Editor:
+    """One document in a client, whose changes wait until the server has said what it finds."""
+
+    def __init__(self, client: LanguageClient, path: Path) -> None:
+        self.client = client
+        self.uri = path.as_uri()
+        self.text = ""
+        self.version = 0
+
+    @property
+    def document(self) -> types.TextDocumentIdentifier:
+        return types.TextDocumentIdentifier(self.uri)
+
+    async def findings(self) -> list[types.Diagnostic]:
+        """What the server publishes next."""
+        await asyncio.wait_for(self.client.wait_for_notification(types.TEXT_DOCUMENT_PUBLISH_DIAGNOSTICS), 20)
+        return list(self.client.diagnostics[self.uri])
+
+    async def open(self, text: str) -> list[types.Diagnostic]:
+        self.text = text
+        item = types.TextDocumentItem(self.uri, "yaml", self.version, text)
+        self.client.text_document_did_open(types.DidOpenTextDocumentParams(item))
+        return await self.findings()
+
+    def type(self, text: str) -> None:
+        """Change the text, without waiting."""
+        self.text, self.version = text, self.version + 1
+        change = types.TextDocumentContentChangeWholeDocument(text)
+        where = types.VersionedTextDocumentIdentifier(version=self.version, uri=self.uri)
+        self.client.text_document_did_change(types.DidChangeTextDocumentParams(where, [change]))
+
+    def at(self, needle: str, offset: int = 0) -> types.Position:
+        """The position of a text, in units of UTF-16, counted without any of our code."""
+        before = self.text[: self.text.index(needle) + offset]
+        line = before[before.rfind("\n") + 1 :]
+        return types.Position(before.count("\n"), len(line.encode("utf-16-le")) // 2)
+
+
+def edit(folder: Path, scenario: Callable[[Editor], Awaitable[None]], capabilities: object = None) -> None:
+    """Start ``neurovis lsp``, run a scenario with it, and end it."""
+
+    async def session() -> None:
+        config = ClientServerConfig(server_command=[sys.executable, "-m", "neurovis_spec", "lsp", "--stdio"])
+        client = await config.start()
+        assert isinstance(client, LanguageClient)
+        given = capabilities if isinstance(capabilities, types.ClientCapabilities) else types.ClientCapabilities()
+        result = await client.initialize_session(types.InitializeParams(capabilities=given))
+        assert result.server_info is not None
+        assert result.server_info.name == "neurovis"
+        try:
+            await scenario(Editor(client, folder / "spec.yaml"))
+        finally:
+            await client.shutdown_session()
+            stop: Callable[[], Awaitable[object]] = client.stop  # has no annotations of its own
+            await stop()
+
+    asyncio.run(session())
+
+
+def test_findings_follow_what_is_typed(tmp_path: Path) -> None:
+    async def scenario(editor: Editor) -> None:
+        assert await editor.open(SPEC) == []
+        for wrong in ("tanh1", "tanh2", "tahn"):  # typed quickly: only the last is looked at
+            editor.type(SPEC.replace("activation: swish", f"activation: {wrong}"))
+        (finding,) = await editor.findings()
+        assert finding.code == "unknown-activation"
+        assert "did you mean 'tanh'?" in finding.message
+        assert finding.severity == types.DiagnosticSeverity.Error
+        assert finding.source == "neurovis"
+        assert finding.range.start == editor.at("tahn")
+        assert finding.range.end == editor.at("tahn", 4)
+        editor.type(SPEC + "layout: [")
+        (finding, *_) = await editor.findings()
+        assert finding.code == "yaml-syntax"
+        editor.type(SPEC)
+        assert await editor.findings() == []
+        editor.client.text_document_did_close(types.DidCloseTextDocumentParams(editor.document))
+        assert await editor.findings() == []
+
+    edit(tmp_path, scenario)
+
+
+def test_an_unsaved_document_reads_the_data_files_of_its_folder(tmp_path: Path) -> None:
+    (tmp_path / "w.csv").write_text("1,2\n3,4\n")
+    text = "neurovis: 1\nname: x\nneurons: {A: {count: 2}}\nconnections: {A -> A: {matrix: {file: w.csv}}}\n"
+
+    async def scenario(editor: Editor) -> None:
+        assert await editor.open(text) == []
+        editor.type(text.replace("w.csv", "v.csv"))
+        (finding,) = await editor.findings()
+        assert finding.code == "file-missing"
+
+    edit(tmp_path, scenario)
+    assert not (tmp_path / "spec.yaml").exists()
+
+
+def test_places_count_utf_16_units(tmp_path: Path) -> None:
+    text = 'neurovis: 1\nname: x\nneurons: {A: {label: "𝜎😀", activation: tahn}, B: {label: "😀"}}\n'
+    text += "connections: {A -> B: 1}\n"
+
+    async def scenario(editor: Editor) -> None:
+        (finding,) = await editor.open(text)
+        assert (finding.range.start, finding.range.end) == (editor.at("tahn"), editor.at("tahn", 4))
+        where = editor.at("B: {label")
+        hover = await editor.client.text_document_hover_async(types.HoverParams(editor.document, where))
+        assert hover is not None
+        assert isinstance(hover.contents, types.MarkupContent)
+        assert hover.contents.value.startswith("**B**: a single neuron")
+        assert hover.range == types.Range(where, types.Position(where.line, where.character + 1))
+        result = await editor.client.text_document_rename_async(types.RenameParams(editor.document, where, "C"))
+        assert result is not None
+        assert result.changes is not None
+        ranges = [change.range for change in result.changes[editor.uri]]
+        places = [editor.at("B: {label"), editor.at("B: 1")]
+        assert ranges == [types.Range(p, types.Position(p.line, p.character + 1)) for p in places]
+
+    edit(tmp_path, scenario)
+
+
+def test_a_client_that_counts_code_points_is_answered_in_them(tmp_path: Path) -> None:
+    general = types.GeneralClientCapabilities(position_encodings=[types.PositionEncodingKind.Utf32])
+
+    async def scenario(editor: Editor) -> None:
+        (finding,) = await editor.open('neurovis: 1\nname: x\nneurons: {A: {label: "𝜎😀", activation: tahn}}\n')
+        assert finding.range.start.character == editor.text.splitlines()[2].index("tahn")
+
+    edit(tmp_path, scenario, types.ClientCapabilities(general=general))
+
+
+def test_completion_hover_definition_and_symbols(tmp_path: Path) -> None:
+    async def scenario(editor: Editor) -> None:
+        client, document = editor.client, editor.document
+        await editor.open(SPEC)
+        where = editor.at("K1 + K3..K5", 6)
+        location = await client.text_document_definition_async(types.DefinitionParams(document, where))
+        start = editor.at("K: {count")
+        assert location == types.Location(
+            editor.uri, types.Range(start, types.Position(start.line, start.character + 1))
+        )
+        shipped = await client.text_document_definition_async(types.DefinitionParams(document, editor.at("{delta", 2)))
+        assert isinstance(shipped, types.Location)
+        assert shipped.uri.endswith("/library/rules.yaml")
+        hover = await client.text_document_hover_async(types.HoverParams(document, editor.at("rate: beta", 7)))
+        assert hover is not None
+        assert isinstance(hover.contents, types.MarkupContent)
+        assert "= 3" in hover.contents.value
+        symbols = await client.text_document_document_symbol_async(types.DocumentSymbolParams(document))
+        assert symbols is not None
+        assert "connections" in [symbol.name for symbol in symbols]
+        editor.type(SPEC + "render: {theme: d")  # broken: completion is asked for in the middle of a word
+        where = editor.at("theme: d", 8)
+        found = await client.text_document_completion_async(types.CompletionParams(document, where))
+        assert isinstance(found, types.CompletionList)
+        assert [item.label for item in found.items] == ["default", "dark", "print", "paper"]
+        replaced = types.Range(types.Position(where.line, where.character - 1), where)
+        assert found.items[0].text_edit == types.TextEdit(replaced, "default")
+
+    edit(tmp_path, scenario)
+
+
+def test_a_refused_rename_says_why(tmp_path: Path) -> None:
+    async def scenario(editor: Editor) -> None:
+        client, document = editor.client, editor.document
+        await editor.open(SPEC)
+        where = editor.at("K3..K5", 5)
+        prepared = await client.text_document_prepare_rename_async(types.PrepareRenameParams(document, where))
+        assert isinstance(prepared, types.PrepareRenamePlaceholder)
+        assert prepared.placeholder == "K"
+        with pytest.raises(JsonRpcException, match="'O' is declared already, in line 12"):
+            await client.text_document_rename_async(types.RenameParams(document, where, "O"))
+        nothing = types.PrepareRenameParams(document, editor.at("name: small", 7))
+        with pytest.raises(JsonRpcException, match="no name here"):
+            await client.text_document_prepare_rename_async(nothing)
+
+    edit(tmp_path, scenario)
+
+
+def test_without_pygls_it_says_what_to_install() -> None:
+    code = (
+        "import sys\n"
+        "sys.modules['pygls'] = None\n"
+        "sys.argv = ['neurovis', 'lsp']\n"
+        "from neurovis_spec.cli import main\n"
+        "main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 1
+    assert done.stdout == ""
+    assert done.stderr.splitlines() == [
+        "error: the language server needs pygls; in a clone of the repository: pip install '.[lsp]'"
+    ]

@@ -1,0 +1,272 @@
+"""What an editor is answered: completions, explanations, places, edits, as plain functions of a text and a place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from lsp_marks import marked
+
+from neurovis_spec.lsp.completion import Completion, complete
+from neurovis_spec.lsp.definition import definition
+from neurovis_spec.lsp.document import Document, check
+from neurovis_spec.lsp.hover import hover
+from neurovis_spec.lsp.rename import RenameError, apply, prepare, rename
+from neurovis_spec.lsp.symbols import symbols
+
+BASE = """neurovis: 1
+name: small
+parameters:
+  alpha: 1.5
+  beta: {value: 2*alpha, min: 0, max: 9, description: how much}
+inputs:
+  go: {expression: alpha*sin(k)}
+activations:
+  swish: {parameters: {slope: 1}, value: x * sigmoid(slope * x), description: Smooth.}
+neurons:
+  K: {count: 5, activation: {gaussian: {sigma: 4}}, description: kernels}
+  O: {activation: swish}
+  T: {input: go}
+"""
+REST = """connections:
+  K1 + K3..K5 -> O: {weight: alpha, plasticity: {delta: {rate: beta, target: T}}}
+  K -> K: {edges: [[K1, K2, 0.5], [K4, K5]]}
+outputs: {all: [K2, O], k: K}
+layout: {positions: {K1: [0, 0]}, arrange: {K3..K4: row}}
+"""
+
+
+def offered(text: str) -> dict[str, Completion]:
+    document, place = marked(text)
+    return {item.label: item for item in complete(document, place)}
+
+
+@pytest.mark.parametrize(
+    ("text", "there", "missing"),
+    [
+        ("¦", ["neurovis", "name", "neurons"], ["weight"]),
+        (BASE + "con¦", ["connections", "outputs"], ["neurons", "name"]),
+        ("neurons:\n  K: {count: 3, ¦", ["activation", "model", "bias"], ["count", "weight"]),
+        ("neurons:\n  K: {cou¦nt: 3}", ["count", "first"], []),
+        ("neurons:\n  K: {combine: ¦", ["sum", "product", "distance"], ["alpha"]),
+        (BASE + "  L: {activation: ¦", ["tanh", "swish"], ["leaky_integrator", "alpha"]),
+        (BASE + "  L: {activation: {swish: {¦", ["slope"], ["sigma"]),
+        (BASE + "  L: {model: ¦", ["leaky_integrator", "static"], ["tanh"]),
+        (BASE + "  L: {input: ¦", ["go"], ["K", "alpha"]),
+        (BASE + "  L: {bias: 2*a¦", ["alpha", "i", "n", "sin", "normal", "pi"], ["K", "j", "tanh "]),
+        (BASE + "connections:\n  K¦", ["K", "K1", "K5", "O", "T"], ["alpha", "go"]),
+        (BASE + "connections:\n  K -> ¦", ["K", "O", "T"], ["alpha"]),
+        (BASE + "connections:\n  K -> O: ¦", ["alpha", "j", "n_from"], ["K"]),
+        (BASE + "connections:\n  K -> O: {plasticity: {¦", ["delta", "oja"], ["tanh"]),
+        (BASE + "connections:\n  K -> O: {plasticity: {delta: {¦", ["rate", "target"], ["alpha"]),
+        (BASE + "connections:\n  K -> O: {plasticity: {delta: {rate: ¦", ["alpha", "beta"], ["K"]),
+        (BASE + "connections:\n  K -> O: {plasticity: {delta: {target: ¦", ["T", "go"], ["alpha"]),
+        (BASE + "connections:\n  K -> O: {pattern: ¦", ["all_to_all", "random"], ["alpha"]),
+        (BASE + "outputs: {o: [K, ¦", ["K", "O", "K3"], ["alpha"]),
+        (BASE + "layout: {positions: {¦", ["K1", "O"], ["K"]),
+        (BASE + "layout: {engine: ¦", ["auto", "layered", "circular"], []),
+        (BASE + "render: {theme: ¦", ["default", "dark", "print", "paper"], []),
+        (BASE + "render: {labels: ¦", ["true", "false"], []),
+        (BASE + "rules:\n  r: {parameters: {eta: 1}, weight: {each_step: ¦", ["eta", "pre", "weight"], ["alpha"]),
+        ("parameters:\n  a: 1\n  b: ¦\n  c: 2", ["a", "sin"], ["b", "c"]),
+        ("description: |\n  ¦", [], ["name"]),
+    ],
+)
+def test_what_fits_is_offered_and_nothing_else(text: str, there: list[str], missing: list[str]) -> None:
+    labels = offered(text)
+    assert [label for label in there if label not in labels] == []
+    assert [label for label in missing if label in labels] == []
+
+
+def test_a_key_comes_with_its_colon_and_its_description() -> None:
+    assert offered("neurons:\n  K: {cou¦")["count"].insert == "count: "
+    assert offered("neurons:\n  K: {cou¦: 3}")["count"].insert == "count"
+    assert "How many neurons" in offered("neurons:\n  K: {¦")["count"].documentation
+
+
+def test_a_completion_replaces_the_word_alone() -> None:
+    document, place = marked(BASE + "  L: {bias: 2*al¦ph + 1}")
+    (found,) = (item for item in complete(document, place) if item.label == "alpha")
+    assert document.text.part(found.span) == "alph"
+    document, place = marked(BASE + "connections:\n  K1..K¦ -> O: 1")
+    (found,) = (item for item in complete(document, place) if item.label == "K3")
+    assert document.text.part(found.span) == "K"
+
+
+def test_behind_a_dot_the_neurons_of_the_module_are_offered() -> None:
+    text = "modules:\n  leg: {neurons: {S: {count: 2}}}\ninstances:\n  left: {module: leg, count: 2}\n"
+    text += "connections:\n  left1.¦"
+    assert set(offered(text)) == {"S", "S1", "S2"}
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("  K1 + K3¦", ["K3", "5 neurons (K1 … K5)", "gaussian(sigma = 4)", "static", "kernels"]),
+        ("weight: al¦pha", ["**alpha** = `1.5`"]),
+        ("rate: be¦ta", ["`2*alpha` = 3", "from 0 to 9", "how much"]),
+        ("{del¦ta:", ["weight = weight + rate * pre * (target - post)", "Widrow", "learning rate"]),
+        ("{ra¦te: beta", ["parameter of delta", "0.01", "learning rate"]),
+        ("activation: sw¦ish", ["f(x) = x * sigmoid(slope * x)", "Smooth."]),
+        ("{gauss¦ian", ["f(x) = exp(-sigma * x^2)", "Bell curve"]),
+        ("alpha*si¦n(k)", ["sin(x)"]),
+        ("alpha*sin(¦k)", ["the step"]),
+        ("{input: g¦o", ["input, size 1", "`alpha*sin(k)`"]),
+        ("{cou¦nt: 5", ["How many neurons"]),
+        ("alpha, plast¦icity", ["A rule"]),
+    ],
+)
+def test_hover_tells_what_it_is(text: str, told: list[str]) -> None:
+    source = (BASE + REST).replace(text.replace("¦", ""), text, 1)
+    found = hover(*marked(source, compiled=True))
+    assert found is not None
+    assert [part for part in told if part not in found.markdown] == []
+
+
+def test_hover_and_definition_work_in_a_broken_document() -> None:
+    broken = (BASE + REST).replace("weight: alpha", "weight: al¦pha") + "render: {gain: {activity: ]\n"
+    document, place = marked(broken)
+    assert check(document).network is None
+    found = hover(document, place)
+    assert found is not None
+    assert found.markdown == "**alpha** = `1.5`"
+    location = definition(document, place)
+    assert location is not None
+    assert document.text.part(location.span) == "alpha"
+    assert location.span.line == 4
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "name"),
+    [
+        ("K1 + K3..K¦5", 11, "K"),
+        ("weight: alph¦a", 4, "alpha"),
+        ("{input: go¦", 7, "go"),
+        ("activation: sw¦ish", 9, "swish"),
+        ("target: T¦", 13, "T"),
+        ("sigmoid(sl¦ope", 9, "slope"),
+        ("{K3..K4¦", 11, "K"),
+    ],
+)
+def test_definition_leads_to_the_declaration(text: str, line: int, name: str) -> None:
+    source = (BASE + REST).replace(text.replace("¦", ""), text, 1)
+    document, place = marked(source)
+    found = definition(document, place)
+    assert found is not None
+    assert (found.path, found.span.line, document.text.part(found.span)) == (None, line, name)
+
+
+def test_definition_leads_to_what_ships_and_to_what_is_included(tmp_path: Path) -> None:
+    found = definition(*marked((BASE + REST).replace("{delta", "{de¦lta")))
+    assert found is not None
+    assert found.path is not None
+    assert found.path.name == "rules.yaml"
+    assert found.path.read_text().splitlines()[found.span.line - 1].strip() == "delta:"
+    (tmp_path / "more.yaml").write_text("neurovis: 1\ninclude: [deep.yaml]\n")
+    (tmp_path / "deep.yaml").write_text("neurovis: 1\nrules:\n  mine: {weight: {each_step: weight}}\n")
+    text = "include: [more.yaml]\nconnections:\n  A -> B: {plasticity: mi¦ne}"
+    found = definition(*marked(text, tmp_path))
+    assert found is not None
+    assert (found.path, found.span.line, found.span.column) == ((tmp_path / "deep.yaml").resolve(), 3, 3)
+    assert definition(*marked("include: [../etc¦/passwd]", tmp_path)) is None
+
+
+def renamed(text: str, new: str) -> str:
+    document, place = marked(text)
+    return apply(document, rename(document, place, new)).source
+
+
+def test_renaming_a_group_renames_its_neurons_and_ranges() -> None:
+    assert check(Document(BASE + REST)).network is not None
+    result = renamed((BASE + REST).replace("K3..K5", "K3..K¦5"), "Leg")
+    assert "Leg: {count: 5" in result
+    assert "Leg1 + Leg3..Leg5 -> O" in result
+    assert "Leg -> Leg: {edges: [[Leg1, Leg2, 0.5], [Leg4, Leg5]]}" in result
+    assert "{all: [Leg2, O], k: Leg}" in result
+    assert "{positions: {Leg1: [0, 0]}, arrange: {Leg3..Leg4: row}}" in result
+    assert check(Document(result)).network is not None
+    assert renamed(result.replace("Leg: {count", "Le¦g: {count"), "K") == BASE + REST
+
+
+def test_renaming_a_parameter_leaves_other_scopes_alone() -> None:
+    text = BASE.replace("slope: 1", "alpha: 1").replace("slope * x", "alpha * x") + REST
+    result = renamed(text.replace("  alpha: 1.5", "  al¦pha: 1.5"), "gain")
+    assert "  gain: 1.5" in result
+    assert "value: 2*gain" in result
+    assert "gain*sin(k)" in result
+    assert "weight: gain" in result
+    assert "{parameters: {alpha: 1}, value: x * sigmoid(alpha * x)" in result
+
+
+def test_renaming_a_definition_and_its_parameters() -> None:
+    text = (BASE + REST).replace("activation: swish", "activation: {swish: {slope: 2}}")
+    assert "activation: {silu: {slope: 2}}" in renamed(text.replace("swish: {par", "swi¦sh: {par"), "silu")
+    result = renamed(text.replace("{slope: 2}", "{slo¦pe: 2}"), "b")
+    assert "{parameters: {b: 1}, value: x * sigmoid(b * x)" in result
+    assert "{swish: {b: 2}}" in result
+
+
+def test_a_module_has_names_of_its_own() -> None:
+    text = (
+        "modules:\n  leg: {neurons: {S: {}}, connections: {S -> S: 1}}\nneurons: {¦S: {}}\nconnections: {S -> S: 2}\n"
+    )
+    assert renamed(text, "U") == text.replace("{¦S: {}}", "{U: {}}").replace("S -> S: 2", "U -> U: 2")
+    text += "instances: {left: {module: leg}}\noutputs: {o: left.S¦}\n"
+    result = renamed(text.replace("¦", "", 1), "V")
+    assert "{neurons: {V: {}}, connections: {V -> V: 1}}" in result
+    assert "o: left.V" in result
+    assert "neurons: {S: {}}" in result
+
+
+def test_names_that_stand_behind_astral_characters_and_over_lines_are_renamed() -> None:
+    text = 'neurovis: 1\nname: x\nparameters:\n  a¦b: 1\n  c: {description: "𝜎😀", value: ab + 1}\n'
+    text += "  d: >-\n    ab +\n    c * ab\n"
+    assert renamed(text, "g") == text.replace("a¦b", "g").replace("ab", "g")
+
+
+@pytest.mark.parametrize(
+    ("mark", "new", "why"),
+    [
+        ("  K¦: {count", "2K", "is not a name"),
+        ("  K¦: {count", "true", "which reads it as true"),
+        ("  K¦: {count", "O", "'O' is declared already, in line 12"),
+        ("  K¦: {count", "go", "'go' is declared already, in line 7"),
+        ("  O¦: {act", "K3", "'K3' is a neuron already, declared in line 11"),
+        ("  alp¦ha: 1.5", "beta", "'beta' is declared already, in line 5"),
+        ("  alp¦ha: 1.5", "pi", "may not be called 'pi'"),
+        ("  alp¦ha: 1.5", "n_from", "'n_from' means something else"),
+        ("slo¦pe: 1", "x", "'x' means something else in line 9"),
+        ("  K¦: {count", "a" * 64, "there would be an error in line 11"),
+        ("{gauss¦ian", "bell", "is not declared in this document"),
+        ("name: sm¦all", "x", "there is no name here"),
+    ],
+)
+def test_a_bad_rename_is_refused_with_a_sentence(mark: str, new: str, why: str) -> None:
+    document, place = marked((BASE + REST).replace(mark.replace("¦", ""), mark, 1))
+    with pytest.raises(RenameError) as caught:
+        rename(document, place, new)
+    assert why in str(caught.value)
+
+
+def test_what_is_renamed_at_a_neuron_is_its_group() -> None:
+    document, place = marked((BASE + REST).replace("K3..K5", "K3..K5¦", 1))
+    span, name = prepare(document, place)
+    assert (name, document.text.part(span), span.line, span.column) == ("K", "K", 15, 12)
+
+
+def test_a_text_with_escapes_is_not_renamed_by_guess() -> None:
+    text = 'parameters:\n  a¦b: 1\n  c: "\\x61b + 1"\n'
+    with pytest.raises(RenameError, match="line 3 in a text with escapes"):
+        renamed(text, "g")
+
+
+def test_symbols_are_nested() -> None:
+    document = Document(BASE + REST)
+    found = {symbol.name: symbol for symbol in symbols(document)}
+    assert [child.name for child in found["neurons"].children] == ["K", "O", "T"]
+    assert [child.detail for child in found["neurons"].children] == ["count 5", "", ""]
+    assert [child.name for child in found["connections"].children] == ["K1 + K3..K5 -> O", "K -> K"]
+    for symbol in found.values():
+        for child in symbol.children:
+            assert (symbol.whole.line, symbol.whole.column) <= (child.whole.line, child.whole.column)
+            assert (child.whole.end_line, child.whole.end_column) <= (symbol.whole.end_line, symbol.whole.end_column)

@@ -1,0 +1,113 @@
+"""Places: conversion to the protocol's units, and the outline of texts that can and cannot be read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from lsp_marks import MARK, marked
+
+from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.language.reader import read_text
+from neurovis_spec.lsp.outline import Item, outline
+from neurovis_spec.lsp.text import Place, Text, holds
+from neurovis_spec.lsp.tolerant import outline_of_text, where
+
+ROOT = Path(__file__).parents[1]
+SPECS = sorted([*ROOT.glob("specs/*.yaml"), *ROOT.glob("neurovis_spec/library/*.yaml")])
+TEXTS = st.text(st.sampled_from("aé𝜎😀\n\r \ufeff{:,-}[#'\""), max_size=40)
+
+
+@given(TEXTS, st.sampled_from(["utf-8", "utf-16", "utf-32"]))
+def test_places_survive_the_way_to_the_protocol_and_back(source: str, encoding: str) -> None:
+    text = Text(source, encoding)
+    for line in range(1, len(text.lines.starts) + 1):
+        for column in range(1, len(text.line(line)) + 2):
+            position = text.position(line, column)
+            assert text.place(*position) == Place(line, column)
+            width = {"utf-8": "utf-8", "utf-16": "utf-16-le", "utf-32": "utf-32-le"}[encoding]
+            before = ("\ufeff" if text.bom and line == 1 else "") + text.line(line)[: column - 1]
+            size = {"utf-8": 1, "utf-16": 2, "utf-32": 4}[encoding]
+            assert position == (line - 1, len(before.encode(width)) // size)
+
+
+def test_astral_characters_take_two_units() -> None:
+    text = Text("title: 𝜎😀x\nname: y")
+    assert text.position(1, 8) == (0, 7)
+    assert text.position(1, 9) == (0, 9)
+    assert text.position(1, 10) == (0, 11)
+    assert text.place(0, 10) == Place(1, 9)  # within a character: its beginning
+    assert text.place(0, 99) == Place(1, 11)  # beyond a line: its end
+    assert text.place(99, 0) == Place(2, 8)
+
+
+def test_a_byte_order_mark_counts_for_the_editor_alone() -> None:
+    text = Text("\ufeffname: x\ny")
+    assert (text.position(1, 1), text.place(0, 1), text.place(0, 0)) == ((0, 1), Place(1, 1), Place(1, 1))
+    assert text.position(2, 1) == (1, 0)
+
+
+def test_a_span_holds_its_end() -> None:
+    span = Span("x", 2, 3, 2, 5)
+    assert [holds(span, Place(2, column)) for column in range(2, 7)] == [False, True, True, True, False]
+    assert not holds(span, Place(1, 4))
+
+
+def plain(items: list[Item]) -> set[tuple[object, ...]]:
+    """What can be compared: a description may be folded, which the tolerant scan does not read."""
+    return {
+        (item.path, item.is_key, item.text, item.span)
+        for item in items
+        if item.span.line == item.span.end_line and item.path[-1] != "description"
+    }
+
+
+@pytest.mark.parametrize("path", SPECS, ids=lambda path: path.name)
+def test_the_tolerant_outline_of_a_sound_text_is_the_exact_one(path: Path) -> None:
+    source = path.read_text(encoding="utf-8")
+    document = read_text(source, "x", Findings())
+    assert document is not None
+    assert plain(list(outline_of_text(Text(source), "x"))) == plain(list(outline(document.root)))
+
+
+@given(TEXTS, st.integers(1, 6), st.integers(1, 12))
+def test_no_text_is_too_broken_to_look_at(source: str, line: int, column: int) -> None:
+    text = Text(source)
+    for item in outline_of_text(text, "x"):
+        assert text.part(item.span) != ""
+    where(text, Place(min(line, len(text.lines.starts)), column))
+
+
+@pytest.mark.parametrize(
+    ("source", "mapping", "value", "typed"),
+    [
+        ("¦", (), None, ""),
+        ("neu¦", (), None, "neu"),
+        ("neurons:\n  K: {count: 3, act¦", ("neurons", "K"), None, "act"),
+        ("neurons:\n  K:\n    ¦", ("neurons", "K"), ("neurons", "K"), ""),
+        ("neurons:\n  K:\n    count: 3\n    ¦", ("neurons", "K"), None, ""),
+        ("neurons:\n  K:\n    count: ¦", None, ("neurons", "K", "count"), ""),
+        ("neurons:\n  K:\n    count: 3\n  ¦", ("neurons",), None, ""),
+        ("neurons:\n  K: {count: 3,\n  O: {activation: ta¦", None, ("neurons", "O", "activation"), "ta"),
+        ("connections:\n  K -> ¦", ("connections",), ("connections",), "K -> "),
+        ("connections:\n  - K -> O: 1\n  - K¦\n", ("connections", 1), ("connections", 1), "K"),
+        ("outputs:\n  a: [K1, K¦]", None, ("outputs", "a", 1), "K"),
+        ("outputs: {a: ¦\nlayout:\n  engine: x", None, ("outputs", "a"), ""),
+        ('parameters:\n  p: "al¦pha"', None, ("parameters", "p"), "al"),
+        ("a: [x,\n   ¦]", None, ("a", 1), ""),
+    ],
+)
+def test_where_a_place_stands(source: str, mapping: object, value: object, typed: str) -> None:
+    document, place = marked(source)
+    found = where(document.text, place)
+    assert found is not None
+    assert (found.mapping, found.value, found.typed) == (mapping, value, typed)
+
+
+def test_nothing_is_looked_for_in_a_block_of_text() -> None:
+    document, place = marked("description: |\n  K ¦ text\nname: x")
+    assert where(document.text, place) is None
+    assert MARK not in document.source
+    assert [item.path for item in outline_of_text(document.text, "x")] == [("description",), ("name",), ("name",)]
