@@ -36,7 +36,7 @@ def compiled(
     with progress("compiling"):
         if spec == "-":
             folder = Path.cwd()
-            text = _standard_input()
+            text = standard_input()
             return api.compile_text(text, file=STDIN, folder=folder, parameters=parameters, root=root, limit=limit)
         return api.compile(spec, parameters=parameters, root=root, limit=limit)
 
@@ -51,7 +51,8 @@ def network_of(spec: str, parameters: Mapping[str, float] | None = None) -> Comp
     return network
 
 
-def _standard_input() -> str:
+def standard_input() -> str:
+    """The text of standard input. Raises SpecError where it is not UTF-8."""
     from neurovis_spec.diagnostics import Diagnostic, Span, SpecError
 
     data = sys.stdin.buffer.read(_LARGEST)

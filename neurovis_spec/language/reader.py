@@ -96,7 +96,7 @@ def read_text(text: str, file: str, findings: Findings, *, pure: bool = False) -
     clean = _without_directives(clean, file, findings)
     if not clean.endswith(("\n", "\r")):
         clean += "\n"  # without it the parsers differ about the place of what is missing at the end
-    composer = Composer(clean, file, findings, _parser(clean, pure))
+    composer = Composer(clean, file, findings, event_source(clean, pure=pure))
     try:
         root = composer.document()
     except ComposingStoppedError:
@@ -108,7 +108,8 @@ def read_text(text: str, file: str, findings: Findings, *, pure: bool = False) -
     return _document(root, file, findings)
 
 
-def _parser(text: str, pure: bool) -> EventSource:
+def event_source(text: str, *, pure: bool = False) -> EventSource:
+    """A parser over a text: the C one where it is installed, unless the ``pure`` Python one is wanted."""
     if pure or not yaml.__with_libyaml__:
         return _PythonParser(text)
     return _CParser(text)

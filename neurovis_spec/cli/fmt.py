@@ -1,0 +1,128 @@
+"""``neurovis fmt``: canonical formatting that keeps comments."""
+
+from __future__ import annotations
+
+import os
+import sys
+from difflib import unified_diff
+from pathlib import Path
+from typing import Final
+
+import click
+
+from neurovis_spec.cli.failure import fault
+from neurovis_spec.cli.files import STDIN, standard_input, writing
+from neurovis_spec.cli.options import examples
+from neurovis_spec.diagnostics import Diagnostic, Findings
+from neurovis_spec.findings import printable, show_text
+from neurovis_spec.language.fmt import FormattingError, format_read
+from neurovis_spec.language.reader import read_file, read_text
+
+_BOM: Final = "\ufeff"
+
+
+@click.command(
+    epilog=examples(
+        "neurovis fmt first.yaml",
+        "neurovis fmt specs/*.yaml --check",
+        "neurovis fmt first.yaml --diff",
+        "cat first.yaml | neurovis fmt -",
+    )
+)
+@click.argument("specs", metavar="SPEC...", nargs=-1, required=True)
+@click.option("--check", is_flag=True, help="Write nothing; name the files that would change, and end with status 1.")
+@click.option("--diff", is_flag=True, help="Write nothing; show what would change.")
+def command(specs: tuple[str, ...], check: bool, diff: bool) -> None:
+    """Format specs canonically, keeping comments.
+
+    Files are rewritten where they stand, and those that have changed are named; standard input (-) goes to standard
+    output. Comments, blank lines between groups, the order and the meaning stay. A file with syntax errors is left
+    alone; its findings go to standard error, and the status is 1.
+    """
+    if specs.count("-") > 1:
+        raise click.UsageError("standard input (-) can be read only once")
+    found: list[Diagnostic] = []
+    sources: dict[str, str] = {}
+    changed = 0
+    for spec in specs:
+        findings = Findings()
+        before = _read(spec, findings)
+        if before is None:
+            found += findings.sorted()
+            sources |= findings.sources
+            continue
+        after = _formatted(spec, before)
+        changed += after != before
+        _show(spec, before, after, check=check, diff=diff)
+        if not (check or diff):
+            _write(spec, before, after)
+    if text := show_text(found, sources):
+        click.echo(text, err=True)
+    if found or (check and changed):
+        raise click.exceptions.Exit(1)
+
+
+def _read(spec: str, findings: Findings) -> str | None:
+    """The text of a spec with its byte-order mark; None where there are errors, which are noted."""
+    if spec == "-":
+        text = standard_input()
+        read_text(text, STDIN, findings)
+        return None if findings.failed else text
+    path = Path(spec)
+    read_file(path, spec, findings)
+    if findings.failed:
+        return None
+    with path.open("rb") as file:
+        mark = file.read(len(_BOM.encode()))
+    return (_BOM if mark == _BOM.encode() else "") + findings.sources[spec]
+
+
+def _formatted(spec: str, text: str) -> str:
+    try:
+        return format_read(text)
+    except FormattingError as error:
+        raise fault(f"{_name(spec)}: {error}", "it is left alone; please report it with this spec") from error
+
+
+def _show(spec: str, before: str, after: str, *, check: bool, diff: bool) -> None:
+    if after == before:
+        return
+    if check:
+        click.echo(f"{_name(spec)}: would change")
+    if diff:
+        click.echo(difference(before, after, spec if spec != "-" else STDIN), nl=False)
+
+
+def _write(spec: str, before: str, after: str) -> None:
+    if spec == "-":
+        sys.stdout.buffer.write(after.encode())
+    elif after != before:
+        _replace(Path(spec), after)
+        click.echo(f"{_name(spec)}: formatted")
+
+
+def _replace(path: Path, text: str) -> None:
+    """Write a file as a whole or not at all; its permissions stay."""
+    from neurovis_spec.runtime.files import replacing
+
+    with writing(path):
+        mode = path.stat().st_mode
+        with replacing(path) as file:
+            if hasattr(os, "fchmod"):
+                os.fchmod(file.fileno(), mode & 0o7777)
+            file.write(text.encode())
+
+
+def _name(spec: str) -> str:
+    return STDIN if spec == "-" else printable(spec)
+
+
+def difference(before: str, after: str, name: str) -> str:
+    """A unified diff that patch and git apply understand."""
+    lines = unified_diff(_lines(before), _lines(after), f"a/{printable(name)}", f"b/{printable(name)}")
+    return "".join(line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n" for line in lines)
+
+
+def _lines(text: str) -> list[str]:
+    """Lines with their ends, which are LF alone: what else a text may hold belongs to its line."""
+    return [line for line in text.replace("\n", "\n\0").split("\0") if line]

@@ -1,0 +1,43 @@
+"""Keys of connections with single blanks: ``K1+K3->O`` becomes ``K1 + K3 -> O``.
+
+In: the keys of a mapping as written, and the keys on the way to it. Out: the keys as they are to be written. What is
+no connection's key stays as it is, since blanks count in a text.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Final
+
+_END: Final = r"[A-Za-z0-9_.]+(?:[ \t]*\+[ \t]*[A-Za-z0-9_.]+)*"
+_CONNECTION: Final = re.compile(rf"[ \t]*{_END}[ \t]*->[ \t]*{_END}[ \t]*")
+
+
+def is_connections(path: Sequence[str]) -> bool:
+    """Whether the keys below this path name connections."""
+    match tuple(path):
+        case ("connections",) | ("modules", _, "connections"):
+            return True
+    return False
+
+
+def normal(key: str) -> str:
+    """A connection's key, quoted or not, with single blanks; anything else as it is.
+
+    >>> normal("K1+K3..K5->O"), normal('"A->B"'), normal("a ->")
+    ('K1 + K3..K5 -> O', '"A -> B"', 'a ->')
+    """
+    quote = key[:1] if key[:1] in ("'", '"') else ""
+    bare = key[1:-1] if quote else key
+    if not _CONNECTION.fullmatch(bare):
+        return key
+    source, _, target = bare.partition("->")
+    ends = (" + ".join(part.strip() for part in end.split("+")) for end in (source, target))
+    return quote + " -> ".join(ends) + quote
+
+
+def normal_all(keys: Sequence[str]) -> list[str]:
+    """The same for all keys of a mapping; none is changed where two would become the same."""
+    changed = [normal(key) for key in keys]
+    return changed if len({key.strip("'\"") for key in changed}) == len(keys) else list(keys)
