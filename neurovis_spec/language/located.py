@@ -187,9 +187,8 @@ def one_of(*words: str) -> Callable[[Node, ValidationInfo], Located[str]]:
     return check
 
 
-_FORMULA_SCHEMA: JsonSchemaValue = {
-    "anyOf": [{"type": "number"}, {"type": "string", "minLength": 1, "maxLength": 1000}],
-}
+#: The schema of a formula: a number, or the text of an expression.
+FORMULA: JsonSchemaValue = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": "\\S", "maxLength": 1000}]}
 
 TextField = Annotated[Located[str], Leaf(as_text, {"type": "string"})]
 TextsField = Annotated[
@@ -203,4 +202,4 @@ IdentifierField = Annotated[
 BoolField = Annotated[Located[bool], Leaf(as_bool, {"type": "boolean"})]
 NumberField = Annotated[Located[float], Leaf(as_number, {"type": "number"})]
 IntegerField = Annotated[Located[int], Leaf(as_integer, {"type": "integer"})]
-FormulaField = Annotated[Formula, Leaf(as_formula, _FORMULA_SCHEMA)]
+FormulaField = Annotated[Formula, Leaf(as_formula, FORMULA)]

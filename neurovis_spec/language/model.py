@@ -9,11 +9,22 @@ left out is what stands in ``source`` and not in the model (``lost``).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Annotated, ClassVar, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, WrapValidator, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    GetJsonSchemaHandler,
+    ValidationError,
+    ValidationInfo,
+    WrapValidator,
+    model_validator,
+)
 from pydantic.fields import FieldInfo
-from pydantic.json_schema import SkipJsonSchema
+from pydantic.json_schema import JsonSchemaValue, SkipJsonSchema
+from pydantic_core import core_schema
 
 from neurovis_spec.diagnostics import Findings, Span, nearest, suggest
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Leaf, bad_name, findings_of, give_up, refuse, shown
@@ -171,5 +182,17 @@ def _keyed(node: Node, handler: Callable[[object], dict[str, V]], info: Validati
 
 #: A mapping whose keys are references or free texts: ``Keyed[PointField]``.
 Keyed = Annotated[dict[str, V], WrapValidator(_keyed)]
+
+
+@dataclass(frozen=True, slots=True)
+class _KeysAreNames:
+    """Says in the schema what ``_named`` checks."""
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        return {**handler(schema), "propertyNames": {"pattern": f"^{IDENTIFIER.pattern}$"}}
+
+
 #: A mapping whose keys are names of the author's: ``Named[Group]``.
-Named = Annotated[dict[str, V], WrapValidator(_named)]
+Named = Annotated[dict[str, V], WrapValidator(_named), _KeysAreNames()]

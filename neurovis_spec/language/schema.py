@@ -5,6 +5,7 @@ In: the pydantic models. Out: a JSON Schema 2020-12 as plain data, with the desc
 
 from __future__ import annotations
 
+from neurovis_spec.language.located import FORMULA
 from neurovis_spec.language.spec import ConnectionModel, Spec
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -20,9 +21,7 @@ def json_schema() -> dict[str, object]:
     entries = {
         "type": "object",
         "propertyNames": {"pattern": "^[^>]*->[^>]*$"},
-        "additionalProperties": {
-            "anyOf": [{"type": ["number", "string", "null"]}, {"$ref": "#/$defs/ConnectionModel"}]
-        },
+        "additionalProperties": {"anyOf": [FORMULA, {"type": "null"}, {"$ref": "#/$defs/ConnectionModel"}]},
     }
     definitions["Connections"] = {"anyOf": [entries, {"type": "array", "items": entries}]}
     properties = schema["properties"]
@@ -35,7 +34,8 @@ def json_schema() -> dict[str, object]:
 
 
 def _closed(value: dict[str, object]) -> dict[str, object]:
-    """The same schema with every model closed: ``additionalProperties: false`` where properties are listed."""
+    """The same schema with every model closed (``additionalProperties: false`` where properties are listed), and with
+    no null where a key may be left out: a key without a value is a finding."""
     result: dict[str, object] = {}
     for key, item in value.items():
         if isinstance(item, dict):
@@ -44,6 +44,20 @@ def _closed(value: dict[str, object]) -> dict[str, object]:
             result[key] = [_closed(one) if isinstance(one, dict) else one for one in item]
         else:
             result[key] = item
-    if isinstance(value.get("properties"), dict) and value.get("type") == "object":
+    properties = result.get("properties")
+    if isinstance(properties, dict) and value.get("type") == "object":
+        result["properties"] = {name: _without_null(one) for name, one in properties.items()}
         result.setdefault("additionalProperties", False)
     return result
+
+
+def _without_null(field: dict[str, object]) -> dict[str, object]:
+    """A field that may be left out, without the null that stands for that, and without a choice of one."""
+    choices = field.get("anyOf")
+    if "default" in field and field["default"] is None:
+        field = {key: item for key, item in field.items() if key != "default"}
+    if not isinstance(choices, list) or choices[-1] != {"type": "null"}:
+        return field
+    if len(choices) > 2:
+        return {**field, "anyOf": choices[:-1]}
+    return {**choices[0], **{key: item for key, item in field.items() if key != "anyOf"}}

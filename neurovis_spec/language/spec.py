@@ -14,6 +14,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from neurovis_spec.language.located import (
+    FORMULA,
     BoolField,
     FormulaField,
     IdentifierField,
@@ -32,6 +33,8 @@ from neurovis_spec.language.located import (
 from neurovis_spec.language.model import Keyed, Model, Named
 from neurovis_spec.language.source import Entry, Mapping, Node, Packed, Scalar, ScalarValue, Sequence
 from neurovis_spec.language.values import (
+    FILE,
+    FORMULAS,
     CentreField,
     ChoiceField,
     EdgesField,
@@ -86,10 +89,13 @@ class InputModel(Model):
     file: TextField | None = Field(None, description="A .csv or .npy file, one row a step; the last row stays.")
     values: Annotated[
         Sequence | Packed | None,
-        Leaf(_table, {"type": "array", "items": {"anyOf": [{"type": "number"}, {"type": "array"}]}}),
+        Leaf(_table, {"type": "array", "items": FORMULAS}),
     ] = Field(None, description="The same, inline: one row a step.")
     size: FormulaField | None = Field(None, description="How many numbers a step, for an input without a source.")
     description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
+
+
+_POINT = {"type": "array", "items": FORMULA, "minItems": 2, "maxItems": 2}
 
 
 def _position(node: Node, info: ValidationInfo) -> FileReference | Sequence | Packed:
@@ -127,7 +133,7 @@ class GroupModel(Model):
     )
     position: Annotated[
         FileReference | Sequence | Packed | None,
-        Leaf(_position, {"anyOf": [{"type": "array"}, {"type": "object"}]}),
+        Leaf(_position, {"anyOf": [_POINT, {"type": "array", "items": _POINT}, FILE]}),
     ] = Field(None, description="Where the neuron is, as data: [x, y], a list of them, a file. It is no pin.")
     label: TextsField | None = Field(None, description="Display text; a counted group may give a list.")
     box: TextField | None = Field(None, description="The named box of the picture that holds the group.")
@@ -167,7 +173,7 @@ class ConnectionModel(Model):
     bounds: Annotated[
         tuple[FormulaField, FormulaField] | None,
         BeforeValidator(lambda node, info: _pair(node, info)),
-        WithJsonSchema({"type": "array", "minItems": 2, "maxItems": 2}),
+        WithJsonSchema({"type": "array", "items": FORMULA, "minItems": 2, "maxItems": 2}),
     ] = Field(None, description="[low, high] for plastic weights.")
     description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
 

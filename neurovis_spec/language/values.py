@@ -12,6 +12,7 @@ from pydantic import ValidationInfo
 
 from neurovis_spec.diagnostics import Span, nearest, suggest
 from neurovis_spec.language.located import (
+    FORMULA,
     Formula,
     Leaf,
     Located,
@@ -28,7 +29,7 @@ from neurovis_spec.language.located import (
 from neurovis_spec.language.model import opening
 from neurovis_spec.language.source import Entry, Mapping, Node, Packed, Scalar, Sequence
 
-FORMULA = {"anyOf": [{"type": "number"}, {"type": "string"}]}
+#: The schema of a formula, or of a list with one for each neuron.
 FORMULAS = {"anyOf": [*FORMULA["anyOf"], {"type": "array", "items": FORMULA}]}
 
 
@@ -71,7 +72,12 @@ ChoiceField = Annotated[
         {
             "anyOf": [
                 {"type": "string"},
-                {"type": "object", "minProperties": 1, "maxProperties": 1},
+                {
+                    "type": "object",
+                    "minProperties": 1,
+                    "maxProperties": 1,
+                    "additionalProperties": {"type": ["object", "null"], "additionalProperties": FORMULAS},
+                },
             ]
         },
     ),
@@ -133,16 +139,23 @@ def as_matrix(node: Node, info: ValidationInfo) -> Matrix:
     return Rows(node)
 
 
-_FILE = {
+#: The schema of ``{file: path}``.
+FILE = {
     "type": "object",
     "properties": {"file": {"type": "string"}, "key": {"type": "string"}},
     "required": ["file"],
     "additionalProperties": False,
 }
+_EDGE = {
+    "type": "array",
+    "prefixItems": [{"type": "string"}, {"type": "string"}, FORMULA, FORMULA],
+    "minItems": 2,
+    "maxItems": 4,
+}
 _CELL = {"anyOf": [*FORMULA["anyOf"], {"type": "null"}]}
 _ROWS = {"type": "array", "items": {"type": "array", "items": _CELL}}
 
-MatrixField = Annotated[Matrix, Leaf(as_matrix, {"anyOf": [_ROWS, _FILE]})]
+MatrixField = Annotated[Matrix, Leaf(as_matrix, {"anyOf": [_ROWS, FILE]})]
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +178,7 @@ def as_edges(node: Node, info: ValidationInfo) -> EdgeRows | FileReference:
 
 EdgesField = Annotated[
     EdgeRows | FileReference,
-    Leaf(as_edges, {"anyOf": [{"type": "array", "items": {"type": "array", "minItems": 2, "maxItems": 4}}, _FILE]}),
+    Leaf(as_edges, {"anyOf": [{"type": "array", "items": _EDGE}, FILE]}),
 ]
 
 
@@ -176,7 +189,7 @@ def as_centre(node: Node, info: ValidationInfo) -> Formula | Matrix:
 
 CentreField = Annotated[
     Formula | Matrix,
-    Leaf(as_centre, {"anyOf": [*FORMULA["anyOf"], _ROWS, _FILE]}),
+    Leaf(as_centre, {"anyOf": [*FORMULA["anyOf"], _ROWS, FILE]}),
 ]
 
 

@@ -1,0 +1,119 @@
+"""The JSON Schema says what the compiler says, as far as shapes go: editors underline what is wrong, nothing else."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import cast
+
+import hostile
+import pytest
+import yaml
+from jsonschema import Draft202012Validator
+
+import neurovis_spec as nv
+from neurovis_spec import api
+
+HERE = Path(__file__).parent
+SPECS = sorted((HERE.parent / "specs").glob("*.yaml"))
+SCHEMA = api.schema()
+VALIDATOR = Draft202012Validator(SCHEMA)
+#: Findings about shapes: these a schema can know.
+SHAPE = {"wrong-type", "unknown-key", "missing-key", "unknown-value", "one-key", "no-value", "unknown-section"}
+#: Where a schema cannot tell, or need not: whether a list of n values or a name is wanted depends on a definition.
+BEYOND = ("goal", "probability", "random", "weight", "swish", "slow", "own", "edges", "position")
+
+
+def messages(text: str) -> list[str]:
+    return [error.message for error in VALIDATOR.iter_errors(yaml.safe_load(text))]
+
+
+def test_it_is_a_schema() -> None:
+    Draft202012Validator.check_schema(SCHEMA)
+    assert SCHEMA["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+
+
+@pytest.mark.parametrize("path", [*SPECS, HERE / "rich.yaml"], ids=lambda path: path.stem)
+def test_right_specs_pass(path: Path) -> None:
+    assert messages(path.read_text(encoding="utf-8")) == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "neurons: {A: {activation: tanh, model: {leaky_integrator: {leak: [0.1, a]}}}}",
+        "neurons: {A: {activation: {gaussian: }}}",
+        "neurons: {A: {activation: {piecewise_linear: {x0: 0, x1: 2*a}}, count: n}}",
+        "connections: {A -> B: , B -> A: 0.5, C -> A: a*i, D -> A: {plasticity: {delta: {rate: 0.1, target: T}}}}",
+        "connections: [{A -> B: 1}, {A -> B: {pattern: {random: {probability: 0.1}}}}]",
+        "connections: {A -> B: {matrix: [[1, null, a*2]], rows: to, bounds: [-a, a]}}",
+        "connections: {A -> B: {edges: [[A, B], [A, B, 1], [A, B, a, 2]]}, B -> A: {edges: {file: e.csv}}}",
+        "connections: {A -> B: {centre: {file: c.csv}}, B -> A: {centre: 1}, C -> A: {centre: [[1]]}}",
+        "inputs: {a: {}, b: {size: 3}, c: {values: [1, a, [2]]}, d: {file: d.csv}}",
+        "parameters: {a: 1, b: {value: 2, min: 0, max: a}}",
+        "neurons: {A: {position: [0, 1]}, B: {position: [[0, a], [1, 2]]}, C: {position: {file: p.csv}}}",
+        "neurons: {A: {bias: 1, initial: [0, a]}, B: {count: 2, label: [x, y]}, C: {names: [u, v], label: z}}",
+        "render: {title: false, size: [640, 480]}",
+        "render: {title: Text}",
+        "outputs: {a: A, b: [A, B + C]}",
+        "seed: -3",
+    ],
+)
+def test_every_way_to_write_passes(text: str) -> None:
+    assert messages(f"neurovis: 1\nname: x\n{text}") == []
+
+
+@pytest.mark.parametrize(
+    ("text", "where"),
+    [
+        ("colour: red", []),
+        ("neurons: {A: {activaton: tanh}}", ["neurons", "A"]),
+        ("neurons: {A: }", ["neurons", "A"]),
+        ("neurons: {1A: {}}", ["neurons"]),
+        ("neurons: {A: {combine: product of}}", ["neurons", "A", "combine"]),
+        ("neurons: {A: {bias: }}", ["neurons", "A", "bias"]),
+        ("neurons: {A: {activation: {tanh: {}, relu: {}}}}", ["neurons", "A", "activation"]),
+        ("neurons: {A: {activation: {gaussian: 3}}}", ["neurons", "A", "activation"]),
+        ("connections: {A to B: 1}", ["connections"]),
+        ("connections: {A -> B: [[1]]}", ["connections"]),
+        ("connections: {A -> B: {wieght: 1}}", ["connections"]),
+        ("time: {dt: true}", ["time", "dt"]),
+        ("rules: {r: {signals: [a]}}", ["rules", "r"]),
+        ("layout: {positions: {A: [1, 2, 3]}}", ["layout", "positions", "A"]),
+        ("render: {theme: drak}", ["render", "theme"]),
+    ],
+)
+def test_wrong_shapes_are_found_where_they_are(text: str, where: list[str]) -> None:
+    found = list(VALIDATOR.iter_errors(yaml.safe_load(f"neurovis: 1\nname: x\n{text}")))
+    assert [list(error.absolute_path) for error in found] == [where]
+
+
+@pytest.mark.parametrize("path", sorted((HERE / "errors").glob("*.yaml")), ids=lambda path: path.stem)
+def test_defective_specs_are_refused_for_their_shape_alone(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    codes = set(re.findall(r"# error: \d+:\d+ ([\w-]+)", text))
+    if path.stem.startswith("yaml_") or not codes <= SHAPE:
+        return  # YAML's own faults never come to a schema; meanings are beyond it
+    if path.stem not in ("wrong_type_bool", "rule_without_change", "no_value"):
+        assert messages(text), f"{path.stem} has a wrong shape"
+
+
+@pytest.mark.parametrize("part", range(3))
+def test_schema_and_compiler_agree(part: int) -> None:
+    """What the compiler accepts the schema accepts; what is wrong in shape alone it refuses."""
+    rich = cast(hostile.Data, yaml.safe_load(hostile.RICH))
+    for number, path in enumerate(hostile.paths(rich)):
+        for other, (name, wrong) in enumerate(hostile.WRONG.items()):
+            if (number + other) % 60 != 20 * part + 3 or name == "huge":  # PyYAML takes 1e300 for a text
+                continue
+            text = hostile.replaced(rich, path, wrong)
+            refused = bool(messages(text))
+            try:
+                nv.compile_text(text)
+                codes: set[str] = set()
+            except nv.SpecError as error:
+                codes = {item.code for item in error.diagnostics if item.severity == "error"}
+            if not codes:
+                assert not refused, f"{hostile.shown(path)}: {name} is refused"
+            elif codes <= SHAPE and not {str(key) for key in path}.intersection(BEYOND) and "->" not in str(path[-1]):
+                assert refused, f"{hostile.shown(path)}: {name} is accepted"
