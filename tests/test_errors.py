@@ -1,7 +1,8 @@
 """Every defective spec of tests/errors is answered at the right place, with the right code, and in words that help.
 
-The expected findings stand in the specs, beside the offending lines: ``# error: LINE:COLUMN CODE  WORDS``; the words
-must occur in the message or the hint.
+The expected findings stand in the specs, beside the offending lines: ``# error: LINE:COLUMN CODE  WORDS``, or
+``# warning: …``; the words must occur in the message or the hint. Specs in ``layout`` compile, and a layout engine
+refuses them: ``# refused: CODE  WORDS``. The files in ``layout_files`` are layout files.
 """
 
 from __future__ import annotations
@@ -12,30 +13,72 @@ from pathlib import Path
 import pytest
 
 import neurovis_spec as nv
-from neurovis_spec.diagnostics import Diagnostic
+from neurovis_spec.codes import VALIDATE, catalogue
+from neurovis_spec.diagnostics import Diagnostic, Findings
+from neurovis_spec.layout.file import parse
+from neurovis_spec.layout.model import LayoutRefusalError
 
 FOLDER = Path(__file__).parent / "errors"
 SPECS = sorted(FOLDER.glob("*.yaml"))
-EXPECTED = re.compile(r"# error: (\d+):(\d+) ([\w-]+)(?:  (.*?))?(?=  # error|$)", re.MULTILINE)
+REFUSED = sorted((FOLDER / "layout").glob("*.yaml"))
+LAYOUT_FILES = sorted((FOLDER / "layout_files").glob("*.yaml"))
+EXPECTED = re.compile(r"# (error|warning): (\d+):(\d+) ([\w-]+)(?:  (.*?))?(?=\s+# error|\s+# warning|$)", re.MULTILINE)
+REFUSAL = re.compile(r"# refused: ([\w-]+)  (.*)")
 
 
 def findings(path: Path) -> tuple[Diagnostic, ...]:
-    with pytest.raises(nv.SpecError) as caught:
-        nv.compile(path)
-    return tuple(found for found in caught.value.diagnostics if found.severity == "error")
+    try:
+        return nv.compile(path).warnings
+    except nv.SpecError as error:
+        return error.diagnostics
+
+
+def text_of(path: Path) -> str:
+    """The text, also of a file that is not UTF-8."""
+    return path.read_text(encoding="utf-8", errors="replace")
+
+
+def hold(path: Path, found: tuple[Diagnostic, ...]) -> None:
+    """The findings are those that the file expects."""
+    expected = EXPECTED.findall(text_of(path))
+    assert expected, "a spec of this folder says what is wrong with it"
+    assert [(d.severity, d.span.line, d.span.column, d.code) for d in found] == [
+        (severity, int(line), int(column), code) for severity, line, column, code, _ in expected
+    ]
+    for diagnostic, (*_, words) in zip(found, expected, strict=True):
+        assert words.strip() in f"{diagnostic.message} {diagnostic.hint or ''}"
 
 
 def test_there_are_many() -> None:
-    assert len(SPECS) >= 100
+    assert len(SPECS) >= 150
+
+
+def test_every_code_is_covered() -> None:
+    covered = {code for path in (*SPECS, *LAYOUT_FILES) for _, _, _, code, _ in EXPECTED.findall(text_of(path))}
+    covered |= {code for path in REFUSED for code, _ in REFUSAL.findall(text_of(path))}
+    wanted = {code.name for code in catalogue().values() if code.rare is None}
+    elsewhere = {name for name in wanted if catalogue()[name].command.startswith("neurovis run")}
+    assert wanted - covered - elsewhere == set()
+    assert all(catalogue()[name].command != VALIDATE for name in elsewhere)
 
 
 @pytest.mark.parametrize("path", SPECS, ids=lambda path: path.stem)
 def test_finding(path: Path) -> None:
-    expected = EXPECTED.findall(path.read_text(encoding="utf-8"))
-    assert expected, "a spec of this folder says what is wrong with it"
-    found = findings(path)
-    assert [(d.span.line, d.span.column, d.code) for d in found] == [
-        (int(line), int(column), code) for line, column, code, _ in expected
-    ]
-    for diagnostic, (_, _, _, words) in zip(found, expected, strict=True):
-        assert words.strip() in f"{diagnostic.message} {diagnostic.hint or ''}"
+    hold(path, findings(path))
+
+
+@pytest.mark.parametrize("path", LAYOUT_FILES, ids=lambda path: path.stem)
+def test_layout_file(path: Path) -> None:
+    found = Findings()
+    assert parse(text_of(path), path.name, found) is None
+    hold(path, found.sorted())
+
+
+@pytest.mark.parametrize("path", REFUSED, ids=lambda path: path.stem)
+def test_refusal(path: Path) -> None:
+    ((code, words),) = REFUSAL.findall(text_of(path))
+    network = nv.compile(path)
+    with pytest.raises(LayoutRefusalError) as caught:
+        network.layout()
+    assert caught.value.code == code
+    assert words in f"{caught.value} {caught.value.hint or ''}"

@@ -64,6 +64,8 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
     steps, episode = _clock(spec, constants)
     files = Files(request.base, request.root, findings)
     inputs = make_inputs(spec, constants, files)
+    missing = spec.inputs.keys() - {entry.name for entry in inputs}
+    definitions = replace(definitions, gaps=definitions.gaps.with_names("inputs", gaps.names["inputs"] | missing))
     population = populate(spec, constants, definitions, inputs, files, request.limits, seed)
     render = render_settings(spec.render, findings)
     check_ros(spec.ros, findings)
@@ -129,7 +131,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
     if not with_events:
         return network
     made = _eventful(spec, request, network, directory, constants)
-    if made is not None:
+    if made is not None and not findings.failed:  # the shape may have been at fault
         warn(spec, made, bundles, findings)
     return made
 

@@ -22,6 +22,7 @@ from neurovis_spec.compiler.network import Connections, FloatArray, Input, IntAr
 from neurovis_spec.compiler.patterns import Ends, all_to_all, pairs_of
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import resolve_end
+from neurovis_spec.compiler.settings import choose
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.expressions.tree import names
@@ -88,8 +89,10 @@ class Connector:
 
     def _entry(self, key: Located[str], body: ConnectionModel, seen: dict[str, int], total: int) -> Bundle | None:
         findings = self.constants.findings
-        before = findings.errors
         ends = self._ends(key)
+        if body.plasticity is not None:  # said here as well, since what is wrong with the ends must not hide it
+            choose(body.plasticity, self.definitions.rules, "rule", self.definitions, findings)
+        before = findings.errors
         if ends is None or body.lost:  # a body without what is at fault in it would be another one
             return None
         name = _normal(key.value)
