@@ -3,6 +3,7 @@
 #   make demo       makes .venv, installs, and runs the main job into demo/
 #   make test       every check that needs Python alone
 #   make test-all   the tests that need Chromium, graphviz' dot or a C compiler; fails without them
+#   make docs       writes the generated parts of docs/ anew
 #
 # PYTHON=... names another interpreter to make .venv with, PYTEST_ARGS=... adds to pytest's arguments.
 
@@ -15,7 +16,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ELSEWHERE := browser or dot or compiler
 
-.PHONY: help install demo test test-all needs format clean
+.PHONY: help install demo test test-all needs docs format clean
 .DELETE_ON_ERROR:
 
 help:
@@ -62,6 +63,10 @@ needs:
 	command -v dot >/dev/null || missing="$$missing dot (apt-get install graphviz);"; \
 	command -v cc >/dev/null || command -v gcc >/dev/null || missing="$$missing a C compiler (apt-get install gcc libc6-dev);"; \
 	test -z "$$missing" || { echo "make test-all needs what is not here:$$missing" >&2; exit 1; }
+
+docs: $(VENV)/installed
+	$(BIN)/python docs/make_language.py
+	$(BIN)/python -m neurovis_spec.codes > docs/errors.md
 
 format: $(VENV)/tested
 	$(BIN)/ruff check --fix .

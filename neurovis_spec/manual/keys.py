@@ -97,7 +97,7 @@ def _model_in(annotation: object) -> type[Model] | None:
 def kind(shape: Mapping[str, object]) -> str:
     """What may be written, in words, from a JSON Schema.
 
-    >>> kind({"anyOf": [{"type": "number"}, {"type": "string"}, {"type": "null"}]})
+    >>> kind({"anyOf": [{"type": "number"}, {"type": "string", "maxLength": 1000}, {"type": "null"}]})
     'number or expression'
     >>> kind({"anyOf": [{"enum": ["from", "to"]}, {"type": "null"}]})
     'from, to'
@@ -105,10 +105,7 @@ def kind(shape: Mapping[str, object]) -> str:
     options = shape.get("anyOf")
     if not isinstance(options, list):
         return _one(shape)
-    kinds = [_one(option) for option in options]
-    if "number" in kinds and "text" in kinds:
-        kinds = ["number", "expression", *(word for word in kinds if word not in ("number", "text"))]
-    words = [word for word in dict.fromkeys(kinds) if word]
+    words = [word for word in dict.fromkeys(map(_one, options)) if word]
     return " or ".join(("name" if word == "text" and _SINGLE in words else word) for word in words)
 
 
@@ -126,7 +123,7 @@ def _one(shape: Mapping[str, object]) -> str:
         case "null":
             return ""
         case "string":
-            return "text" if "pattern" not in shape else "name"
+            return _text(shape)
         case "boolean":
             return "true, false"
         case "array":
@@ -137,14 +134,20 @@ def _one(shape: Mapping[str, object]) -> str:
             return str(plain or "mapping")
 
 
+def _text(shape: Mapping[str, object]) -> str:
+    """Expressions have a length, names have a form."""
+    if "maxLength" in shape:
+        return "expression"
+    return "name" if str(shape.get("pattern", "")).startswith("^[A-Za-z_]") else "text"
+
+
 def _list(shape: Mapping[str, object]) -> str:
     items = shape.get("items")
     if shape.get("minItems") == shape.get("maxItems") == 2:
         return "pair [a, b]"
     if isinstance(items, dict) and items.get("type") == "array":
-        return "list of rows"
-    inner = kind(items) if isinstance(items, dict) else ""
-    return f"list of {inner.replace('text', 'texts')}" if inner == "text" else "list"
+        return "list of pairs" if items.get("maxItems") == 2 else "list of rows"
+    return "list of texts" if isinstance(items, dict) and _one(items) == "text" else "list"
 
 
 def _mapping(shape: Mapping[str, object]) -> str:

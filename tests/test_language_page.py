@@ -1,0 +1,115 @@
+"""The language reference: its tables are those of the program, its examples compile, its claims hold."""
+
+from __future__ import annotations
+
+import re
+import runpy
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import neurovis_spec as nv
+from neurovis_spec.compiler.constants import RESERVED
+from neurovis_spec.manual.keys import keys
+
+ROOT = Path(__file__).parents[1]
+PAGE = (ROOT / "docs" / "language.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"^```yaml\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+WHOLE = [block for block in BLOCKS if block.startswith("neurovis:")]
+PARTS = [block for block in BLOCKS if not block.startswith("neurovis:")]
+REST = {
+    "neurovis": "neurovis: 1",
+    "name": "name: example",
+    "neurons": "neurons: {A: {}, B: {}, O: {}, T: {}, K: {count: 4}}",
+}
+#: Warnings that a part of a spec, or a built-in written down again, causes.
+PARTIAL = {"idle-neuron", "unused-definition", "unused-input", "unused-parameter", "replaces-builtin"}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with the data files that the examples name."""
+    data = tmp_path / "data"
+    data.mkdir()
+    np.savetxt(data / "sensed.csv", [[0.5], [0.25]], delimiter=",")
+    np.savetxt(data / "centres.csv", np.eye(2, 4), delimiter=",")
+    (data / "edges.csv").write_text("from,to,weight,delay\nK1,O,0.5,1\nK2,O,,2\n", encoding="utf-8")
+    return tmp_path
+
+
+def test_the_tables_are_those_of_the_program() -> None:
+    made: Callable[[str], str] = runpy.run_path(str(ROOT / "docs" / "make_language.py"))["made"]
+    assert made(PAGE) == PAGE, "run: make docs"
+
+
+@pytest.mark.parametrize("text", WHOLE, ids=lambda text: str(yaml.safe_load(text)["name"]))
+def test_a_whole_spec_compiles_and_runs_without_a_warning(text: str) -> None:
+    network = nv.compile_text(text)
+    assert network.warnings == ()
+    run = network.run(200)
+    assert np.isfinite(run.activity).all()
+
+
+@pytest.mark.parametrize("text", PARTS, ids=lambda text: "-".join(yaml.safe_load(text)))
+def test_a_part_of_a_spec_compiles_and_runs(text: str, folder: Path) -> None:
+    there = yaml.safe_load(text)
+    whole = "\n".join([text, *(line for key, line in REST.items() if key not in there)])
+    network = nv.compile_text(whole, folder=folder)
+    assert {finding.code for finding in network.warnings} <= PARTIAL
+    network.run(3)
+
+
+def test_there_are_examples_of_every_section() -> None:
+    shown = {key for block in BLOCKS for key in yaml.safe_load(block)}
+    assert shown >= {key.name for key in keys() if "." not in key.path and not key.later} - {
+        "title",
+        "description",
+        "authors",
+        "license",
+        "references",
+        "ros",
+    }
+
+
+def test_every_key_and_built_in_is_on_the_page() -> None:
+    for key in keys():
+        if key.path not in ("rules.state.initial", "rules.state.each_step", "rules.state.each_episode"):
+            assert f"`{key.name}`" in PAGE, key.path
+
+
+def test_the_example_of_the_whole_learns() -> None:
+    run = nv.compile_text(WHOLE[0]).run()
+    error = np.abs(run["T"] - run["O"])
+    assert error[-126:].max() < 0.1 * error[:126].max()
+
+
+def test_the_example_of_episodes_learns() -> None:
+    (text,) = (block for block in WHOLE if "name: episodes" in block)
+    for seed in range(3):
+        run = nv.compile_text(text, seed=seed).run()
+        assert abs(run["O"][0] - 1) > 0.4
+        assert abs(run["O"][-1] - 1) < 0.1
+
+
+def test_the_names_of_parameters_that_are_taken() -> None:
+    line = next(line for line in PAGE.splitlines() if line.startswith("A parameter may not be called"))
+    assert set(re.findall(r"`(\w+)`", line)) == set(RESERVED)
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".mtx"])
+def test_files_that_are_not_read_yet(suffix: str, tmp_path: Path) -> None:
+    (tmp_path / f"m{suffix}").write_bytes(b"%%MatrixMarket matrix array real general\n1 1\n1\n")
+    spec = f"neurovis: 1\nname: x\nneurons: {{A: {{}}}}\nconnections: {{A -> A: {{matrix: {{file: m{suffix}}}}}}}"
+    with pytest.raises(nv.SpecError):
+        nv.compile_text(spec, folder=tmp_path)
+
+
+def test_links_within_the_page_lead_somewhere() -> None:
+    titles = re.findall(r"^#+ (.*)$", PAGE, re.MULTILINE)
+    anchors = {re.sub(r"[^\w -]", "", title).lower().replace(" ", "-") for title in titles}
+    links = re.findall(r"\]\(#([\w-]+)\)", PAGE)
+    assert len(links) > 20
+    assert set(links) <= anchors
