@@ -22,7 +22,8 @@ from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.fmt import FormattingError, format_read, format_text
 from neurovis_spec.language.fmt_keys import normal
-from neurovis_spec.language.reader import read_text
+from neurovis_spec.language.fmt_parse import TreeReader
+from neurovis_spec.language.reader import event_source, read_text
 from neurovis_spec.language.source import Mapping, Node, Scalar
 
 ROOT = Path(__file__).parents[1]
@@ -157,15 +158,39 @@ def test_what_is_written_and_what_becomes_of_it(name: str) -> None:
     assert values(after) == values(before)
 
 
+@pytest.mark.parametrize("name", PAIRS)
+def test_both_parsers_make_the_same_tree(name: str) -> None:
+    for text in PAIRS[name]:
+        plain = re.sub("\r\n?", "\n", text.removeprefix("\ufeff")).replace("\t", " ") + "\n"  # tabs: the C one alone
+        fast, pure = (TreeReader(plain, event_source(plain, pure=pure)).document() for pure in (False, True))
+        assert fast == pure
+
+
+def test_the_deepest_and_the_longest() -> None:
+    deep = "a: " + "[" * 63 + "]" * 63 + "\n"
+    assert formatted(deep) == deep
+    blocks = "".join("   " * depth + "a:\n" for depth in range(64))
+    assert formatted(blocks) == "".join("  " * depth + "a:\n" for depth in range(64))
+    key = "k" * 1100
+    assert formatted(f"?   {key}\n:   - 1\nb: {{?  {key} :  1}}\n") == f"? {key}\n:\n  - 1\nb: {{? {key}: 1}}\n"
+    wide = "x" * 120
+    assert formatted(f"a:\n  {wide}\nb:\n    [{wide}]\nc: [{wide}]\n") == (
+        f"a:\n  {wide}\nb:\n  [{wide}]\nc: [{wide}]\n"
+    )
+    assert formatted(f"m:\n  - [1, {wide}]\n  - [10, 1]\n") == f"m:\n  - [ 1, {wide}]\n  - [10, 1]\n"
+
+
 @pytest.mark.parametrize("path", CANONICAL, ids=lambda path: path.stem)
 def test_what_we_ship_is_canonical(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     assert formatted(text) == text
 
 
-def test_the_examples_of_the_readme_are_canonical() -> None:
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    for text in re.findall(r"^```yaml\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL):
+@pytest.mark.parametrize("page", ["README.md", "docs/language.md"])
+def test_the_examples_of_the_pages_are_canonical(page: str) -> None:
+    examples = re.findall(r"^```yaml\n(.*?)^```$", (ROOT / page).read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    assert examples
+    for text in examples:
         assert formatted(text) == text
 
 
@@ -477,6 +502,9 @@ def test_standard_input_goes_to_standard_output(folder: Path) -> None:
     result = call("-", stdin=BROKEN.encode())
     assert (result.exit_code, result.stdout) == (1, "")
     assert "<stdin>:1:11: error[yaml-syntax]" in result.stderr
+    result = call("-", stdin=b"a: \xff\n")
+    assert (result.exit_code, result.stdout) == (1, "")
+    assert "<stdin>:1:4: error[invalid-utf8]" in result.stderr
     assert call("-", "-").exit_code == 2
 
 

@@ -13,7 +13,8 @@ import click
 from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.files import STDIN, standard_input, writing
 from neurovis_spec.cli.options import examples
-from neurovis_spec.diagnostics import Diagnostic, Findings
+from neurovis_spec.cli.progress import progress
+from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError
 from neurovis_spec.findings import printable, show_text
 from neurovis_spec.language.fmt import FormattingError, format_read
 from neurovis_spec.language.reader import read_file, read_text
@@ -45,13 +46,14 @@ def command(specs: tuple[str, ...], check: bool, diff: bool) -> None:
     sources: dict[str, str] = {}
     changed = 0
     for spec in specs:
-        findings = Findings()
-        before = _read(spec, findings)
-        if before is None:
-            found += findings.sorted()
-            sources |= findings.sources
+        try:
+            with progress("formatting"):
+                before = _read(spec)
+                after = _formatted(spec, before)
+        except SpecError as error:
+            found += error.diagnostics
+            sources |= error.sources
             continue
-        after = _formatted(spec, before)
         changed += after != before
         _show(spec, before, after, check=check, diff=diff)
         if not (check or diff):
@@ -62,16 +64,17 @@ def command(specs: tuple[str, ...], check: bool, diff: bool) -> None:
         raise click.exceptions.Exit(1)
 
 
-def _read(spec: str, findings: Findings) -> str | None:
-    """The text of a spec with its byte-order mark; None where there are errors, which are noted."""
+def _read(spec: str) -> str:
+    """The text of a spec with its byte-order mark. Raises SpecError where the reader refuses it."""
+    findings = Findings()
     if spec == "-":
         text = standard_input()
         read_text(text, STDIN, findings)
-        return None if findings.failed else text
+        findings.check()
+        return text
     path = Path(spec)
     read_file(path, spec, findings)
-    if findings.failed:
-        return None
+    findings.check()
     with path.open("rb") as file:
         mark = file.read(len(_BOM.encode()))
     return (_BOM if mark == _BOM.encode() else "") + findings.sources[spec]
