@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from lsp_marks import marked
 
 from neurovis_spec.lsp.completion import Completion, complete
@@ -13,7 +16,9 @@ from neurovis_spec.lsp.document import Document, check
 from neurovis_spec.lsp.hover import hover
 from neurovis_spec.lsp.rename import RenameError, apply, prepare, rename
 from neurovis_spec.lsp.symbols import symbols
+from neurovis_spec.lsp.text import Place
 
+SPECS = sorted((Path(__file__).parents[1] / "specs").glob("*.yaml"))
 BASE = """neurovis: 1
 name: small
 parameters:
@@ -99,6 +104,17 @@ def test_behind_a_dot_the_neurons_of_the_module_are_offered() -> None:
     assert set(offered(text)) == {"S", "S1", "S2"}
 
 
+def test_an_instance_is_given_the_parameters_and_inputs_of_its_module() -> None:
+    text = "parameters: {outer: 1}\nmodules:\n  leg: {parameters: {gain: 1}, inputs: {load: {}}, neurons: {S: {}}}\n"
+    text += "  body: {instances: {a2: {module: leg, count: 3}}, outputs: {o: a21.¦}}\n"
+    assert set(offered(text)) == {"S"}
+    text = text.replace("¦", "S") + "instances:\n  left: {module: leg, "
+    assert set(offered(text + "set: {¦")) == {"gain"}
+    assert {"outer", "i", "n"} <= set(offered(text + "set: {gain: ¦")) - {"gain"}
+    assert set(offered(text + "inputs: {¦")) == {"load"}
+    assert set(offered(text + "module: ¦")) == {"leg", "body"}
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [
@@ -110,7 +126,7 @@ def test_behind_a_dot_the_neurons_of_the_module_are_offered() -> None:
         ("activation: sw¦ish", ["f(x) = x * sigmoid(slope * x)", "Smooth."]),
         ("{gauss¦ian", ["f(x) = exp(-sigma * x^2)", "Bell curve"]),
         ("alpha*si¦n(k)", ["sin(x)"]),
-        ("alpha*sin(¦k)", ["the step"]),
+        ("alpha*sin(¦k)", ["The step"]),
         ("{input: g¦o", ["input, size 1", "`alpha*sin(k)`"]),
         ("{cou¦nt: 5", ["How many neurons"]),
         ("alpha, plast¦icity", ["A rule"]),
@@ -270,3 +286,35 @@ def test_symbols_are_nested() -> None:
         for child in symbol.children:
             assert (symbol.whole.line, symbol.whole.column) <= (child.whole.line, child.whole.column)
             assert (child.whole.end_line, child.whole.end_column) <= (symbol.whole.end_line, symbol.whole.end_column)
+
+
+@settings(deadline=None, max_examples=150)
+@given(st.sampled_from(SPECS), st.data())
+def test_nothing_breaks_on_whatever_somebody_is_typing(path: Path, data: st.DataObject) -> None:
+    whole = path.read_text(encoding="utf-8")
+    at = data.draw(st.integers(0, len(whole)))
+    cut = data.draw(st.integers(at, min(len(whole), at + 60)))
+    typed = data.draw(st.text(st.sampled_from("aK1.,:+->{}[]\"'#| \n\t𝜎"), max_size=6))
+    document = Document(whole[:at] + typed + whole[cut:], "x", path.parent)
+    for place in (Place(*document.text.lines.place(at)), Place(*document.text.lines.place(at + len(typed)))):
+        for completion in complete(document, place):
+            assert completion.span.line == place.line
+            assert completion.span.column <= place.column <= completion.span.end_column
+        found = hover(document, place)
+        assert found is None or found.markdown
+        definition(document, place)
+        with suppress(RenameError):
+            prepare(document, place)
+    symbols(document)
+
+
+DEEP = ("{a: " * 20_000, "[" * 100_000, "- " * 100_000, "a: " + "x" * 500_000, "outputs: {a: " + "K" * 500_000)
+
+
+@pytest.mark.parametrize("text", DEEP, ids=["braces", "brackets", "dashes", "text", "reference"])
+def test_deep_and_long_texts_are_looked_at_once(text: str) -> None:
+    document, place = Document(text), Place(1, len(text) + 1)  # whatever is quadratic takes minutes here
+    complete(document, place)
+    assert hover(document, place) is None
+    assert definition(document, place) is None
+    assert len(symbols(document)) <= 1

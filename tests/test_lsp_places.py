@@ -11,7 +11,8 @@ from lsp_marks import MARK, marked
 
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.reader import read_text
-from neurovis_spec.lsp.outline import Item, outline
+from neurovis_spec.lsp.outline import Item, item_at, outline
+from neurovis_spec.lsp.rename import apply, rename
 from neurovis_spec.lsp.text import Place, Text, holds
 from neurovis_spec.lsp.tolerant import outline_of_text, where
 
@@ -70,6 +71,31 @@ def test_the_tolerant_outline_of_a_sound_text_is_the_exact_one(path: Path) -> No
     document = read_text(source, "x", Findings())
     assert document is not None
     assert plain(list(outline_of_text(Text(source), "x"))) == plain(list(outline(document.root)))
+
+
+@pytest.mark.parametrize("path", SPECS, ids=lambda path: path.name)
+def test_what_stands_at_a_place_is_the_item_that_begins_there(path: Path) -> None:
+    document = read_text(path.read_text(encoding="utf-8"), "x", Findings())
+    assert document is not None
+    for item in outline(document.root):
+        found = item_at(document.root, Place(item.span.line, item.span.column))
+        assert found is not None
+        assert (found.path, found.is_key, found.span) == (item.path, item.is_key, item.span)
+
+
+def test_long_lists_of_edges_are_packed_and_still_found() -> None:
+    rows = "".join(f"    - [K{i % 9 + 1}, K{i % 7 + 1}, 0.5]\n" for i in range(400))
+    text = f"neurons: {{K: {{count: 9}}}}\nconnections:\n  K -> K:\n    edges:\n{rows}outputs: {{a: K1}}\n"
+    document = read_text(text, "x", Findings())
+    assert document is not None
+    items = list(outline(document.root))
+    assert len([item for item in items if "edges" in item.path and not item.is_key]) == 800
+    for item in items[::37]:
+        assert item_at(document.root, Place(item.span.line, item.span.column)) in (item, None) or item.is_key
+    assert [item.path for item in outline(document.root, edges=False)][-2:] == [("outputs", "a"), ("outputs", "a")]
+    edited, place = marked(text.replace("outputs: {a: K1", "outputs: {a: K1¦"))
+    result = apply(edited, rename(edited, place, "L")).source
+    assert result == text.replace("K", "L")
 
 
 @given(TEXTS, st.integers(1, 6), st.integers(1, 12))

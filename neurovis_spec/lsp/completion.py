@@ -126,13 +126,18 @@ def _of_role(role: Role | None, scope: Scope, path: Path, front: str, index: Ind
         case "engine":
             yield from (_Offer(name, "word") for name in ("auto", *plugins.names(plugins.LAYOUTS)))
         case "names" if role.kind == "input":
-            module = index.module_of(str(path[1])) if path[0] == "instances" else scope.module
+            module = _owner(path, scope, index)
             yield from (_Offer(name.text, "input") for name in index.declared("input", module))
         case "names" if role.kind == "parameter":
-            module = index.module_of(str(path[1])) if path[0] == "instances" else scope.module
+            module = _owner(path, scope, index)
             yield from _parameters(index.declared("parameter", module), index)
         case "names" if role.kind == "module":
             yield from (_Offer(name.text, "module") for name in index.declared("module"))
+
+
+def _owner(path: Path, scope: Scope, index: Index) -> str | None:
+    """The module whose parameters and inputs are named: that of the instance in ``instances: {left: {set: …}}``."""
+    return index.module_of(str(path[-3]), scope.module) if path[-4:-3] == ("instances",) else scope.module
 
 
 def _formula(role: Role, scope: Scope, index: Index, place: Place) -> Iterator[_Offer]:
@@ -173,7 +178,7 @@ def _neurons(scope: Scope, front: str, index: Index, single: bool = False, signa
     module: str | None = scope.module
     instance = re.search(r"([A-Za-z_]\w*)\.$", front)
     if instance:
-        module = index.module_of(instance[1])
+        module = index.module_of(instance[1], scope.module)
         if module is None:
             return
     groups = index.declared("neuron", module)

@@ -45,7 +45,7 @@ def definition(document: Document, place: Place) -> Location | None:
 
 def _file(document: Document, item: Item) -> Location | None:
     """The beginning of a file that is named: data, or one that is included."""
-    if item.is_key or not (item.path[-1] == "file" or item.path[0] == "include"):
+    if item.is_key or not (item.path[-1:] == ("file",) or item.path[:1] == ("include",)):
         return None
     path = _located(document, item)
     return None if path is None or not path.is_file() else Location(path, Span(str(path), 1, 1, 1, 1))
@@ -78,7 +78,7 @@ def _elsewhere(document: Document, name: Name) -> Location | None:
 
 def _included(document: Document) -> Iterator[Path]:
     """The included files, and those that they include."""
-    waiting = [item for item in document.items if item.path[0] == "include" and not item.is_key]
+    waiting = [item for item in document.items if item.path[:1] == ("include",) and not item.is_key]
     seen: set[Path] = set()
     folder = document.folder
     places = [(item.text, folder, item.span) for item in waiting]
@@ -91,7 +91,7 @@ def _included(document: Document) -> Iterator[Path]:
         yield path
         source = read_file(path, str(path), Findings())
         for item in () if source is None else outline(source.root):
-            if item.path[0] == "include" and not item.is_key:
+            if item.path[:1] == ("include",) and not item.is_key:
                 places.append((item.text, path.parent, item.span))
 
 

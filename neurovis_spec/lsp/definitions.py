@@ -92,7 +92,7 @@ def _definition(section: str, name: str, texts: Mapping[tuple[str, ...], str]) -
         if len(path) == 2 and path[0] == "parameters":
             default = texts.get((*path, "value"), text)
             parameters.append(Parameter(path[1], default, texts.get((*path, "description"), "")))
-    signals = tuple(text for path, text in texts.items() if path[0] == "signals" and text)
+    signals = tuple(text for path, text in texts.items() if path[:1] == ("signals",) and text)
     description = " ".join(texts.get(("description",), "").split())
     return Definition(DEFINITIONS[section], name, tuple(parameters), signals, _equations(section, texts), description)
 

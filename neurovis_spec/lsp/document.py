@@ -14,10 +14,11 @@ from neurovis_spec import api
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError
 from neurovis_spec.language.reader import read_text
+from neurovis_spec.language.source import SourceDocument
 from neurovis_spec.lsp.definitions import builtin_signals
 from neurovis_spec.lsp.index import Index
 from neurovis_spec.lsp.names import Name
-from neurovis_spec.lsp.outline import Item, outline
+from neurovis_spec.lsp.outline import Item, item_at, outline
 from neurovis_spec.lsp.text import Place, Text, holds
 from neurovis_spec.lsp.tolerant import outline_of_text
 
@@ -39,26 +40,43 @@ class Document:
         return Text(self.source, self.encoding)
 
     @cached_property
+    def read(self) -> SourceDocument | None:
+        """The values that know their places; None where the text cannot be read at this moment."""
+        return read_text(self.text.text, self.file, Findings())
+
+    @cached_property
     def items(self) -> tuple[Item, ...]:
-        """All keys and texts."""
-        document = read_text(self.text.text, self.file, Findings())
-        if document is None:
+        """All keys and texts, but those in lists of edges."""
+        if self.read is None:
             return outline_of_text(self.text, self.file)
-        return tuple(outline(document.root))
+        return tuple(outline(self.read.root, edges=False))
 
     @cached_property
     def index(self) -> Index:
-        """All names and where they lead."""
+        """All that is declared, and the names outside of lists of edges."""
+        return self._index(self.items)
+
+    @cached_property
+    def whole(self) -> Index:
+        """All names of the document."""
+        return self.index if self.read is None else self._index(tuple(outline(self.read.root)))
+
+    def _index(self, items: tuple[Item, ...]) -> Index:
         groups = () if self.network is None else self.network.neurons.groups
-        return Index(self.items, self.text, {group.name: group.count for group in groups}, builtin_signals())
+        return Index(items, self.text, {group.name: group.count for group in groups}, builtin_signals())
 
     def name_at(self, place: Place) -> Name | None:
-        """The name under a place."""
-        found = [name for name in self.index.names if name.exact and holds(name.span, place)]
-        return max(found, key=lambda name: name.span, default=None)
+        """The name at a place; of two that touch there the second."""
+        item = self.item_at(place)
+        found = () if item is None else self.index.names_in(item)
+        return max(
+            (name for name in found if name.exact and holds(name.span, place)), key=lambda n: n.span, default=None
+        )
 
     def item_at(self, place: Place) -> Item | None:
-        """The key or the text under a place."""
+        """The key or the text at a place."""
+        if self.read is not None:
+            return item_at(self.read.root, place)
         return next((item for item in self.items if holds(item.span, place)), None)
 
 

@@ -19,6 +19,8 @@ from neurovis_spec.lsp.roles import Kind
 from neurovis_spec.lsp.text import Text
 
 _NUMBER = re.compile(r"0|[1-9][0-9]*")
+#: No name is longer.
+_LONGEST = 64
 #: The kinds that share one namespace.
 SHARED: Final[tuple[Kind, ...]] = ("neuron", "input", "instance")
 
@@ -54,7 +56,15 @@ class Index:
     @cached_property
     def names(self) -> tuple[Name, ...]:
         """All names, in the order of the document."""
-        return tuple(names_of(self.items, self.text, Lookup(self.module_of, self._is_signal)))
+        return tuple(names_of(self.items, self.text, self._lookup))
+
+    def names_in(self, item: Item) -> tuple[Name, ...]:
+        """The names of one item."""
+        return tuple(names_of((item,), self.text, self._lookup))
+
+    @property
+    def _lookup(self) -> Lookup:
+        return Lookup(self.module_of, self._is_signal)
 
     @cached_property
     def declarations(self) -> tuple[Name, ...]:
@@ -80,7 +90,8 @@ class Index:
     def find(self, name: Name) -> Found | None:
         """Where a name leads; None where nothing in this document declares it."""
         if name.declares:
-            return Found(name, name.span)
+            key = (name.kind, name.scope.module, name.scope.definition, name.text)
+            return Found(self._declared.get(key, name), name.span)
         kinds: tuple[Kind, ...] = SHARED if name.kind == "neuron" else (name.kind,)
         for kind in kinds:
             exact = self._declared.get((kind, name.scope.module, name.scope.definition, name.text))
@@ -122,7 +133,7 @@ class Index:
 
     def _counted(self, kind: Kind, text: str, module: str | None) -> Name | None:
         """The counted group (or instance) of which this is a neuron: the longest name that fits."""
-        for length in range(len(text) - 1, 0, -1):
+        for length in range(min(len(text), _LONGEST) - 1, 0, -1):
             group = self._declared.get((kind, module, None, text[:length]))
             if group is None or not _NUMBER.fullmatch(text, length):
                 continue
@@ -132,18 +143,21 @@ class Index:
         return None
 
     @cached_property
-    def _modules(self) -> Mapping[str, str]:
-        """The modules of the instances, by the instances' names."""
-        return {
-            str(path[1]): item.text
-            for path, item in self.values.items()
-            if len(path) == 3 and path[0] == "instances" and path[2] == "module"
-        }
+    def _modules(self) -> Mapping[tuple[str | None, str], str]:
+        """The modules of the instances, by the module in which these stand, and their names."""
+        result = {}
+        for path, item in self.values.items():
+            if path[-3:-2] == ("instances",) and path[-1] == "module":
+                outer = str(path[1]) if len(path) == 5 and path[0] == "modules" else None
+                result[outer, str(path[-2])] = item.text
+        return result
 
-    def module_of(self, instance: str) -> str | None:
-        """The module of an instance, or of one of a counted one (``left2``)."""
-        module = self._modules.get(instance)
-        return self._modules.get(instance.rstrip("0123456789")) if module is None else module
+    def module_of(self, instance: str, outer: str | None = None) -> str | None:
+        """The module of an instance, or of one of a counted one (``left2``), that stands in the module ``outer``."""
+        length = len(instance)
+        while length and (outer, instance[:length]) not in self._modules and instance[length - 1].isdigit():
+            length -= 1
+        return self._modules.get((outer, instance[:length]))
 
     def _is_signal(self, rule: str, setting: str) -> bool:
         own = [path for path in self.keys if path[:2] == ("rules", rule)]

@@ -44,7 +44,7 @@ class Lookup:
     """What the reading of some names needs to know of others: the module of an instance, whether a setting of a rule
     is a signal."""
 
-    module_of: Callable[[str], str | None]
+    module_of: Callable[[str, str | None], str | None]
     is_signal: Callable[[str, str], bool]
 
 
@@ -76,8 +76,8 @@ def _names(item: Item, role: Role, scope: Scope, text: Text, lookup: Lookup) -> 
             assert role.kind is not None
             if role.use == "choice":
                 scope = Scope()
-            elif item.path[0] == "instances" and item.is_key and len(item.path) > 2:
-                scope = Scope(lookup.module_of(str(item.path[1])))
+            elif item.is_key and item.path[-4:-3] == ("instances",):
+                scope = Scope(lookup.module_of(str(item.path[-3]), scope.module))
             declares = role.use == "declares"
             if role.kind in ("module", "activation", "model", "rule"):
                 scope = Scope()
@@ -118,7 +118,7 @@ def _references(item: Item, scope: Scope, text: Text, lookup: Lookup) -> Iterato
             if here is not None:
                 via = Name("instance", part, span, here, item, False, exact, via)
                 yield via
-                module = lookup.module_of(part)
+                module = lookup.module_of(part, here.module)
                 here = None if module is None else Scope(module)
         span, exact = next(places)
         if here is not None:

@@ -6,12 +6,14 @@ the document. Numbers in long packed lists are left out: nobody asks for their n
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
 
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.source import TEXT, Mapping, Node, Packed, Scalar, Sequence
+from neurovis_spec.lsp.text import Place, holds
 
 #: Keys and indices from the root.
 Path: TypeAlias = tuple[str | int, ...]
@@ -40,8 +42,9 @@ class Item:
         return "" if self.scalar.value is None else str(self.scalar.value)
 
 
-def outline(node: Node, path: Path = ()) -> Iterator[Item]:
-    """The items of a node, in the order written."""
+def outline(node: Node, path: Path = (), edges: bool = True) -> Iterator[Item]:
+    """The items of a node, in the order written. Without ``edges`` lists of edges are left out, which may be long and
+    declare nothing."""
     match node:
         case Mapping(entries=entries):
             for entry in entries:
@@ -49,27 +52,53 @@ def outline(node: Node, path: Path = ()) -> Iterator[Item]:
                 first, last = entry.key.span, entry.value.span
                 end = max((first.end_line, first.end_column), (last.end_line, last.end_column))
                 yield Item(below, entry.key, True, Span(first.file, first.line, first.column, *end))
-                yield from outline(entry.value, below)
+                if edges or entry.name != "edges" or isinstance(entry.value, (Mapping, Scalar)):
+                    yield from outline(entry.value, below, edges)
         case Sequence(items=items):
             for index, item in enumerate(items):
-                yield from outline(item, (*path, index))
+                yield from outline(item, (*path, index), edges)
         case Packed():
             yield from _packed(node, path)
         case Scalar():
             yield Item(path, node, False, node.span)
 
 
+def item_at(node: Node, place: Place, path: Path = ()) -> Item | None:
+    """The key or the text at a place; only the nodes around it are looked at."""
+
+    def _first(parts: Iterable[tuple[Node, str | int]]) -> Item | None:
+        # A block ends where the next begins, so that a place may be in two.
+        found = (item_at(part, place, (*path, name)) for part, name in parts if holds(part.span, place))
+        return next((item for item in found if item is not None), None)
+
+    match node:
+        case Mapping(entries=entries):
+            for entry in entries:
+                if holds(entry.key.span, place):
+                    return Item((*path, entry.name), entry.key, True, entry.key.span)
+            return _first((entry.value, entry.name) for entry in entries)
+        case Sequence(items=items):
+            return _first((item, index) for index, item in enumerate(items))
+        case Packed(lines=lines):
+            for cell in range(bisect_left(lines, place.line), bisect_right(lines, place.line)):
+                if node.columns[cell] <= place.column <= node.ends[cell]:
+                    return Item((*path, *_indices(node, cell)), node.cell(cell), False, node.cell(cell).span)
+        case Scalar():
+            return Item(path, node, False, node.span)
+    return None
+
+
+def _indices(node: Packed, cell: int) -> Path:
+    """The index of a cell, or those of its row and of the cell in it."""
+    if node.rows is None:
+        return (cell,)
+    row = bisect_right(node.rows, cell) - 1
+    return (row, cell - node.rows[row])
+
+
 def _packed(node: Packed, path: Path) -> Iterator[Item]:
     """The texts of a packed list."""
-    rows, row = node.rows, 0
     for index, kind in enumerate(node.kinds):
-        if kind != TEXT:
-            continue
-        if rows is None:
-            below: Path = (*path, index)
-        else:
-            while rows[row + 1] <= index:
-                row += 1
-            below = (*path, row, index - rows[row])
-        cell = node.cell(index)
-        yield Item(below, cell, False, cell.span)
+        if kind == TEXT:
+            cell = node.cell(index)
+            yield Item((*path, *_indices(node, index)), cell, False, cell.span)

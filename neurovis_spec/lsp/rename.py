@@ -44,7 +44,7 @@ def prepare(document: Document, place: Place) -> tuple[Span, str]:
 def rename(document: Document, place: Place, new: str) -> tuple[Edit, ...]:
     """The edits that give another name to what stands at a place. Raises RenameError."""
     found = _found(document, place)
-    declaration, index = found.declaration, document.index
+    declaration, index = found.declaration, document.whole
     if new == declaration.text:
         return ()
     _check_name(declaration, new, index)
@@ -76,7 +76,7 @@ def _found(document: Document, place: Place) -> Found:
     name = document.name_at(place)
     if name is None:
         raise RenameError(_NOTHING)
-    found = document.index.find(name)
+    found = document.whole.find(name)
     if found is None:
         if name.kind in ("activation", "model", "rule") or name.kind == "local":
             raise RenameError(f"'{name.text}' is not declared in this document")

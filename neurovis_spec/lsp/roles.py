@@ -96,6 +96,7 @@ _VALUES: Final[Mapping[str, Role]] = {
     "parameters * max": _FORMULA,
     "inputs * expression": _RUN,
     "inputs * size": _FORMULA,
+    "inputs * values # #": _FORMULA,
     "neurons * count": _FORMULA,
     "neurons * first": _FORMULA,
     "neurons * names #": Role("declares", "neuron"),

@@ -54,7 +54,7 @@ def symbols(document: Document) -> tuple[Symbol, ...]:
 def _sections(document: Document, path: Path, below: dict[Path, list[Item]]) -> tuple[Symbol, ...]:
     result = []
     for item in below.get(path, ()):
-        name = str(item.path[-1])
+        name = item.text or "?"
         entries = below.get((*path, name), []) if name in _SORTS else []
         children = tuple(_entry(document, entry, _SORTS[name], below) for entry in entries)
         value = document.index.values.get(item.path)

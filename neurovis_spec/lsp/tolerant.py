@@ -19,6 +19,8 @@ from neurovis_spec.lsp.outline import Item, Path
 from neurovis_spec.lsp.text import Place, Text
 
 _QUOTED = re.compile(r"\"(?:[^\"\\]|\\.)*\"?|'(?:[^']|'')*'?")
+#: The reader refuses what is nested deeper; so do we, to stay linear.
+_DEEPEST = 80
 _BLOCK_TEXT = re.compile(r"[|>][-+0-9]*\s*(#.*)?$")
 
 
@@ -67,13 +69,14 @@ class _Scan:
     text: Text
     file: str
     until: Place | None = None
+    first: int = 1
     frames: list[_Frame] = field(default_factory=lambda: [_Frame("block", 0)])
     block_text: int | None = None
     where: Where | None = None
 
     def items(self) -> Iterator[Item]:
         """The items of all lines; stops at ``until``, which ``where`` then describes."""
-        for number in range(1, len(self.text.lines.starts) + 1):
+        for number in range(self.first, len(self.text.lines.starts) + 1):
             line = self.text.line(number)
             here = self.until is not None and number == self.until.line
             if not line.strip() and not here:
@@ -87,7 +90,7 @@ class _Scan:
                 self.block_text = None
             self._close(line, indent, here)
             yield from self._line(number, line, here)
-            if here:
+            if here or len(self.frames) > _DEEPEST:
                 return
 
     def _close(self, line: str, indent: int, here: bool) -> None:
@@ -127,6 +130,8 @@ class _Scan:
                     self.where = self._found(line, token, stop, is_key)
                     return
             yield from self._token(number, line, token, is_key)
+            if len(self.frames) > _DEEPEST:
+                return
         if stop is not None:
             self.where = self._found(line, None, stop, False)
 
@@ -289,9 +294,16 @@ def outline_of_text(text: Text, file: str) -> tuple[Item, ...]:
     return tuple(_Scan(text, file).items())
 
 
+def _section(text: Text, number: int) -> int:
+    """The last line up to this one that begins a section: what is above it is over there, whatever is open."""
+    while number > 1 and (text.line(number)[:1] or " ") in " \t#-]}":
+        number -= 1
+    return number
+
+
 def where(text: Text, place: Place) -> Where | None:
     """Where a place stands; None within a block text, where nothing is looked for."""
-    scan = _Scan(text, "", place)
+    scan = _Scan(text, "", place, first=_section(text, place.line))
     for _ in scan.items():
         pass
     return scan.where
