@@ -87,11 +87,37 @@ def test_the_example_of_the_whole_learns() -> None:
 
 
 def test_the_example_of_episodes_learns() -> None:
-    (text,) = (block for block in WHOLE if "name: episodes" in block)
     for seed in range(3):
-        run = nv.compile_text(text, seed=seed).run()
+        run = nv.compile_text(example("episodes"), seed=seed).run()
         assert abs(run["O"][0] - 1) > 0.4
         assert abs(run["O"][-1] - 1) < 0.1
+
+
+def example(name: str) -> str:
+    (text,) = (block for block in WHOLE if f"\nname: {name}\n" in block)
+    return str(text)
+
+
+def test_the_reservoir_learns() -> None:
+    run = nv.compile_text(example("reservoir")).run()
+    error = np.abs(run["T"] - run["O"])
+    assert error[-200:].mean() < 0.2 * np.abs(run["T"]).mean()
+
+
+def test_the_hopfield_network_mends_two_mistakes() -> None:
+    assert nv.compile_text(example("hopfield")).run()["N"][-1].tolist() == [1, 1, 1, 1, -1, -1, -1, -1]
+
+
+def test_the_neuron_becomes_selective() -> None:
+    answers = nv.compile_text(example("selectivity")).run()["N"][-2:]
+    assert sorted(answers.tolist()) == pytest.approx([0, 2], abs=0.2)
+
+
+def test_the_vehicle_turns_to_the_light() -> None:
+    vehicle = nv.compile_text(example("vehicle")).simulator()
+    for _ in range(3):
+        left, right = np.asarray(vehicle.step(light=[1, 0.2])["motors"]).tolist()
+    assert right > left  # the light is on the left
 
 
 def test_the_names_of_parameters_that_are_taken() -> None:
