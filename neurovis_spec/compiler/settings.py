@@ -113,7 +113,8 @@ def parameters(
                 return None
         values[name] = result[name] = value
         span = entries[name].value.span if name in entries else choice.name.span
-        if not check_bounds(value, default, values, span, findings):
+        # A default that lies outside by itself is a finding of the definition.
+        if given and not check_bounds(value, default, values, span, findings):
             return None
     return result
 

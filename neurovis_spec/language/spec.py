@@ -29,6 +29,7 @@ from neurovis_spec.language.located import (
     give_up,
     one_of,
     refuse,
+    shown,
 )
 from neurovis_spec.language.model import Keyed, Model, Named
 from neurovis_spec.language.source import Entry, Mapping, Node, Packed, Scalar, ScalarValue, Sequence
@@ -417,7 +418,14 @@ def _connections(node: Node, info: ValidationInfo) -> list[tuple[Located[str], o
     left out."""
     result: list[tuple[Located[str], object]] = []
     for mapping in _mappings(node, info, "a mapping FROM -> TO: weight, or a list of such"):
+        first: dict[str, Entry] = {}
         for entry in mapping.entries:
+            same = first.setdefault("".join(entry.name.split()), entry)
+            if same is not entry:  # two spellings of one key
+                place = f"{same.key.span.line}:{same.key.span.column}"
+                message = f"'{shown(entry.name)}' is there twice: first at {place} as '{shown(same.name)}'"
+                hint = "connections that share both ends are written as a list of mappings"
+                findings_of(info).error("duplicate-key", entry.key.span, message, hint)
             with suppress(PydanticCustomError):
                 result.append((Located(entry.name, entry.key), _body(entry, info)))
     return result
