@@ -209,6 +209,11 @@ def test_a_name_of_two_things_is_explained_twice() -> None:
     assert "built in: identity, tanh, sigmoid" in text
 
 
+def test_a_section_lists_its_keys_with_their_defaults() -> None:
+    lines = [line.split() for line in text_of(find("time")).splitlines()]
+    assert ["dt", "number", "or", "expression", "1", "Seconds", "a", "step."] in lines
+
+
 def test_the_nearest_name_is_offered() -> None:
     assert near("izikevich") == "did you mean 'izhikevich'?"
     assert near("connections.dela").startswith("did you mean 'connections.delay'")
@@ -226,3 +231,4 @@ def test_the_command() -> None:
     done = docs("oya")
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr == "error[unknown-name]: there is nothing about 'oya'\nhelp: did you mean 'oja'?\n"
+    assert "help: it is the code of a finding: neurovis explain unknown-key\n" in docs("unknown-key").stderr

@@ -32,7 +32,9 @@ def command(name: str | None) -> None:
     found = find(name)
     if not found:
         from neurovis_spec.cli.failure import fault
+        from neurovis_spec.codes import catalogue
         from neurovis_spec.language.located import shown
 
-        raise fault(f"there is nothing about '{shown(name)}'", near(name), "unknown-name")
+        hint = f"it is the code of a finding: neurovis explain {name}" if name in catalogue() else near(name)
+        raise fault(f"there is nothing about '{shown(name)}'", hint, "unknown-name")
     click.echo(text_of(found))

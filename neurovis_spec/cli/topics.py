@@ -71,7 +71,11 @@ def _key(key: Key) -> str:
         parts.append(filled(f"built in: {', '.join(choices)}"))
     below = keys_of(key.path)
     if below:
-        parts.append(table([(one.name, one.kind, one.about + _later(one.later)) for one in below]))
+        rows = [
+            (one.name, one.kind, "required" if one.required else one.default, one.about + _later(one.later))
+            for one in below
+        ]
+        parts.append(table(rows, ("key", "value", "default", "")))
     shown = None if key.later else example(key.path)
     if shown is not None:
         parts.append(indented(shown))
