@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import subprocess
 import sys
 from collections.abc import Awaitable, Callable
@@ -13,6 +14,9 @@ from lsprotocol import types
 from pygls.exceptions import JsonRpcException
 from pytest_lsp import ClientServerConfig, LanguageClient
 from test_lsp_answers import BASE, REST
+
+from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.fmt import format_text
 
 SPEC = BASE + REST
 
@@ -190,6 +194,39 @@ def test_a_refused_rename_says_why(tmp_path: Path) -> None:
         nothing = types.PrepareRenameParams(document, editor.at("name: small", 7))
         with pytest.raises(JsonRpcException, match="no name here"):
             await client.text_document_prepare_rename_async(nothing)
+
+    edit(tmp_path, scenario)
+
+
+def message(**content: object) -> bytes:
+    body = json.dumps({"jsonrpc": "2.0", **content}).encode()
+    return b"Content-Length: %d\r\n\r\n%s" % (len(body), body)
+
+
+def test_it_ends_quietly() -> None:
+    start = message(id=1, method="initialize", params={"capabilities": {}, "processId": None, "rootUri": None})
+    spoken = start + message(method="initialized", params={}) + message(id=2, method="shutdown")
+    for said in (spoken + message(method="exit"), b""):
+        command = [sys.executable, "-m", "neurovis_spec", "lsp"]
+        done = subprocess.run(command, input=said, capture_output=True, timeout=60, check=False)
+        assert (done.returncode, done.stderr) == (0, b"")
+        assert (b"neurovis" in done.stdout) == (said != b"")
+
+
+def test_formatting_is_that_of_fmt(tmp_path: Path) -> None:
+    options = types.FormattingOptions(tab_size=4, insert_spaces=True)
+
+    async def scenario(editor: Editor) -> None:
+        text = "neurovis:   1\nname: x\nneurons: {A:   {label: 😀}}   # one\n"
+        await editor.open(text)
+        params = types.DocumentFormattingParams(editor.document, options)
+        (change,) = await editor.client.text_document_formatting_async(params) or ()
+        assert change.range == types.Range(types.Position(0, 0), types.Position(3, 0))
+        assert change.new_text == format_text(text, "x", Findings()) != text
+        editor.type(change.new_text)
+        assert not await editor.client.text_document_formatting_async(params)
+        editor.type("neurons: [")
+        assert not await editor.client.text_document_formatting_async(params)
 
     edit(tmp_path, scenario)
 

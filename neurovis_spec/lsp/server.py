@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import os
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Final
@@ -22,6 +24,7 @@ from neurovis_spec.lsp import wire
 from neurovis_spec.lsp.completion import complete
 from neurovis_spec.lsp.definition import definition
 from neurovis_spec.lsp.document import Document, check
+from neurovis_spec.lsp.formatting import formatting
 from neurovis_spec.lsp.hover import hover
 from neurovis_spec.lsp.rename import RenameError, prepare, rename
 from neurovis_spec.lsp.symbols import symbols
@@ -158,7 +161,7 @@ def _answer(server: SpecServer) -> None:
 
 
 def _edit(server: SpecServer) -> None:
-    """Rename. A refusal is an error with a sentence, which editors show."""
+    """Rename and format. A refusal is an error with a sentence, which editors show."""
 
     @server.feature(types.TEXT_DOCUMENT_PREPARE_RENAME)
     def prepare_rename(params: types.PrepareRenameParams) -> types.PrepareRenamePlaceholder:
@@ -178,6 +181,11 @@ def _edit(server: SpecServer) -> None:
             raise JsonRpcInvalidParams(str(error)) from None
         return wire.workspace_edit(document, params.text_document.uri, edits)
 
+    @server.feature(types.TEXT_DOCUMENT_FORMATTING)
+    def on_formatting(params: types.DocumentFormattingParams) -> list[types.TextEdit]:
+        document = server.document(params.text_document.uri)
+        return wire.text_edits(document, formatting(document))
+
 
 def _text_of(path: Path, encoding: str) -> Text:
     """The text of a file, for counting its columns; empty where it cannot be read (then only the line is right)."""
@@ -188,5 +196,10 @@ def _text_of(path: Path, encoding: str) -> Text:
 
 
 def serve() -> None:
-    """Answer on standard input and output until the client ends it."""
-    make_server().start_io()
+    """Answer on standard input and output until the client ends it.
+
+    What anybody else prints goes to standard error: between the answers it would end the conversation.
+    """
+    answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    make_server().start_io(stdout=answers)

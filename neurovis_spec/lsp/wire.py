@@ -107,6 +107,9 @@ def symbol_of(document: Document, symbol: Symbol) -> types.DocumentSymbol:
 
 def workspace_edit(document: Document, uri: str, edits: Iterable[Edit]) -> types.WorkspaceEdit:
     """Edits of one document."""
-    return types.WorkspaceEdit(
-        changes={uri: [types.TextEdit(range_of(document.text, edit.span), edit.text) for edit in edits]}
-    )
+    return types.WorkspaceEdit(changes={uri: text_edits(document, edits)})
+
+
+def text_edits(document: Document, edits: Iterable[Edit]) -> list[types.TextEdit]:
+    """Edits with their ranges."""
+    return [types.TextEdit(range_of(document.text, edit.span), edit.text) for edit in edits]
