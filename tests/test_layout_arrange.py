@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import layout_conformance as suite
 import pytest
@@ -20,6 +20,28 @@ def test_auto_is_manual_where_everything_is_pinned() -> None:
     assert lay_out_problem(pinned).engine == "manual"
     assert choose_engine(PAIR)[0] == "layered"
     assert lay_out_problem(PAIR).engine == "layered"
+
+
+def tangle(count: int, steps: tuple[int, ...] = (1, 7, 11)) -> LayoutProblem:
+    """Every neuron drives those ``steps`` after it, round a circle."""
+    names = [f"N{i}" for i in range(count)]
+    pairs = [(names[i], names[(i + step) % count]) for i in range(count) for step in steps]
+    return canonical("tangle", names, [("N", names)], suite.named(pairs))
+
+
+def test_auto_puts_tangles_on_a_ring_and_large_ones_on_a_grid() -> None:
+    assert choose_engine(tangle(60))[0] == "circular"
+    assert choose_engine(tangle(300))[0] == "grid"
+    assert "densely" in choose_engine(tangle(300))[1]
+    for ordinary in (tangle(20), tangle(60, (1,)), replace(tangle(60), boxes=(("b", (0, 1)),)), PAIR):
+        assert choose_engine(ordinary)[0] == "layered"
+    forward = tangle(60)
+    acyclic = replace(forward, edges=tuple(e for e in forward.edges if e.target > e.source))
+    assert choose_engine(acyclic)[0] == "layered"
+    layers = [(f"{a}{i}", f"{b}{j}") for a, b in ("AB", "BC", "CA") for i in range(20) for j in range(0, 20, 4)]
+    groups = [(name, [f"{name}{i}" for i in range(20)]) for name in "ABC"]
+    names = [neuron for _, members in groups for neuron in members]
+    assert choose_engine(canonical("layers", names, groups, suite.named(layers)))[0] == "layered"
 
 
 def test_an_unknown_engine_is_answered_with_the_nearest() -> None:

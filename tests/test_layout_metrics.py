@@ -42,6 +42,16 @@ def test_meeting_at_a_shared_neuron_is_no_crossing_but_meeting_elsewhere_is() ->
     assert metrics(layout, problem)["crossings"] == 1
 
 
+def test_nearly_level_routes_are_counted_like_others() -> None:
+    """Cells are flat here, and steep routes run through many of them."""
+    places: dict[str, Point] = {f"A{i}": (0.0, i / 8) for i in range(40)}
+    places |= {f"B{i}": (200.0, (39 - i) / 8) for i in range(40)}
+    places |= {"C": (50.03, -3.0), "D": (50.03, 9.0), "E": (151.07, -3.0), "F": (151.07, 9.0)}
+    pairs = [(f"A{i}", f"B{i}") for i in range(40)]
+    assert metrics(*drawn(places, pairs))["crossings"] == 40 * 39 // 2
+    assert metrics(*drawn(places, [*pairs, ("C", "D"), ("F", "E")]))["crossings"] == 40 * 39 // 2 + 80
+
+
 def test_two_routes_may_cross_more_than_once() -> None:
     wave: Route = ((0.0, 0.0), (0.0, 8.0), (2.0, -8.0), (2.0, 0.0))
     places = {"A": (0.0, 0.0), "B": (2.0, 0.0), "C": (-1.0, 0.5), "D": (3.0, 0.5)}

@@ -27,6 +27,10 @@ from neurovis_spec.layout.problem import problem_of
 
 #: Rounding in the last bit does not make two pins overlap.
 _SLACK = 1e-9
+#: A component of so many neurons, with so many connections each within their group, is a tangle.
+_LARGE, _DENSE = 40, 2.5
+#: On a larger ring discs get too small.
+_MOST_IN_RING = 120
 
 
 def lay_out(network: Network, engine: str | None = None) -> Layout:
@@ -52,7 +56,27 @@ def choose_engine(problem: LayoutProblem) -> tuple[str, str]:
     """The engine that ``auto`` stands for, and why, in words for ``inspect``."""
     if problem.neurons and len(problem.pins) == len(problem.neurons):
         return "manual", "every neuron has a position"
+    if not (problem.pins or problem.arrange or problem.boxes) and _tangled(problem):
+        if len(problem.neurons) <= _MOST_IN_RING:
+            return "circular", "its neurons drive one another in loops so densely that ranks would say nothing"
+        return "grid", "its neurons are many and drive one another in loops so densely that ranks would say nothing"
     return "layered", "the default for networks whose positions are not all given"
+
+
+def _tangled(problem: LayoutProblem) -> bool:
+    """Whether a large strongly connected component is dense with connections within groups: there is no direction in
+    such a network that ranks could show. Connections between groups, even back and forth, do give one."""
+    group = {m: number for number, members in enumerate(problem.groups) for m in members.members}
+    loops = [e for e in problem.edges if e.source != e.target and group.get(e.source) == group.get(e.target)]
+    if len(loops) < _DENSE * _LARGE:
+        return False
+    import networkx as nx  # only here, for few networks
+
+    graph: nx.DiGraph[int] = nx.DiGraph()
+    graph.add_edges_from((edge.source, edge.target) for edge in problem.edges)
+    largest: set[int] = max(nx.strongly_connected_components(graph), key=len)
+    inside = sum(edge.source in largest and edge.target in largest for edge in loops)
+    return len(largest) >= _LARGE and inside >= _DENSE * len(largest)
 
 
 def _engine(name: str) -> LayoutEngine:

@@ -23,6 +23,8 @@ _MEETING = 0.35
 _OVER = 0.3
 _SLACK = 1e-9
 _STEP = 0.4
+#: Cells are no smaller than this, and no segment spans more of them across or down.
+_FINEST_CELL, _MOST_CELLS = 0.02, 32
 #: The most segments that a cubic piece is flattened to.
 _FINEST = 4096
 #: Beyond this many in all they grow longer: memory has an end.
@@ -81,68 +83,71 @@ def _flatten(points: FloatArray, parts: int) -> FloatArray:
     return line
 
 
-def _in_cells(low: FloatArray, high: FloatArray, cell: float) -> tuple[IntArray, IntArray]:
-    """For boxes no larger than a cell: (item, cell key) for each of the up to four cells that a box touches."""
-    first, last = np.floor(low / cell).astype(np.int64), np.floor(high / cell).astype(np.int64)
-    items: list[IntArray] = []
-    keys: list[IntArray] = []
-    index = np.arange(len(low), dtype=np.int64)
-    for i in (0, 1):
-        for j in (0, 1):
-            ok = (first[:, 0] + i <= last[:, 0]) & (first[:, 1] + j <= last[:, 1])
-            items.append(index[ok])
-            keys.append(_key(first[ok, 0] + i, first[ok, 1] + j))
-    return np.concatenate(items), np.concatenate(keys)
+def _in_cells(low: FloatArray, high: FloatArray, cell: FloatArray) -> tuple[IntArray, IntArray]:
+    """For boxes (m, 2): (item, cell key) for each of the cells that a box touches."""
+    first = np.floor(low / cell).astype(np.int64)
+    spans = np.floor(high / cell).astype(np.int64) - first + 1
+    counts = spans.prod(axis=1)
+    items = np.repeat(np.arange(len(low), dtype=np.int64), counts)
+    place = np.arange(len(items), dtype=np.int64) - np.repeat(np.cumsum(counts) - counts, counts)
+    column, row = np.divmod(place, spans[items, 1])
+    return items, _key(first[items, 0] + column, first[items, 1] + row)
 
 
 def _key(column: IntArray, row: IntArray) -> IntArray:
     return column * np.int64(1 << 31) + row
 
 
-def _pairs(items: IntArray, keys: IntArray) -> Iterator[tuple[IntArray, IntArray, IntArray]]:
-    """All pairs of items that share a cell, in batches: first, second, key."""
-    order = np.argsort(keys, kind="stable")
-    items, keys = items[order], keys[order]
-    at = np.arange(len(items), dtype=np.int64)
+def _pairs(keys: IntArray) -> Iterator[tuple[IntArray, IntArray]]:
+    """All pairs of places with equal keys, in batches; ``keys`` are sorted."""
+    at = np.arange(len(keys), dtype=np.int64)
     step = 1
     while True:
-        at = at[at + step < len(items)]
+        at = at[at + step < len(keys)]
         at = at[keys[at] == keys[at + step]]
         if not len(at):
             return
-        yield items[at], items[at + step], keys[at]
+        yield at, at + step
         step += 1
 
 
 def _crossings(segments: _Segments, ends: IntArray, centres: FloatArray) -> int:
     if not len(segments.a):
         return 0
-    cell = max(segments.longest, _STEP) * (1 + 1e-9)
     low, high = np.minimum(segments.a, segments.b), np.maximum(segments.a, segments.b)
+    # as large as a typical segment, across and down: where all run nearly level, flat cells tell them apart
+    extent = high - low
+    cell = np.maximum(np.maximum(1.5 * extent.mean(axis=0), extent.max(axis=0) / _MOST_CELLS), _FINEST_CELL)
     items, keys = _in_cells(low, high, cell)
+    order = np.argsort(keys, kind="stable")
+    items, keys = items[order], keys[order]
+    edge, a = segments.edge[items], np.ascontiguousarray(segments.a[items].T)
+    u = np.ascontiguousarray((segments.b - segments.a)[items].T)
     total = 0
-    for first, second, key in _pairs(items, keys):
-        other = segments.edge[first] != segments.edge[second]
-        i, j, k = first[other], second[other], key[other]
-        where, hit = _meet(segments.a[i], segments.b[i], segments.a[j], segments.b[j])
-        i, j, k, where = i[hit], j[hit], k[hit], where[hit]
+    for first, second in _pairs(keys):
+        other = edge[first] != edge[second]
+        i, j = first[other], second[other]
+        share, hit = _meet(a[0][i], a[1][i], u[0][i], u[1][i], a[0][j], a[1][j], u[0][j], u[1][j])
+        i, j = i[hit], j[hit]
+        where = (a[:, i] + share * u[:, i]).T
         # a pair may share several cells: it counts in the one that the point lies in
-        column, row = np.floor(where[:, 0] / cell).astype(np.int64), np.floor(where[:, 1] / cell).astype(np.int64)
-        once = _key(column, row) == k
-        total += int(_outside(where[once], ends[segments.edge[i[once]]], ends[segments.edge[j[once]]], centres).sum())
+        once = _key(*np.floor(where / cell).astype(np.int64).T) == keys[i]
+        total += int(_outside(where[once], ends[edge[i[once]]], ends[edge[j[once]]], centres).sum())
     return total
 
 
-def _meet(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-    """Where segments ab and cd cross, and whether (half-open, so that a corner counts once; parallel ones never do)."""
-    u, v, w = b - a, d - c, c - a
-    cross = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        s = (w[:, 0] * v[:, 1] - w[:, 1] * v[:, 0]) / cross
-        t = (w[:, 0] * u[:, 1] - w[:, 1] * u[:, 0]) / cross
-        hit = (cross != 0) & (s >= 0) & (s < 1) & (t >= 0) & (t < 1)
-        where = a + np.where(hit, s, 0.0)[:, None] * u
-    return where, hit
+def _meet(
+    ax: FloatArray, ay: FloatArray, ux: FloatArray, uy: FloatArray,
+    bx: FloatArray, by: FloatArray, vx: FloatArray, vy: FloatArray,
+) -> tuple[FloatArray, npt.NDArray[np.bool_]]:  # fmt: skip
+    """Whether segments a to a + u and b to b + v cross (half-open, so that a corner counts once; parallel ones never
+    do), and for those that do, at what share of u."""
+    bx, by = bx - ax, by - ay
+    cross = ux * vy - uy * vx
+    sign, whole = np.sign(cross), np.abs(cross)
+    s, t = sign * (bx * vy - by * vx), sign * (bx * uy - by * ux)
+    hit = (s >= 0) & (s < whole) & (t >= 0) & (t < whole)
+    return s[hit] / whole[hit], hit
 
 
 def _outside(where: FloatArray, one: IntArray, two: IntArray, centres: FloatArray) -> npt.NDArray[np.bool_]:

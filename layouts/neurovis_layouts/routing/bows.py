@@ -11,6 +11,9 @@ from neurovis_layouts.routing.obstacles import REACH, Obstacles
 from neurovis_spec.layout.geometry import distance, straight
 from neurovis_spec.layout.model import Point, Route
 
+#: Heights tried where every connection can be followed, and where they are many.
+MANY_TRIES, FEW_TRIES = 12, 2
+
 
 def bow(start: Point, end: Point, height: float, hold: float = 0.3) -> Route:
     """A curve whose control points stand ``height`` to the left of the way, ``hold`` of it from the ends."""
@@ -28,15 +31,22 @@ def bow(start: Point, end: Point, height: float, hold: float = 0.3) -> Route:
 
 
 def clear_bow(
-    start: Point, end: Point, own: tuple[int, int], obstacles: Obstacles, least: float, sided: bool
+    start: Point,
+    end: Point,
+    own: tuple[int, int],
+    obstacles: Obstacles,
+    least: float,
+    sided: bool,
+    tries: int = MANY_TRIES,
 ) -> tuple[Route, float, float]:
     """The flattest bow of at least ``least`` clear of foreign discs, else the clearest; its clearance and height.
 
-    ``sided`` keeps it on the side of ``least`` (one of a reciprocal pair must not change over).
+    ``sided`` keeps it on the side of ``least`` (one of a reciprocal pair must not change over). ``tries`` is how many
+    heights are tried.
     """
     best: tuple[Route, float, float] | None = None
     length = distance(start, end)
-    for height, hold in _candidates(least, length, sided):
+    for height, hold in _candidates(least, length, sided, tries):
         route = bow(start, end, height, hold)
         clearance = obstacles.clearance(route, own)
         if clearance >= REACH - 0.03:
@@ -47,10 +57,10 @@ def clear_bow(
     return best
 
 
-def _candidates(least: float, length: float, sided: bool) -> Iterator[tuple[float, float]]:
+def _candidates(least: float, length: float, sided: bool, tries: int) -> Iterator[tuple[float, float]]:
     yield least, 0.3
     side = -1.0 if least < 0 else 1.0
-    for step in range(1, 13):
+    for step in range(1, tries + 1):
         more = step * (0.25 + 0.05 * length)
         for hold in (0.3, 0.05):
             yield least + side * more, hold

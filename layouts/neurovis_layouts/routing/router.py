@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 
-from neurovis_layouts.routing.bows import clear_bow
+from neurovis_layouts.routing.bows import FEW_TRIES, MANY_TRIES, clear_bow
 from neurovis_layouts.routing.curves import Waypoint, curve
 from neurovis_layouts.routing.loops import best_loop
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
@@ -21,6 +21,8 @@ __all__ = ["Waypoint", "route_all"]
 _NEAR = 3.0
 #: With more edges than this nobody can follow one: discs in the way are not gone round.
 _MOST_CAREFULLY = 4000
+#: With more than this they do not go far out of their way, which would only move the crowd.
+_MOST_AT_LENGTH = 1000
 _STEEP_ENOUGH = 0.75
 
 
@@ -126,6 +128,7 @@ def _bows(
     between: dict[tuple[int, int], list[int]] = {}
     for i in chosen:
         between.setdefault((edges[i].source, edges[i].target), []).append(i)
+    tries = MANY_TRIES if len(chosen) <= _MOST_AT_LENGTH else FEW_TRIES
     routes: dict[int, Route] = {}
     for (source, target), equal in between.items():
         start, end = centres[source], centres[target]
@@ -141,7 +144,7 @@ def _bows(
                 least = 0.0 if odd and place == 0 else left + 0.3 if (place + odd) % 2 == 0 else right - 0.3
                 least = least / 2 if not odd and place < 2 else least
             sided = reciprocal or len(equal) > 1
-            routes[i], _, height = clear_bow(start, end, (source, target), obstacles, least, sided)
+            routes[i], _, height = clear_bow(start, end, (source, target), obstacles, least, sided, tries)
             left, right = max(left, height), min(right, height)
     return routes
 
