@@ -18,6 +18,10 @@ from neurovis_spec.scene.obstacles import Obstacles
 _WEIGHT = 600
 #: on the disc: never smaller, not for the sake of others, never larger; beside it
 _SMALLEST, _READABLE, _LARGEST, _BESIDE = 9.0, 10.5, 14.0, 11.0
+#: a numbered name may be smaller: it says where one is among many
+_NUMBERED = 6.5
+#: with more labels than this to place beside discs, none is
+_MOST_BESIDE = 150
 #: a disc smaller than this has no label
 _SMALLEST_DISC = 7.0
 
@@ -47,14 +51,13 @@ def labels_of(
         return [None] * len(neurons)
     parts = [_parts(label, name) for label, name in zip(neurons.labels, neurons.names, strict=True)]
     common = _common_size(parts, radius)
-    result: list[Label | None] = []
-    outside = 0
-    for label, (base, subscript), centre in zip(neurons.labels, parts, centres, strict=True):
-        found = _on_disc(base, subscript, centre, radius, common)
-        if found is None and outside < 400:  # beyond that a picture is dense anyway
-            outside += 1
-            found = _beside(label, centre, radius, obstacles, picture)
-        result.append(found if found is not None else _shortened(label, centre, radius))
+    result = [_on_disc(*both, centre, radius, common) for both, centre in zip(parts, centres, strict=True)]
+    missing = [index for index, found in enumerate(result) if found is None]
+    for index in missing:
+        label, centre = neurons.labels[index], centres[index]
+        # where most would not find room, the few that do would only look as if they meant something
+        found = _beside(label, centre, radius, obstacles, picture) if len(missing) <= _MOST_BESIDE else None
+        result[index] = found if found is not None else _shortened(label, centre, radius)
     return result
 
 
@@ -78,7 +81,7 @@ def _common_size(parts: list[tuple[str, str]], radius: float) -> float:
 
 def _on_disc(base: str, subscript: str, centre: Point, radius: float, common: float) -> Label | None:
     size = common
-    while size > _SMALLEST and not _fits((base, subscript), size, radius):
+    while size > (_NUMBERED if subscript else _SMALLEST) and not _fits((base, subscript), size, radius):
         size -= 0.5
     if not _fits((base, subscript), size, radius):
         return None

@@ -148,12 +148,13 @@ def _ends(gain: float) -> tuple[str, str]:
 def _thickness(contents: Contents, gains: Gains, theme: Theme) -> Entry:
     shapes: list[Shape] = [_heading("Thickness", theme)]
     values = nice_weights(gains.thickness, contents.heaviest)
+    strokes, words = len(values) * (_STROKE + _STROKE_GAP) - _STROKE_GAP, "line: weight |w|"
+    across = max(strokes, texts.width(words, _SMALL))
     for place, value in enumerate(values):
-        x = place * (_STROKE + _STROKE_GAP)
+        x = (across - strokes) / 2 + place * (_STROKE + _STROKE_GAP)
         shapes.append(_stroke(x, _STROKE, theme.muted, abs(gains.thickness) * value))
         shapes.append(Text((x + _STROKE / 2, _FIRST_Y), texts.number(value), _SMALL, theme.muted, "middle"))
-    across = len(values) * (_STROKE + _STROKE_GAP) - _STROKE_GAP
-    shapes.append(Text((across / 2, _SECOND_Y), "line: weight |w|", _SMALL, theme.muted, "middle"))
+    shapes.append(Text((across / 2, _SECOND_Y), words, _SMALL, theme.muted, "middle"))
     return Entry(tuple(shapes), across)
 
 

@@ -18,6 +18,9 @@ IntArray = npt.NDArray[np.int64]
 Point = tuple[float, float]
 Size = tuple[int, int]  # width, height
 
+#: Powers of two, so that a pixel (up to 2^28 of them), a distance and a dot fit into 62 bits.
+_LEVELS, _MOST_DOTS = 1 << 16, 1 << 18
+
 
 @dataclass(frozen=True, slots=True)
 class Mask:
@@ -61,7 +64,7 @@ def flatten(points: Sequence[Point], spacing: float = 1.0) -> FloatArray:
         coarse.append(s**3 * p[0] + 3 * s * s * t * p[1] + 3 * s * t * t * p[2] + t**3 * p[3])
     dots = np.concatenate(coarse)
     lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(dots, axis=0).T))])
-    count = max(2, int(np.ceil(lengths[-1] / spacing)) + 1)
+    count = min(max(2, int(np.ceil(lengths[-1] / spacing)) + 1), _MOST_DOTS)
     at = np.linspace(0.0, lengths[-1], count)
     return np.stack([np.interp(at, lengths, dots[:, 0]), np.interp(at, lengths, dots[:, 1])], axis=1)
 
@@ -72,7 +75,7 @@ def stroke_field(points: Sequence[Point], widest: float, size: Size) -> Field:
     tangents = np.gradient(dots, axis=0)
     lengths = np.hypot(*tangents.T)[:, None]
     tangents = np.divide(tangents, lengths, out=np.tile([1.0, 0.0], (len(dots), 1)), where=lengths > 1e-12)
-    pixels, centres, nearest = _near(dots, widest / 2 + 1.0, size)
+    pixels, centres, nearest = _near(dots, widest / 2 + 0.75, size)
     away = centres - dots[nearest]
     along = (away * tangents[nearest]).sum(axis=1)
     across = np.abs(away[:, 0] * tangents[nearest, 1] - away[:, 1] * tangents[nearest, 0])
@@ -88,7 +91,7 @@ def dashed(points: Sequence[Point], width: float, dash: Sequence[float], size: S
     period, on = sum(dash), dash[0]
     place = np.mod(at, period)
     drawn = dots[(place <= on) | (place < spacing / 2) | (place > period - spacing / 2)]
-    pixels, centres, nearest = _near(drawn, width / 2 + 1.0, size)
+    pixels, centres, nearest = _near(drawn, width / 2 + 0.75, size)
     share = np.clip(width / 2 + 0.5 - np.hypot(*(centres - drawn[nearest]).T), 0.0, 1.0)
     return Mask(pixels, share)
 
@@ -96,21 +99,22 @@ def dashed(points: Sequence[Point], width: float, dash: Sequence[float], size: S
 def _near(dots: FloatArray, reach: float, size: Size) -> tuple[IntArray, FloatArray, IntArray]:
     """The pixels within ``reach`` of dots: their indices, their centres, and the dot that is nearest to each."""
     wide, high = size
-    steps = np.arange(-int(np.ceil(reach)), int(np.ceil(reach)) + 1)
+    most = int(np.ceil(reach - 0.5))
+    steps = np.arange(-most, most + 1)
     x = np.floor(dots[:, 0]).astype(np.int64)[:, None, None] + steps[None, None, :]
     y = np.floor(dots[:, 1]).astype(np.int64)[:, None, None] + steps[None, :, None]
-    x, y = np.broadcast_arrays(x, y)
-    which = np.broadcast_to(np.arange(len(dots))[:, None, None], x.shape)
     distance = (x + 0.5 - dots[:, 0, None, None]) ** 2 + (y + 0.5 - dots[:, 1, None, None]) ** 2
-    kept = (x >= 0) & (x < wide) & (y >= 0) & (y < high) & (distance <= (reach + 0.75) ** 2)
-    x, y, which, distance = x[kept], y[kept], which[kept], distance[kept]
-    pixels: IntArray = np.asarray(y * wide + x, np.int64)
-    order = np.lexsort((distance, pixels))
-    first = np.ones(len(order), bool)
-    first[1:] = pixels[order][1:] != pixels[order][:-1]
-    chosen = order[first]
-    centres: FloatArray = np.stack([x[chosen] + 0.5, y[chosen] + 0.5], axis=1).astype(float)
-    return pixels[chosen], centres, which[chosen]
+    kept = (x >= 0) & (x < wide) & (y >= 0) & (y < high) & (distance <= reach**2)
+    # one number for pixel, distance and dot, so that one sort finds the nearest dot of each pixel
+    level = (distance[kept] * ((_LEVELS - 1) / reach**2)).astype(np.int64)
+    which = np.broadcast_to(np.arange(len(dots))[:, None, None], kept.shape)[kept]
+    keys = np.sort(((y * wide + x)[kept] * _LEVELS + level) * _MOST_DOTS + which)
+    owner = keys // (_LEVELS * _MOST_DOTS)
+    first = np.ones(len(keys), bool)
+    first[1:] = owner[1:] != owner[:-1]
+    pixels = owner[first]
+    centres: FloatArray = np.stack([pixels % wide + 0.5, pixels // wide + 0.5], axis=1)
+    return pixels, centres, keys[first] % _MOST_DOTS
 
 
 def _window(x0: float, y0: float, x1: float, y1: float, size: Size) -> tuple[IntArray, FloatArray, FloatArray]:

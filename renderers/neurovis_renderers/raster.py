@@ -146,7 +146,7 @@ class Canvas:
             return self._kept(key, lambda: coverage.dashed(self._pixels(shape.points), width, dash, self._size))
         widest, field = self._fields.get(shape.points, (0.0, None))
         if field is None or width > widest:
-            widest = 1.5 * width
+            widest = width if field is None else 1.5 * width
             field = coverage.stroke_field(self._pixels(shape.points), widest, self._size)
             self._fields[shape.points] = (widest, field)
         return field.mask(width)
