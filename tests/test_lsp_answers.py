@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lsp_marks import marked
 
+from neurovis_spec.diagnostics import Diagnostic, Span
 from neurovis_spec.lsp.completion import Completion, complete
 from neurovis_spec.lsp.definition import definition
 from neurovis_spec.lsp.document import Document, check
@@ -17,6 +18,7 @@ from neurovis_spec.lsp.hover import hover
 from neurovis_spec.lsp.rename import RenameError, apply, prepare, rename
 from neurovis_spec.lsp.symbols import symbols
 from neurovis_spec.lsp.text import Place
+from neurovis_spec.lsp.wire import diagnostics
 
 SPECS = sorted((Path(__file__).parents[1] / "specs").glob("*.yaml"))
 BASE = """neurovis: 1
@@ -74,6 +76,8 @@ def offered(text: str) -> dict[str, Completion]:
         (BASE + "render: {labels: ¦", ["true", "false"], []),
         (BASE + "rules:\n  r: {parameters: {eta: 1}, weight: {each_step: ¦", ["eta", "pre", "weight"], ["alpha"]),
         ("parameters:\n  a: 1\n  b: ¦\n  c: 2", ["a", "sin"], ["b", "c"]),
+        (BASE + "outputs: {o: K}\nros: {publish: {¦", ["o"], ["go"]),
+        (BASE + "ros: {subscribe: {¦", ["go"], ["K"]),
         ("description: |\n  ¦", [], ["name"]),
     ],
 )
@@ -137,6 +141,24 @@ def test_hover_tells_what_it_is(text: str, told: list[str]) -> None:
     found = hover(*marked(source, compiled=True))
     assert found is not None
     assert [part for part in told if part not in found.markdown] == []
+
+
+def test_the_size_of_a_group_is_that_of_the_network() -> None:
+    text = (BASE + REST).replace("{count: 5", "{count: 2*beta - 1").replace("K -> K", "K¦ -> K")
+    found = hover(*marked(text, compiled=True))
+    assert found is not None
+    assert "5 neurons (K1 … K5)" in found.markdown
+    found = hover(*marked(text))
+    assert found is not None
+    assert "2*beta - 1 neurons" in found.markdown
+
+
+def test_a_finding_of_an_included_file_stands_where_that_is_included() -> None:
+    document = Document("neurovis: 1\ninclude: [a.yaml, more.yaml]\n", "spec.yaml")
+    elsewhere = Diagnostic("no-value", "'x' has no value", Span("lib/more.yaml", 7, 3, 7, 4), hint="write one")
+    (found,) = diagnostics(document, [elsewhere])
+    assert found.message == "lib/more.yaml:7:3: 'x' has no value\nhelp: write one"
+    assert (found.range.start.line, found.range.start.character) == (1, 18)
 
 
 def test_hover_and_definition_work_in_a_broken_document() -> None:

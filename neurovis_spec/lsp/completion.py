@@ -133,6 +133,8 @@ def _of_role(role: Role | None, scope: Scope, path: Path, front: str, index: Ind
             yield from _parameters(index.declared("parameter", module), index)
         case "names" if role.kind == "module":
             yield from (_Offer(name.text, "module") for name in index.declared("module"))
+        case "names" if role.kind == "output":
+            yield from (_Offer(name.text, "word", "output") for name in index.declared("output"))
 
 
 def _owner(path: Path, scope: Scope, index: Index) -> str | None:

@@ -72,6 +72,8 @@ _KEYS: Final[Mapping[str, Role]] = {
     "rules * let *": Role("declares", "local"),
     "rules * state *": Role("declares", "local"),
     "connections # *": Role("ends"),
+    "ros subscribe *": Role("names", "input"),
+    "ros publish *": Role("names", "output"),
     "layout positions *": Role("references"),
     "layout arrange *": Role("references"),
     "events # set *": Role("names", "parameter"),

@@ -56,17 +56,25 @@ def range_of(text: Text, span: Span) -> types.Range:
 
 
 def diagnostics(document: Document, findings: Iterable[Diagnostic]) -> list[types.Diagnostic]:
-    """Findings with their suggestions. Those of another file stand at the beginning, with their place in words."""
+    """Findings with their suggestions. Those of another file stand where it is included, with their place in words."""
     result = []
     for finding in findings:
         message, span = finding.message, finding.span
         if span.file != document.file:
             message = f"{span.file}:{span.line}:{span.column}: {message}"
-            span = Span(document.file, 1, 1, 1, 1)
+            span = _inclusion(document, span.file)
         severity = types.DiagnosticSeverity.Error if finding.severity == "error" else types.DiagnosticSeverity.Warning
         told = message if finding.hint is None else f"{message}\nhelp: {finding.hint}"
         result.append(types.Diagnostic(range_of(document.text, span), told, severity, finding.code, source="neurovis"))
     return result
+
+
+def _inclusion(document: Document, file: str) -> Span:
+    """Where a file is included; the beginning of the document if that is done by another."""
+    for item in document.items:
+        if item.path[:1] == ("include",) and not item.is_key and item.text and file.endswith(item.text):
+            return item.span
+    return Span(document.file, 1, 1, 1, 1)
 
 
 def completion_list(document: Document, found: Iterable[Completion]) -> types.CompletionList:
