@@ -43,19 +43,20 @@ def key_table(section: str) -> str:
     return table(("key", "value", "default", "meaning"), rows)
 
 
+def ours(kind: str) -> list[Builtin]:
+    """The built-in definitions of a kind, without those that packages on this machine bring along."""
+    return [one for one in builtins() if one.kind == kind and one.origin == "builtin"]
+
+
 def activation_table(_: str) -> str:
     """The built-in activations: a line each."""
-    rows = [
-        (code(one.name), code(_settings(one)), code(_value(one)), one.about)
-        for one in builtins()
-        if one.kind == "activation"
-    ]
+    rows = [(code(one.name), code(_settings(one)), code(_value(one)), one.about) for one in ours("activation")]
     return table(("activation", "parameters", "value", "meaning"), rows)
 
 
 def definitions(kind: str) -> str:
     """The built-in models or rules: a line each, then all of them as they ship."""
-    chosen = [one for one in builtins() if one.kind == kind]
+    chosen = ours(kind)
     settings = [", ".join(filter(None, (_settings(one), "; ".join(one.signals)))) for one in chosen]
     head = (kind, "parameters, signals" if kind == "rule" else "parameters", "meaning")
     rows = [(code(one.name), code(text), one.about) for one, text in zip(chosen, settings, strict=True)]

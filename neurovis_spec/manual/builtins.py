@@ -24,7 +24,7 @@ _Definition: TypeAlias = ActivationModel | ModelModel | RuleModel
 @dataclass(frozen=True, slots=True)
 class Builtin:
     """A definition that needs no declaration. ``parameters``: name, default, meaning; ``yaml``: the definition as it
-    stands in its file, its description left out."""
+    stands in its file, its description left out; ``origin``: the entry point that brings it, ``builtin`` for ours."""
 
     kind: Kind
     name: str
@@ -32,6 +32,7 @@ class Builtin:
     parameters: tuple[tuple[str, str, str], ...]
     signals: tuple[str, ...]
     yaml: str
+    origin: str
 
     @property
     def use(self) -> str:
@@ -80,7 +81,8 @@ def _builtin(
     assert entry is not None
     about = "" if model.description is None else " ".join(model.description.value.split())
     parameters = tuple((key, *_shown(parameter)) for key, parameter in model.parameters.items())
-    return Builtin(kind, name, about, parameters, signals, _excerpt(entry, text))
+    origin = library.source.span.file.partition("/")[0]
+    return Builtin(kind, name, about, parameters, signals, _excerpt(entry, text), origin)
 
 
 def _shown(parameter: Parameter) -> tuple[str, str]:
