@@ -57,7 +57,7 @@ def activation_table(_: str) -> str:
 def definitions(kind: str) -> str:
     """The built-in models or rules: a line each, then all of them as they ship."""
     chosen = ours(kind)
-    settings = [", ".join(filter(None, (_settings(one), "; ".join(one.signals)))) for one in chosen]
+    settings = [", ".join(filter(None, (_settings(one), *one.signals))) for one in chosen]
     head = (kind, "parameters, signals" if kind == "rule" else "parameters", "meaning")
     rows = [(code(one.name), code(text), one.about) for one, text in zip(chosen, settings, strict=True)]
     shipped = "\n\n".join("\n".join(f"  {line}".rstrip() for line in one.yaml.splitlines()) for one in chosen)

@@ -102,16 +102,21 @@ ALL_PATTERNS = (
     Pattern("ring", "ring", "As chain, and the last with the first."),
     Pattern("random", "{random: {probability: 0.1}}", "Every pair with this probability, drawn from the seed."),
     Pattern(
-        "fixed_indegree", "{fixed_indegree: {count: 3}}", "So many sources, drawn from the seed, for every target."
+        "fixed_indegree", "{fixed_indegree: {count: 3}}", "Every target with so many sources, drawn from the seed."
     ),
     Pattern(
-        "fixed_outdegree", "{fixed_outdegree: {count: 3}}", "So many targets, drawn from the seed, for every source."
+        "fixed_outdegree", "{fixed_outdegree: {count: 3}}", "Every source with so many targets, drawn from the seed."
     ),
-    Pattern("nearest", "{nearest: {count: 3}}", "The nearest by position, without positions by index."),
+    Pattern(
+        "nearest",
+        "{nearest: {count: 3}}",
+        "Every source with its nearest targets, by position, or by index where no neuron has a position.",
+    ),
     Pattern(
         "small_world",
         "{small_world: {degree: 4, rewire: 0.1}}",
-        "A ring of neighbours, some of whose connections are drawn anew (Watts and Strogatz 1998).",
+        "A ring whose neurons reach as many neighbours as the degree says, each of these connections led elsewhere with the "
+        "probability rewire; equal sizes (Watts and Strogatz 1998).",
     ),
     Pattern("band", "{band: {width: 1}}", "All pairs with |i − j| up to the width."),
 )
