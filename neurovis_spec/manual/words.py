@@ -115,8 +115,8 @@ ALL_PATTERNS = (
     Pattern(
         "small_world",
         "{small_world: {degree: 4, rewire: 0.1}}",
-        "A ring whose neurons reach as many neighbours as the degree says, each of these connections led elsewhere with the "
-        "probability rewire; equal sizes (Watts and Strogatz 1998).",
+        "A ring whose neurons reach as many neighbours as the degree says, each of these connections led elsewhere "
+        "with the probability rewire; equal sizes (Watts and Strogatz 1998).",
     ),
     Pattern("band", "{band: {width: 1}}", "All pairs with |i − j| up to the width."),
 )
