@@ -11,7 +11,7 @@ import pytest
 from hand_networks import use_case_1
 from hypothesis import given
 from hypothesis import strategies as st
-from neurovis_renderers.animated_svg import LEVELS, AnimatedSvgRenderer, animation
+from neurovis_renderers.animated_svg import LETTERS, LEVELS, AnimatedSvgRenderer, animation
 from neurovis_renderers.svg import SvgRenderer
 
 from neurovis_spec.compiler.network import RenderSettings
@@ -122,6 +122,18 @@ def test_it_is_small() -> None:
 def test_there_are_enough_levels_of_colour() -> None:
     assert LEVELS >= 17
     assert LEVELS % 2 == 1
+    assert len({letter.lower() for letter in LETTERS}) >= LEVELS  # pages in quirks mode do not tell case apart
+    assert not {"on", "glow", "caption"} & set(LETTERS)
+
+
+def test_two_films_in_one_page_do_not_share_their_rules() -> None:
+    other = ET.fromstring(AnimatedSvgRenderer().animate(make(8, 20), ".svg"))
+    assert other.attrib["class"] != ROOT.attrib["class"]
+    for root in (ROOT, other):
+        rules = re.findall(r"[{},]([^{},]+)(?=[,{][^}]*})", (root.findtext(NS + "style") or "").split("{", 1)[1])
+        selectors = [part for part in rules if ":" not in part.split(" ")[0]]
+        assert selectors
+        assert all(part.startswith(f".{root.attrib['class']} ") for part in selectors)
     assert len(set(re.findall(r"\{color:(#\w{6})", STYLE))) >= 17
 
 

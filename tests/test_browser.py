@@ -96,10 +96,10 @@ def shot(browser: Browser, folder: Path, svg: bytes, size: tuple[int, int], wait
     return Image.open(io.BytesIO(target.read_bytes())).convert("RGB")
 
 
-def measured(browser: Browser, svg: bytes, script: str, *more: str) -> object:
+def measured(browser: Browser, svg: bytes, script: str, *more: str, doctype: str = "<!doctype html>") -> object:
     """What a script that stands beside an inline SVG (``svg``) returns."""
     page = (
-        f"<!doctype html><body style='margin:0'>{svg.decode()}<pre id=out></pre><script>"
+        f"{doctype}<body style='margin:0'>{svg.decode()}<pre id=out></pre><script>"
         f"const svg = document.querySelector('svg'), out = document.getElementById('out');"
         f"const work = () => {{ out.textContent = JSON.stringify((() => {{{script}}})()); }};"
         f"setTimeout(work, 300);</script>"
@@ -209,6 +209,12 @@ def test_each_frame_of_a_film_shows_its_step(browser: Browser) -> None:
         assert caption == made.captions[frame]
     assert len({row[0] for row in read}) > 5
     assert len({row[3] for row in read}) > 10
+
+
+def test_a_film_shows_the_same_in_a_page_of_quirks_mode(browser: Browser) -> None:
+    """There class names are told apart by more than their case."""
+    svg = AnimatedSvgRenderer().animate(moving(), ".svg")
+    assert measured(browser, svg, SEEK) == measured(browser, svg, SEEK, doctype="")
 
 
 def test_a_film_starts_over_at_its_end(browser: Browser) -> None:

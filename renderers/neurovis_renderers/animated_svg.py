@@ -1,8 +1,8 @@
 """Animated SVG: a Film as one file without script, the structure of the still with palettes on top.
 
 In: a Film. Out: the bytes of an ``.svg`` that moves, also inside ``<img>``. The attributes are those of frame 0;
-each group that changes has one SMIL animation of its ``class``, a letter for the colour and, where a weight
-changes, one each for width and glow. What these classes look like stands in a style sheet that holds only where no
+each group that changes has one SMIL animation of its ``class``, a letter or two for the colour and, where a weight
+changes, one class each for width and glow. What these classes look like stands in a style sheet that holds only where no
 reduced motion is asked for: where it is, the picture stands still at frame 0.
 """
 
@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from string import ascii_letters
+from string import ascii_lowercase
+from zlib import crc32
 
 import numpy as np
 import numpy.typing as npt
@@ -37,9 +38,10 @@ IntArray = npt.NDArray[np.int64]
 
 #: Levels of colour from −1 to +1; an odd number, so that 0 is one of them.
 LEVELS = 51
+#: Their classes; none differs from another in case alone, which pages in quirks mode do not tell apart.
+LETTERS = (*ascii_lowercase, *(f"a{letter}" for letter in ascii_lowercase))
 #: At most so many different widths are told apart, and so many captions.
 _MOST_WIDTHS, _MOST_CAPTIONS = 240, 500
-_ROOT = "nv"
 
 
 class AnimatedSvgRenderer:
@@ -60,7 +62,9 @@ class AnimatedSvgRenderer:
             body.append(writer.group(group))
             if progress is not None:
                 progress(done + 1, len(film.scene.groups))
-        return document(film.scene, "".join(body), writer.style(), {"class": _ROOT})
+        content = "".join(body)
+        root = f"nv-{crc32(content.encode()):x}"  # so that two films in one page do not share their rules
+        return document(film.scene, content, writer.style(root), {"class": root})
 
 
 class _Writer:
@@ -94,7 +98,7 @@ class _Writer:
 
     def _letter(self, level: int) -> str:
         self._letters.add(level)
-        return ascii_letters[level]
+        return LETTERS[level]
 
     def _connection(self, group: Group, place: int) -> str:
         tokens = [self._letter(level) for level in self._line_levels[:, place].tolist()]
@@ -147,8 +151,8 @@ class _Writer:
             f"{frames}</g></g>\n"
         )
 
-    def style(self) -> str:
-        """The style sheet; its rules hold only where motion is welcome."""
+    def style(self, root: str) -> str:
+        """The style sheet; its rules hold only within the class ``root``, and where motion is welcome."""
         theme = self._film.scene.theme
         rules = [
             "[data-neuron]>circle,[data-connection] polygon{fill:currentColor}",
@@ -161,14 +165,14 @@ class _Writer:
         if self._captions > 1:
             rules.append(".caption text{display:none}")
             rules += [f".t{n}>:nth-child({n + 1}){{display:inline}}" for n in range(self._captions)]
-        scoped = "".join(_scoped(rule) for rule in rules)
+        scoped = "".join(_scoped(rule, root) for rule in rules)
         return f"<style>@media (prefers-reduced-motion:no-preference){{{scoped}}}</style>\n"
 
     def _palette(self, theme: Theme) -> list[str]:
         levels = sorted(self._letters)
         fills = colours(theme, [2 * level / (LEVELS - 1) - 1 for level in levels])
         return [
-            f".{ascii_letters[level]}{{color:{fill};--d:{readable(theme, fill)}}}"
+            f".{LETTERS[level]}{{color:{fill};--d:{readable(theme, fill)}}}"
             for level, fill in zip(levels, fills, strict=True)
         ]
 
@@ -189,10 +193,10 @@ def _half_width(width: str, length: str) -> str:
     return f"max({of_length}*{length} + {of_width}*{width},{0.5 / Arrowhead.NOTCH:.4g}*{width} + {more})"
 
 
-def _scoped(rule: str) -> str:
+def _scoped(rule: str, root: str) -> str:
     """A rule for this picture alone, should it stand inside a page."""
     selectors, rest = rule.split("{", 1)
-    return ",".join(f".{_ROOT} {selector}" for selector in selectors.split(",")) + "{" + rest
+    return ",".join(f".{root} {selector}" for selector in selectors.split(",")) + "{" + rest
 
 
 def _class(token: str) -> str:
