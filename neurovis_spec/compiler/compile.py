@@ -81,6 +81,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
     noisy = tuple((group, spec.neurons[group.name].noise) for group in population.neurons.groups)
     noises = make_noises(noisy, sum(entry.size for entry in inputs), constants)
     if bundles is None or findings.errors > before or not _under_way(bundles, findings):
+        EventReader(None, directory, constants).read(spec.events)
         return None
     plasticity, rules = make_plasticity(bundles)
     connections = join(bundles, rules)

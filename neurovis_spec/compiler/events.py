@@ -44,9 +44,9 @@ class Event:
 
 @dataclass(frozen=True)
 class EventReader:
-    """Reads the events of a spec."""
+    """Reads the events of a spec; without a network, which is at fault then, they are only checked."""
 
-    network: Network
+    network: Network | None
     directory: Directory
     constants: Constants
 
@@ -117,10 +117,11 @@ class EventReader:
 
     def _check_set(self, model: EventModel, name: str, formula: Formula) -> None:
         span = self._key(model, "set", name).span
-        if name not in self.network.parameters:
-            hint = suggest(name, self.network.parameters, "parameters") or "the spec has no parameters"
+        known = (*self.constants.parameters, *self.constants.broken)
+        if name not in known and not self.constants.incomplete:
+            hint = suggest(name, known, "parameters") or "the spec has no parameters"
             self.findings.error("unknown-parameter", span, f"there is no parameter '{name}' to be set", hint)
-        elif name in self.network.structural:
+        elif name in self.constants.structural:
             message = f"'{name}' cannot be set in a run: the structure of the network depends on it"
             self.findings.error("structural-parameter", span, message)
         self.constants.scalar(formula)
@@ -140,7 +141,7 @@ class EventReader:
             span = text.node.at(start, start + len(piece))
             inner = 0 if span != text.span else None
             ends.append(resolve_end(Located(piece, Scalar(piece, span, inner)), self.directory, self.findings))
-        if ends[0] is None or ends[1] is None:
+        if ends[0] is None or ends[1] is None or self.network is None:
             return
         wires = self.network.connections
         found = np.flatnonzero(np.isin(wires.sources, ends[0]) & np.isin(wires.targets, ends[1])).tolist()

@@ -32,6 +32,10 @@ class Gaps:
         """The same, with these names of a section."""
         return replace(self, names={**self.names, section: frozenset(names)})
 
+    def with_section(self, section: str) -> Gaps:
+        """The same, with a section of which nothing is known."""
+        return replace(self, sections=self.sections | {section})
+
     def cover_reference(self, name: str) -> bool:
         """The same for a reference: a group at fault may make any neuron that begins with its name."""
         groups = self.names["neurons"]

@@ -16,7 +16,7 @@ from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.definitions import Defaults, Definitions
 from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.gaps import Gaps
-from neurovis_spec.compiler.limits import Limits, amount, plural
+from neurovis_spec.compiler.limits import PATIENCE, Limits, amount, plural
 from neurovis_spec.compiler.network import (
     Activation,
     Combine,
@@ -95,17 +95,20 @@ def populate(
     be looked at."""
     builder = _Builder(spec, constants, definitions, {entry.name: entry for entry in inputs}, files, limits, seed)
     built: list[_Built] = []
-    lost = set(definitions.gaps.names["neurons"])
+    gaps = definitions.gaps
+    lost = set(gaps.names["neurons"])
     start = 0
     for name, model in spec.neurons.items():
         group = builder.group(name, model, start)
         if group is None:
             lost.add(name)
+            if model.names is not None:  # which neurons these are nobody knows
+                gaps = gaps.with_section("neurons")
             continue
         built.append(group)
         start += group.group.count
     _owners(spec, built, constants.findings)
-    return _join(built, definitions.gaps.with_names("neurons", lost))
+    return _join(built, gaps.with_names("neurons", lost))
 
 
 def _owners(spec: Spec, built: list[_Built], findings: Findings) -> None:
@@ -240,15 +243,18 @@ class _Builder:
         findings = self.constants.findings
         assert model.names is not None
         seen: dict[str, Located[str]] = {}
+        before = findings.errors
         for item in model.names:
             if not IDENTIFIER.fullmatch(item.value):
                 findings.error("bad-name", item.span, bad_name(item.value), NAME_RULE)
-                return None
-            if item.value in seen:
+            elif item.value in seen:
                 line = seen[item.value].span.line
                 findings.error("duplicate-neuron", item.span, f"'{item.value}' is named before (line {line})")
-                return None
             seen[item.value] = item
+            if findings.errors - before >= PATIENCE:
+                break
+        if findings.errors > before:
+            return None
         if not seen or (count is not None and count != len(seen)):
             wanted = "at least one is wanted" if count is None else f"'count' says {count}"
             node = model.source.get("names")
