@@ -15,11 +15,12 @@ from neurovis_spec.compiler.constants import Constants, Randomness
 from neurovis_spec.compiler.definitions import Definitions
 from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.edges import EdgeReader, delay_of
+from neurovis_spec.compiler.ends import Ends
 from neurovis_spec.compiler.learning import Learning, learning_of
 from neurovis_spec.compiler.limits import Limits, amount
 from neurovis_spec.compiler.matrices import Grid, grid_of
 from neurovis_spec.compiler.network import Connections, FloatArray, Input, IntArray, frozen
-from neurovis_spec.compiler.patterns import Ends, all_to_all, pairs_of
+from neurovis_spec.compiler.patterns import all_to_all, pairs_of
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import resolve_end
 from neurovis_spec.compiler.settings import choose
@@ -259,7 +260,9 @@ class _EntryBuilder:
     def _pattern(self) -> _Shape | None:
         n, m = len(self.sources), len(self.targets)
         loops: bool | None = True if n == m == 1 else None
-        ends = Ends(self.sources, self.targets, loops if self.body.self is None else self.body.self.value)
+        loops = loops if self.body.self is None else self.body.self.value
+        position = self.connector.population.neurons.position
+        ends = Ends(self.sources, self.targets, loops, position[self.sources], position[self.targets])
         if self.body.pattern is not None:
             pairs = pairs_of(self.body.pattern, ends, self.constants, self.stream("edges"), self._fits)
             return None if pairs is None else _Shape(*pairs)
