@@ -7,6 +7,7 @@ are shown (text, JSON) is in ``neurovis_spec.findings``.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import SequenceMatcher
@@ -119,15 +120,22 @@ def nearest(name: str, known: Iterable[str], most: int = 3) -> tuple[str, ...]:
     ('tanh', 'atan')
     """
     folded = name.casefold()
+    letters = Counter(folded)
     scored: list[tuple[float, str]] = []
     for candidate in dict.fromkeys(known):
         other = candidate.casefold()
+        begins = bool(folded and other) and (other.startswith(folded) or folded.startswith(other))
+        alike = _stem(folded) == _stem(other) != ""
+        # No ratio is above that of the letters they share: most candidates are done with here.
+        shared = sum(min(count, other.count(letter)) for letter, count in letters.items())
+        if not begins and not alike and 2 * shared < 0.55 * (len(folded) + len(other)):
+            continue
         score = SequenceMatcher(None, folded, other, autojunk=False).ratio()
         if folded[:1] == other[:1]:
             score += 0.05  # a first letter is seldom mistyped
-        if folded and other and (other.startswith(folded) or folded.startswith(other)):
+        if begins:
             score = max(score, 0.75)
-        if _stem(folded) == _stem(other) != "":
+        if alike:
             score = max(score, 0.7)
         if score >= 0.6:
             scored.append((-score, candidate))

@@ -98,10 +98,8 @@ def test_settings_lie_within_the_bounds_of_a_parameter() -> None:
 
 
 def test_settings_that_make_no_number() -> None:
-    text = (
-        "models: {m: {parameters: {z: 1, y: 1/z}, state: {v: {initial: log(z)}}, activity: v*y}}\n"
+    text = "models: {m: {parameters: {z: 1, y: 1/z}, state: {v: {initial: log(z)}}, activity: v*y}}\n"
     text += "neurons: {A: {model: "
-    )
     assert codes(text + "{m: {z: 0}}}}") == ["not-finite"]
     assert codes(text + "{m: {z: 0, y: 1}}}}") == ["not-finite"]
     assert len(network_of(text + "m}}").neurons) == 1
