@@ -156,12 +156,13 @@ class _EntryBuilder:
     def build(self, before: int) -> Bundle | None:
         body, findings = self.body, self.constants.findings
         self._conflicts()
-        delay = 1 if body.delay is None else delay_of(body.delay, self.constants)
         if findings.errors > before:
             return None
+        delay = 1 if body.delay is None else delay_of(body.delay, self.constants)
+        behind = findings.errors
         centre = self._centre_grid()
         shape = self._shape(centre)
-        if shape is None or delay is None or findings.errors > before:
+        if shape is None or findings.errors > behind:
             return None
         if not len(shape.i):
             findings.error("no-connection", self.key.span, "this entry makes no connection at all")
@@ -170,7 +171,7 @@ class _EntryBuilder:
             return None
         weights = shape.weights if shape.weights is not None else self._weights(shape)
         centres = self._centres(centre, shape)
-        delays = np.full(len(shape.i), delay, dtype=np.int64)
+        delays = np.full(len(shape.i), 0 if delay is None else delay, dtype=np.int64)
         if shape.delays is not None:
             delays = np.where(shape.delays >= 0, shape.delays, delays)
         bounds = self._bounds(weights)
