@@ -7,14 +7,16 @@ arrays, or findings at the very character. ``used`` notes on which parameters so
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import chain
 from typing import TypeAlias
 
 import numpy as np
 
 from neurovis_spec.compiler.draws import Stream
+from neurovis_spec.compiler.limits import MOST_HINTS
 from neurovis_spec.compiler.network import FloatArray, IntArray
 from neurovis_spec.diagnostics import Findings, suggest
 from neurovis_spec.language.expressions.arrays import Drawing, evaluate_array
@@ -41,6 +43,22 @@ _ELSEWHERE: Mapping[str, str] = {
     "distance": "'distance' is known in the weight and the centre of a connection",
 }
 _NOT_FINITE = "look for a division by zero, an overflow, or a root or logarithm of a negative number"
+
+
+@dataclass(frozen=True, slots=True)
+class Scope(Collection[str]):
+    """Names from several places, as one collection that nobody copies: there may be many of them, and many formulas."""
+
+    parts: tuple[Collection[str], ...]
+
+    def __contains__(self, name: object) -> bool:
+        return any(name in part for part in self.parts)
+
+    def __iter__(self) -> Iterator[str]:
+        return chain(*self.parts)
+
+    def __len__(self) -> int:
+        return sum(map(len, self.parts))
 
 
 @lru_cache(maxsize=4096)
@@ -70,10 +88,12 @@ def parse_formula(
     except ExpressionError as error:
         findings.error(error.code, formula.node.at(error.start, error.end), error.message, error.hint)
         return None
-    unknown = unknown_names(tree, known)
+    used = names(tree)
+    unknown = unknown_names(tree, [name for name in used if name in known])
     for node in () if incomplete else unknown:
         place = formula.node.at(node.start, node.end)
-        message, hint = _unknown(node.name, known, functions or {}, what)
+        few = known if findings.errors < MOST_HINTS else ()
+        message, hint = _unknown(node.name, few, functions or {}, what)
         findings.error("unknown-name", place, message, hint)
     return None if unknown else tree
 
@@ -133,7 +153,7 @@ class Constants:
         self, formula: Formula, extra: Iterable[str] = (), random: bool = False, what: str = "known here"
     ) -> Tree | None:
         """The tree of a formula over the parameters and ``extra``, for a caller that evaluates it; else findings."""
-        known = dict.fromkeys((*extra, *self.parameters, *self.broken, *ALWAYS))
+        known = Scope((tuple(extra), self.parameters, self.broken, ALWAYS))
         tree = parse_formula(formula, known, self.findings, random=random, what=what, incomplete=self.incomplete)
         return None if tree is None or names(tree) & self.broken else tree
 
@@ -153,7 +173,8 @@ class Constants:
             return None
         if structural:
             self.depend(names(tree))
-        values: dict[str, Value] = {**self.parameters, **CONSTANTS, "dt": self.dt, **extra}
+        fixed: Mapping[str, Value] = {**extra, **CONSTANTS, "dt": self.dt}
+        values = {name: fixed[name] if name in fixed else self.parameters[name] for name in names(tree)}
         result = evaluate_array(tree, values, draw=None if randomness is None else _drawing(randomness))
         return float(result) if np.ndim(result) == 0 else np.asarray(result, dtype=np.float64)
 

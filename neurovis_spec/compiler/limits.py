@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 #: Findings in one list of values, after which the rest of the list is not looked at.
 PATIENCE = 20
+#: Errors after which unknown names are no longer compared with the known ones.
+MOST_HINTS = 200
 #: The longest delay in steps, and the most signals under way (delays of all connections together).
 LONGEST_DELAY, MOST_SIGNALS = 1_000_000, 250_000_000
 

@@ -12,7 +12,7 @@ from functools import cached_property
 from itertools import islice
 
 from neurovis_spec.compiler.gaps import Gaps
-from neurovis_spec.compiler.limits import PATIENCE
+from neurovis_spec.compiler.limits import MOST_HINTS, PATIENCE
 from neurovis_spec.compiler.network import Group
 from neurovis_spec.diagnostics import Findings, Span, suggest
 from neurovis_spec.language.located import Located, shown
@@ -114,7 +114,8 @@ def resolve_part(name: str, span: Span, directory: Directory, findings: Findings
             findings.error("empty-reference", span, "a reference is missing here", "name a group, a neuron or a range")
         elif not directory.gaps.cover_reference(name):
             message = f"there is no neuron or group '{shown(name)}'"
-            findings.error("unknown-neuron", span, message, directory.hint(name))
+            hint = directory.hint(name) if findings.errors < MOST_HINTS else None
+            findings.error("unknown-neuron", span, message, hint)
     return result
 
 
