@@ -19,6 +19,7 @@ from random_specs import Plain, Spec, specs
 
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
+from neurovis_spec.cli.differences import difference
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.fmt import FormattingError, format_read, format_text
 from neurovis_spec.language.fmt_keys import normal
@@ -186,9 +187,9 @@ def test_what_we_ship_is_canonical(path: Path) -> None:
     assert formatted(text) == text
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/language.md"])
-def test_the_examples_of_the_pages_are_canonical(page: str) -> None:
-    examples = re.findall(r"^```yaml\n(.*?)^```$", (ROOT / page).read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+def test_the_example_of_the_readme_is_canonical() -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    examples = re.findall(r"^```yaml\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL)
     assert examples
     for text in examples:
         assert formatted(text) == text
@@ -472,6 +473,43 @@ def test_the_difference_is_one_that_can_be_applied(folder: Path, text: str) -> N
     command = ["git", "apply", "--unidiff-zero", "-"]
     subprocess.run(command, cwd=folder, input=result.stdout_bytes, check=True, env={"GIT_CEILING_DIRECTORIES": "/"})
     assert path.read_bytes() == NEAT.encode()
+
+
+_SOME_LINES = st.lists(st.sampled_from(["a\n", "b\n", "\n", " a\n", *(f"{n}\n" for n in range(30))]), max_size=40)
+
+
+@given(_SOME_LINES, _SOME_LINES, st.booleans(), st.sampled_from([1, 10, 300]))
+@settings(max_examples=150, deadline=None)
+def test_a_difference_says_how_one_text_becomes_the_other(
+    old: list[str], new: list[str], bare: bool, copies: int
+) -> None:
+    before, after = "".join(old * copies).removesuffix("\n" if bare else ""), "".join(new)
+    shown = difference(before, after, "x")
+    assert bool(shown) == (before != after)
+    assert applied(before, shown) == after
+
+
+def applied(text: str, diff: str) -> str:
+    """A text with a diff applied to it, each line of which has to fit."""
+    lines, made, at = text.splitlines(keepends=True), [], 0
+    diff = re.sub(r"\n\\ No newline at end of file\n", "\0", diff)
+    for line in re.findall("[^\n\0]*[\n\0]", diff)[2:]:
+        sign, content = line[0], line[1:].removesuffix("\0")
+        if sign == "@":
+            match = re.fullmatch(r"@@ -(\d+),(\d+) \+(\d+),(\d+) @@\n", line)
+            assert match is not None
+            first, count, there = (int(match.group(n)) for n in (1, 2, 3))
+            first -= count > 0
+            made += lines[at:first]
+            at = first
+            assert len(made) == there - (int(match.group(4)) > 0)
+        else:
+            if sign in " -":
+                assert lines[at] == content
+                at += 1
+            if sign in " +":
+                made.append(content)
+    return "".join([*made, *lines[at:]])
 
 
 def test_check_and_diff_together(folder: Path) -> None:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import sys
-from difflib import unified_diff
 from pathlib import Path
 from typing import Final
 
 import click
 
+from neurovis_spec.cli.differences import difference
 from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.files import STDIN, standard_input, writing
 from neurovis_spec.cli.options import examples
@@ -93,7 +93,7 @@ def _show(spec: str, before: str, after: str, *, check: bool, diff: bool) -> Non
     if check:
         click.echo(f"{_name(spec)}: would change")
     if diff:
-        click.echo(difference(before, after, spec if spec != "-" else STDIN), nl=False)
+        click.echo(difference(before, after, _name(spec)), nl=False)
 
 
 def _write(spec: str, before: str, after: str) -> None:
@@ -118,14 +118,3 @@ def _replace(path: Path, text: str) -> None:
 
 def _name(spec: str) -> str:
     return STDIN if spec == "-" else printable(spec)
-
-
-def difference(before: str, after: str, name: str) -> str:
-    """A unified diff that patch and git apply understand."""
-    lines = unified_diff(_lines(before), _lines(after), f"a/{printable(name)}", f"b/{printable(name)}")
-    return "".join(line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n" for line in lines)
-
-
-def _lines(text: str) -> list[str]:
-    """Lines with their ends, which are LF alone: what else a text may hold belongs to its line."""
-    return [line for line in text.replace("\n", "\n\0").split("\0") if line]
