@@ -2,6 +2,7 @@
 #
 #   make demo       makes .venv, installs, and runs the main job into demo/
 #   make test       every check that needs Python alone
+#   make gallery    draws the examples into docs/pictures and writes docs/gallery.md
 #   make test-all   the tests that need Chromium, graphviz' dot or a C compiler; fails without them
 #   make docs       writes the generated parts of docs/ anew
 #
@@ -16,7 +17,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ELSEWHERE := browser or dot or compiler
 
-.PHONY: help install demo test test-all needs docs format clean
+.PHONY: help install demo gallery test test-all needs docs format clean
 .DELETE_ON_ERROR:
 
 help:
@@ -44,6 +45,9 @@ install: $(VENV)/installed
 
 demo: $(VENV)/installed
 	@$(BIN)/python demo.py
+
+gallery: $(VENV)/installed
+	@$(BIN)/python gallery.py
 
 test: $(VENV)/tested
 	$(BIN)/ruff check .

@@ -67,6 +67,13 @@ def dash(width: float) -> tuple[float, float]:
 
 
 def label_of(teachers: list[Teacher]) -> str:
-    """What the legend says of them: ``target of delta``."""
-    told = dict.fromkeys(f"{teacher.signal} of {teacher.rule}" for teacher in teachers)
-    return next(iter(told)) if len(told) == 1 else f"{len(told)} signals of rules"
+    """What the legend says of them: ``target of delta``, or the signals alone where they are several.
+
+    >>> label_of([Teacher(0, 1, "reward", "walk"), Teacher(2, 1, "policy", "walk")])
+    'policy, reward'
+    """
+    told = {f"{teacher.signal} of {teacher.rule}" for teacher in teachers}
+    if len(told) == 1:
+        return told.pop()
+    signals = sorted({teacher.signal for teacher in teachers})
+    return ", ".join(signals) if len(signals) <= 3 else f"{len(signals)} signals of rules"

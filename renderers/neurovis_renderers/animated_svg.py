@@ -1,8 +1,8 @@
 """Animated SVG: a Film as one file without script, the structure of the still with palettes on top.
 
 In: a Film. Out: the bytes of an ``.svg`` that moves, also inside ``<img>``. The attributes are those of frame 0;
-each group that changes has one SMIL animation of its ``class``, a letter or two for the colour and, where a weight
-changes, one class each for width and glow. What these classes look like stands in a style sheet that holds only where no
+each group that changes has one SMIL animation of its ``class``: a letter or two for the colour and, where a weight
+changes, one each for width and glow. What these classes look like stands in a style sheet that holds only where no
 reduced motion is asked for: where it is, the picture stands still at frame 0.
 """
 
@@ -39,7 +39,7 @@ IntArray = npt.NDArray[np.int64]
 #: Levels of colour from −1 to +1; an odd number, so that 0 is one of them.
 LEVELS = 51
 #: Their classes; none differs from another in case alone, which pages in quirks mode do not tell apart.
-LETTERS = (*ascii_lowercase, *(f"a{letter}" for letter in ascii_lowercase))
+LETTERS: tuple[str, ...] = (*ascii_lowercase, *(f"a{letter}" for letter in ascii_lowercase))
 #: At most so many different widths are told apart, and so many captions.
 _MOST_WIDTHS, _MOST_CAPTIONS = 240, 500
 
