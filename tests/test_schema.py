@@ -90,9 +90,9 @@ def test_wrong_shapes_are_found_where_they_are(text: str, where: list[str]) -> N
 
 @pytest.mark.parametrize("path", sorted((HERE / "errors").glob("*.yaml")), ids=lambda path: path.stem)
 def test_defective_specs_are_refused_for_their_shape_alone(path: Path) -> None:
-    text = path.read_text(encoding="utf-8")
+    text = path.read_bytes().decode("utf-8", "replace")
     codes = set(re.findall(r"# error: \d+:\d+ ([\w-]+)", text))
-    if path.stem.startswith("yaml_") or not codes <= SHAPE:
+    if path.stem.startswith("yaml_") or not codes or not codes <= SHAPE:
         return  # YAML's own faults never come to a schema; meanings are beyond it
     if path.stem not in ("wrong_type_bool", "rule_without_change", "no_value"):
         assert messages(text), f"{path.stem} has a wrong shape"

@@ -171,11 +171,16 @@ def check_bounds(value: Value, default: Default, values: Mapping[str, Value], sp
     return False
 
 
-def _activation(name: str, model: ActivationModel, findings: Findings, dt: float) -> tuple[Activation, Defaults]:
+def _activation(name: str, model: ActivationModel, findings: Findings, dt: float) -> tuple[Activation, Defaults] | None:
+    """The activation; None where an intermediate value is at fault."""
     checker = _Checker(_ACTIVATION, model.source, findings, dt)
     defaults = checker.parameters(model.parameters)
     replaced: dict[str, Tree] = {}
-    for key, tree in checker.let(model.let):
+    let = checker.let(model.let)
+    before = findings.errors
+    for key, tree in let:
+        if findings.errors > before:  # what explodes once explodes again in all that uses it
+            return None
         replaced[key] = _expanded(tree, replaced, checker.known[key] or model.source.span, findings)
     value = checker.tree(model.value)
     tree = _expanded(value or Number(0.0), replaced, model.value.span, findings)
