@@ -16,8 +16,6 @@ from neurovis_spec.cli.options import examples
 from neurovis_spec.cli.progress import progress
 from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError
 from neurovis_spec.findings import printable, show_text
-from neurovis_spec.language.fmt import FormattingError, format_read
-from neurovis_spec.language.reader import read_file, read_text
 
 _BOM: Final = "\ufeff"
 
@@ -66,6 +64,8 @@ def command(specs: tuple[str, ...], check: bool, diff: bool) -> None:
 
 def _read(spec: str) -> str:
     """The text of a spec with its byte-order mark. Raises SpecError where the reader refuses it."""
+    from neurovis_spec.language.reader import read_file, read_text
+
     findings = Findings()
     if spec == "-":
         text = standard_input()
@@ -81,6 +81,8 @@ def _read(spec: str) -> str:
 
 
 def _formatted(spec: str, text: str) -> str:
+    from neurovis_spec.language.fmt import FormattingError, format_read
+
     try:
         return format_read(text)
     except FormattingError as error:

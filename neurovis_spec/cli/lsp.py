@@ -13,10 +13,10 @@ from neurovis_spec.cli.options import examples
 @click.command(epilog=examples("neurovis lsp"))
 @click.option("--stdio", is_flag=True, help="Accepted and not needed: many editors add it.")
 def command(stdio: bool) -> None:
-    """Answer an editor over standard input and output.
+    """Answer an editor: findings while typing, completion, hover, rename.
 
-    Findings while typing, completion, hover, go to definition, rename, symbols. An editor starts it; docs/editors.md
-    says how to set it up.
+    It also goes to definitions, lists symbols and formats, over standard input and output. An editor starts it;
+    docs/editors.md says how to set it up.
     """
     if find_spec("pygls") is None:
         raise fault("the language server needs pygls; in a clone of the repository: pip install '.[lsp]'")
