@@ -128,12 +128,12 @@ def _refuse(error: CellError, path_text: str, span: Span, findings: Findings) ->
 
 
 def _neighbours(path: Path) -> str | None:
-    """A help line that names the files beside a missing one, where one of them is alike."""
+    """A help line that names the files beside a missing one, where one of the same kind is alike."""
     try:
-        names = [entry.name for _, entry in zip(range(1000), path.parent.iterdir(), strict=False)]
+        beside = [entry for _, entry in zip(range(1000), path.parent.iterdir(), strict=False)]
     except OSError:
         return None
-    hint = suggest(path.name, sorted(names))
+    hint = suggest(path.name, sorted(entry.name for entry in beside if entry.suffix == path.suffix))
     return hint if hint is not None and hint.startswith("did you mean") else None
 
 

@@ -20,6 +20,8 @@ _WEIGHT = 600
 _SMALLEST, _READABLE, _LARGEST, _BESIDE = 9.0, 10.5, 14.0, 11.0
 #: a numbered name may be smaller: it says where one is among many
 _NUMBERED = 6.5
+#: how wide, in radii, a text beside a disc may be: it must not look like a title of the neurons around
+_WIDEST_BESIDE = 5.0
 #: with more labels than this to place beside discs, none is
 _MOST_BESIDE = 150
 #: a disc smaller than this has no label
@@ -96,6 +98,7 @@ def _chord(radius: float, size: float) -> float:
 
 def _beside(label: str, centre: Point, radius: float, obstacles: Obstacles, picture: Rect) -> Label | None:
     size, (x, y) = _BESIDE, centre
+    label = texts.shorten(label, size, _WIDEST_BESIDE * radius, _WEIGHT)
     width = texts.width(label, size, _WEIGHT)
     places: tuple[tuple[Literal["start", "middle", "end"], float, float], ...] = (
         ("middle", x, y + radius + 4 + 0.8 * size),
