@@ -23,6 +23,7 @@ from neurovis_spec.compiler.network import Connections, FloatArray, Input, IntAr
 from neurovis_spec.compiler.patterns import all_to_all, pairs_of
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import resolve_end
+from neurovis_spec.compiler.scale import scaled
 from neurovis_spec.compiler.settings import choose
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.diagnostics import Span
@@ -170,6 +171,9 @@ class _EntryBuilder:
         if not self._fits(len(shape.i)):
             return None
         weights = shape.weights if shape.weights is not None else self._weights(shape)
+        if weights is not None and body.scale is not None:
+            ends, pairs = (self.sources, self.targets), (shape.i, shape.j)
+            weights = scaled(body.scale, weights, ends, pairs, self.constants)
         centres = self._centres(centre, shape)
         delays = np.full(len(shape.i), 0 if delay is None else delay, dtype=np.int64)
         if shape.delays is not None:

@@ -144,17 +144,30 @@ class GroupModel(Model):
     description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
 
 
+class ScaleModel(Model):
+    """How the weights of an entry are scaled together; one of the three."""
+
+    PLACE: ClassVar[str] = "a 'scale'"
+
+    spectral_radius: FormulaField | None = Field(
+        None, description="The largest magnitude of an eigenvalue of the entry's matrix; both ends the same neurons."
+    )
+    norm: FormulaField | None = Field(None, description="The Frobenius norm of the entry's matrix.")
+    indegree: BoolField | None = Field(
+        None, description="Whether each weight is divided by the connections of this entry into its target."
+    )
+
+
 class ConnectionModel(Model):
     """The body of a connection; a bare weight is read as ``{weight: …}``."""
 
     PLACE: ClassVar[str] = "a connection"
 
-    LATER: ClassVar[dict[str, str]] = {"scale": "weights scaled when they are made"}
-
     weight: FormulaField | None = Field(
         None, description="One number, or an expression of i, j, n_from, n_to (default 1)."
     )
     centre: CentreField | None = Field(None, description="For combine: distance; like weight or matrix (default 0).")
+    scale: ScaleModel | None = Field(None, description="Scales the weights of this entry together when they are made.")
     matrix: MatrixField | None = Field(None, description="Dense rows, rows are sources; null means no connection.")
     edges: EdgesField | None = Field(None, description="[[from, to, weight, delay], …], the last two optional.")
     pattern: ChoiceField | None = Field(

@@ -1,0 +1,90 @@
+"""Scale: the weights of an entry, scaled together when they are made (§4).
+
+In: the weights of an entry and where they go from and to, the ``scale`` of its body. Out: the scaled weights. The
+matrix of an entry has its sources as rows and its targets as columns; parallel connections add up in it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from neurovis_spec.compiler.constants import Constants
+from neurovis_spec.compiler.network import FloatArray, IntArray
+from neurovis_spec.language.located import Formula
+from neurovis_spec.language.spec import ScaleModel
+
+#: Most neurons whose spectral radius is computed: all eigenvalues of a dense matrix are found.
+MOST = 3000
+#: A radius below this share of the norm is a rounding error of 0.
+_NOTHING = 1e-12
+
+
+def scaled(
+    model: ScaleModel,
+    weights: FloatArray,
+    ends: tuple[IntArray, IntArray],
+    pairs: tuple[IntArray, IntArray],
+    constants: Constants,
+) -> FloatArray | None:
+    """The weights (one a connection), scaled as the author asks; None where that cannot be, which is noted.
+
+    ``ends`` are the neurons of both ends, ``pairs`` the positions in them of each connection's source and target.
+    """
+    if model.lost:  # without what is at fault in it, it would be another one
+        return None
+    given = [key for key in ("spectral_radius", "norm", "indegree") if getattr(model, key) is not None]
+    if len(given) != 1:
+        entry = model.source.entry(given[1]) if given else None
+        span = model.source.span if entry is None else entry.key.span
+        message = f"expected one kind of scale here, found {len(given)}"
+        constants.findings.error("one-key", span, message, "keep one of spectral_radius, norm and indegree")
+        return None
+    i, j = pairs
+    if model.indegree is not None:
+        return weights / np.bincount(j)[j] if model.indegree.value else weights
+    if model.norm is not None:
+        cells = i * len(ends[1]) + j
+        _, place = np.unique(cells, return_inverse=True)
+        return _to(model.norm, weights, float(np.linalg.norm(np.bincount(place, weights))), "norm", constants)
+    assert model.spectral_radius is not None
+    radius = _radius(model.spectral_radius, weights, ends, pairs, constants)
+    return None if radius is None else _to(model.spectral_radius, weights, radius, "spectral radius", constants)
+
+
+def _to(wanted: Formula, weights: FloatArray, found: float, what: str, constants: Constants) -> FloatArray | None:
+    """The weights times what makes a measure of theirs the wanted one."""
+    value = constants.scalar(wanted)
+    if value is None:
+        return None
+    if value < 0:
+        constants.findings.error("out-of-range", wanted.span, f"a {what} is not negative, this is {value:g}")
+        return None
+    if found <= _NOTHING * float(np.abs(weights).sum()):
+        message = f"the {what} of these weights is 0: there is nothing to scale"
+        constants.findings.error("out-of-range", wanted.span, message)
+        return None
+    return weights * (value / found)
+
+
+def _radius(
+    wanted: Formula,
+    weights: FloatArray,
+    ends: tuple[IntArray, IntArray],
+    pairs: tuple[IntArray, IntArray],
+    constants: Constants,
+) -> float | None:
+    """The largest magnitude of an eigenvalue of the matrix of the entry, whose ends must be the same neurons."""
+    sources, targets = ends
+    n = len(sources)
+    if not np.array_equal(np.sort(sources), np.sort(targets)):
+        message = "a spectral radius is that of a matrix from neurons to the same neurons; these ends differ"
+        constants.findings.error("wrong-size", wanted.span, message, "use norm or indegree")
+        return None
+    if n > MOST:
+        message = f"a spectral radius is computed for {MOST:,} neurons at most, these are {n:,}"
+        constants.findings.error("too-many", wanted.span, message, "use norm or indegree")
+        return None
+    column = np.argsort(sources)[np.searchsorted(np.sort(sources), targets)]
+    matrix = np.zeros((n, n))
+    np.add.at(matrix, (pairs[0], column[pairs[1]]), weights)
+    return float(np.abs(np.linalg.eigvals(matrix)).max())
