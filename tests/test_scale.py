@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 import neurovis_spec as nv
+from neurovis_spec.compiler.network import FloatArray
 
 HEAD = "neurovis: 1\nname: x\nseed: 3\nparameters: {rho: 0.9}\nneurons: {A: {count: 40}, B: {count: 3}}\nconnections:\n"
 
 
-def matrix(text: str, n: int, m: int, start: int = 0) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+def matrix(text: str, n: int, m: int, start: int = 0) -> FloatArray:
     """The weights as a matrix, rows are sources."""
     wires = nv.compile_text(text).network.connections
     result = np.zeros((n, m))
@@ -29,7 +30,7 @@ def test_spectral_radius() -> None:
 def test_spectral_radius_of_ends_in_another_order() -> None:
     body = "{matrix: [[0, 2], [3, 0]], scale: {spectral_radius: 1}}"
     found = matrix(HEAD + f"  B1 + B2 -> B2 + B1: {body}", 43, 43)[40:42, 40:42]
-    np.testing.assert_allclose(found, [[2 / 3, 0], [0, 1]], rtol=1e-12)  # B1 -> B1 is 2, B2 -> B2 is 3
+    np.testing.assert_allclose(found, np.array([[2 / 3, 0.0], [0.0, 1.0]]), rtol=1e-12)  # B1 -> B1 is 2, B2 -> B2 is 3
 
 
 def test_norm_adds_parallel_connections_up() -> None:
