@@ -22,14 +22,13 @@ from neurovis_spec.compiler.matrices import Grid, grid_of
 from neurovis_spec.compiler.network import Connections, FloatArray, Input, IntArray, frozen
 from neurovis_spec.compiler.patterns import all_to_all, pairs_of
 from neurovis_spec.compiler.populate import Population
-from neurovis_spec.compiler.references import resolve_end
+from neurovis_spec.compiler.references import resolve_ends
 from neurovis_spec.compiler.scale import scaled
 from neurovis_spec.compiler.settings import choose
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.located import Formula, Located, shown
-from neurovis_spec.language.source import Scalar
 from neurovis_spec.language.spec import ConnectionModel, Spec
 from neurovis_spec.language.values import FileReference, Rows
 
@@ -106,25 +105,15 @@ class Connector:
 
     def _ends(self, key: Located[str]) -> tuple[IntArray, IntArray] | None:
         findings = self.constants.findings
-        left, arrow, right = key.value.partition("->")
+        _, arrow, right = key.value.partition("->")
         if not arrow or "->" in right:
             message = f"'{shown(key.value)}' is no connection"
             findings.error("bad-connection", key.span, message, "write FROM -> TO")
             return None
-        offset = len(left) + len(arrow)
-        directory = self.population.directory
-        sources = resolve_end(_piece(key, 0, len(left)), directory, findings)
-        targets = resolve_end(_piece(key, offset, len(key.value)), directory, findings)
-        if sources is None or targets is None:
+        ends = resolve_ends(key, self.population.directory, findings)
+        if ends is None:
             return None
-        return np.array(sources, dtype=np.int64), np.array(targets, dtype=np.int64)
-
-
-def _piece(key: Located[str], start: int, end: int) -> Located[str]:
-    """A part of a key as a text of its own, with its place."""
-    span = key.node.at(start, end)
-    inner = 0 if span != key.node.span else None
-    return Located(key.value[start:end], Scalar(key.value[start:end], span, inner))
+        return np.array(ends[0], dtype=np.int64), np.array(ends[1], dtype=np.int64)
 
 
 def _normal(text: str) -> str:

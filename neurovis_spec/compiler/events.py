@@ -15,11 +15,9 @@ import numpy as np
 
 from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.network import Block, IntArray, Learn, Network, Plasticity, frozen
-from neurovis_spec.compiler.references import Directory, resolve_end
+from neurovis_spec.compiler.references import Directory, key_of, resolve_end, resolve_ends
 from neurovis_spec.diagnostics import Findings, Span, suggest
 from neurovis_spec.language.located import Formula, Located
-from neurovis_spec.language.source import Mapping as SourceMapping
-from neurovis_spec.language.source import Scalar
 from neurovis_spec.language.spec import EventModel
 
 #: Compiles the network anew with other parameters, without its events; None where that is at fault.
@@ -110,13 +108,8 @@ class EventReader:
         elif "at" not in timed:
             wrong(actions[0], "at which step? 'at' is missing")
 
-    def _key(self, model: EventModel, section: str, name: str) -> Located[str]:
-        node = model.source.get(section)
-        entry = node.entry(name) if isinstance(node, SourceMapping) else None
-        return Located(name, Scalar(name, model.source.span) if entry is None else entry.key)
-
     def _check_set(self, model: EventModel, name: str, formula: Formula) -> None:
-        span = self._key(model, "set", name).span
+        span = key_of(model.source, "set", name).span
         known = (*self.constants.parameters, *self.constants.broken)
         if name not in known and not self.constants.incomplete:
             hint = suggest(name, known, "parameters") or "the spec has no parameters"
@@ -127,21 +120,16 @@ class EventReader:
         self.constants.scalar(formula)
 
     def _clamp(self, model: EventModel, name: str, formula: Formula) -> list[tuple[int, float]]:
-        neurons = resolve_end(self._key(model, "clamp", name), self.directory, self.findings)
+        neurons = resolve_end(key_of(model.source, "clamp", name), self.directory, self.findings)
         value = self.constants.scalar(formula)
         return [] if neurons is None or value is None else [(neuron, value) for neuron in neurons]
 
     def _lesion(self, text: Located[str], neurons: list[int], connections: list[int]) -> None:
-        left, arrow, right = text.value.partition("->")
-        if not arrow:
+        if "->" not in text.value:
             neurons.extend(resolve_end(text, self.directory, self.findings) or ())
             return
-        ends = []
-        for start, piece in ((0, left), (len(left) + 2, right)):
-            span = text.node.at(start, start + len(piece))
-            inner = 0 if span != text.span else None
-            ends.append(resolve_end(Located(piece, Scalar(piece, span, inner)), self.directory, self.findings))
-        if ends[0] is None or ends[1] is None or self.network is None:
+        ends = resolve_ends(text, self.directory, self.findings)
+        if ends is None or self.network is None:
             return
         wires = self.network.connections
         found = np.flatnonzero(np.isin(wires.sources, ends[0]) & np.isin(wires.targets, ends[1])).tolist()

@@ -30,12 +30,11 @@ from neurovis_spec.compiler.network import (
     frozen,
 )
 from neurovis_spec.compiler.positions import positions_of
-from neurovis_spec.compiler.references import Directory
+from neurovis_spec.compiler.references import Directory, key_of
 from neurovis_spec.compiler.settings import check_initials, choose, parameters, spread
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.diagnostics import Findings, Span, suggest
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, shown
-from neurovis_spec.language.source import Mapping as SourceMapping
 from neurovis_spec.language.source import Scalar
 from neurovis_spec.language.spec import GroupModel, Spec
 from neurovis_spec.language.values import Choice, FormulaList
@@ -77,9 +76,7 @@ class _Built:
 
 def key_span(spec: Spec, section: str, name: str) -> Span:
     """Where an entry of a section has its name."""
-    node = spec.source.get(section)
-    entry = node.entry(name) if isinstance(node, SourceMapping) else None
-    return spec.source.span if entry is None else entry.key.span
+    return key_of(spec.source, section, name).span
 
 
 def populate(

@@ -16,6 +16,8 @@ from neurovis_spec.compiler.limits import MOST_HINTS, PATIENCE
 from neurovis_spec.compiler.network import Group
 from neurovis_spec.diagnostics import Findings, Span, suggest
 from neurovis_spec.language.located import Located, shown
+from neurovis_spec.language.source import Mapping as SourceMapping
+from neurovis_spec.language.source import Scalar
 
 #: How many names are looked through for one that is like another: it takes a while.
 _MANY = 1000
@@ -82,6 +84,20 @@ def few(name: str, known: Collection[str]) -> Collection[str]:
     return tuple(islice((other for other in known if other.startswith(begin)), _MANY))
 
 
+def key_of(section: SourceMapping, part: str, name: str) -> Located[str]:
+    """The key ``name`` of the part ``part`` of a section, as a text with its place; the section's where it has none."""
+    node = section.get(part)
+    entry = node.entry(name) if isinstance(node, SourceMapping) else None
+    return Located(name, Scalar(name, section.span) if entry is None else entry.key)
+
+
+def piece(text: Located[str], start: int, end: int) -> Located[str]:
+    """Characters ``start`` to ``end`` of a text as a text of their own, with their place."""
+    span = text.node.at(start, end)
+    inner = 0 if span != text.node.span else None
+    return Located(text.value[start:end], Scalar(text.value[start:end], span, inner))
+
+
 def parts(text: Located[str]) -> Iterator[tuple[str, Span]]:
     """The references that are joined with ``+``, each with its place.
 
@@ -144,3 +160,13 @@ def resolve(texts: tuple[Located[str], ...], directory: Directory, findings: Fin
 def resolve_end(text: Located[str], directory: Directory, findings: Findings) -> tuple[int, ...] | None:
     """One end of a connection: references joined with ``+``."""
     return resolve((text,), directory, findings)
+
+
+def resolve_ends(
+    text: Located[str], directory: Directory, findings: Findings
+) -> tuple[tuple[int, ...], tuple[int, ...]] | None:
+    """Both ends of ``FROM -> TO``, split at its first arrow; both are looked at even if one is at fault."""
+    arrow = text.value.index("->")
+    sources = resolve_end(piece(text, 0, arrow), directory, findings)
+    targets = resolve_end(piece(text, arrow + 2, len(text.value)), directory, findings)
+    return None if sources is None or targets is None else (sources, targets)

@@ -12,11 +12,9 @@ import numpy as np
 
 from neurovis_spec import plugins
 from neurovis_spec.compiler.network import LayoutSettings, Output, RenderSettings, frozen
-from neurovis_spec.compiler.references import Directory, resolve, resolve_end
+from neurovis_spec.compiler.references import Directory, key_of, resolve, resolve_end
 from neurovis_spec.diagnostics import Findings, suggest
 from neurovis_spec.language.located import Located, shown
-from neurovis_spec.language.source import Mapping as SourceMapping
-from neurovis_spec.language.source import Scalar
 from neurovis_spec.language.spec import LayoutModel, RenderModel, RosModel, Spec
 
 #: Engines that the language names and that come later.
@@ -39,14 +37,6 @@ def make_outputs(spec: Spec, directory: Directory, findings: Findings) -> tuple[
     return tuple(result)
 
 
-def _key(section: SourceMapping, part: str, name: str) -> Located[str]:
-    """The key of an entry of a part of a section, as a text with its place."""
-    node = section.get(part)
-    entry = node.entry(name) if isinstance(node, SourceMapping) else None
-    key = Scalar(name, section.span) if entry is None else entry.key
-    return Located(name, key)
-
-
 def layout_settings(model: LayoutModel | None, directory: Directory, findings: Findings) -> LayoutSettings:
     """The ``layout`` section. Which engines there are is known where they are called; here only words are checked."""
     if model is None:
@@ -56,7 +46,7 @@ def layout_settings(model: LayoutModel | None, directory: Directory, findings: F
         _check_engine(model.engine, findings)
     arrange = []
     for name, how in model.arrange.items():
-        members = resolve_end(_key(model.source, "arrange", name), directory, findings)
+        members = resolve_end(key_of(model.source, "arrange", name), directory, findings)
         if members is not None:
             arrange.append((members, how.value))
     boxes = []
@@ -108,7 +98,7 @@ def _pins(model: LayoutModel, directory: Directory, findings: Findings) -> dict[
     keys: dict[int, Located[str]] = {}
     cells: dict[tuple[int, int], list[int]] = {}  # as wide as a disc: what is too close lies in one next to it
     for name, point in model.positions.items():
-        key = _key(model.source, "positions", name)
+        key = key_of(model.source, "positions", name)
         neuron = _pinned(key, directory, findings)
         if neuron is None:
             continue
