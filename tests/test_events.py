@@ -152,6 +152,13 @@ events: [{at: 5, set: {rate: 0, first: 9}}]
     assert (weight[5:] == weight[5]).all()
 
 
+def test_where_an_event_stands_does_not_show_in_the_hash() -> None:
+    text = CHAIN + "events: [{at: 2, set: {gain: 3, push: 2*gain}}]\n"
+    moved = text.replace("parameters:", "\n# a comment\n\nparameters:").replace("gain: 3", "gain:   3.0")
+    assert nv.compile_text(text).hash == nv.compile_text(moved).hash
+    assert nv.compile_text(text).hash != nv.compile_text(text.replace("gain: 3", "gain: 4")).hash
+
+
 def test_events_show_in_the_hash_and_in_what_can_change(tmp_path: Path) -> None:
     plain = nv.compile_text(CHAIN)
     later, sooner = (nv.compile_text(CHAIN + f"events: [{{at: {at}, set: {{gain: 3}}}}]") for at in (5000, 50))

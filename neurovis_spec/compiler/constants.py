@@ -120,7 +120,7 @@ def check_finite(value: Value, formula: Formula, findings: Findings) -> bool:
     """Whether a value is finite everywhere; a finding where it is not."""
     if np.all(np.isfinite(value)):
         return True
-    what = f"{value}" if np.ndim(value) == 0 else "not finite everywhere"
+    what = "not finite everywhere" if np.ndim(value) else "undefined" if np.isnan(value) else "infinite"
     findings.error("not-finite", formula.span, f"the value of this expression is {what}", _NOT_FINITE)
     return False
 

@@ -12,6 +12,8 @@ from dataclasses import fields, is_dataclass
 
 import numpy as np
 
+from neurovis_spec.language.located import Located
+
 #: Where a node of an expression stood, and what is only shown, is no content.
 _SHOWN = frozenset({"start", "end", "title", "description", "descriptions", "labels", "label", "box", "role"})
 
@@ -43,6 +45,9 @@ class _Writer:
             for key, item in sorted(value.items()):  # no mapping of a network has an order that matters
                 self.value(str(key))
                 self.value(item)
+        elif isinstance(value, Located):  # where it stands is no content
+            written = value.value
+            self.value(float(written) if isinstance(written, int) else written)
         elif is_dataclass(value) and not isinstance(value, type):
             self.put("record", type(value).__name__.encode())
             hidden = _SHOWN if type(value).__name__ not in _KEEP_START else _SHOWN - {"start"}

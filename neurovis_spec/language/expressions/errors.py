@@ -17,3 +17,8 @@ class ExpressionError(Exception):
         self.end = end
         self.hint = hint
         super().__init__(message)
+
+
+def shortened(text: str, most: int = 40) -> str:
+    """A piece of the author's text in a message: the beginning of a long one."""
+    return text if len(text) <= most else text[: most - 3] + "…"

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from neurovis_spec.language.expressions.errors import ExpressionError
+from neurovis_spec.language.expressions.errors import ExpressionError, shortened
 
 Kind = Literal["number", "name", "operator", "end"]
 
@@ -122,13 +122,13 @@ def _number(text: str, number: re.Match[str]) -> Token:
         written = text[start : tail.end()]
         raise ExpressionError(
             "malformed-number",
-            f"'{written}' is no number",
+            f"'{shortened(written)}' is no number",
             start,
             tail.end(),
             _number_hint(number.group(), tail.group()),
         )
     if math.isinf(float(number.group())):
-        message = f"{_shortened(number.group())} is beyond the range of numbers, which ends near 1.8e308"
+        message = f"{shortened(number.group(), 20)} is beyond the range of numbers, which ends near 1.8e308"
         raise ExpressionError("number-overflow", message, start, end)
     return Token("number", number.group(), start, end)
 
@@ -139,9 +139,9 @@ def _number_hint(number: str, tail: str) -> str | None:
     if number == "0" and re.fullmatch(r"[xXoObB][0-9a-fA-F]+", tail):
         return "numbers are decimal here"
     if re.fullmatch(r"[eE]", tail):
-        return f"an exponent needs digits, as in {number}e-3"
+        return f"an exponent needs digits, as in {shortened(number)}e-3"
     if _NAME.fullmatch(tail):
-        return f"for a product write {number} * {tail}"
+        return f"for a product write {shortened(number)} * {shortened(tail)}"
     return None
 
 
@@ -183,7 +183,3 @@ def _lookalike(character: str) -> str | None:
     if character.isalnum():
         return "names have ASCII letters, digits and underscores"
     return None
-
-
-def _shortened(text: str) -> str:
-    return text if len(text) <= 20 else text[:17] + "…"
