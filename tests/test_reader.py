@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import math
 import os
 import unicodedata
@@ -558,3 +559,16 @@ def test_any_change_of_a_spec_is_read_or_refused(changes: list[tuple[int, int, s
         text = text[:at] + new + text[at + gone :]
     holds(text)
     holds(text, pure=True)
+
+
+@pytest.mark.parametrize("text", ["a: [{b: 1}]", "a: [", "a: " + "[" * 100], ids=["right", "wrong", "deep"])
+def test_the_search_for_garbage_is_left_as_it_was(text: str) -> None:
+    assert gc.isenabled()
+    read(text)
+    assert gc.isenabled()
+    gc.disable()
+    try:
+        read(text)
+        assert not gc.isenabled()
+    finally:
+        gc.enable()
