@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import io
 import os
 import pickle
 import struct
@@ -12,41 +10,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from data_attempts import HERE, attempt, fault, npy, table
 from hypothesis import given
 from hypothesis import strategies as st
 
-from neurovis_spec.diagnostics import Diagnostic, Findings, Span
-from neurovis_spec.language.data_files import EdgeTable, Table, read_edges, read_table
-from neurovis_spec.language.data_files_csv import CellError, parse_edges, parse_numbers, parse_rows
+from neurovis_spec.diagnostics import Diagnostic, Findings
+from neurovis_spec.language.data_files import EdgeTable, read_edges, read_table
+from neurovis_spec.language.data_files_csv import parse_edges, parse_numbers, parse_rows
 from neurovis_spec.language.data_files_npy import parse_npy
-
-HERE = Span("net.yaml", 4, 20, 4, 30)
-
-
-def table(folder: Path, name: str, data: str | bytes) -> Table:
-    found, findings = attempt(folder, name, data)
-    assert findings == ()
-    assert found is not None
-    return found
-
-
-def fault(folder: Path, name: str, data: str | bytes) -> Diagnostic:
-    found, findings = attempt(folder, name, data)
-    assert found is None
-    assert [finding.span for finding in findings] == [HERE]
-    return findings[0]
-
-
-def attempt(folder: Path, name: str, data: str | bytes) -> tuple[Table | None, tuple[Diagnostic, ...]]:
-    (folder / name).write_bytes(data.encode() if isinstance(data, str) else data)
-    findings = Findings()
-    return read_table(name, folder, folder, HERE, findings), findings.sorted()
-
-
-def npy(array: np.ndarray, allow_pickle: bool = False) -> bytes:
-    stream = io.BytesIO()
-    np.save(stream, array, allow_pickle=allow_pickle)
-    return stream.getvalue()
+from neurovis_spec.language.data_files_table import CellError
 
 
 def npy_header(text: str, data: bytes = b"") -> bytes:
@@ -60,8 +32,13 @@ def test_csv_with_header_and_empty_cells(tmp_path: Path) -> None:
     assert got.header == ("x", "y")
     np.testing.assert_array_equal(got.values, [[1, np.nan], [-25, 0.5]])
     np.testing.assert_array_equal(got.present, [[True, False], [True, True]])
-    assert got.digest == hashlib.sha256(data.encode()).hexdigest()
     assert got.values.dtype == np.float64
+
+
+def test_csv_of_any_line_ends(tmp_path: Path) -> None:
+    for end in ("\n", "\r\n", "\r"):
+        got = table(tmp_path, "a.csv", f"x,y{end}1,2{end},4{end}{end}")
+        np.testing.assert_array_equal(got.values, [[1, 2], [np.nan, 4]])
 
 
 def test_csv_without_header_takes_the_quick_way_to_the_same_numbers(tmp_path: Path) -> None:
@@ -76,6 +53,7 @@ def test_csv_without_header_takes_the_quick_way_to_the_same_numbers(tmp_path: Pa
 def test_an_empty_line_of_one_column_is_an_empty_cell(tmp_path: Path) -> None:
     got = table(tmp_path, "a.csv", "1\n\n3\n\n\n")
     np.testing.assert_array_equal(got.values, [[1], [np.nan], [3]])
+    np.testing.assert_array_equal(table(tmp_path, "b.csv", "\n1\n").values, [[np.nan], [1]])
 
 
 @given(st.lists(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=3, max_size=3), min_size=1))
@@ -107,6 +85,8 @@ def test_csv_numbers_read_back_exactly(rows: list[list[float]]) -> None:
         ('1,"2\n', "file-format", "no CSV"),
         ("1,2\x00\n", "file-format", "row 1, column 2"),
         ("1," + "9" * 200_000, "file-format", "row 1"),
+        ("x,y\n1,2\n" + "9" * 200_000, "file-format", "row 3 is no CSV"),
+        ("1,\x1b[2J\n", "file-format", "row 1, column 2: '?[2J' is no number"),
     ],
 )
 def test_faults_of_a_csv(tmp_path: Path, data: str | bytes, code: str, words: str) -> None:
@@ -115,6 +95,17 @@ def test_faults_of_a_csv(tmp_path: Path, data: str | bytes, code: str, words: st
     assert words in finding.message
     assert "'a.csv'" in finding.message
     assert len(finding.message) < 300
+
+
+def test_a_table_of_too_many_cells_is_refused_before_they_are_made(tmp_path: Path) -> None:
+    for name, data in (
+        ("a.csv", b"," * 2**25 + b"\n"),
+        ("b.csv", b"x\n" * (2**25 + 1)),
+        ("c.npy", npy(np.zeros(2**25 + 1, dtype="u1"))),
+    ):
+        finding = fault(tmp_path, name, data)
+        assert finding.code == "too-large"
+        assert "33,554,432 cells" in finding.message
 
 
 def test_semicolons_are_explained(tmp_path: Path) -> None:
@@ -159,6 +150,11 @@ class Bomb:
         (npy(np.array([1, np.inf])), "not-finite", "row 2, column 1 is infinity"),
         (npy(np.zeros(8))[:-1], "file-format", "64 bytes"),
         (npy(np.zeros(8)) + b"x", "file-format", "64 bytes"),
+        (
+            npy_header("{'descr': '<f8', 'fortran_order': False, 'shape': (" + "9" * 4000 + ",)}"),
+            "file-format",
+            "bytes",
+        ),
         (npy_header("{'descr': '<f8', 'fortran_order': False, 'shape': (10**9,)}"), "file-format", ""),
         (
             npy_header("{'descr': '<f8', 'fortran_order': False, 'shape': (9999999999999, 999999999)}"),
@@ -197,7 +193,7 @@ def test_nothing_but_its_own_error_leaves_a_parser(noise: bytes, at: int, patch:
             continue
         assert np.isfinite(values).all()
     for data in (noise, b"from,to,weight\n" + noise):
-        for parse in (parse_numbers, lambda data: parse_edges(parse_rows(data), "")):
+        for parse in (parse_numbers, lambda data: parse_edges(parse_rows(data))):
             with suppress(CellError):
                 parse(data)
 
@@ -215,14 +211,14 @@ def test_edges_by_the_names_of_the_columns(tmp_path: Path) -> None:
     assert got.sources == ("K1", "K2")
     assert got.targets == ("O1", "O2")
     assert got.weights.tolist() == [0.5, 1.0]
-    assert got.delays == (None, 3)
-    assert got.rows == (2, 3)
+    assert got.delays.tolist() == [-1, 3]
+    assert got.rows.tolist() == [2, 3]
 
 
 def test_edges_without_delays(tmp_path: Path) -> None:
     got, _ = edges(tmp_path, "from,to,weight\nK1,O1,-2\n")
     assert got is not None
-    assert (got.weights.tolist(), got.delays) == ([-2.0], (None,))
+    assert (got.weights.tolist(), got.delays.tolist()) == ([-2.0], [-1])
 
 
 @pytest.mark.parametrize(

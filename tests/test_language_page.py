@@ -13,6 +13,8 @@ import yaml
 
 import neurovis_spec as nv
 from neurovis_spec.compiler.constants import RESERVED
+from neurovis_spec.language.data_files import KINDS, LARGEST
+from neurovis_spec.language.data_files_table import MOST_CELLS
 from neurovis_spec.manual.keys import keys
 
 ROOT = Path(__file__).parents[1]
@@ -36,6 +38,8 @@ def folder(tmp_path: Path) -> Path:
     data.mkdir()
     np.savetxt(data / "sensed.csv", [[0.5], [0.25]], delimiter=",")
     np.savetxt(data / "centres.csv", np.eye(2, 4), delimiter=",")
+    np.savez_compressed(data / "trained.npz", weights=np.ones((2, 4)), bias=np.zeros(4))
+    (data / "feedback.mtx").write_text("%%MatrixMarket matrix coordinate pattern general\n4 2 2\n1 1\n4 2\n")
     (data / "edges.csv").write_text("from,to,weight,delay\nK1,O,0.5,1\nK2,O,,2\n", encoding="utf-8")
     return tmp_path
 
@@ -125,12 +129,11 @@ def test_the_names_of_parameters_that_are_taken() -> None:
     assert set(re.findall(r"`(\w+)`", line)) == set(RESERVED)
 
 
-@pytest.mark.parametrize("suffix", [".npz", ".mtx"])
-def test_files_that_are_not_read_yet(suffix: str, tmp_path: Path) -> None:
-    (tmp_path / f"m{suffix}").write_bytes(b"%%MatrixMarket matrix array real general\n1 1\n1\n")
-    spec = f"neurovis: 1\nname: x\nneurons: {{A: {{}}}}\nconnections: {{A -> A: {{matrix: {{file: m{suffix}}}}}}}"
-    with pytest.raises(nv.SpecError):
-        nv.compile_text(spec, folder=tmp_path)
+def test_the_data_files_are_those_that_are_read() -> None:
+    section = PAGE.partition("### Data files")[2].partition("\n### ")[0]
+    assert tuple(re.findall(r"^\| `(\.\w+)`", section, re.MULTILINE)) == KINDS
+    assert f"{MOST_CELLS:,} cells" in section
+    assert f"{LARGEST >> 20} MiB" in section
 
 
 def test_links_within_the_page_lead_somewhere() -> None:

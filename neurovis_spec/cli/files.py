@@ -19,12 +19,14 @@ from neurovis_spec.cli.progress import progress
 
 if TYPE_CHECKING:
     from neurovis_spec.api import CompiledNetwork
-    from neurovis_spec.compiler.network import FloatArray
+    from neurovis_spec.compiler.network import FloatArray, Network
     from neurovis_spec.runtime.recording import Recording
 
 STDIN: Final = "<stdin>"
 #: characters read from standard input: more than the language allows, so that its own limit speaks
 _LARGEST: Final = (64 << 20) + 1
+#: kinds of files that stand in for the source of an input
+_INPUTS: Final = (".csv", ".npy")
 
 
 def compiled(
@@ -76,19 +78,22 @@ def recording_of(path: str | None) -> Recording | None:
     return api.load(path)
 
 
-def tables(named: Mapping[str, str]) -> dict[str, FloatArray]:
-    """Input name to array (steps, columns) of the ``.csv`` and ``.npy`` files. Raises SpecError with all findings."""
+def tables(named: Mapping[str, str], network: Network) -> dict[str, FloatArray]:
+    """Input name to array (steps, columns) of the ``.csv`` and ``.npy`` files, none of which is opened before every
+    name is known. Raises InputError, or SpecError with all findings."""
     if not named:
         return {}
     from neurovis_spec.diagnostics import Findings, Span
     from neurovis_spec.language.data_files import read_table
+    from neurovis_spec.runtime.inputs import check_names
 
+    check_names(network, named)
     findings = Findings()
     arrays: dict[str, FloatArray] = {}
     for name, text in named.items():
         place = Span(text, 1, 1, 1, 1)
         folder = Path(text).resolve().parent
-        table = read_table(Path(text).resolve().name, folder, folder, place, findings)
+        table = read_table(Path(text).resolve().name, folder, folder, place, findings, kinds=_INPUTS)
         if table is None:
             continue
         if not table.present.all():

@@ -64,7 +64,7 @@ def command(
     check_target(output)
     _check_format(output)
     network = network_of(spec, settings)
-    arrays, before = tables(inputs), recording_of(start)
+    arrays, before = tables(inputs, network.network), recording_of(start)
     begun = perf_counter()
     with progress("running") as bar:
         recording = network.run(steps, arrays, backend=backend, every=every, start=before, progress=bar)

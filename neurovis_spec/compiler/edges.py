@@ -123,7 +123,7 @@ class EdgeReader:
         self.constants.findings.error("edge-outside", span, message, hint)
 
     def _from_file(self, reference: FileReference) -> EdgeList | None:
-        table = self.files.edges(reference.path)
+        table = self.files.edges(reference)
         if table is None:
             return None
         span = reference.path.span
@@ -134,18 +134,19 @@ class EdgeReader:
         j = self._named(table.targets, table.rows, self.targets, "target", span)
         if i is None or j is None:
             return None
-        delays = np.array([-1 if delay is None else delay for delay in table.delays], dtype=np.int64)
-        if delays.max() > LONGEST_DELAY:
-            message = f"row {table.rows[int(delays.argmax())]} of the file: a delay must be at most {LONGEST_DELAY:,}"
+        if table.delays.max() > LONGEST_DELAY:
+            message = (
+                f"row {table.rows[int(table.delays.argmax())]} of the file: a delay must be at most {LONGEST_DELAY:,}"
+            )
             self.constants.findings.error("out-of-range", span, message)
             return None
-        return EdgeList(i, j, np.asarray(table.weights, dtype=np.float64), delays)
+        return EdgeList(i, j, table.weights, table.delays)
 
     def _named(
-        self, names: tuple[str, ...], rows: tuple[int, ...], known: Mapping[str, int], what: str, span: Span
+        self, names: tuple[str, ...], rows: IntArray, known: Mapping[str, int], what: str, span: Span
     ) -> IntArray | None:
         positions = np.array([known.get(name, -1) for name in names], dtype=np.int64)
-        unknown = {names[place]: rows[place] for place in reversed(np.flatnonzero(positions < 0).tolist())}
+        unknown = {names[place]: int(rows[place]) for place in reversed(np.flatnonzero(positions < 0).tolist())}
         for name in sorted(unknown, key=unknown.__getitem__)[:PATIENCE]:
             self._outside(name, span, known, what, f" (row {unknown[name]} of the file)")
         return None if unknown else positions

@@ -47,12 +47,7 @@ def grid_of(
     In its cells ``i`` is the source and ``j`` the target, also where ``by_target`` its rows are targets.
     """
     if isinstance(matrix, FileReference):
-        if matrix.key is not None:
-            constants.findings.error(
-                "unsupported", matrix.key.span, "archives of arrays are not read by this version yet"
-            )
-            return None
-        table = files.table(matrix.path)
+        table = files.table(matrix)
         grid = None if table is None else Grid(table.values, table.present, matrix.path.span)
         return None if grid is None else fit(grid, n, m, by_target, constants.findings)
     return _written(matrix, n, m, by_target, constants, stream)

@@ -36,15 +36,7 @@ def positions_of(
     if node is None:
         return np.full((n, 2), np.nan)
     if isinstance(node, FileReference):
-        table = files.table(node.path)
-        if table is None:
-            return None
-        if table.values.shape != (n, 2) or not table.present.all():
-            rows, columns = table.values.shape
-            message = f"positions of {n} neurons are {n} rows of 2 numbers; the file has {rows} × {columns}"
-            constants.findings.error("wrong-size", node.path.span, message)
-            return None
-        return np.array(table.values, dtype=np.float64)
+        return _from_file(node, n, constants, files)
     items = node.items
     if n == 1 and items and not isinstance(items[0], (Sequence, Packed)):
         items = (Sequence(items, node.span),)
@@ -56,3 +48,20 @@ def positions_of(
     if any(point is None for point in points):
         return None
     return np.array([point for point in points if point is not None], dtype=np.float64)
+
+
+def _from_file(reference: FileReference, n: int, constants: Constants, files: Files) -> FloatArray | None:
+    table = files.table(reference)
+    if table is None:
+        return None
+    rows, columns = table.values.shape
+    if (rows, columns) != (n, 2):
+        wanted = f"positions of {plural(n, 'neuron')} are {plural(n, 'row')} of 2 numbers"
+        constants.findings.error("wrong-size", reference.path.span, f"{wanted}; the file has {rows} × {columns}")
+        return None
+    if not table.present.all():
+        row, column = divmod(int(np.argmin(table.present)), 2)
+        message = f"row {row + 1}, column {column + 1} of the file is empty; a position is two numbers"
+        constants.findings.error("file-format", reference.path.span, message)
+        return None
+    return np.array(table.values, dtype=np.float64)

@@ -48,11 +48,11 @@ def _make(name: str, model: InputModel, start: int, spec: Spec, constants: Const
         tree = _expression(model.expression, constants)
         return None if tree is None else Input(name, start, 1, expression=tree)
     if model.file is not None:
-        table = files.table(model.file)
+        table = files.table_at(model.file)
         if table is None:
             return None
         if not table.present.all():
-            row, column = np.argwhere(~table.present)[0]
+            row, column = divmod(int(np.argmin(table.present)), table.present.shape[1])
             message = f"row {row + 1}, column {column + 1} of the file is empty; an input needs a number everywhere"
             findings.error("file-format", model.file.span, message)
             return None

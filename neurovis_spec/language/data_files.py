@@ -6,36 +6,24 @@ that place. Files are opened only inside the root, only if they are regular ones
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Iterable
 from pathlib import Path, PureWindowsPath
 from typing import Final
 
-import numpy as np
-from numpy.typing import NDArray
-
 from neurovis_spec.diagnostics import Findings, Span, suggest
-from neurovis_spec.language.data_files_csv import CellError, EdgeTable, Rows, parse_edges, parse_numbers, parse_rows
+from neurovis_spec.language.data_files_csv import EdgeTable, parse_edges, parse_numbers, parse_rows
+from neurovis_spec.language.data_files_mtx import parse_mtx
 from neurovis_spec.language.data_files_npy import parse_npy
+from neurovis_spec.language.data_files_npz import parse_npz
+from neurovis_spec.language.data_files_table import CellError, Table, full
+from neurovis_spec.language.located import Located
 from neurovis_spec.language.reader_files import FileFault, read_bytes
 
-__all__ = ["EdgeTable", "Table", "locate", "read_data", "read_edges", "read_table"]
+__all__ = ["KINDS", "EdgeTable", "Table", "locate", "read_data", "read_edges", "read_table"]
 
 LARGEST: Final = 256 << 20  # bytes; ten million connections in double precision are 80 MB
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Table:
-    """Numbers in rows. ``values`` (rows × columns, float64) is NaN exactly where ``present`` is false: an empty cell.
-
-    ``header`` holds the names of the columns, where the file has them; ``digest`` is the SHA-256 of its bytes, in hex.
-    """
-
-    values: NDArray[np.float64]
-    present: NDArray[np.bool_]
-    header: tuple[str, ...] | None
-    digest: str
+#: files that hold a table of numbers
+KINDS: Final = (".csv", ".npy", ".npz", ".mtx")
 
 
 def locate(path_text: str, root: Path, base: Path, span: Span, findings: Findings) -> Path | None:
@@ -77,50 +65,77 @@ def read_data(path_text: str, root: Path, base: Path, span: Span, findings: Find
     return data
 
 
-def read_table(path_text: str, root: Path, base: Path, span: Span, findings: Findings) -> Table | None:
-    """A table of numbers from a ``.csv`` or ``.npy`` file; a one-dimensional array is a column.
+def read_table(
+    path_text: str,
+    root: Path,
+    base: Path,
+    span: Span,
+    findings: Findings,
+    key: Located[str] | None = None,
+    *,
+    keyed: bool = True,
+    kinds: Iterable[str] = KINDS,
+) -> Table | None:
+    """A table of numbers from a file of one of these ``kinds``; an array of one dimension is a column.
 
-    A ``.csv`` may begin with a row of texts, the header; its empty cells are absent. Codes: those of ``locate``, and
-    ``file-kind``, ``file-unreadable``, ``too-large``, ``file-format``, ``not-finite``.
+    A ``.csv`` may begin with a row of texts, the header; its empty cells are absent, and so is what an ``.mtx`` and a
+    sparse ``.npz`` leave out. ``key`` names an array of an ``.npz``; ``keyed`` says whether the author can give one at
+    this place. Codes: those of ``read_data``, and ``file-format``, ``invalid-utf8``, ``not-finite``, ``missing-key``,
+    ``unknown-array``, ``useless-key``.
     """
-    parsers: dict[str, Callable[[bytes], Rows]] = {".csv": parse_numbers, ".npy": _npy}
     suffix = Path(path_text).suffix.lower()
-    if suffix not in parsers:
+    if suffix not in kinds:
         message = f"'{_short(path_text)}' is no kind of file that holds numbers"
-        findings.error("file-format", span, message, "known: " + ", ".join(parsers))
+        findings.error("file-format", span, message, "known: " + ", ".join(kinds))
+        return None
+    if key is not None and suffix != ".npz":
+        _refuse_key(key, findings)
         return None
     data = read_data(path_text, root, base, span, findings)
     if data is None:
         return None
     try:
-        rows = parsers[suffix](data)
+        if suffix == ".csv":
+            return parse_numbers(data)
+        if suffix == ".npy":
+            return full(parse_npy(data))
+        if suffix == ".mtx":
+            return parse_mtx(data)
+        return parse_npz(data, None if key is None else key.value)
     except CellError as error:
-        _refuse(error, path_text, span, findings)
+        if error.code == "missing-key" and not keyed:
+            error = CellError("file-format", str(error), "keep the one that is meant in a file of its own")
+        place = key.span if key is not None and error.code == "unknown-array" else span
+        _refuse(error, path_text, place, findings)
         return None
-    return Table(rows.values, rows.present, rows.header, hashlib.sha256(data).hexdigest())
 
 
-def read_edges(path_text: str, root: Path, base: Path, span: Span, findings: Findings) -> EdgeTable | None:
+def read_edges(
+    path_text: str, root: Path, base: Path, span: Span, findings: Findings, key: Located[str] | None = None
+) -> EdgeTable | None:
     """A list of edges from a ``.csv`` file whose header names the columns from, to, weight and perhaps delay.
 
-    An empty weight is 1, an empty delay None. Codes: those of ``read_table``.
+    An empty weight is 1, an empty delay −1; a ``key`` is refused. Codes: those of ``read_data``, and ``file-format``,
+    ``invalid-utf8``, ``not-finite``, ``useless-key``.
     """
     if Path(path_text).suffix.lower() != ".csv":
         findings.error("file-format", span, f"edges are read from a .csv file, not from '{_short(path_text)}'")
         return None
+    if key is not None:
+        _refuse_key(key, findings)
+        return None
     data = read_data(path_text, root, base, span, findings)
     if data is None:
         return None
     try:
-        return parse_edges(parse_rows(data), hashlib.sha256(data).hexdigest())
+        return parse_edges(parse_rows(data))
     except CellError as error:
         _refuse(error, path_text, span, findings)
         return None
 
 
-def _npy(data: bytes) -> Rows:
-    values = parse_npy(data)
-    return Rows(values, np.ones(values.shape, dtype=np.bool_), None)
+def _refuse_key(key: Located[str], findings: Findings) -> None:
+    findings.error("useless-key", key.span, "'key' names an array of an .npz file, and this file is none")
 
 
 def _refuse(error: CellError, path_text: str, span: Span, findings: Findings) -> None:

@@ -87,7 +87,7 @@ class InputModel(Model):
     PLACE: ClassVar[str] = "an input"
 
     expression: FormulaField | None = Field(None, description="A formula of k (the step), t (seconds) and parameters.")
-    file: TextField | None = Field(None, description="A .csv or .npy file, one row a step; the last row stays.")
+    file: TextField | None = Field(None, description="A .csv, .npy or .npz file, one row a step; the last row stays.")
     values: Annotated[
         Sequence | Packed | None,
         Leaf(_table, {"type": "array", "items": FORMULAS}),

@@ -6,7 +6,7 @@ at a time, the same stretches however one runs, so that stepping and running giv
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -91,6 +91,12 @@ class InputReader:
             return stream.drawn(node.kind, first, second, i, 0, step, node.index)
 
         return evaluate_array(noise.expression, known, draw)
+
+
+def check_names(network: Network, names: Iterable[str]) -> None:
+    """Refuse a name that no input has. Raises InputError."""
+    for name in names:
+        _entry(network, name)
 
 
 def _entry(network: Network, name: str) -> Input:

@@ -1,0 +1,95 @@
+"""What every kind of data file gives: numbers in rows, or a CellError that says what is wrong and where.
+
+In: shapes and entries as a file states them. Out: Table. Memory is taken only after the number of cells was checked.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: a table has at most this many cells: 256 MiB in double precision
+MOST_CELLS: Final = 1 << 25
+#: what to do with a sparse matrix that has more
+SPARSER: Final = "list its entries as 'edges', or divide it among several entries of 'connections'"
+
+
+class CellError(ValueError):
+    """What is wrong with a file: a finding's code, a sentence that names the place, and perhaps a hint."""
+
+    def __init__(self, code: str, message: str, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.code = code
+        self.hint = hint
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Table:
+    """Numbers (rows × columns; NaN where not ``present``), and the names of the columns, if any."""
+
+    values: NDArray[np.float64]
+    present: NDArray[np.bool_]
+    header: tuple[str, ...] | None = None
+
+
+def check_cells(cells: int, hint: str | None = None) -> None:
+    """Refuse a table that is too large, before memory is taken for it. Raises CellError."""
+    if cells > MOST_CELLS:
+        raise CellError("too-large", f"it has more than {MOST_CELLS:,} cells, the most that are read", hint)
+
+
+def check_finite(values: NDArray[np.float64]) -> None:
+    """Refuse NaN and infinity, naming the first one, row by row. Raises CellError."""
+    finite = np.isfinite(values)
+    if not finite.all():
+        row, column = divmod(int(np.argmin(finite)), values.shape[1])
+        raise CellError("not-finite", f"row {row + 1}, column {column + 1} is {not_finite(values[row, column])}")
+
+
+def not_finite(value: float) -> str:
+    """NaN or infinity, in words."""
+    return "NaN" if math.isnan(value) else "infinity"
+
+
+def full(values: NDArray[np.float64]) -> Table:
+    """Table in which no cell is missing."""
+    return Table(values, np.ones(values.shape, dtype=np.bool_))
+
+
+def scattered(
+    shape: tuple[int, int], i: NDArray[np.int64], j: NDArray[np.int64], numbers: NDArray[np.float64]
+) -> Table:
+    """Table that hold these numbers at rows i and columns j (from 0) and nothing elsewhere."""
+    values = np.full(shape, np.nan)
+    values[i, j] = numbers
+    return Table(values, ~np.isnan(values))
+
+
+def repeated(i: NDArray[np.int64], j: NDArray[np.int64], columns: int) -> tuple[int, int] | None:
+    """Two entries of the same cell, the later one as early as can be; None where each cell has one at most."""
+    cells = i * columns + j
+    order = np.argsort(cells, kind="stable")
+    again = np.flatnonzero(np.diff(cells[order]) == 0)
+    if not len(again):
+        return None
+    place = int(again[np.argmin(order[again + 1])])
+    return int(order[place]), int(order[place + 1])
+
+
+def printable(text: str) -> str:
+    """A text of a file in a sentence: the beginning of a long one, nothing that a terminal would obey.
+
+    >>> printable("a" + chr(27) + "[2J")
+    'a?[2J'
+    """
+    short = text if len(text) <= 40 else text[:38] + "…"
+    return "".join(character if character.isprintable() else "?" for character in short)
+
+
+def quoted(text: str) -> str:
+    """The same, in quotes."""
+    return f"'{printable(text)}'"
