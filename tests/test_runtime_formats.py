@@ -236,6 +236,7 @@ class Bomb:
         header("(2.0, 2)") + bytes(32),
         header("(2, 2)", "'|O'") + pickle.dumps([[Bomb()] * 2] * 2),
         header("(2, 2)", "'<f8, <f8'") + bytes(64),
+        header("(2, 2)", "'<M8[Y/0]'") + bytes(32),  # ends the process when NumPy's own reader meets it
         header("(" * 60),
         b"\x93NUMPY\x09\x00" + bytes(64),
     ],

@@ -144,7 +144,7 @@ def _sizes(words: tuple[str, ...], text: bytes, line: int) -> _Head:
         raise CellError("file-format", f"line {line}: a matrix has one row and one column at least")
     if symmetry != "general" and rows != columns:
         raise CellError("file-format", f"line {line}: {rows} × {columns} cannot be {symmetry}")
-    check_cells(rows * columns, SPARSER)
+    check_cells(rows * columns, hint=SPARSER)
     lower = {"general": rows * columns, "symmetric": rows * (rows + 1) // 2, "skew-symmetric": rows * (rows - 1) // 2}
     entries = int(sizes[2]) if sparse else lower[symmetry]
     if entries > lower[symmetry]:

@@ -97,7 +97,7 @@ def _sparse(archive: Archive) -> Table:
     if len(sizes) != 2 or sizes.min() < 1:
         raise CellError("file-format", "'shape': a matrix has two sizes of at least 1")
     rows, columns = (int(size) for size in sizes)
-    check_cells(rows * columns, SPARSER)
+    check_cells(rows * columns, hint=SPARSER)
     with np.errstate(over="ignore", invalid="ignore"):
         values = archive.vector("data", REAL).astype(np.float64)
     if kind == "coo":

@@ -36,10 +36,10 @@ class Table:
     header: tuple[str, ...] | None = None
 
 
-def check_cells(cells: int, hint: str | None = None) -> None:
+def check_cells(cells: int, most: int = MOST_CELLS, *, hint: str | None = None) -> None:
     """Refuse a table that is too large, before memory is taken for it. Raises CellError."""
-    if cells > MOST_CELLS:
-        raise CellError("too-large", f"it has more than {MOST_CELLS:,} cells, the most that are read", hint)
+    if cells > most:
+        raise CellError("too-large", f"it has more than {most:,} cells, the most that are read", hint)
 
 
 def check_finite(values: NDArray[np.float64]) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -19,6 +20,8 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.compiler.network import IntArray
+from neurovis_spec.language.data_files_npy import LONGEST_HEADER, read_header
+from neurovis_spec.language.data_files_table import CellError
 from neurovis_spec.runtime.files import regular_size, replacing
 from neurovis_spec.runtime.recording import Recording, RecordingError
 
@@ -102,20 +105,16 @@ def _arrays(path: Path) -> dict[str, Array]:
 
 def _array(file: IO[bytes], name: str, size: int, kinds: str, dimensions: int) -> Array:
     """One array, its header checked before its data is read."""
-    version = np.lib.format.read_magic(file)
-    read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}.get(version)
-    if read is None:
-        raise RecordingError(f"'{name}': version {version} of the array format")
-    shape, fortran, dtype = read(file)
-    if dtype.hasobject or dtype.kind not in kinds or len(shape) != dimensions or min(shape, default=0) < 0:
-        raise RecordingError(f"'{name}' is of another type or shape: {dtype}, {shape}")
-    count = math.prod(shape)
-    if count * dtype.itemsize != size - file.tell():
-        raise RecordingError(f"'{name}' is shorter or longer than it says")
-    if not count or not dtype.itemsize:
-        return np.zeros(shape, dtype)
-    data: Array = np.frombuffer(file.read(count * dtype.itemsize), dtype=dtype, count=count)
-    return data.reshape(shape, order="F" if fortran else "C")
+    try:
+        header = read_header(file.read(LONGEST_HEADER), size, kinds, (dimensions,), most=sys.maxsize)
+    except CellError as error:
+        raise RecordingError(f"'{name}' is of another type or shape: {error}") from None
+    file.seek(header.offset)
+    count = math.prod(header.shape)
+    if not count:
+        return np.zeros(header.shape, header.dtype)
+    data: Array = np.frombuffer(file.read(count * header.dtype.itemsize), dtype=header.dtype, count=count)
+    return data.reshape(header.shape, order="F" if header.column_major else "C")
 
 
 def _recording(arrays: Mapping[str, Array]) -> Recording:
