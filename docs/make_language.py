@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from neurovis_spec import plugins
-from neurovis_spec.language.spec import ENGINES
+from neurovis_spec.language.drawing import ENGINES
 from neurovis_spec.manual.builtins import Builtin, builtins
 from neurovis_spec.manual.keys import Key, keys, keys_of
 from neurovis_spec.manual.words import ALL_PATTERNS, functions, names

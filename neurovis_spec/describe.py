@@ -23,7 +23,7 @@ def describe(network: Network, engine: tuple[str, str]) -> dict[str, object]:
             {
                 "name": name,
                 "group": group.name,
-                "module": None,
+                "module": group.module,
                 "activation": group.activation,
                 "model": group.model,
                 "combine": group.combine,

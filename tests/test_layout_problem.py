@@ -8,7 +8,8 @@ from networks_by_hand import cpg_rbf
 
 from neurovis_spec.compiler.network import LayoutSettings
 from neurovis_spec.layout.arrange import lay_out
-from neurovis_spec.layout.problem import canonical, edge_key, natural_key, problem_of
+from neurovis_spec.layout.naming import edge_key, natural_key
+from neurovis_spec.layout.problem import canonical, problem_of
 
 
 def test_numbers_in_names_count_as_numbers() -> None:

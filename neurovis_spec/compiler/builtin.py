@@ -12,9 +12,9 @@ from importlib.resources import files
 from neurovis_spec import plugins
 from neurovis_spec.compiler.definitions import Definitions, define
 from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.library import Library
 from neurovis_spec.language.reader import read_text
 from neurovis_spec.language.shape import read_library
-from neurovis_spec.language.spec import Library
 
 
 @cache

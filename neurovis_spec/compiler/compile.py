@@ -7,36 +7,33 @@ is held back.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from neurovis_spec.compiler.builtin import builtin_definitions
-from neurovis_spec.compiler.connect import Bundle, Connector, join
-from neurovis_spec.compiler.constants import RESERVED, Constants
-from neurovis_spec.compiler.definitions import define
+from neurovis_spec.compiler.connect import Bundle, connect, join
+from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.events import EventReader, with_phases
 from neurovis_spec.compiler.gaps import gaps_of
 from neurovis_spec.compiler.limits import MOST_SIGNALS, Limits, amount
 from neurovis_spec.compiler.lower import make_blocks, make_plasticity, make_program
-from neurovis_spec.compiler.network import IntArray, Network
+from neurovis_spec.compiler.modules import library_of
+from neurovis_spec.compiler.network import Instance, IntArray, Network
 from neurovis_spec.compiler.noise import make_noises
 from neurovis_spec.compiler.order import Cycle, levels
-from neurovis_spec.compiler.populate import Population, key_span, populate
-from neurovis_spec.compiler.references import Directory
+from neurovis_spec.compiler.parameters import make_parameters
+from neurovis_spec.compiler.populate import Population, populate
+from neurovis_spec.compiler.references import Directory, key_span
 from neurovis_spec.compiler.sections import check_ros, layout_settings, make_outputs, render_settings
-from neurovis_spec.compiler.signals import make_inputs
-from neurovis_spec.compiler.tables import Files
-from neurovis_spec.compiler.warnings import warn
-from neurovis_spec.diagnostics import Diagnostic, Findings, Span, SpecError, suggest
-from neurovis_spec.language.expressions.tree import names
+from neurovis_spec.compiler.units import Expander, Unit, constants_of
+from neurovis_spec.compiler.warnings import Compiled, warn
+from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError, suggest
+from neurovis_spec.language.includes import Includes, read_includes
 from neurovis_spec.language.model import opening
 from neurovis_spec.language.spec import Spec
-from neurovis_spec.language.values import Parameter
 
 
 @dataclass(frozen=True)
@@ -48,25 +45,33 @@ class Request:
     parameters: Mapping[str, float] = field(default_factory=dict)
     seed: int | None = None
     limits: Limits = field(default_factory=Limits)
+    #: the included files, where they are read already
+    includes: Includes | None = None
 
 
 def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_events: bool = True) -> Network | None:
     """The network of a spec; None where it is at fault (the findings say why)."""
     before = findings.errors
     seed = request.seed if request.seed is not None else 0 if spec.seed is None else spec.seed.value
+    includes = request.includes
+    if includes is None:
+        includes = read_includes(spec, request.base, request.root, findings)
+        request = replace(request, includes=includes)
     gaps = gaps_of(spec)
     constants = Constants(
         {}, 1.0, findings, broken=set(gaps.names["parameters"]), incomplete="parameters" in gaps.sections
     )
     _step_length(spec, constants)
-    definitions = define(spec, findings, builtin_definitions(), constants.dt)
-    _parameters(spec, constants, request.parameters)
+    library = library_of(spec, includes, request.base, constants.dt, findings)
+    make_parameters(spec, constants, request.parameters)
+    _check_given(spec, constants, request.parameters)
     steps, episode = _clock(spec, constants)
-    files = Files(request.base, request.root, findings)
-    inputs = make_inputs(spec, constants, files)
-    missing = spec.inputs.keys() - {entry.name for entry in inputs}
-    definitions = replace(definitions, gaps=definitions.gaps.with_names("inputs", gaps.names["inputs"] | missing))
-    population = populate(spec, constants, definitions, inputs, files, request.limits, seed)
+    expander = Expander(library, request.root, findings, constants.dt)
+    expansion = expander.expand(spec, constants, request.base)
+    units, inputs = expansion.units, expansion.inputs
+    population = populate(units, request.limits, seed)
+    if with_events:
+        _look_at_unused(expander, request.limits, seed)
     render = render_settings(spec.render, findings)
     check_ros(spec.ros, findings)
     if not len(population.neurons):
@@ -74,12 +79,10 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
         return None
     directory = population.directory
     outputs = make_outputs(spec, directory, findings)
-    layout = layout_settings(spec.layout, directory, findings)
-    by_name = {entry.name: entry for entry in inputs}
-    connector = Connector(spec, population, by_name, constants, definitions, files, request.limits, seed)
-    bundles = connector.connect()
-    noisy = tuple((group, spec.neurons[group.name].noise) for group in population.neurons.groups)
-    noises = make_noises(noisy, sum(entry.size for entry in inputs), constants)
+    layout = layout_settings(spec.layout, units, population, findings)
+    bundles = connect(units, population, request.limits, seed)
+    noises = make_noises(units, population, sum(entry.size for entry in inputs))
+    expansion.depend()
     if bundles is None or findings.errors > before or not _under_way(bundles, findings):
         EventReader(None, directory, constants).read(spec.events)
         return None
@@ -128,13 +131,35 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
         render=render,
         hash=content,
         noises=noises,
+        instances=_instances(units, population),
     )
     if not with_events:
         return network
     made = _eventful(spec, request, network, directory, constants)
     if made is not None and not findings.failed:  # the shape may have been at fault
-        warn(spec, made, bundles, findings)
+        warn(Compiled(spec, units, library, expander.used, made, bundles), findings)
     return made
+
+
+def _look_at_unused(expander: Expander, limits: Limits, seed: int) -> None:
+    """A module that nobody uses is looked at by itself, with its own parameters: mistakes are found at once."""
+    for name, module in expander.library.modules.items():
+        if name not in expander.used:
+            constants = constants_of(module, expander.dt, expander.findings)
+            make_parameters(module.model, constants, {})
+            units = expander.expand(module.model, constants, module.folder, name).units
+            population = populate(units, limits, seed)
+            connect(units, population, limits, seed)
+            make_noises(units, population, 0)
+            layout_settings(None, units, population, expander.findings)
+
+
+def _instances(units: tuple[Unit, ...], population: Population) -> tuple[Instance, ...]:
+    return tuple(
+        Instance(unit.path, unit.module, members.start, len(members), unit.declared, unit.number)
+        for unit, members in zip(units, (directory.members for directory in population.directories), strict=True)
+        if unit.module is not None
+    )
 
 
 def _eventful(
@@ -149,7 +174,7 @@ def _eventful(
 
     def again(values: Mapping[str, float]) -> Network | None:
         parameters = {**request.parameters, **values}
-        changed = Request(request.base, request.root, parameters, network.seed, request.limits)
+        changed = replace(request, parameters=parameters, seed=network.seed)
         return compile_spec(spec, changed, findings, with_events=False)
 
     if findings.errors > before:
@@ -162,7 +187,7 @@ def _eventful(
 def _report_no_neurons(spec: Spec, population: Population, findings: Findings) -> None:
     """Without neurons nothing else can be looked at; if that is because groups are at fault, it is said already."""
     gaps = population.directory.gaps
-    if "neurons" in gaps.sections or gaps.names["neurons"]:
+    if gaps.sections & {"neurons", "instances"} or gaps.names["neurons"] or gaps.names["instances"]:
         return
     node = spec.source.entry("neurons")
     span = opening(spec.source) if node is None else node.key.span
@@ -193,42 +218,14 @@ def _step_length(spec: Spec, constants: Constants) -> None:
         constants.dt = dt
 
 
-def _parameters(spec: Spec, constants: Constants, given: Mapping[str, float]) -> None:
-    """The parameters in the order written; what is set replaces the value, within its bounds."""
-    findings = constants.findings
-    for name, parameter in spec.parameters.items():
-        _parameter(name, parameter, key_span(spec, "parameters", name), constants, given)
+def _check_given(spec: Spec, constants: Constants, given: Mapping[str, float]) -> None:
+    """What is set from outside must be parameters of the spec."""
     for name in given:
         if name not in spec.parameters:
             node = spec.source.entry("parameters")
             span = opening(spec.source) if node is None else node.key.span
             hint = suggest(name, spec.parameters, "parameters") or "the spec has no parameters"
-            findings.error("unknown-parameter", span, f"there is no parameter '{name}' to be set", hint)
-
-
-def _parameter(name: str, parameter: Parameter, span: Span, constants: Constants, given: Mapping[str, float]) -> None:
-    findings = constants.findings
-    if name in RESERVED:
-        message = f"a parameter may not be called '{name}': the language gives this name a meaning of its own"
-        findings.error("reserved-name", span, message)
-    tree = constants.tree(parameter.value, what="parameters before this one, and constants")
-    constants.uses[name] = frozenset() if tree is None or name in given else names(tree)
-    value = None if tree is None else constants.scalar(parameter.value)
-    low = None if parameter.minimum is None else constants.scalar(parameter.minimum)
-    high = None if parameter.maximum is None else constants.scalar(parameter.maximum)
-    if name in given:
-        value = float(given[name])
-        if not math.isfinite(value):
-            findings.error("not-finite", span, f"the parameter '{name}' is set to {value}")
-            value = None
-    if value is None:
-        constants.broken.add(name)
-        return
-    constants.parameters[name] = value
-    if (low is not None and value < low) or (high is not None and value > high):
-        bounds = f"{'-∞' if low is None else f'{low:g}'} to {'∞' if high is None else f'{high:g}'}"
-        where = span if name in given else parameter.value.span
-        findings.error("out-of-range", where, f"'{name}' is {value:g}; its bounds are {bounds}")
+            constants.findings.error("unknown-parameter", span, f"there is no parameter '{name}' to be set", hint)
 
 
 def _clock(spec: Spec, constants: Constants) -> tuple[int, int | None]:
@@ -262,7 +259,7 @@ def rebind(spec: Spec, request: Request, network: Network, changes: Mapping[str,
         findings.error("structural-parameter", span, message)
     findings.check()
     parameters = {**request.parameters, **changes}
-    made = compile_spec(spec, Request(request.base, request.root, parameters, network.seed, request.limits), findings)
+    made = compile_spec(spec, replace(request, parameters=parameters, seed=network.seed), findings)
     findings.check()
     if made is None:  # pragma: no cover - an error is among the findings where there is no network
         raise SpecError((Diagnostic("internal", "the network could not be made", opening(spec.source)),))

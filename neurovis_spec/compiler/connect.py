@@ -6,7 +6,6 @@ matrix or pattern row by row), and for each plastic entry what it learns by.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,17 +18,17 @@ from neurovis_spec.compiler.ends import Ends
 from neurovis_spec.compiler.learning import Learning, learning_of
 from neurovis_spec.compiler.limits import Limits, amount
 from neurovis_spec.compiler.matrices import Grid, grid_of
-from neurovis_spec.compiler.network import Connections, FloatArray, Input, IntArray, frozen
+from neurovis_spec.compiler.network import Connections, FloatArray, IntArray, frozen
 from neurovis_spec.compiler.patterns import all_to_all, pairs_of
 from neurovis_spec.compiler.populate import Population
-from neurovis_spec.compiler.references import resolve_ends
+from neurovis_spec.compiler.references import Directory, resolve_ends
 from neurovis_spec.compiler.scale import scaled
 from neurovis_spec.compiler.settings import choose
-from neurovis_spec.compiler.tables import Files
+from neurovis_spec.compiler.units import Unit
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.located import Formula, Located, shown
-from neurovis_spec.language.spec import ConnectionModel, Spec
+from neurovis_spec.language.sections import ConnectionModel
 from neurovis_spec.language.values import FileReference, Rows
 
 
@@ -60,26 +59,50 @@ class _Shape:
     delays: IntArray | None = None
 
 
+def connect(units: tuple[Unit, ...], population: Population, limits: Limits, seed: int) -> tuple[Bundle, ...] | None:
+    """The entries of all units, a unit's own before those of the instances within it; None where one is at fault. What
+    is at fault in one instance of a module is so in all: it is said once."""
+    result: list[Bundle] = []
+    total = 0
+    failed: set[str | None] = set()
+    for unit, directory in zip(units, population.directories, strict=True):
+        if unit.module is not None and unit.module in failed:
+            continue
+        bundles = Connector(unit, directory, population, limits, seed).connect(total)
+        if bundles is None:
+            failed.add(unit.module)
+            continue
+        result += bundles
+        total += sum(len(bundle.sources) for bundle in bundles)
+    return None if failed else tuple(result)
+
+
 @dataclass(frozen=True)
 class Connector:
-    """Makes the connections of every entry."""
+    """Makes the connections of every entry of one unit."""
 
-    spec: Spec
+    unit: Unit
+    directory: Directory
     population: Population
-    inputs: Mapping[str, Input]
-    constants: Constants
-    definitions: Definitions
-    files: Files
     limits: Limits
     seed: int
 
-    def connect(self) -> tuple[Bundle, ...] | None:
-        """All entries; None where one is at fault, the others are still looked at."""
+    @property
+    def constants(self) -> Constants:
+        """What evaluates the formulas of the unit."""
+        return self.unit.constants
+
+    @property
+    def definitions(self) -> Definitions:
+        """What the unit knows of activations, models and rules."""
+        return self.unit.definitions
+
+    def connect(self, total: int) -> tuple[Bundle, ...] | None:
+        """All entries, behind ``total`` connections; None where one is at fault, the others are still looked at."""
         result: list[Bundle] = []
         failed = False
-        total = 0
         seen: dict[str, int] = {}
-        for key, body in self.spec.connections:
+        for key, body in self.unit.section.connections:
             bundle = self._entry(key, body, seen, total)
             if bundle is None:
                 failed = True
@@ -96,7 +119,7 @@ class Connector:
         before = findings.errors
         if ends is None or body.lost:  # a body without what is at fault in it would be another one
             return None
-        name = _normal(key.value)
+        name = self.unit.called(_normal(key.value))
         seen[name] = seen.get(name, 0) + 1
         if seen[name] > 1:
             name = f"{name} ({seen[name]})"
@@ -110,7 +133,7 @@ class Connector:
             message = f"'{shown(key.value)}' is no connection"
             findings.error("bad-connection", key.span, message, "write FROM -> TO")
             return None
-        ends = resolve_ends(key, self.population.directory, findings)
+        ends = resolve_ends(key, self.directory, findings)
         if ends is None:
             return None
         return np.array(ends[0], dtype=np.int64), np.array(ends[1], dtype=np.int64)
@@ -231,7 +254,7 @@ class _EntryBuilder:
     def _grid(self, matrix: Rows | FileReference, purpose: str) -> Grid | None:
         by_target = self.body.rows is not None and self.body.rows.value == "to"
         n, m = len(self.sources), len(self.targets)
-        return grid_of(matrix, n, m, by_target, self.constants, self.connector.files, self.stream(purpose))
+        return grid_of(matrix, n, m, by_target, self.constants, self.connector.unit.files, self.stream(purpose))
 
     def _shape(self, centre: Grid | None) -> _Shape | None:
         body = self.body
@@ -268,10 +291,10 @@ class _EntryBuilder:
         return _Shape(*all_to_all(ends))
 
     def _edges(self) -> _Shape | None:
-        called = self.connector.population.neurons.names
-        sources = {called[neuron]: place for place, neuron in enumerate(self.sources.tolist())}
-        targets = {called[neuron]: place for place, neuron in enumerate(self.targets.tolist())}
-        reader = EdgeReader(sources, targets, self.constants, self.connector.files, self.stream("weight"))
+        called, own = self.connector.population.neurons.names, len(self.connector.unit.called(""))
+        sources = {called[neuron][own:]: place for place, neuron in enumerate(self.sources.tolist())}
+        targets = {called[neuron][own:]: place for place, neuron in enumerate(self.targets.tolist())}
+        reader = EdgeReader(sources, targets, self.constants, self.connector.unit.files, self.stream("weight"))
         assert self.body.edges is not None
         edges = reader.read(self.body.edges)
         return None if edges is None else _Shape(edges.i, edges.j, edges.weights, edges.delays)
@@ -322,12 +345,7 @@ class _EntryBuilder:
 
     def _measures_distance(self) -> bool:
         """Whether any of the targets combines by distance, or may, where what it says of that is at fault."""
-        written = self.connector.spec.neurons
-        for group in self.connector.population.neurons.groups:
-            may = group.combine == "distance" or "combine" in written[group.name].lost
-            if may and ((self.targets >= group.start) & (self.targets < group.start + group.count)).any():
-                return True
-        return False
+        return bool(self.connector.population.by_distance[self.targets].any())
 
     def _bounds(self, weights: FloatArray | None) -> tuple[float, float] | None:
         bounds = self.body.bounds
@@ -360,10 +378,9 @@ class _EntryBuilder:
             self.body.plasticity,
             shape.j,
             len(self.targets),
-            connector.population,
-            connector.inputs,
-            connector.definitions,
-            self.constants,
+            connector.unit,
+            connector.directory,
+            len(connector.population.neurons),
         )
 
 

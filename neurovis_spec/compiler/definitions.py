@@ -22,11 +22,11 @@ from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.errors import ExpressionError
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.tree import Number, Tree, substitute
+from neurovis_spec.language.library import ActivationModel, Library, ModelModel, RuleModel, StateModel
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, bad_name
 from neurovis_spec.language.model import Model as LanguageModel
 from neurovis_spec.language.model import lost_names, opening
 from neurovis_spec.language.source import Mapping as SourceMapping
-from neurovis_spec.language.spec import ActivationModel, Library, ModelModel, RuleModel, StateModel
 from neurovis_spec.language.values import Parameter
 
 _ACTIVATION = ("x",)

@@ -15,7 +15,7 @@ import numpy as np
 from neurovis_spec.language.located import Located
 
 #: Where a node of an expression stood, and what is only shown, is no content.
-_SHOWN = frozenset({"start", "end", "title", "description", "descriptions", "labels", "label", "box", "role"})
+_SHOWN = frozenset({"start", "end", "title", "description", "descriptions", "labels", "label", "box", "role", "module"})
 
 
 class _Writer:

@@ -18,7 +18,7 @@ from neurovis_spec.compiler.network import Block, IntArray, Learn, Network, Plas
 from neurovis_spec.compiler.references import Directory, key_of, resolve_end, resolve_ends
 from neurovis_spec.diagnostics import Findings, Span, suggest
 from neurovis_spec.language.located import Formula, Located
-from neurovis_spec.language.spec import EventModel
+from neurovis_spec.language.sections import EventModel
 
 #: Compiles the network anew with other parameters, without its events; None where that is at fault.
 Recompile = Callable[[Mapping[str, float]], Network | None]

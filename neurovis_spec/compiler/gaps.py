@@ -10,10 +10,15 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 from neurovis_spec.diagnostics import nearest
+from neurovis_spec.language.library import Library
 from neurovis_spec.language.model import lost_names
-from neurovis_spec.language.spec import GroupModel, Library, Spec
+from neurovis_spec.language.modules import ModuleModel
+from neurovis_spec.language.sections import GroupModel
+from neurovis_spec.language.spec import Spec
 
-SECTIONS = ("parameters", "inputs", "neurons", "activations", "models", "rules")
+SECTIONS = ("parameters", "inputs", "neurons", "instances", "modules", "activations", "models", "rules")
+#: what an included file may hold
+INCLUDED = ("modules", "activations", "models", "rules")
 _NAMING = frozenset({"count", "first", "names"})
 
 
@@ -37,9 +42,16 @@ class Gaps:
         return replace(self, sections=self.sections | {section})
 
     def cover_reference(self, name: str) -> bool:
-        """The same for a reference: a group at fault may make any neuron that begins with its name."""
-        groups = self.names["neurons"]
-        return "neurons" in self.sections or any(name.startswith(group) for group in groups)
+        """The same for a reference: a group at fault may make any neuron that begins with its name, and so may an
+        instance."""
+        if not self.sections.isdisjoint(("neurons", "instances")):
+            return True
+        return any(name.startswith(lost) for section in ("neurons", "instances") for lost in self.names[section])
+
+    def joined(self, other: Gaps) -> Gaps:
+        """The gaps of both."""
+        names = {section: self.names[section] | other.names[section] for section in SECTIONS}
+        return Gaps(names, self.sections | other.sections)
 
 
 def _names_neurons(key: str) -> bool:
@@ -50,18 +62,18 @@ def _names_neurons(key: str) -> bool:
     return not close or not _NAMING.isdisjoint(close)
 
 
-def gaps_of(library: Library) -> Gaps:
-    """The gaps of a spec, or of a file of definitions."""
+def gaps_of(library: Library | ModuleModel) -> Gaps:
+    """The gaps of a spec, of a module, or of a file of definitions."""
     whole = set(library.lost.intersection(SECTIONS))
     for key in library.lost.difference(SECTIONS):
         whole.update(nearest(key, SECTIONS))
-    if library.lost & {"instances", "modules", "include"}:
-        whole.update(SECTIONS)
+    if "include" in library.lost:
+        whole.update(INCLUDED)
     names: dict[str, frozenset[str]] = {}
     for section in SECTIONS:
         kept: dict[str, object] = getattr(library, section, {})
         names[section] = frozenset(lost_names(library.source, section, kept))
-    if isinstance(library, Spec):
+    if isinstance(library, (Spec, ModuleModel)):
         for name, group in library.neurons.items():
             if any(_names_neurons(key) for key in group.lost):
                 names["neurons"] |= {name}

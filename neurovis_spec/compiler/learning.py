@@ -11,12 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neurovis_spec.compiler.constants import Constants
-from neurovis_spec.compiler.definitions import Definitions
-from neurovis_spec.compiler.network import FloatArray, Input, IntArray, Rule
-from neurovis_spec.compiler.populate import Population
-from neurovis_spec.compiler.references import few, resolve_end
+from neurovis_spec.compiler.network import FloatArray, IntArray, Rule
+from neurovis_spec.compiler.references import Directory, few, resolve_end
 from neurovis_spec.compiler.settings import check_initials, choose, parameters
+from neurovis_spec.compiler.units import Unit
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.located import Located, shown
 from neurovis_spec.language.source import Entry, Scalar
@@ -37,12 +35,15 @@ def learning_of(
     choice: Choice,
     targets: IntArray,
     target_count: int,
-    population: Population,
-    inputs: Mapping[str, Input],
-    definitions: Definitions,
-    constants: Constants,
+    unit: Unit,
+    directory: Directory,
+    neurons: int,
 ) -> Learning | None:
-    """The rule of an entry whose connection c goes to the ``targets[c]``-th of ``target_count`` targets."""
+    """The rule of an entry whose connection c goes to the ``targets[c]``-th of ``target_count`` targets.
+
+    ``directory`` says what the names of the unit mean, ``neurons`` is how many the network has.
+    """
+    constants, definitions = unit.constants, unit.definitions
     found = choose(choice, definitions.rules, "rule", definitions, constants.findings)
     if found is None:
         return None
@@ -59,7 +60,7 @@ def learning_of(
             constants.findings.error("missing-signal", choice.name.span, message, hint)
             failed = True
             continue
-        where = _signal(entries[signal], targets, target_count, population, inputs, definitions, constants)
+        where = _signal(entries[signal], targets, target_count, unit, directory, neurons)
         if where is None:
             failed = True
         else:
@@ -73,12 +74,11 @@ def _signal(
     entry: Entry,
     targets: IntArray,
     target_count: int,
-    population: Population,
-    inputs: Mapping[str, Input],
-    definitions: Definitions,
-    constants: Constants,
+    unit: Unit,
+    directory: Directory,
+    neurons: int,
 ) -> IntArray | None:
-    findings = constants.findings
+    findings, inputs = unit.constants.findings, unit.inputs
     node = entry.value
     if not isinstance(node, Scalar) or not isinstance(node.value, str):
         findings.error(
@@ -86,22 +86,22 @@ def _signal(
         )
         return None
     name = node.value.strip()
-    n = len(population.neurons)
     if name in inputs:
         source = inputs[name]
-        where = np.arange(n + source.start, n + source.start + source.size, dtype=np.int64)
-    elif definitions.gaps.cover("inputs", name) or population.directory.gaps.cover_reference(name):
+        first = neurons + source.start
+        where = np.arange(first, first + source.size, dtype=np.int64)
+    elif unit.gaps.cover("inputs", name) or directory.covers(name):
         return None
-    elif population.directory.find(name) is None and ".." not in name and "+" not in name:
-        names = (*inputs, *population.directory.known)
+    elif directory.find(name) is None and "." not in name and "+" not in name:
+        names = (*unit.section.inputs, *directory.known)
         hint = suggest(name, few(name, names), "inputs and neurons")
         findings.error("unknown-signal", node.span, f"there is no neuron, group or input '{shown(name)}'", hint)
         return None
     else:
-        neurons = resolve_end(Located(node.value, node), population.directory, findings)
-        if neurons is None:
+        found = resolve_end(Located(node.value, node), directory, findings)
+        if found is None:
             return None
-        where = np.array(neurons, dtype=np.int64)
+        where = np.array(found, dtype=np.int64)
     if len(where) == 1:
         return np.repeat(where, len(targets))
     if len(where) == target_count:

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 PATIENCE = 20
 #: Errors after which unknown names are no longer compared with the known ones.
 MOST_HINTS = 200
+#: The most instances of modules, and how deep they may be nested.
+MOST_INSTANCES, DEEPEST = 100_000, 64
 #: The longest delay in steps, and the most signals under way (delays of all connections together).
 LONGEST_DELAY, MOST_SIGNALS = 1_000_000, 250_000_000
 

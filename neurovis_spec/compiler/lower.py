@@ -13,6 +13,7 @@ from typing import TypeAlias
 import numpy as np
 
 from neurovis_spec.compiler.connect import Bundle
+from neurovis_spec.compiler.learning import Learning
 from neurovis_spec.compiler.network import (
     Block,
     Combine,
@@ -28,6 +29,7 @@ from neurovis_spec.compiler.network import (
     frozen,
 )
 from neurovis_spec.compiler.populate import Kind, Population
+from neurovis_spec.diagnostics import Span
 
 #: What the neurons of a block have in common: level, activation, model, combination.
 _Key: TypeAlias = tuple[int, str, str, Combine]
@@ -96,23 +98,35 @@ def _column(parts: list[tuple[Mapping[str, FloatArray], IntArray]]) -> Mapping[s
 
 
 def make_plasticity(bundles: tuple[Bundle, ...]) -> tuple[tuple[Plasticity, ...], IntArray]:
-    """One Plasticity a plastic entry, and for each connection the number of its Plasticity or −1."""
-    result: list[Plasticity] = []
+    """One Plasticity a plastic entry, the instances of a module together, and for each connection the number of its
+    Plasticity or −1."""
+    numbers: dict[tuple[Span, str], int] = {}
+    parts: list[list[tuple[Learning, IntArray]]] = []
     rules: list[IntArray] = [np.zeros(0, dtype=np.int64)]
     start = 0
     for bundle in bundles:
-        n = len(bundle.sources)
-        learning = bundle.learning
-        if learning is None:
-            rules.append(np.full(n, -1, dtype=np.int64))
-        else:
-            rules.append(np.full(n, len(result), dtype=np.int64))
-            members = np.arange(start, start + n, dtype=np.int64)
-            for array in (members, *learning.parameters.values(), *learning.signals.values()):
-                frozen(array)
-            result.append(Plasticity(learning.rule, members, learning.parameters, learning.signals, learning.title))
+        n, learning = len(bundle.sources), bundle.learning
+        number = -1
+        if learning is not None:
+            # An entry has the same place in all instances; by its title the rule is used in the same way.
+            number = numbers.setdefault((bundle.key, learning.title), len(parts))
+            if number == len(parts):
+                parts.append([])
+            parts[number].append((learning, np.arange(start, start + n, dtype=np.int64)))
+        rules.append(np.full(n, number, dtype=np.int64))
         start += n
-    return tuple(result), np.concatenate(rules)
+    return tuple(_together(part) for part in parts), np.concatenate(rules)
+
+
+def _together(parts: list[tuple[Learning, IntArray]]) -> Plasticity:
+    """The connections of several entries that learn by one rule."""
+    first = parts[0][0]
+    members = np.concatenate([members for _, members in parts])
+    parameters = {name: np.concatenate([one.parameters[name] for one, _ in parts]) for name in first.parameters}
+    signals = {name: np.concatenate([one.signals[name] for one, _ in parts]) for name in first.signals}
+    for array in (members, *parameters.values(), *signals.values()):
+        frozen(array)
+    return Plasticity(first.rule, members, parameters, signals, first.title)
 
 
 def make_program(blocks: tuple[Block, ...], plasticity: tuple[Plasticity, ...]) -> tuple[Operation, ...]:

@@ -44,6 +44,29 @@ class Group:
     box: str | None = None
     role: Role | None = None
     description: str | None = None
+    #: the module of whose instance it is a part, None where it is the spec's own
+    module: str | None = None
+
+    @property
+    def indices(self) -> range:
+        """The indices of its neurons."""
+        return range(self.start, self.start + self.count)
+
+
+@dataclass(frozen=True, slots=True)
+class Instance:
+    """An instance of a module: its path (``left1.knee``), and its neurons, those of instances within it behind its own.
+
+    ``number`` is its number among those declared together as ``declared`` (the path without the number), 0 for a
+    single one.
+    """
+
+    path: str
+    module: str
+    start: int
+    count: int
+    declared: str
+    number: int = 0
 
     @property
     def indices(self) -> range:
@@ -290,6 +313,19 @@ Operation: TypeAlias = ReadInputs | Gather | Update | Send | Learn
 
 
 @dataclass(frozen=True, slots=True)
+class Mirror:
+    """Neurons of which the second of each pair is the mirror image of the first, on an axis along the direction.
+
+    ``scope`` is the path of the instance in whose frame the axis lies, empty for the whole; ``instances`` are the paths
+    of the instances that were named, if any.
+    """
+
+    scope: str
+    pairs: tuple[tuple[int, int], ...]
+    instances: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class LayoutSettings:
     """The ``layout`` section, references resolved. Pins by neuron index, units of the layout."""
 
@@ -301,6 +337,15 @@ class LayoutSettings:
     boxes: tuple[tuple[str, tuple[int, ...]], ...] = ()
     neuron_spacing: float = 1.0
     rank_spacing: float = 2.0
+    #: for each instance with pins of its module: its path, and its pins relative to its origin
+    relative: tuple[tuple[str, Mapping[int, tuple[float, float]]], ...] = ()
+    #: where instances have their origin, by path; the pins within them are among the positions then
+    origins: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    mirrors: tuple[Mirror, ...] = ()
+    #: neurons on one line across the direction
+    align: tuple[tuple[int, ...], ...] = ()
+    #: an earlier layout, as the spec names it
+    file: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -348,6 +393,8 @@ class Network:
     render: RenderSettings
     hash: str
     noises: tuple[Noise, ...] = ()
+    #: all instances of modules, an instance before those within it
+    instances: tuple[Instance, ...] = ()
     #: neurons whose activity is held at a value, whatever their model says
     clamped: tuple[tuple[int, float], ...] = ()
     #: events: the step from which on another network runs, with the same neurons and connections, ascending

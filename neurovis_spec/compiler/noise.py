@@ -7,19 +7,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from neurovis_spec.compiler.constants import Constants
-from neurovis_spec.compiler.network import Group, Noise, frozen
+from neurovis_spec.compiler.network import Noise, frozen
+from neurovis_spec.compiler.populate import Population
+from neurovis_spec.compiler.units import Unit
 from neurovis_spec.language.expressions.tree import draws
-from neurovis_spec.language.located import Formula
 
 
-def make_noises(
-    groups: tuple[tuple[Group, Formula | None], ...], inputs: int, constants: Constants
-) -> tuple[Noise, ...]:
+def make_noises(units: tuple[Unit, ...], population: Population, inputs: int) -> tuple[Noise, ...]:
     """The noise of every group that has some; ``inputs`` is the length of the vector of all inputs."""
     result: list[Noise] = []
     start = inputs
-    for group, formula in groups:
+    for group, model, owner in zip(population.neurons.groups, population.models, population.owners, strict=True):
+        formula, constants = model.noise, units[owner].constants
         if formula is None:
             continue
         tree = constants.tree(formula, ("k", "t", "i", "n"), random=True)

@@ -1,16 +1,18 @@
 """Neurons: from the groups of a spec to structures of arrays.
 
-In: the ``neurons`` and ``inputs`` sections, Constants, Definitions. Out: a Population: Neurons, a Directory of names,
-and for each group what its activation and its model are.
+In: Units. Out: a Population: Neurons, a Directory of names for each unit, and for each group what its activation and
+its model are.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import cast
 
 import numpy as np
+import numpy.typing as npt
 
 from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.definitions import Defaults, Definitions
@@ -22,7 +24,6 @@ from neurovis_spec.compiler.network import (
     Combine,
     FloatArray,
     Group,
-    Input,
     IntArray,
     Model,
     Neurons,
@@ -30,13 +31,13 @@ from neurovis_spec.compiler.network import (
     frozen,
 )
 from neurovis_spec.compiler.positions import positions_of
-from neurovis_spec.compiler.references import Directory, key_of
+from neurovis_spec.compiler.references import Directory, key_span
 from neurovis_spec.compiler.settings import check_initials, choose, parameters, spread
-from neurovis_spec.compiler.tables import Files
-from neurovis_spec.diagnostics import Findings, Span, suggest
+from neurovis_spec.compiler.units import Unit
+from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, shown
+from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.source import Scalar
-from neurovis_spec.language.spec import GroupModel, Spec
 from neurovis_spec.language.values import Choice, FormulaList
 
 
@@ -52,19 +53,39 @@ class Kind:
 
 @dataclass(frozen=True)
 class Population:
-    """All neurons, how they are called, and what each group is."""
+    """All neurons, what each group is and how it is written, and how everything is called in each unit (``directories``
+    are in the order of the units, the network's own first)."""
 
     neurons: Neurons
-    directory: Directory
+    directories: tuple[Directory, ...]
     kinds: tuple[Kind, ...]
+    models: tuple[GroupModel, ...]
+    #: the place of each group's unit
+    owners: tuple[int, ...]
+
+    @cached_property
+    def by_distance(self) -> npt.NDArray[np.bool_]:
+        """For each neuron whether it combines by distance, or may, where what the spec says of that is at fault."""
+        result = np.zeros(len(self.neurons), dtype=np.bool_)
+        for group, model in zip(self.neurons.groups, self.models, strict=True):
+            result[group.start : group.start + group.count] = group.combine == "distance" or "combine" in model.lost
+        return result
+
+    @property
+    def directory(self) -> Directory:
+        """How everything is called in the spec itself."""
+        return self.directories[0]
 
 
 @dataclass(frozen=True)
 class _Built:
-    """One group, before its values are joined with those of the others."""
+    """One group, before its values are joined with those of the others. ``name`` and ``names`` are those that it and
+    its neurons have in their unit."""
 
+    name: str
     group: Group
     kind: Kind
+    model: GroupModel
     names: tuple[str, ...]
     labels: tuple[str, ...]
     bias: FloatArray
@@ -74,62 +95,95 @@ class _Built:
     first: int | None
 
 
-def key_span(spec: Spec, section: str, name: str) -> Span:
-    """Where an entry of a section has its name."""
-    return key_of(spec.source, section, name).span
+@dataclass(frozen=True)
+class _Settled:
+    """A unit with its groups: the neurons from ``start`` on, and what of their names could not be read."""
+
+    unit: Unit
+    built: tuple[_Built, ...]
+    start: int
+    gaps: Gaps
 
 
-def populate(
-    spec: Spec,
-    constants: Constants,
-    definitions: Definitions,
-    inputs: tuple[Input, ...],
-    files: Files,
-    limits: Limits,
-    seed: int,
-) -> Population:
-    """Make every neuron. A group that is at fault is made as far as its names are known, so that what refers to it can
-    be looked at."""
-    builder = _Builder(spec, constants, definitions, {entry.name: entry for entry in inputs}, files, limits, seed)
-    built: list[_Built] = []
-    gaps = definitions.gaps
-    lost = set(gaps.names["neurons"])
+def populate(units: tuple[Unit, ...], limits: Limits, seed: int) -> Population:
+    """Make every neuron, unit by unit. A group that is at fault is made as far as its names are known, so that what
+    refers to it can be looked at."""
+    settled: list[_Settled] = []
     start = 0
-    for name, model in spec.neurons.items():
-        group = builder.group(name, model, start)
+    for unit in units:
+        made = _settle(unit, start, limits, seed)
+        settled.append(made)
+        start += sum(item.group.count for item in made.built)
+        _owners(unit, made.built)
+    return _join(settled)
+
+
+def _settle(unit: Unit, start: int, limits: Limits, seed: int) -> _Settled:
+    builder = _Builder(unit, limits, seed)
+    built: list[_Built] = []
+    gaps = unit.gaps
+    lost = set(gaps.names["neurons"])
+    at = start
+    for name, model in unit.section.neurons.items():
+        group = builder.group(name, model, at)
         if group is None:
             lost.add(name)
             if model.names is not None:  # which neurons these are nobody knows
                 gaps = gaps.with_section("neurons")
             continue
         built.append(group)
-        start += group.group.count
-    _owners(spec, built, constants.findings)
-    return _join(built, gaps.with_names("neurons", lost))
+        at += group.group.count
+    return _Settled(unit, tuple(built), start, gaps.with_names("neurons", lost))
 
 
-def _owners(spec: Spec, built: list[_Built], findings: Findings) -> None:
-    """Two declarations of one name are a finding: of two groups, or of a neuron and an input."""
+def _owners(unit: Unit, built: tuple[_Built, ...]) -> None:
+    """Two declarations of one name are a finding: of two groups, a neuron and an input, an instance and others."""
+    section, findings = unit.section, unit.constants.findings
     owners: dict[str, str] = {}
     for item in built:
-        name = item.group.name
+        name = item.name
         # A group of several may not be called like a neuron of another one either: what would the name refer to?
         for neuron in dict.fromkeys((*item.names, name)):
             other = owners.setdefault(neuron, name)
             if other != name:
-                first = key_span(spec, "neurons", other)
+                first = key_span(section, "neurons", other)
                 message = f"'{name}' and '{other}' (line {first.line}) both make the name '{neuron}'"
-                findings.error("duplicate-neuron", key_span(spec, "neurons", name), message)
+                findings.error("duplicate-neuron", key_span(section, "neurons", name), message)
                 break
-            if neuron in spec.inputs and neuron != name:
-                first = key_span(spec, "inputs", neuron)
+            if neuron in section.inputs and neuron != name:
+                first = key_span(section, "inputs", neuron)
                 message = f"the neuron '{neuron}' of '{name}' is called like an input (line {first.line})"
-                findings.error("duplicate-name", key_span(spec, "neurons", name), message)
+                findings.error("duplicate-name", key_span(section, "neurons", name), message)
+                break
+    _instances(unit, owners)
+
+
+def _instances(unit: Unit, owners: Mapping[str, str]) -> None:
+    """An instance may be called like nothing else in its unit."""
+    section, findings = unit.section, unit.constants.findings
+    taken: dict[str, str] = {}
+    for name, model in section.instances.items():
+        count = 0 if model.count is None else len(unit.children.get(name, ()))
+        for called in (name, *(f"{name}{number}" for number in range(1, count + 1))):
+            other = taken.setdefault(called, name)
+            what = None
+            if other != name:
+                what = f"instance '{other}' (line {key_span(section, 'instances', other).line})"
+            elif called in owners:
+                what = f"group '{owners[called]}' (line {key_span(section, 'neurons', owners[called]).line})"
+            elif called in section.inputs:
+                what = f"input '{called}' (line {key_span(section, 'inputs', called).line})"
+            if what is not None:
+                whose = "" if called == name else f" of '{name}'"
+                message = f"the instance '{called}'{whose} is called like the {what}"
+                hint = "groups, inputs and instances share their names"
+                findings.error("duplicate-name", key_span(section, "instances", name), message, hint)
                 break
 
 
-def _join(built: list[_Built], gaps: Gaps) -> Population:
-    names = tuple(name for item in built for name in item.names)
+def _join(settled: list[_Settled]) -> Population:
+    built = [item for one in settled for item in one.built]
+    names = tuple(one.unit.called(name) for one in settled for item in one.built for name in item.names)
     empty = np.zeros(0)
     neurons = Neurons(
         names=names,
@@ -142,32 +196,53 @@ def _join(built: list[_Built], gaps: Gaps) -> Population:
     )
     for array in (neurons.bias, neurons.initial, neurons.input, neurons.position):
         frozen(array)
-    directory = Directory(
-        {item.group.name: item.group for item in built},
-        {name: index for index, name in enumerate(names)},
-        {item.group.name: item.first for item in built if item.first is not None},
-        gaps,
-    )
-    return Population(neurons, directory, tuple(item.kind for item in built))
+    directories = _directories(settled, len(names))
+    kinds, models = tuple(item.kind for item in built), tuple(item.model for item in built)
+    owners = tuple(place for place, one in enumerate(settled) for _ in one.built)
+    return Population(neurons, directories, kinds, models, owners)
+
+
+def _directories(settled: list[_Settled], total: int) -> tuple[Directory, ...]:
+    """The Directory of each unit; those of the instances within a unit are made before its own."""
+    made: dict[int, Directory] = {}
+    ends: dict[int, int] = {}
+    for index in range(len(settled) - 1, -1, -1):
+        one = settled[index]
+        after = max([index + 1, *(ends[place] for places in one.unit.children.values() for place in places)])
+        ends[index] = after
+        stop = settled[after].start if after < len(settled) else total
+        made[index] = Directory(
+            {item.name: item.group for item in one.built},
+            {name: item.group.start + position for item in one.built for position, name in enumerate(item.names)},
+            {item.name: item.first for item in one.built if item.first is not None},
+            one.gaps,
+            {name: tuple(made[place] for place in places) for name, places in one.unit.children.items()},
+            range(one.start, stop),
+        )
+    return tuple(made[index] for index in range(len(settled)))
 
 
 @dataclass(frozen=True)
 class _Builder:
-    spec: Spec
-    constants: Constants
-    definitions: Definitions
-    inputs: Mapping[str, Input]
-    files: Files
+    unit: Unit
     limits: Limits
     seed: int
+
+    @property
+    def constants(self) -> Constants:
+        return self.unit.constants
+
+    @property
+    def definitions(self) -> Definitions:
+        return self.unit.definitions
 
     def group(self, name: str, model: GroupModel, start: int) -> _Built | None:
         """One group; None where it is not known which neurons it has."""
         findings = self.constants.findings
-        if name in self.spec.inputs and IDENTIFIER.fullmatch(name):
-            first = key_span(self.spec, "inputs", name)
+        if name in self.unit.section.inputs and IDENTIFIER.fullmatch(name):
+            first = key_span(self.unit.section, "inputs", name)
             message = f"'{name}' is an input already (line {first.line}); groups and inputs share their names"
-            findings.error("duplicate-name", key_span(self.spec, "neurons", name), message)
+            findings.error("duplicate-name", key_span(self.unit.section, "neurons", name), message)
         names, first_number = None, None
         if name not in self.definitions.gaps.names["neurons"]:
             names, first_number = self._names(name, model, start)
@@ -179,10 +254,10 @@ class _Builder:
         bias = None if model.bias is None else self._drawn(model.bias, n, "bias", name)
         initial = None if model.initial is None else self._drawn(model.initial, n, "initial", name)
         input_index = self._input(model, n)
-        position = positions_of(model.position, n, self.constants, self.files)
+        position = positions_of(model.position, n, self.constants, self.unit.files)
         labels = self._labels(model, names)
         group = Group(
-            name=name,
+            name=self.unit.called(name),
             start=start,
             count=n,
             activation=kind.activation.name,
@@ -190,14 +265,17 @@ class _Builder:
             combine=cast(Combine, model.combine.value if model.combine else "sum"),
             activation_parameters={k: tuple(v.tolist()) for k, v in kind.activation_parameters.items()},
             model_parameters={k: tuple(v.tolist()) for k, v in kind.model_parameters.items()},
-            input=None if model.input is None else model.input.value,
-            box=None if model.box is None else model.box.value,
+            input=self._fed(model),
+            box=None if model.box is None else self.unit.called(model.box.value),
             role=None if model.role is None else cast(Role, model.role.value),
             description=None if model.description is None else model.description.value,
+            module=self.unit.module,
         )
         return _Built(
+            name=name,
             group=group,
             kind=kind,
+            model=model,
             names=names,
             labels=labels or names,
             bias=np.zeros(n) if bias is None else bias,
@@ -207,6 +285,13 @@ class _Builder:
             first=first_number,
         )
 
+    def _fed(self, model: GroupModel) -> str | None:
+        """The network's name of the input of a group."""
+        if model.input is None:
+            return None
+        found = self.unit.inputs.get(model.input.value)
+        return model.input.value if found is None else found.name
+
     def _names(self, name: str, model: GroupModel, start: int) -> tuple[tuple[str, ...] | None, int | None]:
         findings = self.constants.findings
         count = None
@@ -214,7 +299,7 @@ class _Builder:
             count = self.constants.integer(model.count, "'count'", 1)
             if count is None:
                 return None, None
-        span = key_span(self.spec, "neurons", name) if model.count is None else model.count.span
+        span = key_span(self.unit.section, "neurons", name) if model.count is None else model.count.span
         total = start + (count or len(model.names or ()) or 1)
         if total > self.limits.neurons:
             message = f"this makes {amount(total)} neurons; the limit is {self.limits.neurons:,}"
@@ -232,7 +317,7 @@ class _Builder:
             return None, None
         names = tuple(f"{name}{number}" for number in range(first, first + count))
         if len(names[-1]) > 64:
-            findings.error("bad-name", key_span(self.spec, "neurons", name), bad_name(names[-1]), NAME_RULE)
+            findings.error("bad-name", key_span(self.unit.section, "neurons", name), bad_name(names[-1]), NAME_RULE)
             return None, None
         return names, first
 
@@ -289,16 +374,16 @@ class _Builder:
         return Kind(activation[0], activity, neuron[0], settings)
 
     def _drawn(self, formulas: Formula | FormulaList, n: int, purpose: str, name: str) -> FloatArray | None:
-        return spread(formulas, n, self.constants, f"'{purpose}'", Stream(self.seed, purpose, name))
+        return spread(formulas, n, self.constants, f"'{purpose}'", Stream(self.seed, purpose, self.unit.called(name)))
 
     def _input(self, model: GroupModel, n: int) -> IntArray | None:
         if model.input is None:
             return None
         name = model.input.value
-        found = self.inputs.get(name)
+        found = self.unit.inputs.get(name)
         findings = self.constants.findings
         if found is None:
-            known = tuple(self.spec.inputs)
+            known = tuple(self.unit.section.inputs)
             if name not in known and not self.definitions.gaps.cover("inputs", name):
                 hint = suggest(name, known, "inputs") or "no inputs are declared; add it under 'inputs'"
                 findings.error("unknown-input", model.input.span, f"there is no input '{shown(name)}'", hint)

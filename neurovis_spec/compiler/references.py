@@ -10,31 +10,42 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import islice
+from typing import TypeAlias
 
 from neurovis_spec.compiler.gaps import Gaps
 from neurovis_spec.compiler.limits import MOST_HINTS, PATIENCE
 from neurovis_spec.compiler.network import Group
 from neurovis_spec.diagnostics import Findings, Span, suggest
 from neurovis_spec.language.located import Located, shown
+from neurovis_spec.language.modules import ModuleModel
 from neurovis_spec.language.source import Mapping as SourceMapping
 from neurovis_spec.language.source import Scalar
+from neurovis_spec.language.spec import Spec
 
+#: What declares neurons, inputs and connections: a spec, or a module.
+Section: TypeAlias = Spec | ModuleModel
 #: How many names are looked through for one that is like another: it takes a while.
 _MANY = 1000
 #: A neuron's number as its name has it: without leading zeros.
 _NUMBER = re.compile(r"0|[1-9][0-9]{0,63}")
+_QUOTED = re.compile(r"'([^']*)'")
 _RANGE = re.compile(r"\s*(?P<low>\S+?)\s*\.\.\s*(?P<high>\S+)\s*")
 
 
 @dataclass(frozen=True)
 class Directory:
-    """Who is called what: groups by name, and the numbers of counted groups."""
+    """Who is called what in a spec, or in an instance of a module: groups, neurons and instances by the names that they
+    have there."""
 
     groups: Mapping[str, Group]
     neurons: Mapping[str, int]
     #: the number of the first neuron of each counted group
     first: Mapping[str, int]
     gaps: Gaps = field(default_factory=Gaps)
+    #: the instances of a name: all of a counted one, each also by its own name
+    instances: Mapping[str, tuple[Directory, ...]] = field(default_factory=dict)
+    #: all neurons, those of the instances behind its own
+    members: range = range(0)
 
     @cached_property
     def known(self) -> tuple[str, ...]:
@@ -43,7 +54,15 @@ class Directory:
 
     def hint(self, name: str) -> str | None:
         """What an unknown name may be meant for: the nearest names, and the numbers that its group has."""
+        head, dot, rest = name.partition(".")
+        if dot and head in self.instances:
+            hint = self.instances[head][0].hint(rest)
+            return None if hint is None else _QUOTED.sub(rf"'{head}.\1'", hint)
+        if dot:
+            return suggest(head, few(head, tuple(self.instances)), "instances") or "there are no instances here"
         hint = suggest(name, few(name, self.known), "groups and neurons")
+        if not self.known and self.instances:
+            hint = suggest(name, few(name, tuple(self.instances)), "instances")
         stem = name.rstrip("0123456789")
         if stem in self.first and stem != name:
             first = self.first[stem]
@@ -52,15 +71,41 @@ class Directory:
         return hint
 
     def find(self, name: str) -> tuple[int, ...] | None:
-        """The neurons of a group, or one neuron."""
+        """The neurons of a group, or one neuron; ``left.K`` is K in all instances that ``left`` names."""
+        head, dot, rest = name.partition(".")
+        if dot:
+            found = [inner.find(rest) for inner in self.instances.get(head, ())]
+            if not found or any(one is None for one in found):
+                return None
+            return tuple(index for one in found if one is not None for index in one)
         group = self.groups.get(name)
         if group is not None:
             return tuple(group.indices)
         neuron = self.neurons.get(name)
         return None if neuron is None else (neuron,)
 
+    def instance(self, name: str) -> tuple[Directory, ...]:
+        """The instances that a name means; none where it means something else, or nothing."""
+        head, dot, rest = name.partition(".")
+        found = self.instances.get(head, ())
+        return tuple(one for inner in found for one in inner.instance(rest)) if dot else found
+
+    def covers(self, name: str) -> bool:
+        """Whether an unknown name may be one whose declaration is at fault."""
+        head, dot, rest = name.partition(".")
+        if dot and head in self.instances:
+            return any(inner.covers(rest) for inner in self.instances[head])
+        return self.gaps.cover_reference(name)
+
     def range(self, low: str, high: str) -> tuple[int, ...] | str:
         """The neurons of a counted group from one of its numbers to another; a text says why not."""
+        head, dot, rest = low.partition(".")
+        if dot:
+            if head not in self.instances:
+                return f"there is no instance '{shown(head)}'"
+            found = [inner.range(rest, high.removeprefix(f"{head}.")) for inner in self.instances[head]]
+            wrong = next((one for one in found if isinstance(one, str)), None)
+            return wrong or tuple(index for one in found if not isinstance(one, str) for index in one)
         for name in sorted((g for g in self.first if low.startswith(g)), key=len, reverse=True):
             start, stop = low[len(name) :], high[len(name) :]
             if not (high.startswith(name) and _NUMBER.fullmatch(start) and _NUMBER.fullmatch(stop)):
@@ -91,6 +136,11 @@ def key_of(section: SourceMapping, part: str, name: str) -> Located[str]:
     return Located(name, Scalar(name, section.span) if entry is None else entry.key)
 
 
+def key_span(section: Section, part: str, name: str) -> Span:
+    """Where an entry of a part of a section has its name."""
+    return key_of(section.source, part, name).span
+
+
 def piece(text: Located[str], start: int, end: int) -> Located[str]:
     """Characters ``start`` to ``end`` of a text as a text of their own, with their place."""
     span = text.node.at(start, end)
@@ -101,10 +151,11 @@ def piece(text: Located[str], start: int, end: int) -> Located[str]:
 def parts(text: Located[str]) -> Iterator[tuple[str, Span]]:
     """The references that are joined with ``+``, each with its place.
 
-    >>> from neurovis_spec.language.source import Scalar
-    >>> node = Scalar("K1 + K3", Span("x", 1, 1, 1, 8))
-    >>> [(name, span.column) for name, span in parts(Located("K1 + K3", node))]
-    [('K1', 1), ('K3', 6)]
+        >>> from neurovis_spec.language.source import Scalar
+    from neurovis_spec.language.spec import Spec
+        >>> node = Scalar("K1 + K3", Span("x", 1, 1, 1, 8))
+        >>> [(name, span.column) for name, span in parts(Located("K1 + K3", node))]
+        [('K1', 1), ('K3', 6)]
     """
     start = 0
     for piece in text.value.split("+"):
@@ -120,7 +171,7 @@ def resolve_part(name: str, span: Span, directory: Directory, findings: Findings
     if match:
         found = directory.range(match["low"], match["high"])
         if isinstance(found, str):
-            if not directory.gaps.cover_reference(match["low"]):
+            if not directory.covers(match["low"]):
                 findings.error("bad-range", span, f"'{shown(name)}' is no range: {found}")
             return None
         return found
@@ -128,15 +179,28 @@ def resolve_part(name: str, span: Span, directory: Directory, findings: Findings
     if result is None:
         if not name:
             findings.error("empty-reference", span, "a reference is missing here", "name a group, a neuron or a range")
-        elif not directory.gaps.cover_reference(name):
-            message = f"there is no neuron or group '{shown(name)}'"
-            hint = directory.hint(name) if findings.errors < MOST_HINTS else None
-            findings.error("unknown-neuron", span, message, hint)
+        elif not directory.covers(name):
+            _unknown(name, span, directory, findings)
     return result
 
 
-def resolve(texts: tuple[Located[str], ...], directory: Directory, findings: Findings) -> tuple[int, ...] | None:
-    """Several references, in the order written; a neuron named twice is a finding."""
+def _unknown(name: str, span: Span, directory: Directory, findings: Findings) -> None:
+    inside = directory.instance(name)
+    if inside:
+        some = next(iter((*inside[0].groups, *inside[0].instances)), None)
+        hint = None if some is None else f"name a group or a neuron in it, as in {name}.{some}"
+        findings.error("unknown-neuron", span, f"'{shown(name)}' is an instance, not a neuron", hint)
+        return
+    message = f"there is no neuron or group '{shown(name)}'"
+    hint = directory.hint(name) if findings.errors < MOST_HINTS else None
+    findings.error("unknown-neuron", span, message, hint)
+
+
+def resolve(
+    texts: tuple[Located[str], ...], directory: Directory, findings: Findings, *, instances: bool = False
+) -> tuple[int, ...] | None:
+    """Several references, in the order written; a neuron named twice is a finding. With ``instances`` the name of an
+    instance stands for all of its neurons."""
     result: list[int] = []
     seen: set[int] = set()
     before = findings.errors
@@ -145,7 +209,10 @@ def resolve(texts: tuple[Located[str], ...], directory: Directory, findings: Fin
         for name, span in parts(text):
             if findings.errors - before >= PATIENCE:
                 return None
-            found = resolve_part(name, span, directory, findings)
+            inside = directory.instance(name) if instances else ()
+            found: tuple[int, ...] | None = tuple(index for one in inside for index in one.members)
+            if not inside:
+                found = resolve_part(name, span, directory, findings)
             if found is None:
                 failed = True
                 continue

@@ -11,7 +11,7 @@ import numpy as np
 from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.network import FloatArray, IntArray
 from neurovis_spec.language.located import Formula
-from neurovis_spec.language.spec import ScaleModel
+from neurovis_spec.language.sections import ScaleModel
 
 #: Most neurons whose spectral radius is computed: all eigenvalues of a dense matrix are found.
 MOST = 3000

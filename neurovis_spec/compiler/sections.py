@@ -5,22 +5,27 @@ In: the sections as written and the Directory. Out: Outputs, LayoutSettings, Ren
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterator
 from typing import Literal, cast
 
 import numpy as np
 
 from neurovis_spec import plugins
+from neurovis_spec.compiler.mirrors import check_pins, lines_of, mirrors_of
 from neurovis_spec.compiler.network import LayoutSettings, Output, RenderSettings, frozen
+from neurovis_spec.compiler.pins import DIAMETER, FARTHEST, pins_of
+from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import Directory, key_of, resolve, resolve_end
-from neurovis_spec.diagnostics import Findings, suggest
+from neurovis_spec.compiler.units import Unit
+from neurovis_spec.diagnostics import Findings, Span, suggest
+from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel, RenderModel
 from neurovis_spec.language.located import Located, shown
-from neurovis_spec.language.spec import LayoutModel, RenderModel, RosModel, Spec
+from neurovis_spec.language.source import Mapping as SourceMapping
+from neurovis_spec.language.spec import RosModel, Spec
 
 #: Engines that the language names and that come later.
 _LATER_ENGINES = ("organic", "large", "spatial")
-#: The diameter of a neuron's disc, and how far out anything may be asked to stand (units of the layout).
-DIAMETER, _FARTHEST = 0.6, 1e6
+_NOTHING = LayoutModel.model_validate(SourceMapping((), Span("", 1, 1, 1, 1)), context=Findings())
 
 
 def make_outputs(spec: Spec, directory: Directory, findings: Findings) -> tuple[Output, ...]:
@@ -37,46 +42,77 @@ def make_outputs(spec: Spec, directory: Directory, findings: Findings) -> tuple[
     return tuple(result)
 
 
-def layout_settings(model: LayoutModel | None, directory: Directory, findings: Findings) -> LayoutSettings:
-    """The ``layout`` section. Which engines there are is known where they are called; here only words are checked."""
+def layout_settings(
+    model: LayoutModel | None, units: tuple[Unit, ...], population: Population, findings: Findings
+) -> LayoutSettings:
+    """The ``layout`` section, and those of modules. Which engines there are is known where they are called; here only
+    words are checked."""
+    pins = pins_of(units, population, findings)
+    arrange: list[tuple[tuple[int, ...], str]] = []
+    boxes: list[tuple[str, tuple[int, ...]]] = []
+    for unit, directory in zip(units, population.directories, strict=True):
+        if unit.section.layout is not None:
+            arrange += _arranged(unit.section.layout, directory, findings)
+            boxes += _boxed(unit, unit.section.layout, directory, findings)
     if model is None:
-        return LayoutSettings()
+        model = _NOTHING
     engine = "auto" if model.engine is None else model.engine.value
     if model.engine is not None:
         _check_engine(model.engine, findings)
-    arrange = []
-    for name, how in model.arrange.items():
-        members = resolve_end(key_of(model.source, "arrange", name), directory, findings)
-        if members is not None:
-            arrange.append((members, how.value))
-    boxes = []
-    for name, reference in model.boxes.items():
-        members = resolve(reference.parts, directory, findings)
-        if not reference.parts:
-            findings.error("empty-reference", reference.span, f"the box '{shown(name)}' holds no neuron")
-        elif members is not None:
-            boxes.append((name, members))
+    mirrors = mirrors_of(units, population, findings)
+    lines = lines_of(units, population, findings)
+    direction = cast(
+        Literal["down", "up", "right", "left"], "down" if model.direction is None else model.direction.value
+    )
+    entry = model.source.entry("positions")
+    place = None if entry is None else Located(entry.name, entry.key)
+    check_pins(mirrors, lines, pins.places, direction, population.neurons.names, place, findings)
     spacing = model.spacing
     neuron = 1.0 if spacing is None or spacing.neuron is None else spacing.neuron.value
     rank = 2.0 if spacing is None or spacing.rank is None else spacing.rank.value
     for value, field in ((neuron, "neuron"), (rank, "rank")):
-        if not DIAMETER <= value <= _FARTHEST and spacing is not None:
+        if not DIAMETER <= value <= FARTHEST and spacing is not None:
             node = spacing.source.get(field)
             message = (
-                f"a spacing lies between {DIAMETER}, the diameter of a neuron, and {_FARTHEST:g}; this is {value:g}"
+                f"a spacing lies between {DIAMETER}, the diameter of a neuron, and {FARTHEST:g}; this is {value:g}"
             )
             findings.error("out-of-range", spacing.source.span if node is None else node.span, message)
     return LayoutSettings(
         engine=engine,
-        direction=cast(
-            Literal["down", "up", "right", "left"], "down" if model.direction is None else model.direction.value
-        ),
-        positions=_pins(model, directory, findings),
+        direction=direction,
+        positions=pins.places,
         arrange=tuple(arrange),
         boxes=tuple(boxes),
         neuron_spacing=neuron,
         rank_spacing=rank,
+        relative=pins.relative,
+        origins=pins.origins,
+        mirrors=mirrors,
+        align=lines,
+        file=None if model.file is None else model.file.value,
     )
+
+
+def _arranged(
+    model: LayoutModel | ModuleLayoutModel, directory: Directory, findings: Findings
+) -> Iterator[tuple[tuple[int, ...], str]]:
+    for name, how in model.arrange.items():
+        members = resolve_end(key_of(model.source, "arrange", name), directory, findings)
+        if members is not None:
+            yield members, how.value
+
+
+def _boxed(
+    unit: Unit, model: LayoutModel | ModuleLayoutModel, directory: Directory, findings: Findings
+) -> Iterator[tuple[str, tuple[int, ...]]]:
+    """The named boxes; a reference in them may name an instance, which stands for all of its neurons."""
+    for name, reference in model.boxes.items():
+        if not reference.parts:
+            findings.error("empty-reference", reference.span, f"the box '{shown(name)}' holds no neuron")
+            continue
+        members = resolve(reference.parts, directory, findings, instances=True)
+        if members is not None:
+            yield unit.called(name), members
 
 
 def _check_engine(engine: Located[str], findings: Findings) -> None:
@@ -90,47 +126,6 @@ def _check_engine(engine: Located[str], findings: Findings) -> None:
     else:
         hint = suggest(name, ("auto", *installed), "known engines")
         findings.error("unknown-engine", engine.span, f"there is no layout engine '{shown(name)}' here", hint)
-
-
-def _pins(model: LayoutModel, directory: Directory, findings: Findings) -> dict[int, tuple[float, float]]:
-    """Pins by neuron; a pin names a neuron or a group of one, and pins closer than 0.6 are a finding."""
-    pins: dict[int, tuple[float, float]] = {}
-    keys: dict[int, Located[str]] = {}
-    cells: dict[tuple[int, int], list[int]] = {}  # as wide as a disc: what is too close lies in one next to it
-    for name, point in model.positions.items():
-        key = key_of(model.source, "positions", name)
-        neuron = _pinned(key, directory, findings)
-        if neuron is None:
-            continue
-        if neuron in pins:
-            message = f"'{name}' is pinned already (line {keys[neuron].span.line})"
-            findings.error("duplicate-pin", key.span, message)
-            continue
-        if max(abs(point.x), abs(point.y)) > _FARTHEST:
-            findings.error("out-of-range", point.span, f"a pin lies within {_FARTHEST:g} of the origin")
-            continue
-        column, row = math.floor(point.x / DIAMETER), math.floor(point.y / DIAMETER)
-        near = (other for i in (-1, 0, 1) for j in (-1, 0, 1) for other in cells.get((column + i, row + j), ()))
-        for other in near:
-            if math.dist(pins[other], (point.x, point.y)) < DIAMETER - 1e-9:
-                first = keys[other]
-                message = (
-                    f"the pins of '{name}' and '{first.value}' (line {first.span.line}) are closer than {DIAMETER}"
-                )
-                findings.error("pins-overlap", point.span, message)
-                break
-        cells.setdefault((column, row), []).append(neuron)
-        pins[neuron], keys[neuron] = (point.x, point.y), key
-    return pins
-
-
-def _pinned(key: Located[str], directory: Directory, findings: Findings) -> int | None:
-    members = resolve_end(key, directory, findings)
-    if members is not None and len(members) != 1:
-        message = f"'{shown(key.value)}' is {len(members)} neurons; a pin names one"
-        findings.error("bad-pin", key.span, message, "pin its neurons one by one, or use 'arrange'")
-        return None
-    return None if members is None else members[0]
 
 
 def check_ros(model: RosModel | None, findings: Findings) -> None:

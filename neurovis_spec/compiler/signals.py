@@ -11,29 +11,20 @@ from neurovis_spec.compiler.cells import cells_of, values_of
 from neurovis_spec.compiler.constants import ALWAYS, Constants, is_constant
 from neurovis_spec.compiler.limits import PATIENCE, amount, plural
 from neurovis_spec.compiler.network import FloatArray, Input, frozen
-from neurovis_spec.compiler.populate import key_span
+from neurovis_spec.compiler.references import Section, key_span
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.language.located import Formula, formula_of
+from neurovis_spec.language.sections import InputModel
 from neurovis_spec.language.source import NULL, Packed, Sequence
-from neurovis_spec.language.spec import InputModel, Spec
 
 _SOURCES = ("expression", "file", "values", "size")
 
 
-def make_inputs(spec: Spec, constants: Constants, files: Files) -> tuple[Input, ...]:
-    """All inputs that are not at fault."""
-    result: list[Input] = []
-    start = 0
-    for name, model in spec.inputs.items():
-        made = _make(name, model, start, spec, constants, files)
-        if made is not None:
-            result.append(made)
-            start += made.size
-    return tuple(result)
-
-
-def _make(name: str, model: InputModel, start: int, spec: Spec, constants: Constants, files: Files) -> Input | None:
+def make_input(
+    name: str, model: InputModel, start: int, section: Section, constants: Constants, files: Files
+) -> Input | None:
+    """One input of a section, from ``start`` on in the vector of all inputs; None where it is at fault."""
     findings = constants.findings
     if model.lost:
         return None
@@ -62,7 +53,7 @@ def _make(name: str, model: InputModel, start: int, spec: Spec, constants: Const
         return None if values is None else _tabled(name, start, values)
     size = 1 if model.size is None else constants.integer(model.size, "'size'", 1)
     if size is not None and size > 1_000_000:
-        span = key_span(spec, "inputs", name) if model.size is None else model.size.span
+        span = key_span(section, "inputs", name) if model.size is None else model.size.span
         findings.error("too-many", span, "an input has at most 1,000,000 components")
         return None
     return None if size is None else Input(name, start, size)

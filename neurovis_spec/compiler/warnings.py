@@ -7,7 +7,8 @@ one: what may be meant (a rate that is a parameter and can be set in a run, a bi
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -15,11 +16,14 @@ import numpy as np
 from neurovis_spec.compiler.connect import Bundle
 from neurovis_spec.compiler.idle import idle_neurons
 from neurovis_spec.compiler.inert import changes_nothing
+from neurovis_spec.compiler.modules import Library
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.populate import key_span
+from neurovis_spec.compiler.references import Section, key_span
+from neurovis_spec.compiler.units import Unit
 from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.language.sections import ConnectionModel
 from neurovis_spec.language.source import Mapping, Node, Packed, Scalar, Sequence
-from neurovis_spec.language.spec import ConnectionModel, Spec
+from neurovis_spec.language.spec import Spec
 
 _WORD: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _DEFINITIONS: Final = ("activations", "models", "rules")
@@ -29,43 +33,69 @@ _NO_EXPRESSIONS: Final = frozenset(
 )
 
 
-def warn(spec: Spec, network: Network, bundles: tuple[Bundle, ...], findings: Findings) -> None:
+@dataclass(frozen=True)
+class Compiled:
+    """What the warnings look at: a spec without errors, what it became, and which modules are used in it."""
+
+    spec: Spec
+    units: tuple[Unit, ...]
+    library: Library
+    used: Collection[str]
+    network: Network
+    bundles: tuple[Bundle, ...]
+
+    def sections(self) -> Iterator[tuple[Section, list[Unit]]]:
+        """The spec, and every module that is used, with the units that were made of it."""
+        made: dict[str | None, list[Unit]] = {}
+        for unit in self.units:
+            made.setdefault(unit.module, []).append(unit)
+        for units in made.values():
+            yield units[0].section, units
+
+
+def warn(compiled: Compiled, findings: Findings) -> None:
     """Note everything that is surely not meant in a spec that compiled."""
-    _inputs(spec, network, findings)
-    _parameters(spec, findings)
-    _definitions(spec, network, findings)
-    _neurons(spec, network, findings)
-    _rates(spec, bundles, findings)
+    _inputs(compiled, findings)
+    for section, _ in compiled.sections():
+        _parameters(section, findings)
+    _definitions(compiled.spec, compiled.network, findings)
+    _modules(compiled, findings)
+    _neurons(compiled, findings)
+    _rates(compiled, findings)
 
 
-def _inputs(spec: Spec, network: Network, findings: Findings) -> None:
-    """Inputs that neither a group nor a rule reads."""
+def _inputs(compiled: Compiled, findings: Findings) -> None:
+    """Inputs that neither a group nor a rule reads; of a module those that are read in no instance."""
+    network = compiled.network
     n = len(network.neurons)
     read = set(network.neurons.input.tolist())
     for plasticity in network.plasticity:
         for signal in plasticity.signals.values():
             read.update((np.unique(signal) - n).tolist())
-    for entry in network.inputs:
-        if entry.name in spec.inputs and read.isdisjoint(range(entry.start, entry.start + entry.size)):
-            message = f"nothing reads the input '{entry.name}'"
-            findings.warning("unused-input", key_span(spec, "inputs", entry.name), message, _READ.format(entry.name))
+    for section, units in compiled.sections():
+        handed = {outer.value for instance in section.instances.values() for outer in instance.inputs.values()}
+        for name in section.inputs.keys() - handed:
+            made = [unit.inputs[name] for unit in units if name in unit.inputs]
+            if all(read.isdisjoint(range(entry.start, entry.start + entry.size)) for entry in made):
+                message = f"nothing reads the input '{name}'"
+                findings.warning("unused-input", key_span(section, "inputs", name), message, _READ.format(name))
 
 
 _READ: Final = "give it to a group, as in {{input: {0}}}, or to a rule as a signal, or remove it"
 
 
-def _parameters(spec: Spec, findings: Findings) -> None:
+def _parameters(section: Section, findings: Findings) -> None:
     """Parameters that no expression names."""
     used: set[str] = set()
-    for entry in spec.source.entries:
-        # a definition sees its own parameters only
-        if entry.name not in _NO_EXPRESSIONS.union(_DEFINITIONS):
+    for entry in section.source.entries:
+        # a definition and a module see their own parameters only
+        if entry.name not in _NO_EXPRESSIONS.union(_DEFINITIONS, ("modules",)):
             for text in _texts(entry.value, _NO_EXPRESSIONS):
                 used.update(_WORD.findall(text))
-    for name in spec.parameters:
+    for name in section.parameters:
         if name not in used:
             message = f"no expression uses the parameter '{name}'"
-            findings.warning("unused-parameter", key_span(spec, "parameters", name), message, "remove it, or use it")
+            findings.warning("unused-parameter", key_span(section, "parameters", name), message, "remove it, or use it")
 
 
 def _definitions(spec: Spec, network: Network, findings: Findings) -> None:
@@ -83,28 +113,49 @@ def _definitions(spec: Spec, network: Network, findings: Findings) -> None:
                 findings.warning("unused-definition", entry.key.span, message, "remove it, or use it")
 
 
-def _neurons(spec: Spec, network: Network, findings: Findings) -> None:
-    """Neurons that stay at 0 for ever while something depends on them; a finding for each group."""
+def _modules(compiled: Compiled, findings: Findings) -> None:
+    """Modules of the spec's own that have no instance; those of an included file may be there for others."""
+    inside = {
+        instance.module.value
+        for module in compiled.library.modules.values()
+        for instance in module.model.instances.values()
+    }
+    for name, module in compiled.library.modules.items():
+        if module.own and name not in compiled.used and name not in inside:
+            message = f"the module '{name}' has no instance"
+            findings.warning("unused-module", key_span(compiled.spec, "modules", name), message, _INSTANCE)
+
+
+_INSTANCE: Final = "add one under 'instances', or remove it"
+
+
+def _neurons(compiled: Compiled, findings: Findings) -> None:
+    """Neurons that stay at 0 for ever while something depends on them; a finding for each group as it is written."""
+    spec, network = compiled.spec, compiled.network
     events = spec.source.get("events")
     if events is not None and any(text == "clamp" for text in _texts(events, frozenset(), keys=True)):
         return  # what is clamped is active from outside
+    written = {unit.called(name): (unit, name) for unit in compiled.units for name in unit.section.neurons}
+    told: set[Span] = set()
     for group, members in idle_neurons(network):
-        model = spec.neurons.get(group.name)
-        if model is None or model.bias is not None or model.initial is not None:
+        unit, own = written[group.name]
+        model, span = unit.section.neurons[own], key_span(unit.section, "neurons", own)
+        if span in told or model.bias is not None or model.initial is not None:
             continue
+        told.add(span)
         names = [network.neurons.names[member] for member in members]
         shown = f"'{group.name}'" if len(names) == group.count else ", ".join(f"'{name}'" for name in names[:5])
         if len(names) > 5 and len(names) < group.count:
             shown += " and others"
         message = f"nothing reaches {shown}, and there is no input, bias, initial or noise: the activity stays 0"
         hint = "connect something to it, or give it an input, a bias, an initial or a noise"
-        findings.warning("idle-neuron", key_span(spec, "neurons", group.name), message, hint)
+        findings.warning("idle-neuron", span, message, hint)
 
 
-def _rates(spec: Spec, bundles: tuple[Bundle, ...], findings: Findings) -> None:
+def _rates(compiled: Compiled, findings: Findings) -> None:
     """Rules whose rate is 0, and which therefore change no weight. A rate that names a parameter can be set later."""
-    bodies = {key.span: body for key, body in spec.connections}
-    for bundle in bundles:
+    bodies = {key.span: body for section, _ in compiled.sections() for key, body in section.connections}
+    for bundle in compiled.bundles:
         body, learning = bodies.get(bundle.key), bundle.learning
         if body is None or learning is None or "rate" not in learning.parameters:
             continue

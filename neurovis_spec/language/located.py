@@ -187,6 +187,11 @@ def one_of(*words: str) -> Callable[[Node, ValidationInfo], Located[str]]:
     return check
 
 
+def words(*allowed: str) -> Leaf[Node]:
+    """The annotation of a field that takes one of these words."""
+    return Leaf(one_of(*allowed), {"enum": list(allowed)})
+
+
 #: The schema of a formula: a number, or the text of an expression.
 FORMULA: JsonSchemaValue = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": "\\S", "maxLength": 1000}]}
 

@@ -74,6 +74,11 @@ def read_file(path: Path, name: str, findings: Findings) -> SourceDocument | Non
     if isinstance(data, FileFault):
         findings.error(data.code, Span(name, 1, 1, 1, 1), f"the file {data.reason}")
         return None
+    return read_content(data, name, findings)
+
+
+def read_content(data: bytes, name: str, findings: Findings) -> SourceDocument | None:
+    """Read the bytes of a file that findings call ``name``."""
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:

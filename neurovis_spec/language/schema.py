@@ -6,7 +6,8 @@ In: the pydantic models. Out: a JSON Schema 2020-12 as plain data, with the desc
 from __future__ import annotations
 
 from neurovis_spec.language.located import FORMULA
-from neurovis_spec.language.spec import ConnectionModel, Spec
+from neurovis_spec.language.sections import ConnectionModel
+from neurovis_spec.language.spec import Spec
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 

@@ -12,10 +12,12 @@ from typing import TypeVar
 from pydantic import ValidationError
 
 from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.library import Library
 from neurovis_spec.language.located import REPORTED
 from neurovis_spec.language.model import Model, opening
+from neurovis_spec.language.modules import IncludedModel
 from neurovis_spec.language.source import Mapping, SourceDocument
-from neurovis_spec.language.spec import Library, Spec
+from neurovis_spec.language.spec import Spec
 
 M = TypeVar("M", bound=Model)
 
@@ -55,6 +57,11 @@ def _foreign(document: SourceDocument, findings: Findings) -> bool:
 def read_spec(document: SourceDocument, findings: Findings) -> Spec | None:
     """The Spec of a document."""
     return read_shape(document, Spec, findings)
+
+
+def read_included(document: SourceDocument, findings: Findings) -> IncludedModel | None:
+    """The modules and definitions of an included file."""
+    return read_shape(document, IncludedModel, findings)
 
 
 def read_library(document: SourceDocument, findings: Findings) -> Library | None:

@@ -6,351 +6,26 @@ and no expression is parsed here. The descriptions are what an editor shows, and
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import suppress
 from typing import Annotated, ClassVar
 
-from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
-from pydantic_core import PydanticCustomError
+from pydantic import Field, ValidationInfo
 
+from neurovis_spec.language.drawing import LayoutModel, RenderModel
+from neurovis_spec.language.library import LANGUAGE_VERSION, Library
 from neurovis_spec.language.located import (
-    FORMULA,
-    BoolField,
-    FormulaField,
     IdentifierField,
     IntegerField,
     Leaf,
-    Located,
     NumberField,
     TextField,
     TextsField,
-    as_integer,
-    findings_of,
-    give_up,
-    one_of,
     refuse,
-    shown,
 )
-from neurovis_spec.language.model import Keyed, Model, Named
-from neurovis_spec.language.source import Entry, Mapping, Node, Packed, Scalar, ScalarValue, Sequence
-from neurovis_spec.language.values import (
-    FILE,
-    FORMULAS,
-    CentreField,
-    ChoiceField,
-    EdgesField,
-    FileReference,
-    FormulasField,
-    MatrixField,
-    ParameterField,
-    PointField,
-    ReferenceField,
-    TitleField,
-    as_file,
-)
-
-LANGUAGE_VERSION = 1
-
-
-def _version(node: Node, info: ValidationInfo) -> Located[int]:
-    version = as_integer(node, info)
-    if version.value != LANGUAGE_VERSION:
-        message = f"this is written in version {version.value:g} of the language; this program reads version 1"
-        findings_of(info).error("language-version", node.span, message, "write neurovis: 1")
-        give_up()
-    return version
-
-
-def _words(*words: str) -> Leaf[Node]:
-    return Leaf(one_of(*words), {"enum": list(words)})
-
-
-class Time(Model):
-    """The clock of a run."""
-
-    PLACE: ClassVar[str] = "'time'"
-
-    dt: FormulaField | None = Field(None, description="Seconds a step (default 1).")
-    steps: FormulaField | None = Field(None, description="Default run length in steps (default 1000).")
-    episode: FormulaField | None = Field(None, description="Steps of an episode; it ends after every m steps.")
-
-
-def _table(node: Node, info: ValidationInfo) -> FileReference | Sequence | Packed:
-    if isinstance(node, (Sequence, Packed)):
-        return node
-    refuse(info, node, "a list of rows, one a step")
-
-
-class InputModel(Model):
-    """A signal that comes from outside the network."""
-
-    PLACE: ClassVar[str] = "an input"
-
-    expression: FormulaField | None = Field(None, description="A formula of k (the step), t (seconds) and parameters.")
-    file: TextField | None = Field(None, description="A .csv, .npy or .npz file, one row a step; the last row stays.")
-    values: Annotated[
-        Sequence | Packed | None,
-        Leaf(_table, {"type": "array", "items": FORMULAS}),
-    ] = Field(None, description="The same, inline: one row a step.")
-    size: FormulaField | None = Field(None, description="How many numbers a step, for an input without a source.")
-    description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
-
-
-_POINT = {"type": "array", "items": FORMULA, "minItems": 2, "maxItems": 2}
-
-
-def _position(node: Node, info: ValidationInfo) -> FileReference | Sequence | Packed:
-    if isinstance(node, Mapping):
-        return as_file(node, info)
-    if isinstance(node, (Sequence, Packed)):
-        return node
-    refuse(info, node, "a position [x, y], a list of them, or {file: …}")
-
-
-class GroupModel(Model):
-    """A group of neurons, or a single one."""
-
-    PLACE: ClassVar[str] = "a group of neurons"
-
-    count: FormulaField | None = Field(None, description="How many neurons; K with count 3 makes K1, K2, K3.")
-    first: FormulaField | None = Field(None, description="The number of the first neuron (default 1).")
-    names: TextsField | None = Field(None, description="The names of the neurons, one by one.")
-    activation: ChoiceField | None = Field(
-        None, description="Activation function, name or {name: {parameter: value}} (default identity)."
-    )
-    model: ChoiceField | None = Field(
-        None,
-        description="How the activity follows from the input, name or {name: {…}}; static is Eq. 1 (default static).",
-    )
-    combine: Annotated[Located[str], _words("sum", "product", "distance")] | None = Field(
-        None,
-        description="What arrives is combined by sum or product of w·a, or by distance √Σ(w·a − c)² (default sum).",
-    )
-    bias: FormulasField | None = Field(None, description="Added to the combined input (default 0).")
-    initial: FormulasField | None = Field(None, description="The activity at step 0; without it step 0 is computed.")
-    input: TextField | None = Field(None, description="An entry of inputs, added to the combined input.")
-    noise: FormulaField | None = Field(
-        None, description="An expression with normal(m, s) or uniform(a, b), drawn anew and added each step."
-    )
-    position: Annotated[
-        FileReference | Sequence | Packed | None,
-        Leaf(_position, {"anyOf": [_POINT, {"type": "array", "items": _POINT}, FILE]}),
-    ] = Field(None, description="Where the neuron is, as data: [x, y], a list of them, a file. It is no pin.")
-    label: TextsField | None = Field(None, description="Display text; a counted group may give a list.")
-    box: TextField | None = Field(None, description="The named box of the picture that holds the group.")
-    role: Annotated[Located[str], _words("input", "hidden", "output")] | None = Field(
-        None, description="What the picture and the layout take it for: input, hidden or output."
-    )
-    description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
-
-
-class ScaleModel(Model):
-    """How the weights of an entry are scaled together; one of the three."""
-
-    PLACE: ClassVar[str] = "a 'scale'"
-
-    spectral_radius: FormulaField | None = Field(
-        None, description="The largest magnitude of an eigenvalue of the entry's matrix; both ends the same neurons."
-    )
-    norm: FormulaField | None = Field(None, description="The Frobenius norm of the entry's matrix.")
-    indegree: BoolField | None = Field(
-        None, description="Whether each weight is divided by the connections of this entry into its target."
-    )
-
-
-class ConnectionModel(Model):
-    """The body of a connection; a bare weight is read as ``{weight: …}``."""
-
-    PLACE: ClassVar[str] = "a connection"
-
-    weight: FormulaField | None = Field(
-        None, description="One number, or an expression of i, j, n_from, n_to (default 1)."
-    )
-    centre: CentreField | None = Field(None, description="For combine: distance; like weight or matrix (default 0).")
-    scale: ScaleModel | None = Field(None, description="Scales the weights of this entry together when they are made.")
-    matrix: MatrixField | None = Field(None, description="Dense rows, rows are sources; null means no connection.")
-    edges: EdgesField | None = Field(None, description="[[from, to, weight, delay], …], the last two optional.")
-    pattern: ChoiceField | None = Field(
-        None,
-        description="Which pairs are connected: all_to_all, one_to_one, chain, ring, {random: {probability: p}}, ….",
-    )
-    self: BoolField | None = Field(
-        None, description="Whether a neuron may connect to itself in a pattern (default false)."
-    )
-    rows: Annotated[Located[str], _words("from", "to")] | None = Field(
-        None, description="Whether the rows of a matrix are sources (from) or targets (to) (default from)."
-    )
-    delay: FormulaField | None = Field(
-        None, description="Steps the signal travels; 0 is within the same step (default 1)."
-    )
-    plasticity: ChoiceField | None = Field(None, description="A rule: name, or {name: {parameter: value, signal: …}}.")
-    bounds: Annotated[
-        tuple[FormulaField, FormulaField] | None,
-        BeforeValidator(lambda node, info: _pair(node, info)),
-        WithJsonSchema({"type": "array", "items": FORMULA, "minItems": 2, "maxItems": 2}),
-    ] = Field(None, description="[low, high] for plastic weights.")
-    description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
-
-
-def _pair(node: Node, info: ValidationInfo) -> tuple[Node, Node]:
-    if isinstance(node, Sequence) and len(node.items) == 2:
-        return (node.items[0], node.items[1])
-    refuse(info, node, "bounds [low, high]")
-
-
-class StateModel(Model):
-    """A state of a model or of a rule."""
-
-    initial: FormulaField | None = Field(None, description="Its value before step 0 (default 0).")
-    each_step: FormulaField | None = Field(None, description="Its new value at each step.")
-    each_episode: FormulaField | None = Field(None, description="Its new value at an episode's end.")
-
-
-class ActivationModel(Model):
-    """An activation function of one's own."""
-
-    parameters: Named[ParameterField] = Field(default_factory=dict, description="Names and defaults.")
-    let: Named[FormulaField] = Field(default_factory=dict, description="Intermediate values, in order.")
-    value: FormulaField = Field(description="An expression of x, the combined input, and the parameters.")
-    description: TextField | None = Field(None, description="What it is, its equation and its source.")
-
-
-class ModelModel(Model):
-    """A neuron model of one's own: how the activity follows from the drive."""
-
-    parameters: Named[ParameterField] = Field(default_factory=dict, description="Names and defaults.")
-    let: Named[FormulaField] = Field(default_factory=dict, description="Intermediate values, in order.")
-    state: Named[StateModel] = Field(default_factory=dict, description="States, updated together from old values.")
-    activity: FormulaField = Field(description="The activity; f(…) is the neuron's activation, drive is u[t].")
-    description: TextField | None = Field(None, description="What it is, its equation and its source.")
-
-
-class WeightModel(Model):
-    """How a rule changes the weight."""
-
-    each_step: FormulaField | None = Field(None, description="w[t+1], an expression of weight, pre, post, ….")
-    each_episode: FormulaField | None = Field(None, description="The weight after an episode.")
-
-
-class RuleModel(Model):
-    """A plasticity rule of one's own."""
-
-    parameters: Named[ParameterField] = Field(default_factory=dict, description="Names and defaults.")
-    signals: TextsField = Field(default=(), description="Names of signals that the connection must supply.")
-    let: Named[FormulaField] = Field(default_factory=dict, description="Intermediate values, in order.")
-    state: Named[StateModel] = Field(default_factory=dict, description="States, one for each connection.")
-    weight: WeightModel = Field(description="How the weight changes.")
-    description: TextField | None = Field(None, description="What it is, its equation and its source.")
-
-
-class EventModel(Model):
-    """Something that changes during a run."""
-
-    PLACE: ClassVar[str] = "an event"
-
-    at: FormulaField | None = Field(None, description="The step from which on it applies (set, lesion).")
-    from_: FormulaField | None = Field(None, alias="from", description="The first step of a clamp.")
-    to: FormulaField | None = Field(None, description="The step before which a clamp ends; without it, it lasts.")
-    set: Named[FormulaField] = Field(default_factory=dict, description="{parameter: value} from this step on.")
-    clamp: Keyed[FormulaField] = Field(default_factory=dict, description="{neurons: activity}.")
-    lesion: TextsField = Field(default=(), description="Neurons and connections (FROM -> TO) that are removed.")
-
-
-#: Findings of one list, after which the rest of it is not looked at.
-_PATIENCE = 20
-
-
-def _mappings(node: Node, info: ValidationInfo, wanted: str) -> Iterator[Mapping]:
-    """The mappings of a list; what is none is noted."""
-    findings = findings_of(info)
-    before = findings.errors
-    for item in node.items if isinstance(node, (Sequence, Packed)) else (node,):
-        if isinstance(item, Mapping):
-            yield item
-        elif findings.errors - before < _PATIENCE:
-            with suppress(PydanticCustomError):
-                refuse(info, item, wanted)
-
-
-def _events(node: Node, info: ValidationInfo) -> tuple[Mapping, ...]:
-    if not isinstance(node, (Sequence, Packed)):
-        refuse(info, node, "a list of events", "write each event behind a dash")
-    return tuple(_mappings(node, info, "an event, that is a mapping"))
-
-
-class Spacing(Model):
-    """Distances of the layout in its units."""
-
-    PLACE: ClassVar[str] = "'layout: spacing'"
-
-    neuron: NumberField | None = Field(None, description="Between neighbours of a rank (default 1).")
-    rank: NumberField | None = Field(None, description="Between ranks (default 2).")
-
-
-ENGINES = ("auto", "layered", "organic", "large", "circular", "grid", "spatial", "manual")
-
-
-class LayoutModel(Model):
-    """How the network is laid out."""
-
-    PLACE: ClassVar[str] = "'layout'"
-
-    LATER: ClassVar[dict[str, str]] = {
-        "mirror": "mirror images",
-        "align": "neurons on one line",
-        "file": "an earlier layout as memory",
-    }
-
-    engine: TextField | None = Field(
-        None, description="What lays it out: auto, layered, circular, grid, manual, or a plug-in (default auto)."
-    )
-    direction: Annotated[Located[str], _words("down", "up", "right", "left")] | None = Field(
-        None, description="Where the signals go: down, up, right, left (default down)."
-    )
-    positions: Keyed[PointField] = Field(default_factory=dict, description="Pins: {neuron: [x, y]}.")
-    arrange: Keyed[Annotated[Located[str], _words("row", "column", "grid", "ring", "arc")]] = Field(
-        default_factory=dict, description="{reference: row | column | grid | ring | arc}."
-    )
-    boxes: Keyed[ReferenceField] = Field(default_factory=dict, description="{title: references}.")
-    spacing: Spacing | None = Field(None, description="Distances in units of the layout.")
-
-
-class Gain(Model):
-    """The scaling factors γ of Eqs. 2–5; those not given suit the network's range."""
-
-    PLACE: ClassVar[str] = "'render: gain'"
-
-    activity: NumberField | None = Field(None, description="γ_NC, Eq. 2: colour of neurons.")
-    signal: NumberField | None = Field(None, description="γ_CC, Eq. 3: colour of connections.")
-    thickness: NumberField | None = Field(None, description="γ_CT, Eq. 4: thickness of connections, pixels a unit.")
-    change: NumberField | None = Field(None, description="γ_LI, Eq. 5: glow of connections whose weight changes.")
-
-
-class RenderModel(Model):
-    """How the network is drawn."""
-
-    PLACE: ClassVar[str] = "'render'"
-
-    gain: Gain | None = Field(None, description="The scaling factors γ of Eqs. 2–5.")
-    theme: Annotated[Located[str], _words("default", "dark", "print", "paper")] | None = Field(
-        None, description="The colours: default, dark, print or paper (default default)."
-    )
-    size: Annotated[
-        tuple[IntegerField, IntegerField] | None,
-        BeforeValidator(lambda node, info: _size(node, info)),
-        WithJsonSchema({"type": "array", "items": {"type": "integer", "minimum": 1}, "minItems": 2, "maxItems": 2}),
-    ] = Field(None, description="[width, height] in pixels.")
-    labels: BoolField | None = Field(None, description="Whether neurons show their labels (default true).")
-    legend: BoolField | None = Field(None, description="Whether there is a legend (default true).")
-    title: TitleField | None = Field(
-        None, description="Whether there is a title, or another text for it (default true)."
-    )
-
-
-def _size(node: Node, info: ValidationInfo) -> tuple[Node, Node]:
-    if isinstance(node, Sequence) and len(node.items) == 2:
-        return (node.items[0], node.items[1])
-    refuse(info, node, "a size [width, height]")
+from neurovis_spec.language.model import Model, Named
+from neurovis_spec.language.modules import InstanceModel, ModuleModel
+from neurovis_spec.language.sections import ConnectionsField, EventsField, GroupModel, InputModel, Time
+from neurovis_spec.language.source import Mapping, Node, ScalarValue
+from neurovis_spec.language.values import ParameterField, ReferenceField
 
 
 def _any_mapping(node: Node, info: ValidationInfo) -> Mapping:
@@ -372,36 +47,11 @@ class RosModel(Model):
     publish: MappingField | None = Field(None, description="{output: {topic, type}}.")
 
 
-class Library(Model):
-    """A file of definitions, as the built-in ones ship."""
-
-    STAND_INS: ClassVar[dict[str, ScalarValue]] = {"neurovis": LANGUAGE_VERSION}
-
-    neurovis: Annotated[Located[int], Leaf(_version, {"const": 1})] = Field(
-        description="The version of the language: 1."
-    )
-    title: TextField | None = Field(None, description="A title.")
-    description: TextField | None = Field(None, description="What this is.")
-    activations: Named[ActivationModel] = Field(default_factory=dict, description="Activation functions of one's own.")
-    models: Named[ModelModel] = Field(default_factory=dict, description="Neuron models of one's own.")
-    rules: Named[RuleModel] = Field(default_factory=dict, description="Plasticity rules of one's own.")
-
-
-def _as_it_is(value: Located[str], info: ValidationInfo) -> Located[str]:
-    return value
-
-
 class Spec(Library):
     """A whole spec."""
 
     PLACE: ClassVar[str] = "the top level"
     STAND_INS: ClassVar[dict[str, ScalarValue]] = {"neurovis": LANGUAGE_VERSION, "name": "unnamed"}
-
-    LATER: ClassVar[dict[str, str]] = {
-        "include": "definitions from other files",
-        "modules": "networks to be used several times",
-        "instances": "uses of modules",
-    }
 
     name: IdentifierField = Field(description="The name of the network, an identifier.")
     authors: TextsField | None = Field(None, description="Who wrote it.")
@@ -410,48 +60,20 @@ class Spec(Library):
     time: Time | None = Field(None, description="The clock: dt, steps, episode.")
     seed: IntegerField | None = Field(None, description="The only source of randomness (default 0).")
     parameters: Named[ParameterField] = Field(default_factory=dict, description="Named constants, in order.")
+    include: TextsField = Field(
+        default=(), description="Files whose modules, activations, models and rules are used here."
+    )
+    modules: Named[ModuleModel] = Field(default_factory=dict, description="Networks to be used several times.")
     inputs: Named[InputModel] = Field(default_factory=dict, description="Signals from outside the network.")
     neurons: Named[GroupModel] = Field(default_factory=dict, description="Groups of neurons.")
-    connections: Annotated[
-        tuple[tuple[Annotated[Located[str], Leaf(_as_it_is, {})], ConnectionModel], ...],
-        BeforeValidator(lambda node, info: _connections(node, info)),
-        WithJsonSchema({"title": "Connections"}),
-    ] = Field(default=(), description="FROM -> TO: a weight or a body. Rows are sources, columns are targets.")
+    instances: Named[InstanceModel] = Field(default_factory=dict, description="Uses of modules.")
+    connections: ConnectionsField = Field(
+        default=(), description="FROM -> TO: a weight or a body. Rows are sources, columns are targets."
+    )
     outputs: Named[ReferenceField] = Field(default_factory=dict, description="Names for what leaves the network.")
-    events: Annotated[tuple[EventModel, ...], BeforeValidator(lambda node, info: _events(node, info))] = Field(
+    events: EventsField = Field(
         default=(), description="What changes during a run: parameters set, neurons clamped, parts lesioned."
     )
     layout: LayoutModel | None = Field(None, description="How it is laid out.")
     render: RenderModel | None = Field(None, description="How it is drawn.")
     ros: RosModel | None = Field(None, description="How it meets ROS.")
-
-
-def _connections(node: Node, info: ValidationInfo) -> list[tuple[Located[str], object]]:
-    """One mapping, or a list of mappings: in both cases the entries in the order written. What is at fault is noted and
-    left out."""
-    result: list[tuple[Located[str], object]] = []
-    for mapping in _mappings(node, info, "a mapping FROM -> TO: weight, or a list of such"):
-        first: dict[str, Entry] = {}
-        for entry in mapping.entries:
-            same = first.setdefault("".join(entry.name.split()), entry)
-            if same is not entry:  # two spellings of one key
-                place = f"{same.key.span.line}:{same.key.span.column}"
-                message = f"'{shown(entry.name)}' is there twice: first at {place} as '{shown(same.name)}'"
-                hint = "connections that share both ends are written as a list of mappings"
-                findings_of(info).error("duplicate-key", entry.key.span, message, hint)
-            with suppress(PydanticCustomError):
-                result.append((Located(entry.name, entry.key), _body(entry, info)))
-    return result
-
-
-def _body(entry: Entry, info: ValidationInfo) -> Mapping:
-    """A body as it is; a bare weight is short for a body with a weight, and nothing for an empty one."""
-    node = entry.value
-    if isinstance(node, Mapping):
-        return node
-    if not isinstance(node, Scalar):
-        hint = "write {matrix: …}" if isinstance(node, (Sequence, Packed)) else None
-        refuse(info, node, "a weight or a mapping", hint)
-    if node.value is None:
-        return Mapping((), entry.key.span)
-    return Mapping((Entry(Scalar("weight", node.span, None), node),), node.span)

@@ -112,6 +112,8 @@ def refuse_what_it_cannot(problem: LayoutProblem, name: str, can: Capabilities) 
         "layout-pins-unsupported": (bool(problem.pins), can.pins, "keep pinned positions (layout.positions)"),
         "layout-arrange-unsupported": (bool(problem.arrange), can.arrange, "arrange groups (layout.arrange)"),
         "layout-boxes-unsupported": (bool(problem.boxes), can.boxes, "keep the members of a box together"),
+        "layout-mirror-unsupported": (bool(problem.mirrors), can.mirrors, "draw mirror images (layout.mirror)"),
+        "layout-align-unsupported": (bool(problem.align), can.align, "put neurons on one line (layout.align)"),
         "layout-direction-unsupported": (problem.direction != "down", can.direction, "draw in another direction"),
     }
     for code, (wanted, possible, what) in asked.items():

@@ -14,7 +14,7 @@ from neurovis_spec.diagnostics import Findings, suggest
 from neurovis_spec.language.reader import read_text
 from neurovis_spec.language.source import Mapping, Node, Packed, Scalar, Sequence, describe
 from neurovis_spec.layout.model import Layout, Point, Route
-from neurovis_spec.layout.problem import edge_key, natural_key
+from neurovis_spec.layout.naming import edge_key, natural_key
 
 VERSION = 1
 _KEYS = ("neurovis_layout", "network", "engine", "positions", "routes")

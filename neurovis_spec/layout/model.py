@@ -43,6 +43,36 @@ class LayoutGroup:
 
 
 @dataclass(frozen=True, slots=True)
+class LayoutModule:
+    """An instance of a module: a frame that nothing foreign enters.
+
+    ``path`` is its name (``left1.knee``); ``parent`` the index of the instance around it, −1 without one; ``members``
+    its neurons, those of instances within it included. Instances with the same ``template`` are of one make (the same
+    neurons, connections and pins within): they are drawn alike, exactly, up to a mirror; the i-th member of one is
+    the i-th member of the other. ``pins`` are relative to the origin of the
+    instance, which is free unless ``origin`` says where it is.
+    """
+
+    path: str
+    module: str
+    parent: int
+    members: tuple[int, ...]
+    template: str
+    pins: Mapping[int, Point] = field(default_factory=dict)
+    origin: Point | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class LayoutMirror:
+    """Pairs of neurons, the second the mirror image of the first on an axis along the direction; ``modules`` are the
+    pairs of instances that were named. ``scope`` is the instance in whose frame the axis lies, −1 for the whole."""
+
+    scope: int
+    pairs: tuple[tuple[int, int], ...]
+    modules: tuple[tuple[int, int], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class LayoutProblem:
     """What is to be laid out, in canonical order: neurons in the natural order of their names (K2 before K10), edges by
     the natural order of their names, so that the order of the spec cannot show in the result."""
@@ -51,7 +81,7 @@ class LayoutProblem:
     neurons: tuple[str, ...]
     groups: tuple[LayoutGroup, ...]
     edges: tuple[LayoutEdge, ...]
-    #: pinned neurons: index to exact position
+    #: pinned neurons: index to exact position, those that an instance's origin pins among them
     pins: Mapping[int, Point] = field(default_factory=dict)
     direction: Direction = "down"
     #: members and how they are to be arranged
@@ -63,6 +93,15 @@ class LayoutProblem:
     #: where signals enter and leave the network: a hint on what comes first in a loop
     entries: tuple[int, ...] = ()
     exits: tuple[int, ...] = ()
+    #: instances of modules, in the natural order of their paths: an instance before those within it
+    modules: tuple[LayoutModule, ...] = ()
+    mirrors: tuple[LayoutMirror, ...] = ()
+    #: neurons on one line across the direction
+    align: tuple[tuple[int, ...], ...] = ()
+    #: where neurons are as data (a body, a connectome); NaN where that is not known
+    places: tuple[Point, ...] = ()
+    #: an earlier layout of the same network: memory, not pins
+    memory: Layout | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +124,12 @@ class Capabilities:
     arrange: bool = False
     boxes: bool = False
     direction: bool = False
+    #: draws instances as frames, those of one template alike
+    modules: bool = False
+    mirrors: bool = False
+    align: bool = False
+    #: keeps what it can of an earlier layout
+    memory: bool = False
     #: most neurons and most connections
     neurons: int = 1_000_000
     edges: int = 10_000_000

@@ -6,45 +6,27 @@ theirs. Whatever order the spec was written in, an engine sees the same problem,
 
 from __future__ import annotations
 
-import re
+import math
 from collections.abc import Iterable, Mapping
 from typing import cast
 
+import numpy as np
+
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.layout.makes import modules_of
 from neurovis_spec.layout.model import (
     Arrangement,
     Direction,
+    Layout,
     LayoutEdge,
     LayoutGroup,
+    LayoutMirror,
     LayoutProblem,
     Point,
 )
+from neurovis_spec.layout.naming import edge_key, natural_key
 
-_DIGITS = re.compile(r"(\d+)")
-NaturalKey = tuple[tuple[tuple[int, int, str], ...], str]
-
-
-def natural_key(name: str) -> NaturalKey:
-    """A sort key in which numbers count as numbers; the name itself decides between equals.
-
-    >>> sorted(["K10", "K2", "K"], key=natural_key)
-    ['K', 'K2', 'K10']
-    """
-    parts = (
-        (0, int(part), "") if part.isascii() and part.isdigit() else (1, 0, part)
-        for part in _DIGITS.split(name)
-        if part
-    )
-    return tuple(parts), name
-
-
-def edge_key(name: str) -> tuple[NaturalKey, ...]:
-    """A sort key for the names of edges: source, target, then the number among equals.
-
-    >>> sorted(["K2 -> O", "K -> O (2)", "K -> O"], key=edge_key)
-    ['K -> O', 'K -> O (2)', 'K2 -> O']
-    """
-    return tuple(natural_key(part) for part in name.split(" "))
+_NOWHERE = (math.nan, math.nan)
 
 
 def canonical(
@@ -59,12 +41,22 @@ def canonical(
     spacing: tuple[float, float] = (1.0, 2.0),
     entries: Iterable[str] = (),
     exits: Iterable[str] = (),
+    modules: Iterable[tuple[str, str]] = (),
+    relative: Mapping[str, Mapping[str, Point]] | None = None,
+    origins: Mapping[str, Point] | None = None,
+    mirrors: Iterable[tuple[str, Iterable[tuple[str, str]], Iterable[tuple[str, str]]]] = (),
+    align: Iterable[Iterable[str]] = (),
+    places: Mapping[str, Point] | None = None,
+    memory: Layout | None = None,
 ) -> LayoutProblem:
     """The problem made of these parts, in canonical order.
 
     ``edges`` are (name, source, target, delay); ``spacing`` is that of neurons, then that of ranks. Equal parts in
     any order give an equal problem. The members of a group keep the order in which they are given (that of their
-    numbers).
+    numbers). ``modules`` are the paths of instances and the names of their modules (their neurons are those whose names
+    begin with the path), ``relative`` the pins within instances, ``origins`` the places of
+    these, ``mirrors`` the scope's path, the
+    pairs of neurons and the pairs of instances; ``places`` where neurons are as data.
     """
     names = tuple(sorted(neurons, key=natural_key))
     index = {name: i for i, name in enumerate(names)}
@@ -73,25 +65,50 @@ def canonical(
         return tuple(sorted({index[name] for name in of}))
 
     pinned = {index[name]: (float(x), float(y)) for name, (x, y) in (pins or {}).items()}
+    ordered_edges = tuple(
+        LayoutEdge(name, index[source], index[target], delay)
+        for name, source, target, delay in sorted(edges, key=lambda edge: edge_key(edge[0]))
+    )
+    ordered_groups = tuple(
+        LayoutGroup(name, tuple(index[member] for member in of))
+        for name, of in sorted(groups, key=lambda group: natural_key(group[0]))
+    )
+    arranged = tuple(sorted((members(of), how) for of, how in arrange))
+    framed = tuple(sorted(_merged((name, members(of)) for name, of in boxes), key=lambda box: natural_key(box[0])))
+    instances = modules_of(
+        names, tuple(modules), ordered_edges, ordered_groups, arranged, framed, relative or {}, origins or {}
+    )
+    where = {instance.path: place for place, instance in enumerate(instances)}
     return LayoutProblem(
         network=network,
         neurons=names,
-        groups=tuple(
-            LayoutGroup(name, tuple(index[member] for member in of))
-            for name, of in sorted(groups, key=lambda group: natural_key(group[0]))
-        ),
-        edges=tuple(
-            LayoutEdge(name, index[source], index[target], delay)
-            for name, source, target, delay in sorted(edges, key=lambda edge: edge_key(edge[0]))
-        ),
+        groups=ordered_groups,
+        edges=ordered_edges,
         pins=dict(sorted(pinned.items())),
         direction=direction,
-        arrange=tuple(sorted((members(of), how) for of, how in arrange)),
-        boxes=tuple(sorted(_merged((name, members(of)) for name, of in boxes), key=lambda box: natural_key(box[0]))),
+        arrange=arranged,
+        boxes=framed,
         neuron_spacing=spacing[0],
         rank_spacing=spacing[1],
         entries=members(entries),
         exits=members(exits),
+        modules=instances,
+        mirrors=tuple(
+            sorted(
+                (
+                    LayoutMirror(
+                        where.get(scope, -1),
+                        tuple(sorted((index[one], index[other]) for one, other in pairs)),
+                        tuple(sorted((where[one], where[other]) for one, other in paths)),
+                    )
+                    for scope, pairs, paths in mirrors
+                ),
+                key=lambda mirror: mirror.pairs,
+            )
+        ),
+        align=tuple(sorted(members(line) for line in align)),
+        places=tuple((places or {}).get(name, _NOWHERE) for name in names) if places else (),
+        memory=memory,
     )
 
 
@@ -103,8 +120,9 @@ def _merged(boxes: Iterable[tuple[str, tuple[int, ...]]]) -> list[tuple[str, tup
     return [(name, tuple(sorted(members))) for name, members in joined.items()]
 
 
-def problem_of(network: Network) -> LayoutProblem:
-    """The layout problem of a compiled network: structure and layout settings, no activity, no weight."""
+def problem_of(network: Network, memory: Layout | None = None) -> LayoutProblem:
+    """The layout problem of a compiled network: structure and layout settings, no activity, no weight. ``memory`` is an
+    earlier layout of it."""
     names, settings, connections = network.neurons.names, network.layout, network.connections
 
     def named(indices: Iterable[int]) -> list[str]:
@@ -131,7 +149,24 @@ def problem_of(network: Network) -> LayoutProblem:
         (settings.neuron_spacing, settings.rank_spacing),
         named(_entries(network)),
         named(_exits(network)),
+        [(instance.path, instance.module) for instance in network.instances],
+        {path: {names[i]: point for i, point in pins.items()} for path, pins in settings.relative},
+        settings.origins,
+        [
+            (mirror.scope, [(names[a], names[b]) for a, b in mirror.pairs], mirror.instances)
+            for mirror in settings.mirrors
+        ],
+        [named(line) for line in settings.align],
+        _places(network),
+        memory,
     )
+
+
+def _places(network: Network) -> dict[str, Point]:
+    """The ``position`` of the neurons that have one."""
+    known = np.isfinite(network.neurons.position).all(axis=1)
+    points = network.neurons.position.tolist()
+    return {network.neurons.names[i]: (points[i][0], points[i][1]) for i in np.flatnonzero(known).tolist()}
 
 
 def _entries(network: Network) -> list[int]:

@@ -13,8 +13,8 @@ from typing import Literal, TypeAlias
 
 from neurovis_spec import plugins
 from neurovis_spec.compiler.builtin import libraries
+from neurovis_spec.language.library import ActivationModel, Library, ModelModel, RuleModel
 from neurovis_spec.language.source import Entry, Mapping
-from neurovis_spec.language.spec import ActivationModel, Library, ModelModel, RuleModel
 from neurovis_spec.language.values import Parameter
 
 Kind: TypeAlias = Literal["activation", "model", "rule"]

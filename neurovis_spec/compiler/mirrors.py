@@ -1,0 +1,161 @@
+"""Mirrors and lines: neurons that are mirror images of each other, and neurons on one line.
+
+In: ``layout.mirror`` and ``layout.align`` of every unit. Out: pairs of neurons, and lists of neurons. Two sides of a
+mirror are of equal make: as many neurons, in instances with the same names; how they are connected does not matter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal
+
+from neurovis_spec.compiler.limits import plural
+from neurovis_spec.compiler.network import Mirror
+from neurovis_spec.compiler.populate import Population
+from neurovis_spec.compiler.references import Directory, resolve, resolve_end
+from neurovis_spec.compiler.units import Unit
+from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.located import Located, shown
+from neurovis_spec.language.values import Reference
+
+#: Coordinates of pins that differ by less are the same.
+_SLACK = 1e-9
+
+
+def mirrors_of(units: tuple[Unit, ...], population: Population, findings: Findings) -> tuple[Mirror, ...]:
+    """All mirrors. A neuron that stands on two sides, or twice on one, is a finding."""
+    paths = {id(directory): unit.path for unit, directory in zip(units, population.directories, strict=True)}
+    result: list[Mirror] = []
+    taken: dict[int, int] = {}
+    for unit, directory in zip(units, population.directories, strict=True):
+        layout = unit.section.layout
+        for reference in () if layout is None else layout.mirror:
+            mirror = _mirror(unit, reference, directory, population.neurons.names, paths, findings)
+            if mirror is None:
+                continue
+            twice = next((m for pair in mirror.pairs for m in pair if m in taken), None)
+            itself = next((a for a, b in mirror.pairs if a == b), None)
+            for pair in mirror.pairs:
+                taken.update({pair[0]: pair[1], pair[1]: pair[0]})
+            if itself is not None:
+                name = population.neurons.names[itself]
+                hint = "what stands on the axis needs no mirror"
+                findings.error("bad-mirror", reference.span, f"'{name}' would be its own mirror image", hint)
+            elif twice is not None:
+                name = population.neurons.names[twice]
+                findings.error("bad-mirror", reference.span, f"'{name}' has a mirror image already")
+            else:
+                result.append(mirror)
+    return tuple(result)
+
+
+def _mirror(
+    unit: Unit,
+    reference: Reference,
+    directory: Directory,
+    names: tuple[str, ...],
+    paths: Mapping[int, str],
+    findings: Findings,
+) -> Mirror | None:
+    left, right = reference.parts
+    sides = directory.instance(left.value), directory.instance(right.value)
+    if bool(sides[0]) != bool(sides[1]) and not (directory.covers(left.value) or directory.covers(right.value)):
+        known = directory.find((right if sides[0] else left).value)
+        if known is not None:
+            message = "a mirror pairs instances with instances, and neurons with neurons"
+            findings.error("bad-mirror", reference.span, message)
+            return None
+    if sides[0] and sides[1]:
+        return _of_instances(unit, reference, sides, names, paths, findings)
+    pair = _members(left, directory, findings), _members(right, directory, findings)
+    if pair[0] is None or pair[1] is None:
+        return None
+    if len(pair[0]) != len(pair[1]):
+        message = f"'{shown(left.value)}' is {plural(len(pair[0]), 'neuron')}, '{shown(right.value)}' {len(pair[1])}"
+        findings.error("unequal-mirror", reference.span, f"{message}; a mirror needs sides of equal make")
+        return None
+    return Mirror(unit.path, tuple(zip(pair[0], pair[1], strict=True)))
+
+
+def _members(side: Located[str], directory: Directory, findings: Findings) -> tuple[int, ...] | None:
+    return () if directory.instance(side.value) else resolve_end(side, directory, findings)
+
+
+def _of_instances(
+    unit: Unit,
+    reference: Reference,
+    sides: tuple[tuple[Directory, ...], tuple[Directory, ...]],
+    names: tuple[str, ...],
+    paths: Mapping[int, str],
+    findings: Findings,
+) -> Mirror | None:
+    left, right = reference.parts
+    if len(sides[0]) != len(sides[1]):
+        message = (
+            f"'{shown(left.value)}' is {plural(len(sides[0]), 'instance')}, '{shown(right.value)}' {len(sides[1])}"
+        )
+        findings.error("unequal-mirror", reference.span, f"{message}; instances pair by number")
+        return None
+    pairs: list[tuple[int, int]] = []
+    instances: list[tuple[str, str]] = []
+    for one, other in zip(*sides, strict=True):
+        own, theirs = paths[id(one)], paths[id(other)]
+        mates = {names[index][len(theirs) :]: index for index in other.members}
+        there = {names[index][len(own) :]: index for index in one.members}
+        if mates.keys() != there.keys():
+            odd = min(mates.keys() ^ there.keys())
+            message = f"'{own}' and '{theirs}' are not of equal make: only one of them has '{odd[1:]}'"
+            findings.error("unequal-mirror", reference.span, message)
+            return None
+        pairs += [(index, mates[name]) for name, index in there.items()]
+        instances.append((own, theirs))
+    return Mirror(unit.path, tuple(pairs), tuple(instances))
+
+
+def lines_of(units: tuple[Unit, ...], population: Population, findings: Findings) -> tuple[tuple[int, ...], ...]:
+    """The neurons of each list of ``align``."""
+    result: list[tuple[int, ...]] = []
+    for unit, directory in zip(units, population.directories, strict=True):
+        layout = unit.section.layout
+        for reference in () if layout is None else layout.align:
+            members = resolve(reference.parts, directory, findings)
+            if members is not None and len(members) < 2:
+                findings.error("wrong-size", reference.span, "a line needs at least two neurons")
+            elif members is not None:
+                result.append(members)
+    return tuple(result)
+
+
+def check_pins(
+    mirrors: tuple[Mirror, ...],
+    lines: tuple[tuple[int, ...], ...],
+    pins: Mapping[int, tuple[float, float]],
+    direction: Literal["down", "up", "right", "left"],
+    names: tuple[str, ...],
+    place: Located[str] | None,
+    findings: Findings,
+) -> None:
+    """Pins that no mirror, or no line, can keep are a finding at ``place``."""
+    if place is None:
+        return
+    across, along = (0, 1) if direction in ("down", "up") else (1, 0)
+    axis: tuple[float, str] | None = None
+    for a, b in (pair for mirror in mirrors if not mirror.scope for pair in mirror.pairs):
+        if a not in pins or b not in pins:
+            continue
+        shown_pair = f"'{names[a]}' and '{names[b]}'"
+        middle = (pins[a][across] + pins[b][across]) / 2
+        if abs(pins[a][along] - pins[b][along]) > _SLACK:
+            message = f"{shown_pair} are mirror images; their pins are not on one line across the axis"
+            findings.error("mirror-pins", place.span, message)
+        elif axis is not None and abs(axis[0] - middle) > _SLACK:
+            message = f"the pins of {shown_pair} put the mirror's axis at {middle:g}, those of {axis[1]} at {axis[0]:g}"
+            findings.error("mirror-pins", place.span, message)
+        axis = axis or (middle, shown_pair)
+    for line in lines:
+        pinned = [index for index in line if index in pins]
+        for index in pinned[1:]:
+            if abs(pins[index][along] - pins[pinned[0]][along]) > _SLACK:
+                message = f"'{names[pinned[0]]}' and '{names[index]}' are aligned; their pins are not on one line"
+                findings.error("align-pins", place.span, message)
+                break

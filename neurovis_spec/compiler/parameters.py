@@ -1,0 +1,53 @@
+"""Parameters: the named constants of a spec, or of an instance of a module.
+
+In: a section's ``parameters``, in the order written, and what is set from outside. Out: their values, in Constants.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from neurovis_spec.compiler.constants import RESERVED, Constants
+from neurovis_spec.compiler.references import Section, key_span
+from neurovis_spec.diagnostics import Span
+from neurovis_spec.language.expressions.tree import names
+from neurovis_spec.language.values import Parameter
+
+
+def make_parameters(
+    section: Section, constants: Constants, given: Mapping[str, float], places: Mapping[str, Span] | None = None
+) -> None:
+    """The parameters in the order written; what is given replaces the value, within its bounds. ``places`` say where
+    it is given."""
+    for name, parameter in section.parameters.items():
+        span = key_span(section, "parameters", name)
+        _parameter(name, parameter, span, (places or {}).get(name, span), constants, given)
+
+
+def _parameter(
+    name: str, parameter: Parameter, span: Span, place: Span, constants: Constants, given: Mapping[str, float]
+) -> None:
+    findings = constants.findings
+    if name in RESERVED:
+        message = f"a parameter may not be called '{name}': the language gives this name a meaning of its own"
+        findings.error("reserved-name", span, message)
+    at_fault = name in constants.broken  # what is set is at fault
+    tree = constants.tree(parameter.value, what="parameters before this one, and constants")
+    constants.uses[name] = frozenset() if tree is None or name in given else names(tree)
+    value = None if tree is None else constants.scalar(parameter.value)
+    low = None if parameter.minimum is None else constants.scalar(parameter.minimum)
+    high = None if parameter.maximum is None else constants.scalar(parameter.maximum)
+    if name in given:
+        value = float(given[name])
+        if not math.isfinite(value):
+            findings.error("not-finite", place, f"the parameter '{name}' is set to {value}")
+            value = None
+    if value is None or at_fault:
+        constants.broken.add(name)
+        return
+    constants.parameters[name] = value
+    if (low is not None and value < low) or (high is not None and value > high):
+        bounds = f"{'-∞' if low is None else f'{low:g}'} to {'∞' if high is None else f'{high:g}'}"
+        where = place if name in given else parameter.value.span
+        findings.error("out-of-range", where, f"'{name}' is {value:g}; its bounds are {bounds}")

@@ -1,0 +1,169 @@
+"""Pins: where neurons are put by hand, in the spec and in modules.
+
+In: ``layout.positions`` of every unit. Out: the places of neurons that are known, and for instances the places of their
+neurons relative to their origins, and these origins, as far as they are known. A pin of the spec names a neuron or an
+instance, whose origin it is then, and wins over what a module says; a module's pins are relative to the instance's
+origin.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Final, TypeAlias
+
+from neurovis_spec.compiler.populate import Population
+from neurovis_spec.compiler.references import Directory, key_of, resolve_end
+from neurovis_spec.compiler.units import Unit
+from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel
+from neurovis_spec.language.located import Located, shown
+from neurovis_spec.language.values import Point
+
+Place: TypeAlias = tuple[float, float]
+
+#: The diameter of a neuron's disc, and how far out anything may be asked to stand (units of the layout).
+DIAMETER: Final = 0.6
+FARTHEST: Final = 1e6
+
+
+@dataclass(frozen=True)
+class Pins:
+    """Places by neuron; for each instance with pins of its module these, relative to its origin, by its path; and the
+    origins that are known."""
+
+    places: Mapping[int, Place]
+    relative: tuple[tuple[str, Mapping[int, Place]], ...] = ()
+    origins: Mapping[str, Place] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class _Pin:
+    """A place, and where it was said."""
+
+    x: float
+    y: float
+    key: Located[str]
+    span: Span
+
+    def moved(self, by: Place) -> _Pin:
+        return _Pin(self.x + by[0], self.y + by[1], self.key, self.span)
+
+
+@dataclass
+class _Said:
+    """What one unit says: places of neurons, and origins of instances by the place of their unit."""
+
+    neurons: dict[int, _Pin] = field(default_factory=dict)
+    origins: dict[int, _Pin] = field(default_factory=dict)
+
+
+def pins_of(units: tuple[Unit, ...], population: Population, findings: Findings) -> Pins:
+    """All pins. Those closer than 0.6 to each other are a finding."""
+    by_identity = {id(directory): place for place, directory in enumerate(population.directories)}
+    said = [
+        _said(unit, directory, by_identity, findings)
+        for unit, directory in zip(units, population.directories, strict=True)
+    ]
+    own: dict[int, _Pin] = dict(said[0].neurons)
+    taken = set(own)  # what an outer unit says wins
+    # for each unit the instance whose origin its pins are relative to, and the way there from that origin
+    frames: list[tuple[int, Place]] = [(0, (0.0, 0.0))]
+    groups: dict[int, dict[int, _Pin]] = {}
+    for index in range(1, len(units)):
+        frames.append(_frame(index, units, said, frames))
+        base, shift = frames[index]
+        for neuron, pin in said[index].neurons.items():
+            if neuron not in taken:
+                groups.setdefault(base, {})[neuron] = pin.moved(shift)
+            taken.add(neuron)
+    origins = said[0].origins
+    for base, pins in sorted(groups.items()):
+        if base in origins:
+            own.update({neuron: pin.moved((origins[base].x, origins[base].y)) for neuron, pin in pins.items()})
+        else:
+            _check_apart(pins, findings)
+    _check_apart(own, findings)
+    return Pins(
+        {neuron: (pin.x, pin.y) for neuron, pin in own.items()},
+        tuple(
+            (units[base].path, {neuron: (pin.x, pin.y) for neuron, pin in pins.items()})
+            for base, pins in sorted(groups.items())
+        ),
+        {units[index].path: (pin.x, pin.y) for index, pin in origins.items()},
+    )
+
+
+def _frame(
+    index: int, units: tuple[Unit, ...], said: list[_Said], frames: list[tuple[int, Place]]
+) -> tuple[int, Place]:
+    """What the pins of an instance are relative to: its own origin, unless a module around it says where that is, the
+    outermost first."""
+    found: tuple[int, _Pin] | None = None
+    outer = units[index].parent
+    while outer > 0:
+        pin = said[outer].origins.get(index)
+        if pin is not None:
+            found = outer, pin
+        outer = units[outer].parent
+    if found is None or index in said[0].origins:
+        return index, (0.0, 0.0)
+    base, (x, y) = frames[found[0]]
+    return base, (x + found[1].x, y + found[1].y)
+
+
+def _said(unit: Unit, directory: Directory, by_identity: Mapping[int, int], findings: Findings) -> _Said:
+    result = _Said()
+    model = unit.section.layout
+    if model is None:
+        return result
+    for key, point in _points(model):
+        if max(abs(point.x), abs(point.y)) > FARTHEST:
+            findings.error("out-of-range", point.span, f"a pin lies within {FARTHEST:g} of the origin")
+            continue
+        pin = _Pin(point.x, point.y, key, point.span)
+        instances = directory.instance(key.value)
+        if len(instances) > 1:
+            message = f"'{shown(key.value)}' is {len(instances)} instances; a pin names one"
+            findings.error("bad-pin", key.span, message, f"pin {key.value}1 and the others one by one")
+            continue
+        found = by_identity[id(instances[0])] if instances else _neuron(key, directory, findings)
+        if found is None:
+            continue
+        known = result.origins if instances else result.neurons
+        if found in known:
+            line = known[found].key.span.line
+            findings.error("duplicate-pin", key.span, f"'{key.value}' is pinned already (line {line})")
+            continue
+        known[found] = pin
+    return result
+
+
+def _points(model: LayoutModel | ModuleLayoutModel) -> Iterator[tuple[Located[str], Point]]:
+    for name, point in model.positions.items():
+        yield key_of(model.source, "positions", name), point
+
+
+def _neuron(key: Located[str], directory: Directory, findings: Findings) -> int | None:
+    members = resolve_end(key, directory, findings)
+    if members is not None and len(members) != 1:
+        message = f"'{shown(key.value)}' is {len(members)} neurons; a pin names one"
+        findings.error("bad-pin", key.span, message, "pin its neurons one by one, or use 'arrange'")
+        return None
+    return None if members is None else members[0]
+
+
+def _check_apart(pins: Mapping[int, _Pin], findings: Findings) -> None:
+    """Pins that are closer than discs are wide. Each is compared with those in the cells next to its own."""
+    cells: dict[tuple[int, int], list[_Pin]] = {}
+    for pin in pins.values():
+        column, row = math.floor(pin.x / DIAMETER), math.floor(pin.y / DIAMETER)
+        near = (other for i in (-1, 0, 1) for j in (-1, 0, 1) for other in cells.get((column + i, row + j), ()))
+        for other in near:
+            if math.dist((other.x, other.y), (pin.x, pin.y)) < DIAMETER - 1e-9:
+                line = other.key.span.line
+                names = f"'{pin.key.value}' and '{other.key.value}' (line {line})"
+                findings.error("pins-overlap", pin.span, f"the pins of {names} are closer than {DIAMETER}")
+                break
+        cells.setdefault((column, row), []).append(pin)

@@ -1,0 +1,370 @@
+"""Units: the spec itself and every instance of a module, each with what the names in it mean.
+
+In: the root's Spec (or a module that is looked at by itself), the Library, Constants. Out: Units in the order of their
+neurons: a unit before the instances within it, and all inputs of the network. An instance's parameters are worked out
+anew, with what ``set`` gives them; its inputs are those of the unit around it, or inputs of the network.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from neurovis_spec.compiler.constants import Constants
+from neurovis_spec.compiler.definitions import Definitions
+from neurovis_spec.compiler.gaps import Gaps, gaps_of
+from neurovis_spec.compiler.limits import DEEPEST, MOST_INSTANCES, amount, plural
+from neurovis_spec.compiler.modules import Library, Module
+from neurovis_spec.compiler.network import Input
+from neurovis_spec.compiler.parameters import make_parameters
+from neurovis_spec.compiler.references import Section, key_of, key_span
+from neurovis_spec.compiler.signals import make_input
+from neurovis_spec.compiler.tables import Files
+from neurovis_spec.diagnostics import Findings, Span, suggest
+from neurovis_spec.language.expressions.tree import Number, names, substitute
+from neurovis_spec.language.located import NAME_RULE, Formula, Located, bad_name, shown
+from neurovis_spec.language.model import lost_names
+from neurovis_spec.language.modules import InstanceModel
+
+
+@dataclass(frozen=True)
+class Unit:
+    """The spec (its ``path`` is empty) or one instance (``left1``, ``left1.knee``).
+
+    ``inputs`` are those that its names may mean, those of instances within it by their dotted names. ``children`` are
+    the places of the instances within it, by name: ``left`` means all of a counted one, ``left1`` the first of them.
+    ``settings`` are the parameters that ``set`` gives, each with the names that its formula uses in the unit around.
+    """
+
+    path: str
+    section: Section
+    constants: Constants
+    definitions: Definitions
+    files: Files
+    inputs: Mapping[str, Input]
+    module: str | None = None
+    parent: int = -1
+    declared: str = ""
+    number: int = 0
+    children: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    settings: Mapping[str, frozenset[str]] = field(default_factory=dict)
+
+    def called(self, name: str) -> str:
+        """The name that something of this unit has in the whole network."""
+        return f"{self.path}.{name}" if self.path else name
+
+    @property
+    def gaps(self) -> Gaps:
+        """What could not be read, in this unit and among the definitions."""
+        return self.definitions.gaps
+
+
+@dataclass(frozen=True)
+class Expansion:
+    """All units, and the inputs of the network in the order of their places in the vector of all inputs."""
+
+    units: tuple[Unit, ...]
+    inputs: tuple[Input, ...]
+
+    def depend(self) -> None:
+        """What is structural in an instance is so for the parameters, of the unit around it, that it was set from."""
+        for unit in reversed(self.units):
+            for name, used in unit.settings.items():
+                if name in unit.constants.structural:
+                    self.units[unit.parent].constants.depend(used)
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where an instance stands: its names, and how many there are of it."""
+
+    path: str
+    declared: str
+    number: int
+    position: int
+    count: int
+
+
+@dataclass(frozen=True)
+class _Binding:
+    """Where an instance says what an input of its module is, and what it is; None where that is at fault."""
+
+    span: Span
+    input: Input | None
+
+
+class _StoppedError(Exception):
+    """There are too many instances; the finding is noted."""
+
+
+@dataclass
+class Expander:
+    """Makes the units of a network."""
+
+    library: Library
+    root: Path
+    findings: Findings
+    dt: float
+    units: list[Unit | None] = field(default_factory=list)
+    inputs: list[Input] = field(default_factory=list)
+    #: one for each folder, so that each file is read once
+    files: dict[Path, Files] = field(default_factory=dict)
+    used: set[str] = field(default_factory=set)
+
+    def expand(self, section: Section, constants: Constants, folder: Path, module: str | None = None) -> Expansion:
+        """The units of a section whose parameters are known, and the inputs of the network. ``module``: it is a module
+        that is looked at by itself."""
+        path = module or ""
+        self.units, self.inputs = [], []
+        try:
+            self._unit(section, constants, folder, _Place(path, path, 0, 0, 1), (), module=module)
+        except _StoppedError:  # which instances there are is not known then
+            root = self._at(0)
+            gaps = root.gaps.with_section("instances")
+            self.units = [replace(root, definitions=replace(root.definitions, gaps=gaps))]
+        return Expansion(tuple(map(self._at, range(len(self.units)))), tuple(self.inputs))
+
+    def files_in(self, folder: Path) -> Files:
+        """The data files that are named relative to a folder."""
+        if folder not in self.files:
+            self.files[folder] = Files(folder, self.root, self.findings)
+        return self.files[folder]
+
+    def _unit(
+        self,
+        section: Section,
+        constants: Constants,
+        folder: Path,
+        place: _Place,
+        way: tuple[int, ...],
+        bound: Mapping[str, _Binding] | None = None,
+        module: str | None = None,
+        settings: Mapping[str, frozenset[str]] | None = None,
+    ) -> int:
+        """One unit and those within it; ``way`` are the units around it. The place of the unit."""
+        index = len(self.units)
+        self.units.append(None)
+        files = self.files_in(folder)
+        own = self._inputs(section, constants, files, place, bound or {})
+        lost = section.inputs.keys() - own.keys()
+        gaps = self.library.definitions.gaps if not way and module is None else gaps_of(section)
+        gaps = gaps.with_names("inputs", gaps.names["inputs"] | lost)
+        if module is not None:
+            gaps = replace(gaps, sections=gaps.sections - {"modules"}).joined(_definitions_only(self.library))
+        unit = Unit(
+            path=place.path,
+            section=section,
+            constants=constants,
+            definitions=replace(self.library.definitions, gaps=gaps),
+            files=files,
+            inputs=own,
+            module=module,
+            parent=way[-1] if way else -1,
+            declared=place.declared,
+            number=place.number,
+            settings=settings or {},
+        )
+        self.units[index] = unit
+        children: dict[str, tuple[int, ...]] = {}
+        absent: set[str] = set()
+        for name, model in section.instances.items():
+            made = self._instances(name, model, unit, (*way, index))
+            if made is None:
+                absent.add(name)
+            else:
+                children.update(made)
+        inner = {
+            f"{name}.{key}": found
+            for name, places in children.items()
+            if len(places) == 1
+            for key, found in self._at(places[0]).inputs.items()
+        }
+        gaps = gaps.with_names("instances", gaps.names["instances"] | absent)
+        self.units[index] = replace(
+            unit, children=children, inputs={**own, **inner}, definitions=replace(unit.definitions, gaps=gaps)
+        )
+        return index
+
+    def _at(self, index: int) -> Unit:
+        unit = self.units[index]
+        assert unit is not None
+        return unit
+
+    def _inputs(
+        self,
+        section: Section,
+        constants: Constants,
+        files: Files,
+        place: _Place,
+        bound: Mapping[str, _Binding],
+    ) -> dict[str, Input]:
+        """The inputs of a unit by their names in it; those that are not bound are inputs of the network."""
+        result: dict[str, Input] = {}
+        for name, model in section.inputs.items():
+            start = 0 if not self.inputs else self.inputs[-1].start + self.inputs[-1].size
+            made = make_input(name, model, start, section, constants, files)
+            if made is None:
+                continue
+            if name in bound:
+                shared = self._share(made, bound[name], place)
+                if shared is not None:
+                    result[name] = shared
+                continue
+            if place.path:
+                tree = made.expression
+                if tree is not None:  # the network knows the parameters of the spec alone
+                    values = {key: Number(value) for key, value in constants.parameters.items()}
+                    tree = substitute(tree, values)
+                made = replace(made, name=f"{place.path}.{name}", expression=tree)
+            self.inputs.append(made)
+            result[name] = made
+        return result
+
+    def _share(self, made: Input, bound: _Binding, place: _Place) -> Input | None:
+        """What an instance gets of an input around it; None where the sizes do not fit, which is noted."""
+        outer = bound.input
+        if outer is None:
+            return None
+        if outer.size == made.size:
+            return Input(outer.name, outer.start, made.size)
+        if outer.size == place.count * made.size:
+            return Input(outer.name, outer.start + place.position * made.size, made.size)
+        wanted = f"{made.size}" if place.count == 1 else f"{made.size} or {place.count * made.size}"
+        message = f"the input '{outer.name}' has {plural(outer.size, 'component')}; {wanted} are wanted here"
+        hint = None if place.count == 1 else "one of count × size is shared out, one of the module's size goes to each"
+        self.findings.error("wrong-size", bound.span, message, hint)
+        return None
+
+    def _instances(
+        self, name: str, model: InstanceModel, unit: Unit, way: tuple[int, ...]
+    ) -> dict[str, tuple[int, ...]] | None:
+        """The places of the instances that one entry makes, by name; None where it is not known which these are."""
+        module = self._module(model)
+        count = None
+        if model.count is not None:
+            count = unit.constants.integer(model.count, "'count'", 1)
+        if module is None or "count" in model.lost or (model.count is not None and count is None):
+            self._look(model, unit)
+            return None
+        span = key_span(unit.section, "instances", name) if model.count is None else model.count.span
+        total = len(self.units) + (count or 1)
+        if total - 1 > MOST_INSTANCES:
+            message = f"this makes {amount(total - 1)} instances; {MOST_INSTANCES:,} are the most"
+            self.findings.error("too-many", span, message)
+            raise _StoppedError
+        if len(way) > DEEPEST:
+            self.findings.error("too-deep", span, f"modules are nested at most {DEEPEST} deep")
+            raise _StoppedError
+        called = [name] if count is None else [f"{name}{number}" for number in range(1, count + 1)]
+        if len(called[-1]) > 64:
+            self.findings.error("bad-name", key_span(unit.section, "instances", name), bad_name(called[-1]), NAME_RULE)
+            return None
+        self.used.add(module.name)
+        self._check_keys(model, module)
+        bound = self._bound(model, unit)
+        result: dict[str, tuple[int, ...]] = {}
+        for position, own in enumerate(called):
+            number = 0 if count is None else position + 1
+            place = _Place(unit.called(own), unit.called(name), number, position, len(called))
+            constants, settings = self._constants(model, module, unit, place)
+            index = self._unit(
+                module.model, constants, module.folder, place, way, bound, module=module.name, settings=settings
+            )
+            result[own] = (index,)
+        if count is not None:
+            result[name] = tuple(result[own][0] for own in called)
+        return result
+
+    def _module(self, model: InstanceModel) -> Module | None:
+        name = model.module.value
+        found = self.library.modules.get(name)
+        if found is None and not self.library.definitions.gaps.cover("modules", name):
+            hint = suggest(name, self.library.modules, "modules") or "there are no modules; add it under 'modules'"
+            self.findings.error("unknown-module", model.module.span, f"there is no module '{shown(name)}'", hint)
+        return found
+
+    def _look(self, model: InstanceModel, unit: Unit) -> None:
+        """What can be said of an instance whose module or count is not known."""
+        for formula in model.set.values():
+            unit.constants.tree(formula, ("i", "n"))
+        self._bound(model, unit)
+
+    def _check_keys(self, model: InstanceModel, module: Module) -> None:
+        """What ``set`` and ``inputs`` name must be the module's."""
+        gaps = gaps_of(module.model)
+        parts: tuple[tuple[str, Mapping[str, object], str, Mapping[str, object]], ...] = (
+            ("set", model.set, "parameter", module.model.parameters),
+            ("inputs", model.inputs, "input", module.model.inputs),
+        )
+        for part, given, what, known in parts:
+            for name in given:
+                if name not in known and not gaps.cover(f"{what}s", name):
+                    message = f"the module '{module.name}' has no {what} '{shown(name)}'"
+                    hint = suggest(name, known, f"{what}s of '{module.name}'")
+                    self.findings.error(f"unknown-{what}", key_of(model.source, part, name).span, message, hint)
+
+    def _bound(self, model: InstanceModel, unit: Unit) -> dict[str, _Binding]:
+        """The inputs of the unit around that an instance names; None for one that is at fault."""
+        result: dict[str, _Binding] = {}
+        for name, outer in model.inputs.items():
+            found = unit.inputs.get(outer.value)
+            if found is None and not unit.gaps.cover("inputs", outer.value):
+                self._unknown_input(outer, unit)
+            result[name] = _Binding(outer.span, found)
+        for name in lost_names(model.source, "inputs", dict(model.inputs)):
+            result[name] = _Binding(model.source.span, None)
+        return result
+
+    def _unknown_input(self, outer: Located[str], unit: Unit) -> None:
+        if outer.value.partition(".")[0] in unit.section.neurons:
+            message = f"'{shown(outer.value)}' is a group of neurons, not an input"
+            hint = "connect it to the neurons of the instance"
+        else:
+            message = f"there is no input '{shown(outer.value)}'"
+            known = suggest(outer.value, tuple(unit.section.inputs), "inputs")
+            hint = known or "no inputs are declared; add it under 'inputs'"
+        self.findings.error("unknown-input", outer.span, message, hint)
+
+    def _constants(
+        self, model: InstanceModel, module: Module, unit: Unit, place: _Place
+    ) -> tuple[Constants, dict[str, frozenset[str]]]:
+        """The constants of one instance, and what its settings depend on."""
+        constants = constants_of(module, self.dt, self.findings)
+        extra = {"i": float(place.position), "n": float(place.count)}
+        given: dict[str, float] = {}
+        settings: dict[str, frozenset[str]] = {}
+        for name, formula in model.set.items():
+            value = unit.constants.value(formula, extra)
+            if name not in module.model.parameters:
+                continue
+            if value is None:
+                constants.broken.add(name)
+                continue
+            given[name] = float(value)
+            settings[name] = _used(formula, unit.constants)
+        constants.broken.update(lost_names(model.source, "set", dict(model.set)))
+        places = {name: formula.span for name, formula in model.set.items()}
+        make_parameters(module.model, constants, given, places)
+        return constants, settings
+
+
+def constants_of(module: Module, dt: float, findings: Findings) -> Constants:
+    """Constants for the parameters of a module, before these are known."""
+    gaps = gaps_of(module.model)
+    lost, incomplete = set(gaps.names["parameters"]), "parameters" in gaps.sections
+    return Constants({}, dt, findings, broken=lost, incomplete=incomplete)
+
+
+def _used(formula: Formula, constants: Constants) -> frozenset[str]:
+    """The parameters that a formula uses."""
+    tree = constants.tree(formula, ("i", "n")) if isinstance(formula.value, str) else None
+    return frozenset() if tree is None else frozenset(names(tree))
+
+
+def _definitions_only(library: Library) -> Gaps:
+    """The gaps of the definitions and modules, which every unit sees."""
+    gaps = library.definitions.gaps
+    seen = ("modules", "activations", "models", "rules")
+    names = {section: gaps.names[section] if section in seen else frozenset() for section in gaps.names}
+    return Gaps(names, gaps.sections.intersection(seen))

@@ -1,0 +1,96 @@
+"""Definitions: activations, models and rules of one's own, and the file that holds them.
+
+In: nodes. Out: frozen models whose leaves know their places.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+from pydantic import Field, ValidationInfo
+
+from neurovis_spec.language.located import (
+    FormulaField,
+    Leaf,
+    Located,
+    TextField,
+    TextsField,
+    as_integer,
+    findings_of,
+    give_up,
+)
+from neurovis_spec.language.model import Model, Named
+from neurovis_spec.language.source import Node, ScalarValue
+from neurovis_spec.language.values import ParameterField
+
+LANGUAGE_VERSION = 1
+
+
+def version_field(node: Node, info: ValidationInfo) -> Located[int]:
+    """The version of the language, which must be the one that this program reads."""
+    version = as_integer(node, info)
+    if version.value != LANGUAGE_VERSION:
+        message = f"this is written in version {version.value:g} of the language; this program reads version 1"
+        findings_of(info).error("language-version", node.span, message, "write neurovis: 1")
+        give_up()
+    return version
+
+
+class StateModel(Model):
+    """A state of a model or of a rule."""
+
+    initial: FormulaField | None = Field(None, description="Its value before step 0 (default 0).")
+    each_step: FormulaField | None = Field(None, description="Its new value at each step.")
+    each_episode: FormulaField | None = Field(None, description="Its new value at an episode's end.")
+
+
+class ActivationModel(Model):
+    """An activation function of one's own."""
+
+    parameters: Named[ParameterField] = Field(default_factory=dict, description="Names and defaults.")
+    let: Named[FormulaField] = Field(default_factory=dict, description="Intermediate values, in order.")
+    value: FormulaField = Field(description="An expression of x, the combined input, and the parameters.")
+    description: TextField | None = Field(None, description="What it is, its equation and its source.")
+
+
+class ModelModel(Model):
+    """A neuron model of one's own: how the activity follows from the drive."""
+
+    parameters: Named[ParameterField] = Field(default_factory=dict, description="Names and defaults.")
+    let: Named[FormulaField] = Field(default_factory=dict, description="Intermediate values, in order.")
+    state: Named[StateModel] = Field(default_factory=dict, description="States, updated together from old values.")
+    activity: FormulaField = Field(description="The activity; f(…) is the neuron's activation, drive is u[t].")
+    description: TextField | None = Field(None, description="What it is, its equation and its source.")
+
+
+class WeightModel(Model):
+    """How a rule changes the weight."""
+
+    each_step: FormulaField | None = Field(None, description="w[t+1], an expression of weight, pre, post, ….")
+    each_episode: FormulaField | None = Field(None, description="The weight after an episode.")
+
+
+class RuleModel(Model):
+    """A plasticity rule of one's own."""
+
+    parameters: Named[ParameterField] = Field(default_factory=dict, description="Names and defaults.")
+    signals: TextsField = Field(default=(), description="Names of signals that the connection must supply.")
+    let: Named[FormulaField] = Field(default_factory=dict, description="Intermediate values, in order.")
+    state: Named[StateModel] = Field(default_factory=dict, description="States, one for each connection.")
+    weight: WeightModel = Field(description="How the weight changes.")
+    description: TextField | None = Field(None, description="What it is, its equation and its source.")
+
+
+class Library(Model):
+    """A file of definitions, as the built-in ones ship."""
+
+    STAND_INS: ClassVar[dict[str, ScalarValue]] = {"neurovis": LANGUAGE_VERSION}
+
+    neurovis: Annotated[Located[int], Leaf(version_field, {"const": 1})] = Field(
+        description="The version of the language: 1."
+    )
+    title: TextField | None = Field(None, description="A title.")
+    description: TextField | None = Field(None, description="What this is.")
+    activations: Named[ActivationModel] = Field(default_factory=dict, description="Activation functions of one's own.")
+    models: Named[ModelModel] = Field(default_factory=dict, description="Neuron models of one's own.")
+    rules: Named[RuleModel] = Field(default_factory=dict, description="Plasticity rules of one's own.")

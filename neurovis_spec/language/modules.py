@@ -1,0 +1,74 @@
+"""Modules, instances and included files; the shape as written.
+
+In: nodes. Out: frozen models whose leaves know their places. A module is a network that is used several times: it has
+the sections of a spec that say what there is, and none that says how it is run, drawn or connected to the world.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+from pydantic import Field
+
+from neurovis_spec.language.drawing import ModuleLayoutModel
+from neurovis_spec.language.library import Library, version_field
+from neurovis_spec.language.located import FormulaField, IdentifierField, Leaf, Located, TextField, TextsField
+from neurovis_spec.language.model import Model, Named
+from neurovis_spec.language.sections import ConnectionsField, GroupModel, InputModel
+from neurovis_spec.language.source import ScalarValue
+from neurovis_spec.language.values import ParameterField
+
+
+class InstanceModel(Model):
+    """A use of a module, or several of them."""
+
+    PLACE: ClassVar[str] = "an instance"
+
+    module: IdentifierField = Field(description="The module that it is an instance of.")
+    count: FormulaField | None = Field(
+        None, description="How many instances; left with count 3 makes left1, left2, left3."
+    )
+    set: Named[FormulaField] = Field(
+        default_factory=dict, description="{parameter of the module: value}; may use i (0-based) and n (count)."
+    )
+    inputs: Named[TextField] = Field(
+        default_factory=dict,
+        description="{input of the module: input out here}; one of count × size is shared out in order.",
+    )
+    description: TextField | None = Field(None, description="What it is.")
+
+
+class ModuleModel(Model):
+    """A network that is used several times, with parameters and inputs of its own."""
+
+    PLACE: ClassVar[str] = "a module"
+
+    title: TextField | None = Field(None, description="A title.")
+    description: TextField | None = Field(None, description="What this is.")
+    parameters: Named[ParameterField] = Field(
+        default_factory=dict, description="Constants of its own, in order; an instance may set them."
+    )
+    inputs: Named[InputModel] = Field(
+        default_factory=dict,
+        description="Signals from outside the module; those that an instance does not name are inputs of the network.",
+    )
+    neurons: Named[GroupModel] = Field(default_factory=dict, description="Groups of neurons.")
+    instances: Named[InstanceModel] = Field(default_factory=dict, description="Uses of other modules.")
+    connections: ConnectionsField = Field(default=(), description="FROM -> TO: a weight or a body, as in a spec.")
+    layout: ModuleLayoutModel | None = Field(None, description="How every instance is laid out.")
+
+
+class IncludedModel(Library):
+    """A file that a spec includes: modules, definitions and metadata, nothing else."""
+
+    PLACE: ClassVar[str] = "an included file"
+    STAND_INS: ClassVar[dict[str, ScalarValue]] = {}
+
+    neurovis: Annotated[Located[int], Leaf(version_field, {"const": 1})] | None = Field(  # type: ignore[assignment]
+        None, description="The version of the language: 1."
+    )
+    authors: TextsField | None = Field(None, description="Who wrote it.")
+    license: TextField | None = Field(None, description="Under which licence.")
+    references: TextsField | None = Field(None, description="What it goes back to.")
+    include: TextsField = Field(default=(), description="Files whose modules and definitions are used here.")
+    modules: Named[ModuleModel] = Field(default_factory=dict, description="Networks to be used several times.")

@@ -1,0 +1,251 @@
+"""The sections of a network: clock, inputs, neurons, connections, events; the shape as written.
+
+In: nodes. Out: frozen models whose leaves know their places. A spec has these sections, and a module has most of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from typing import Annotated, ClassVar
+
+from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
+from pydantic_core import PydanticCustomError
+
+from neurovis_spec.language.located import (
+    FORMULA,
+    BoolField,
+    FormulaField,
+    Leaf,
+    Located,
+    TextField,
+    TextsField,
+    findings_of,
+    refuse,
+    shown,
+    words,
+)
+from neurovis_spec.language.model import Keyed, Model, Named
+from neurovis_spec.language.source import Entry, Mapping, Node, Packed, Scalar, Sequence
+from neurovis_spec.language.values import (
+    FILE,
+    FORMULAS,
+    CentreField,
+    ChoiceField,
+    EdgesField,
+    FileReference,
+    FormulasField,
+    MatrixField,
+    as_file,
+)
+
+
+class Time(Model):
+    """The clock of a run."""
+
+    PLACE: ClassVar[str] = "'time'"
+
+    dt: FormulaField | None = Field(None, description="Seconds a step (default 1).")
+    steps: FormulaField | None = Field(None, description="Default run length in steps (default 1000).")
+    episode: FormulaField | None = Field(None, description="Steps of an episode; it ends after every m steps.")
+
+
+def _table(node: Node, info: ValidationInfo) -> FileReference | Sequence | Packed:
+    if isinstance(node, (Sequence, Packed)):
+        return node
+    refuse(info, node, "a list of rows, one a step")
+
+
+class InputModel(Model):
+    """A signal that comes from outside the network."""
+
+    PLACE: ClassVar[str] = "an input"
+
+    expression: FormulaField | None = Field(None, description="A formula of k (the step), t (seconds) and parameters.")
+    file: TextField | None = Field(None, description="A .csv, .npy or .npz file, one row a step; the last row stays.")
+    values: Annotated[
+        Sequence | Packed | None,
+        Leaf(_table, {"type": "array", "items": FORMULAS}),
+    ] = Field(None, description="The same, inline: one row a step.")
+    size: FormulaField | None = Field(None, description="How many numbers a step, for an input without a source.")
+    description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
+
+
+_POINT = {"type": "array", "items": FORMULA, "minItems": 2, "maxItems": 2}
+
+
+def _position(node: Node, info: ValidationInfo) -> FileReference | Sequence | Packed:
+    if isinstance(node, Mapping):
+        return as_file(node, info)
+    if isinstance(node, (Sequence, Packed)):
+        return node
+    refuse(info, node, "a position [x, y], a list of them, or {file: …}")
+
+
+class GroupModel(Model):
+    """A group of neurons, or a single one."""
+
+    PLACE: ClassVar[str] = "a group of neurons"
+
+    count: FormulaField | None = Field(None, description="How many neurons; K with count 3 makes K1, K2, K3.")
+    first: FormulaField | None = Field(None, description="The number of the first neuron (default 1).")
+    names: TextsField | None = Field(None, description="The names of the neurons, one by one.")
+    activation: ChoiceField | None = Field(
+        None, description="Activation function, name or {name: {parameter: value}} (default identity)."
+    )
+    model: ChoiceField | None = Field(
+        None,
+        description="How the activity follows from the input, name or {name: {…}}; static is Eq. 1 (default static).",
+    )
+    combine: Annotated[Located[str], words("sum", "product", "distance")] | None = Field(
+        None,
+        description="What arrives is combined by sum or product of w·a, or by distance √Σ(w·a − c)² (default sum).",
+    )
+    bias: FormulasField | None = Field(None, description="Added to the combined input (default 0).")
+    initial: FormulasField | None = Field(None, description="The activity at step 0; without it step 0 is computed.")
+    input: TextField | None = Field(None, description="An entry of inputs, added to the combined input.")
+    noise: FormulaField | None = Field(
+        None, description="An expression with normal(m, s) or uniform(a, b), drawn anew and added each step."
+    )
+    position: Annotated[
+        FileReference | Sequence | Packed | None,
+        Leaf(_position, {"anyOf": [_POINT, {"type": "array", "items": _POINT}, FILE]}),
+    ] = Field(None, description="Where the neuron is, as data: [x, y], a list of them, a file. It is no pin.")
+    label: TextsField | None = Field(None, description="Display text; a counted group may give a list.")
+    box: TextField | None = Field(None, description="The named box of the picture that holds the group.")
+    role: Annotated[Located[str], words("input", "hidden", "output")] | None = Field(
+        None, description="What the picture and the layout take it for: input, hidden or output."
+    )
+    description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
+
+
+class ScaleModel(Model):
+    """How the weights of an entry are scaled together; one of the three."""
+
+    PLACE: ClassVar[str] = "a 'scale'"
+
+    spectral_radius: FormulaField | None = Field(
+        None, description="The largest magnitude of an eigenvalue of the entry's matrix; both ends the same neurons."
+    )
+    norm: FormulaField | None = Field(None, description="The Frobenius norm of the entry's matrix.")
+    indegree: BoolField | None = Field(
+        None, description="Whether each weight is divided by the connections of this entry into its target."
+    )
+
+
+class ConnectionModel(Model):
+    """The body of a connection; a bare weight is read as ``{weight: …}``."""
+
+    PLACE: ClassVar[str] = "a connection"
+
+    weight: FormulaField | None = Field(
+        None, description="One number, or an expression of i, j, n_from, n_to (default 1)."
+    )
+    centre: CentreField | None = Field(None, description="For combine: distance; like weight or matrix (default 0).")
+    scale: ScaleModel | None = Field(None, description="Scales the weights of this entry together when they are made.")
+    matrix: MatrixField | None = Field(None, description="Dense rows, rows are sources; null means no connection.")
+    edges: EdgesField | None = Field(None, description="[[from, to, weight, delay], …], the last two optional.")
+    pattern: ChoiceField | None = Field(
+        None,
+        description="Which pairs are connected: all_to_all, one_to_one, chain, ring, {random: {probability: p}}, ….",
+    )
+    self: BoolField | None = Field(
+        None, description="Whether a neuron may connect to itself in a pattern (default false)."
+    )
+    rows: Annotated[Located[str], words("from", "to")] | None = Field(
+        None, description="Whether the rows of a matrix are sources (from) or targets (to) (default from)."
+    )
+    delay: FormulaField | None = Field(
+        None, description="Steps the signal travels; 0 is within the same step (default 1)."
+    )
+    plasticity: ChoiceField | None = Field(None, description="A rule: name, or {name: {parameter: value, signal: …}}.")
+    bounds: Annotated[
+        tuple[FormulaField, FormulaField] | None,
+        BeforeValidator(lambda node, info: _pair(node, info)),
+        WithJsonSchema({"type": "array", "items": FORMULA, "minItems": 2, "maxItems": 2}),
+    ] = Field(None, description="[low, high] for plastic weights.")
+    description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
+
+
+def _pair(node: Node, info: ValidationInfo) -> tuple[Node, Node]:
+    if isinstance(node, Sequence) and len(node.items) == 2:
+        return (node.items[0], node.items[1])
+    refuse(info, node, "bounds [low, high]")
+
+
+class EventModel(Model):
+    """Something that changes during a run."""
+
+    PLACE: ClassVar[str] = "an event"
+
+    at: FormulaField | None = Field(None, description="The step from which on it applies (set, lesion).")
+    from_: FormulaField | None = Field(None, alias="from", description="The first step of a clamp.")
+    to: FormulaField | None = Field(None, description="The step before which a clamp ends; without it, it lasts.")
+    set: Named[FormulaField] = Field(default_factory=dict, description="{parameter: value} from this step on.")
+    clamp: Keyed[FormulaField] = Field(default_factory=dict, description="{neurons: activity}.")
+    lesion: TextsField = Field(default=(), description="Neurons and connections (FROM -> TO) that are removed.")
+
+
+#: Findings of one list, after which the rest of it is not looked at.
+_PATIENCE = 20
+
+
+def _mappings(node: Node, info: ValidationInfo, wanted: str) -> Iterator[Mapping]:
+    """The mappings of a list; what is none is noted."""
+    findings = findings_of(info)
+    before = findings.errors
+    for item in node.items if isinstance(node, (Sequence, Packed)) else (node,):
+        if isinstance(item, Mapping):
+            yield item
+        elif findings.errors - before < _PATIENCE:
+            with suppress(PydanticCustomError):
+                refuse(info, item, wanted)
+
+
+def _events(node: Node, info: ValidationInfo) -> tuple[Mapping, ...]:
+    if not isinstance(node, (Sequence, Packed)):
+        refuse(info, node, "a list of events", "write each event behind a dash")
+    return tuple(_mappings(node, info, "an event, that is a mapping"))
+
+
+def _as_it_is(value: Located[str], info: ValidationInfo) -> Located[str]:
+    return value
+
+
+def _connections(node: Node, info: ValidationInfo) -> list[tuple[Located[str], object]]:
+    """One mapping, or a list of mappings: in both cases the entries in the order written. What is at fault is noted and
+    left out."""
+    result: list[tuple[Located[str], object]] = []
+    for mapping in _mappings(node, info, "a mapping FROM -> TO: weight, or a list of such"):
+        first: dict[str, Entry] = {}
+        for entry in mapping.entries:
+            same = first.setdefault("".join(entry.name.split()), entry)
+            if same is not entry:  # two spellings of one key
+                place = f"{same.key.span.line}:{same.key.span.column}"
+                message = f"'{shown(entry.name)}' is there twice: first at {place} as '{shown(same.name)}'"
+                hint = "connections that share both ends are written as a list of mappings"
+                findings_of(info).error("duplicate-key", entry.key.span, message, hint)
+            with suppress(PydanticCustomError):
+                result.append((Located(entry.name, entry.key), _body(entry, info)))
+    return result
+
+
+def _body(entry: Entry, info: ValidationInfo) -> Mapping:
+    """A body as it is; a bare weight is short for a body with a weight, and nothing for an empty one."""
+    node = entry.value
+    if isinstance(node, Mapping):
+        return node
+    if not isinstance(node, Scalar):
+        hint = "write {matrix: …}" if isinstance(node, (Sequence, Packed)) else None
+        refuse(info, node, "a weight or a mapping", hint)
+    if node.value is None:
+        return Mapping((), entry.key.span)
+    return Mapping((Entry(Scalar("weight", node.span, None), node),), node.span)
+
+
+ConnectionsField = Annotated[
+    tuple[tuple[Annotated[Located[str], Leaf(_as_it_is, {})], ConnectionModel], ...],
+    BeforeValidator(_connections),
+    WithJsonSchema({"title": "Connections"}),
+]
+EventsField = Annotated[tuple[EventModel, ...], BeforeValidator(_events)]
