@@ -19,7 +19,7 @@ from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.limits import MOST_HINTS
 from neurovis_spec.compiler.network import FloatArray, IntArray
 from neurovis_spec.diagnostics import Findings, suggest
-from neurovis_spec.language.expressions.arrays import Drawing, evaluate_array
+from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS, FUNCTIONS
 from neurovis_spec.language.expressions.parser import DRAWS, ExpressionError, parse, unknown_names
 from neurovis_spec.language.expressions.tree import Draw, Number, Tree, draws, names
@@ -175,8 +175,18 @@ class Constants:
             self.depend(names(tree))
         fixed: Mapping[str, Value] = {**extra, **CONSTANTS, "dt": self.dt}
         values = {name: fixed[name] if name in fixed else self.parameters[name] for name in names(tree)}
-        result = evaluate_array(tree, values, draw=None if randomness is None else _drawing(randomness))
+        drawing = None if randomness is None else _Drawing(randomness)
+        result = evaluate_array(tree, values, draw=drawing)
+        if drawing is not None and drawing.negative is not None and np.isnan(result).any():
+            self.refuse_deviation(formula, *drawing.negative)
+            return None
         return float(result) if np.ndim(result) == 0 else np.asarray(result, dtype=np.float64)
+
+    def refuse_deviation(self, formula: Formula, draw: Draw, deviation: float) -> None:
+        """The finding about a draw from ``normal`` whose deviation is negative."""
+        place = formula.node.at(draw.second.start, draw.second.end)
+        message = f"the deviation of a normal distribution must be at least 0, this is {deviation:.15g}"
+        self.findings.error("out-of-range", place, message, "normal(mean, deviation): the mean comes first")
 
     def value(
         self,
@@ -220,8 +230,19 @@ class Constants:
                 waiting += self.uses.get(name, ())
 
 
-def _drawing(randomness: Randomness) -> Drawing:
-    def draw(node: Draw, first: Value, second: Value) -> Value:
-        return randomness.stream.drawn(node.kind, first, second, randomness.i, randomness.j, 0, node.index)
+class _Drawing:
+    """Draws the numbers of one formula, and keeps the first draw with a negative deviation and the least of that.
 
-    return draw
+    What is drawn with it is NaN, so that it counts only where the formula's value depends on it: a branch that is not
+    taken may have one.
+    """
+
+    def __init__(self, randomness: Randomness) -> None:
+        self.randomness = randomness
+        self.negative: tuple[Draw, float] | None = None
+
+    def __call__(self, node: Draw, first: Value, second: Value) -> Value:
+        if node.kind == "normal" and self.negative is None and np.less(second, 0).any():
+            self.negative = node, float(np.nanmin(second))
+        at = self.randomness
+        return at.stream.drawn(node.kind, first, second, at.i, at.j, 0, node.index)

@@ -113,9 +113,13 @@ class Stream:
         step: Index,
         draw: Index,
     ) -> FloatArray:
-        """``normal(first, second)``: mean and deviation; or ``uniform(first, second)``: from low to below high."""
+        """``normal(first, second)``: mean and deviation; or ``uniform(first, second)``: from low to below high.
+
+        NaN where a deviation is negative: no distribution has one.
+        """
         if kind == "normal":
-            return np.asarray(first + second * self.normal(i, j, step, draw))
+            drawn = np.asarray(first + second * self.normal(i, j, step, draw))
+            return np.where(np.less(second, 0), np.nan, drawn) if np.less(second, 0).any() else drawn
         return np.asarray(first + (second - first) * self.uniform(i, j, step, draw))
 
     def random_targets(self, row: int, n: int, probability: float) -> IntArray:

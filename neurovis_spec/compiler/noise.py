@@ -5,12 +5,18 @@ In: the ``noise`` of the groups. Out: Noises, each with its place in the vector 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from neurovis_spec.compiler.constants import Constants, Value
 from neurovis_spec.compiler.network import Noise, frozen
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.units import Unit
-from neurovis_spec.language.expressions.tree import draws
+from neurovis_spec.language.expressions.arrays import evaluate_array
+from neurovis_spec.language.expressions.functions import CONSTANTS
+from neurovis_spec.language.expressions.tree import Conditional, Draw, Tree, children, draws, names
+from neurovis_spec.language.located import Formula
 
 
 def make_noises(units: tuple[Unit, ...], population: Population, inputs: int) -> tuple[Noise, ...]:
@@ -29,8 +35,31 @@ def make_noises(units: tuple[Unit, ...], population: Population, inputs: int) ->
             hint = "use normal(mean, deviation) or uniform(low, high); a constant belongs to 'bias'"
             constants.findings.error("no-draw", formula.span, message, hint)
             continue
+        _check_deviations(tree, formula, group.count, constants)
         members = np.arange(group.start, group.start + group.count, dtype=np.int64)
         frozen(members)
         result.append(Noise(group.name, members, start, tree, dict(constants.parameters)))
         start += group.count
     return tuple(result)
+
+
+def _check_deviations(tree: Tree, formula: Formula, count: int, constants: Constants) -> None:
+    """A finding where a deviation is known before the run and negative for any neuron. One that depends on the step,
+    or a draw in a branch, which may not be taken, gives NaN in the run, and its warning."""
+    known: dict[str, Value] = {**constants.parameters, **CONSTANTS, "dt": constants.dt}
+    known |= {"i": np.arange(count, dtype=np.float64), "n": float(count)}
+    for draw in _always_drawn(tree):
+        if draw.kind == "normal" and names(draw.second) <= known.keys() and not draws(draw.second):
+            deviation = evaluate_array(draw.second, known)
+            if np.less(deviation, 0).any():
+                constants.refuse_deviation(formula, draw, float(np.min(deviation)))
+
+
+def _always_drawn(tree: Tree) -> Iterator[Draw]:
+    """The draws of a formula that are in no branch of it."""
+    waiting = [tree]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, Draw):
+            yield node
+        waiting.extend((node.condition,) if isinstance(node, Conditional) else children(node))
