@@ -2,10 +2,14 @@
 
 In: the entry point group ``neurovis.libraries``; each names a package whose ``.yaml`` files hold definitions. Out:
 Definitions, and the library models with their descriptions. Reading is done once in a process; the result is frozen.
+
+What a spec means does not depend on what else is installed: ours come first, and a package that defines a name a second
+time is warned of and not heard. A spec of one's own may still replace a built-in.
 """
 
 from __future__ import annotations
 
+import warnings
 from functools import cache
 from importlib.resources import files
 
@@ -16,17 +20,38 @@ from neurovis_spec.language.library import Library
 from neurovis_spec.language.reader import read_text
 from neurovis_spec.language.shape import read_library
 
+#: the entry point of our own library
+OURS = "builtin"
+_SECTIONS = ("activations", "models", "rules")
+
 
 @cache
 def libraries() -> tuple[Library, ...]:
-    """The library files as models, in the order of the entry points' names and of the files'. Raises SpecError if one
-    is at fault."""
-    result = []
-    for name in plugins.names(plugins.LIBRARIES):
-        folder = files(plugins.package(plugins.LIBRARIES, name))
-        for file in sorted((f for f in folder.iterdir() if f.name.endswith(".yaml")), key=lambda f: f.name):
-            result.append(_read(file.read_text(encoding="utf-8"), f"{name}/{file.name}"))
+    """The library files as models: ours, then in the order of the entry points' names, and of the files'; each without
+    what one before it defines already (RuntimeWarning). Raises SpecError if one is at fault."""
+    result: list[Library] = []
+    owners: dict[tuple[str, str], str] = {}
+    for name in sorted(plugins.names(plugins.LIBRARIES), key=lambda name: (name != OURS, name)):
+        package = plugins.package(plugins.LIBRARIES, name)
+        for file in sorted((f for f in files(package).iterdir() if f.name.endswith(".yaml")), key=lambda f: f.name):
+            library = _read(file.read_text(encoding="utf-8"), f"{name}/{file.name}")
+            result.append(_without_known(library, f"{package}/{file.name}", owners))
     return tuple(result)
+
+
+def _without_known(library: Library, place: str, owners: dict[tuple[str, str], str]) -> Library:
+    """The library without the definitions that ``owners`` has already; the others are noted there as of ``place``."""
+    kept: dict[str, dict[str, object]] = {}
+    for section in _SECTIONS:
+        kept[section] = {}
+        for name, definition in getattr(library, section).items():
+            owner = owners.setdefault((section, name), place)
+            if owner == place:
+                kept[section][name] = definition
+                continue
+            message = f"'{name}' in the {section} of {place} is not used: {owner} defines it; rename it in that package"
+            warnings.warn(message, RuntimeWarning, stacklevel=2)
+    return library.model_copy(update=kept)
 
 
 def _read(text: str, name: str) -> Library:

@@ -70,7 +70,8 @@ def definitions(items: Iterable[Item]) -> Mapping[tuple[str, str], Definition]:
 @cache
 def builtin() -> Mapping[tuple[str, str], Definition]:
     """The definitions that ship with the package and with plug-ins."""
-    return {key: value for library in libraries() for key, value in definitions(outline(library.source)).items()}
+    first_wins = reversed(libraries())
+    return {key: value for library in first_wins for key, value in definitions(outline(library.source)).items()}
 
 
 @cache
