@@ -30,12 +30,14 @@ _MOST_SHOWN = 20
     )
 )
 @click.argument("spec", metavar="SPEC", required=False)
-@click.option("--steps", type=click.IntRange(min=1), metavar="N", help="Steps to run; default: the spec's time.steps.")
+@click.option(
+    "--steps", type=click.IntRange(1, 2**53), metavar="N", help="Steps to run; default: the spec's time.steps."
+)
 @set_option
 @input_option
 @backend_option
 @click.option(
-    "--every", type=click.IntRange(min=1), default=1, metavar="K", help="Record every K-th step only; default 1."
+    "--every", type=click.IntRange(1, 2**53), default=1, metavar="K", help="Record every K-th step only; default 1."
 )
 @click.option(
     "--from", "start", metavar="RECORDING", help="Begin with the last weights and activities of this recording."

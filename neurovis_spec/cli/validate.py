@@ -29,7 +29,12 @@ FORMATS = ("text", "json", "sarif", "github")
     "--format", "form", type=click.Choice(FORMATS), default="text", help="How findings are shown: text is the default."
 )
 @click.option("--strict", is_flag=True, help="Take warnings for errors.")
-@click.option("--limit", type=click.IntRange(min=1), metavar="N", help="The most connections; default ten million.")
+@click.option(
+    "--limit",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="The most connections, ten million by default, and the most neurons where N is above their million.",
+)
 @click.option(
     "--root",
     type=click.Path(path_type=Path),

@@ -14,6 +14,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.backend import Backend, prepare
 from neurovis_spec.runtime.inputs import STRETCH, InputReader
+from neurovis_spec.runtime.memory import check_room
 from neurovis_spec.runtime.phases import go_over, segments
 from neurovis_spec.runtime.recording import Recording, recording_of
 from neurovis_spec.runtime.resume import resumed_state
@@ -33,11 +34,12 @@ def record(
     """Run a network for ``steps`` steps (by default ``time.steps``) and record steps 0, ``every``, 2·``every``, …
 
     ``inputs`` as in ``InputReader``; ``start`` as in ``resume``. Warns once (RuntimeWarning) when something is no
-    longer finite. Raises InputError, BackendError, RecordingError, ValueError.
+    longer finite. Raises InputError, BackendError, RecordingError (also where there is not the memory), ValueError.
     """
     steps = network.steps if steps is None else steps
     if steps < 0 or every < 1:
         raise ValueError(f"{steps} steps, every {every}: at least 0 and at least 1 are needed")
+    check_room(steps, every, len(network.neurons) + len(network.changing))
     watch = Watch(network)
     state = initial_state(network) if start is None else resumed_state(network, start)
     kept = np.arange(0, steps, every, dtype=np.int64)
