@@ -116,15 +116,16 @@ def headline(diagnostic: Diagnostic) -> str:
 def nearest(name: str, known: Iterable[str], most: int = 3) -> tuple[str, ...]:
     """The known names that are most like ``name``, best first; none that is too far off.
 
-    >>> nearest("tahn", ["tanh", "sigmoid", "atan"])
-    ('tanh', 'atan')
+    >>> nearest("kerel", ["kernel", "sigmoid", "keel"]), nearest("tahn", ["tanh", "sigmoid", "atan"])
+    (('kernel', 'keel'), ('tanh',))
     """
     folded = name.casefold()
     letters = Counter(folded)
     scored: list[tuple[float, str]] = []
     for candidate in dict.fromkeys(known):
         other = candidate.casefold()
-        begins = bool(folded and other) and (other.startswith(folded) or folded.startswith(other))
+        # a name of one letter begins too many others
+        begins = bool(folded and other) and (other.startswith(folded) or (other[1:] != "" and folded.startswith(other)))
         alike = _stem(folded) == _stem(other) != ""
         # No ratio is above that of the letters they share: most candidates are done with here.
         shared = sum(min(count, other.count(letter)) for letter, count in letters.items())
@@ -133,6 +134,8 @@ def nearest(name: str, known: Iterable[str], most: int = 3) -> tuple[str, ...]:
         score = SequenceMatcher(None, folded, other, autojunk=False).ratio()
         if folded[:1] == other[:1]:
             score += 0.05  # a first letter is seldom mistyped
+        if letters == Counter(other):
+            score = max(score, 0.97)  # letters changed over, the commonest slip
         if begins:
             score = max(score, 0.75)
         if alike:

@@ -37,6 +37,8 @@ NASTY = (
 )  # fmt: skip
 _TOKEN = re.compile(r"\s+|\w+|[^\w\s]")
 _WORD = re.compile(r"[A-Za-z_]\w*")
+_VALUE = re.compile(r"(?<=[ \[{])(?:(?P<number>-?[0-9.]+)|[a-z_]+)(?=[\s,\]}])")
+_VALUES = ("0", "1", "2", "3", "4", "-1", "0.5", "1e3", "1e-9", "-0.0", "12", "1/3", "2*pi", "dt", "sin(1)", "1e300")
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +94,9 @@ def make(seed: int, number: int) -> Input:
     # Half of them come from the specs that are right, which are fewer than those that are not.
     parent = chooser.choice(corpus() if chooser.random() < 0.5 else right())
     text = parent.text
-    if isinstance(parent.data, dict) and chooser.random() < 0.5:
+    if parent in right() and chooser.random() < 0.3:
+        text, rounds = _renumbered(chooser, text), 0
+    elif isinstance(parent.data, dict) and chooser.random() < 0.5:
         text = _restructured(chooser, parent.data)
         rounds = chooser.choice((0, 0, 1))
     else:
@@ -109,6 +113,17 @@ def _broken(chooser: random.Random, data: bytes) -> bytes:
     for _ in range(chooser.randint(1, 3)):
         broken[chooser.randrange(len(broken))] ^= 1 << chooser.randrange(8)
     return bytes(broken)
+
+
+def _renumbered(chooser: random.Random, text: str) -> str:
+    """Some numbers, words and lines that end in a value replaced by such as may well do: much of this compiles."""
+    for _ in range(chooser.randint(1, 3)):
+        places = list(_VALUE.finditer(text))
+        if places:
+            match = chooser.choice(places)
+            value = chooser.choice(_VALUES) if match["number"] else chooser.choice(words())
+            text = text[: match.start()] + value + text[match.end() :]
+    return text
 
 
 # Characters

@@ -11,6 +11,7 @@ import re
 from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from typing import Final
 
 import yaml
@@ -35,12 +36,12 @@ class Allow:
 
 
 def allows(text: str, file: str) -> tuple[Allow, ...]:
-    """All codes that a text allows, in order.
+    """All codes that a text allows, in order; of very many the first.
 
     >>> [(allow.code, allow.span.line) for allow in allows("a: '# neurovis: allow x'  # neurovis: allow y, z", "f")]
     [('y', 1), ('z', 1)]
     """
-    matches = list(_ALLOW.finditer(text))
+    matches = list(islice(_ALLOW.finditer(text), _MOST))
     if not matches:
         return ()
     lines = Lines(text)
@@ -53,10 +54,12 @@ def allows(text: str, file: str) -> tuple[Allow, ...]:
         offset = match.start("codes") - match.start()
         found = [
             Allow(code.group(), _on(file, line, column + offset + code.start(), len(code.group())))
-            for code in _CODE.finditer(match["codes"])
+            for code in islice(_CODE.finditer(match["codes"]), _MOST)
         ]
         result += found or [Allow("", _on(file, line, column, len(match.group().rstrip())))]
-    return tuple(result)
+        if len(result) >= _MOST:
+            break
+    return tuple(result[:_MOST])
 
 
 def _on(file: str, line: int, column: int, length: int) -> Span:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, TypeVar
+from typing import Annotated, ClassVar, Final, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -31,6 +31,9 @@ from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Leaf, bad_name
 from neurovis_spec.language.source import Entry, Mapping, Node, Scalar, ScalarValue
 
 V = TypeVar("V")
+
+#: Errors after which unknown keys are no longer compared with the known ones.
+_MOST_HINTS: Final = 200  # as in the compiler
 
 
 def _as_it_is(value: Node, info: ValidationInfo) -> Node:
@@ -112,6 +115,9 @@ class Model(BaseModel):
         if name in cls.LATER:
             message = f"'{name}' ({cls.LATER[name]}) is not read by this version yet"
             findings.error("unsupported", span, message)
+            return ()
+        if findings.errors >= _MOST_HINTS:
+            findings.error("unknown-key", span, f"unknown key '{shown(name)}'")
             return ()
         close = nearest(name, fields)
         homes = () if close else tuple(dict.fromkeys(model.PLACE for model in _models() if name in model._fields()))

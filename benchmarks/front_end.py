@@ -1,0 +1,74 @@
+"""How quickly an author gets an answer: the commands' start, a small spec, a connectome's size, a spec of 5 MB.
+
+In: nothing. Out: a table, on standard output. Run it with ``python benchmarks/front_end.py``. The ratios are to what
+Python itself takes for nothing (``python -c pass``), or PyYAML to load the text; only ratios of one run can be
+compared.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+import neurovis_spec as nv
+
+EXAMPLE = Path(__file__).resolve().parent.parent / "specs" / "cpg_rbf.yaml"
+COMMAND = [sys.executable, "-m", "neurovis_spec"]
+
+
+def connectome(neurons: int, connections: int) -> str:
+    """Tanh neurons and random connections, as edges."""
+    random = np.random.default_rng(1)
+    ends = random.integers(1, neurons + 1, (connections, 2)).tolist()
+    weights = random.normal(0, (neurons / connections) ** 0.5, connections).tolist()
+    edges = "".join(f"      - [N{a}, N{b}, {w:.6g}]\n" for (a, b), w in zip(ends, weights, strict=True))
+    return (
+        f"neurovis: 1\nname: worm\nneurons:\n  N: {{count: {neurons}, activation: tanh, bias: 0.1}}\n"
+        f"connections:\n  N -> N:\n    edges:\n{edges}"
+    )
+
+
+def best(what: Callable[[], object], repeats: int = 5) -> float:
+    """Seconds, the least of several times."""
+    seconds = []
+    for _ in range(repeats):
+        begun = time.perf_counter()
+        what()
+        seconds.append(time.perf_counter() - begun)
+    return min(seconds)
+
+
+def process(*command: str) -> Callable[[], object]:
+    return lambda: subprocess.run(command, check=True, capture_output=True)
+
+
+def main() -> None:
+    print(f"{'what':44}{'time':>10}{'against':>26}{'time':>10}{'ratio':>8}")
+
+    def row(what: str, seconds: float, against: str, peer: float) -> None:
+        print(f"{what:44}{seconds:8.3f} s{against:>26}{peer:8.3f} s{seconds / peer:8.2f}", flush=True)
+
+    nothing = best(process(sys.executable, "-c", "pass"))
+    row("neurovis --help", best(process(*COMMAND, "--help")), "python -c pass", nothing)
+    row("neurovis validate, use case 1", best(process(*COMMAND, "validate", str(EXAMPLE))), "python -c pass", nothing)
+    small = connectome(302, 2194)
+    peer = best(lambda: yaml.load(small, yaml.CSafeLoader))
+    row("302/2,194: compile", best(lambda: nv.compile_text(small)), "CSafeLoader", peer)
+    row("302/2,194: compile and 1,000 steps", best(lambda: nv.compile_text(small).run(1000)), "CSafeLoader", peer)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "big.yaml"
+        path.write_text(connectome(1000, 150_000), encoding="utf-8")
+        text = path.read_text(encoding="utf-8")
+        peer = best(lambda: yaml.load(text, yaml.CSafeLoader), 2)
+        row("1,000/150,000, 3.9 MB: compile", best(lambda: nv.compile(path), 2), "CSafeLoader", peer)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,41 @@
+"""Suggestions: the right word first, and none where there are too many to suggest."""
+
+from __future__ import annotations
+
+import pytest
+
+import neurovis_spec as nv
+from neurovis_spec.compiler.limits import MOST_HINTS
+from neurovis_spec.diagnostics import nearest
+from neurovis_spec.language.allow import allows
+
+HEAD = "neurovis: 1\nname: x\n"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "known", "right"),
+    [
+        ("isn", ["min", "sin"], "sin"),
+        ("elak", ["e", "leak"], "leak"),
+        ("moto1r", ["motor", "motor1", "motor2"], "motor1"),
+        ("e", ["eta", "x"], "eta"),
+        ("C3", ["C1", "K1"], "C1"),
+    ],
+)
+def test_the_right_word_comes_first(wrong: str, known: list[str], right: str) -> None:
+    assert nearest(wrong, known)[0] == right
+
+
+def test_of_many_unknown_keys_the_first_are_answered_with_the_known_ones() -> None:
+    keys = "".join(f"    bais{number}: 1\n" for number in range(2 * MOST_HINTS))
+    with pytest.raises(nv.SpecError) as caught:
+        nv.compile_text(HEAD + "neurons:\n  A:\n" + keys)
+    hints = [item.hint for item in caught.value.diagnostics]
+    assert len(hints) == 2 * MOST_HINTS
+    assert all(hint is not None and "'bias'" in hint for hint in hints[:MOST_HINTS])
+    assert set(hints[MOST_HINTS:]) == {None}
+
+
+def test_of_many_allows_the_first_are_read() -> None:
+    assert len(allows("# neurovis: allow " + "x, " * 5000, "f")) == 1000
+    assert len(allows("# neurovis: allow x, y\n" * 5000, "f")) == 1000
