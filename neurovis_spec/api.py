@@ -141,6 +141,7 @@ def _plain(value: object) -> object:
 
 def _finish(document: SourceDocument | None, request: Request, findings: Findings, file: str) -> CompiledNetwork:
     spec = None if document is None else pipeline.shape(document, findings)
+    request = request if spec is None else pipeline.include(spec, request, findings)
     network = None if spec is None else pipeline.build(spec, request, findings)
     pipeline.allow(findings)
     findings.check()

@@ -2,17 +2,19 @@
 
 Each function is one stage: it takes a value, gives a new one, and reaches back to none before it.
 
-    text ─read─▶ SourceDocument ─shape─▶ Spec ─build─▶ Network ─simulate─▶ Recording ─▶ Snapshot
-                                                          └─arrange─▶ Layout        │
+    text ─read─▶ SourceDocument ─shape─▶ Spec ─include─▶ Includes
+    Spec + Includes ─build─▶ Network ─simulate─▶ Recording ─▶ Snapshot
+                                └─arrange─▶ Layout                │
     Network + Layout + Snapshot ─encode (Eqs. 2–5)─▶ Scene ─draw─▶ bytes of a picture
     Network + Layout + Snapshots ─film─▶ Film ─animate─▶ bytes of a moving one
 
-What the first three find at fault goes into Findings, all at once; ``Findings.check`` raises SpecError.
+What the first four find at fault goes into Findings, all at once; ``Findings.check`` raises SpecError.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy.typing as npt
@@ -21,6 +23,7 @@ from neurovis_spec.compiler.compile import Request, compile_spec
 from neurovis_spec.compiler.network import Network, RenderSettings
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.allow import silence
+from neurovis_spec.language.includes import read_includes
 from neurovis_spec.language.reader import read_file, read_text
 from neurovis_spec.language.shape import read_spec
 from neurovis_spec.language.source import SourceDocument
@@ -51,6 +54,11 @@ def read_string(text: str, name: str, findings: Findings) -> SourceDocument | No
 def shape(document: SourceDocument, findings: Findings) -> Spec | None:
     """The shape as written: known keys, the right kind of value at each."""
     return read_spec(document, findings)
+
+
+def include(spec: Spec, request: Request, findings: Findings) -> Request:
+    """The request with the files whose modules and definitions the spec uses."""
+    return replace(request, includes=read_includes(spec, request.base, request.root, findings))
 
 
 def build(spec: Spec, request: Request, findings: Findings) -> Network | None:
