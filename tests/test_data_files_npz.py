@@ -197,7 +197,7 @@ OVERLAPPING = patched(npz(a=MATRIX, w=MATRIX)[::-1], ENTRY[::-1], -42, "L", 0)[:
         (GOOD[:40], "file-format", "end is missing"),
         (GOOD[1:], "file-format", "damaged"),
         (b"x" + GOOD, "file-format", "damaged"),
-        (patched(GOOD, END, 10, "H", 0xFFFF), "too-large", "10,000 members"),
+        (patched(GOOD, END, 10, "H", 0xFFFF), "too-large", "4,000 members"),
         (patched(GOOD, END, 10, "H", 2), "file-format", "damaged"),
         (patched(patched(GOOD, END, 10, "H", 2), END, 8, "H", 2), "file-format", "damaged"),
         (patched(GOOD, END, 16, "L", 0xFFFFFFFF), "file-format", "damaged"),

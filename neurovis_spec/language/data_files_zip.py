@@ -15,7 +15,7 @@ from typing import Final
 
 from neurovis_spec.language.data_files_table import CellError, quoted
 
-MOST_MEMBERS: Final = 10_000
+MOST_MEMBERS: Final = 4_000
 _END: Final = struct.Struct("<4s4H2LH")
 _ENTRY: Final = struct.Struct("<4s6H3L5H2L")
 _LOCAL: Final = struct.Struct("<4s5H3L2H")
