@@ -28,7 +28,7 @@ def fit(free: Sequence[Point], pins: Mapping[int, Point]) -> tuple[list[Point], 
         snap(sum(x - free[i][0] for i, (x, _) in sorted(pins.items())) / count),
         snap(sum(y - free[i][1] for i, (_, y) in sorted(pins.items())) / count),
     )
-    cells = _Cells()
+    cells = Cells()
     placed: dict[int, Point] = dict(pins)
     for point in pins.values():
         cells.add(point)
@@ -52,7 +52,7 @@ def fit(free: Sequence[Point], pins: Mapping[int, Point]) -> tuple[list[Point], 
     return [placed[i] for i in range(len(free))], shift, frozenset(moved)
 
 
-class _Cells:
+class Cells:
     """Centres in square cells, to ask whether a place is free."""
 
     def __init__(self) -> None:
