@@ -1,0 +1,160 @@
+"""What the language says of YAML, neurons and expressions (§2, §3, §6): accepted, or refused by its own code."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+import neurovis_spec as nv
+
+HEAD = "neurovis: 1\nname: x\n"
+
+
+def codes(text: str) -> list[str]:
+    """The codes of the errors of a spec without its head."""
+    try:
+        nv.compile_text(HEAD + text)
+    except nv.SpecError as error:
+        return [found.code for found in error.diagnostics if found.severity == "error"]
+    return []
+
+
+@pytest.mark.parametrize(
+    "word", ["010", "0o7", "0x1f", "on", "off", "yes", "no", "190:20:30", "2001-01-01", "Yes", "NO"]
+)
+def test_words_that_stay_texts(word: str) -> None:
+    """What YAML 1.1 takes for numbers, truth values and dates is a text."""
+    assert codes(f"neurons: {{A: {{label: {word}, bias: 1}}}}\n") == []
+
+
+def test_an_exponent_alone_makes_a_number() -> None:
+    """``1e5`` is a number."""
+    assert nv.compile_text(HEAD + "neurons: {A: {bias: 1e5}}\n").network.neurons.bias.tolist() == [1e5]
+    assert codes("title: 1e5\nneurons: {A: {bias: 1}}\n") == ["wrong-type"]
+
+
+def test_a_byte_order_mark_counts_as_no_column() -> None:
+    """It is accepted, and columns count code points, also beyond the basic plane."""
+    text = "\ufeffneurovis: 1\nname: x\nneurons: {A: {label: '\U0001f600\U0001f600', bia: 1}}\n"
+    with pytest.raises(nv.SpecError) as caught:
+        nv.compile_text(text)
+    found = caught.value.diagnostics[0]
+    assert (found.code, found.span.line, found.span.column) == ("unknown-key", 3, 28)
+
+
+REFUSED = [
+    ("neurons: {A: {}, A: {}}\n", "duplicate-key"),
+    ("neurons: {A: !!str {}}\n", "tag"),
+    ("neurons: {A: {<<: {bias: 1}}}\n", "merge-key"),
+    ("neurons: {A: {}}\n---\na: 1\n", "several-documents"),
+    ("neurons: {A: &a {}}\n", "anchor"),
+    ("neurons: {A: {bias: .nan}}\n", "not-finite"),
+    ("neurons: {A: {bias: -.inf}}\n", "not-finite"),
+    ("neurons: {A: {bias: 9223372036854775808}}\n", "integer-range"),
+    ("neurons: {A: {bias: -9223372036854775809}}\n", "integer-range"),
+    ("neurons: {A: {label: 'a\u202eb'}}\n", "control-character"),
+    ("neurons: {A: {label: 'a\u2066b'}}\n", "control-character"),
+    ('neurons: {A: {label: "a\\u202eb"}}\n', "control-character"),
+    ("neurons: {A: {label: 'a\x7fb'}}\n", "control-character"),
+    ("neurons: {A: {}}\x00\n", "control-character"),
+]
+
+
+@pytest.mark.parametrize(("text", "code"), REFUSED)
+def test_what_yaml_allows_and_a_spec_does_not(text: str, code: str) -> None:
+    """Each has its own code."""
+    assert codes(text) == [code]
+
+
+def test_directives() -> None:
+    """Only %YAML 1.2 is one."""
+    for line, wanted in (("%YAML 1.2", []), ("%YAML 1.1", ["directive"]), ("%TAG ! tag:x,2000:", ["directive"])):
+        try:
+            nv.compile_text(f"{line}\n---\n{HEAD}neurons: {{A: {{bias: 1}}}}\n")
+            found: list[str] = []
+        except nv.SpecError as error:
+            found = [item.code for item in error.diagnostics]
+        assert found == wanted, line
+
+
+def test_the_limits_of_integers_are_numbers() -> None:
+    """Signed 64 bits, both ends included."""
+    assert codes("neurons: {A: {bias: -9223372036854775808}, B: {bias: 9223372036854775807}}\n") == []
+
+
+NEURONS = [
+    ("{K: {count: 11}, K1: {count: 1}}", ["duplicate-neuron"]),
+    ("{K: {first: 0}}", ["first-without-count"]),
+    ("{K: {count: 2, names: [a, b, c]}}", ["wrong-size"]),
+    ("{K: {count: 0}}", ["out-of-range"]),
+    ("{K: {count: 2, label: [a]}}", ["wrong-size"]),
+    ("{K: {role: sensor}}", ["unknown-value"]),
+    ("{" + "a" * 65 + ": {}}", ["bad-name"]),
+    ("{" + "a" * 64 + ": {}}", []),
+    ("{null: {}}", ["key-not-text"]),
+    ("{true: {}}", ["key-not-text"]),
+    ("{1: {}}", ["key-not-text"]),
+    ("{~: {}}", ["key-not-text"]),
+    ("{n: {}, y: {}, e: {}, pi: {}, t: {}, sin: {}}", []),
+]
+
+
+@pytest.mark.parametrize(("neurons", "wanted"), NEURONS)
+def test_names_and_counts(neurons: str, wanted: list[str]) -> None:
+    """Names of neurons are unique and names; a count and what stands beside it agree."""
+    assert codes(f"neurons: {neurons}\n") == wanted
+
+
+def test_how_neurons_are_named() -> None:
+    """From 1, from ``first``, one by one, or as the group; ``count: 1`` is counted."""
+    text = "neurons: {K: {count: 2}, L: {count: 2, first: 0}, M: {names: [p, q]}, N: {}, O: {count: 1}}\n"
+    assert nv.compile_text(HEAD + text).network.neurons.names == ("K1", "K2", "L0", "L1", "p", "q", "N", "O1")
+
+
+VALUES = [
+    ("-2^2", -4), ("2^3^2", 512), ("2**-1", 0.5), ("-7 % 3", 2), ("7 % -3", -2), ("round(2.5)", 2), ("round(3.5)", 4),
+    ("step(0)", 1), ("clip(5, 0, 1)", 1), ("min(1, 2, 3)", 1), ("sign(-0.5)", -1), ("1 and 0", 0), ("2 or 0", 1),
+    ("not 3", 0), ("not 1 == 2", 1), ("1 if 0 else 2", 2), ("1 if 1 else 2 if 0 else 3", 1), ("1 < 2 and 2 < 3", 1),
+    ("pi", math.pi), ("e", math.e), ("dt", 1), ("floor(-1.5)", -2), ("ceil(-1.5)", -1), ("atan2(1, 1)", math.pi / 4),
+    ("sigmoid(0)", 0.5), ("pow(2, 3)", 8), ("1.5E-2", 0.015),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("expression", "value"), VALUES)
+def test_values_of_expressions(expression: str, value: float) -> None:
+    """Operators bind and round as stated."""
+    network = nv.compile_text(HEAD + f"neurons: {{A: {{bias: '{expression}'}}}}\n")
+    assert network.network.neurons.bias.tolist() == [value]
+
+
+@pytest.mark.parametrize(
+    ("expression", "code"),
+    [
+        ("1 < 2 < 3", "chained-comparison"),
+        ("a.b", "no-attributes"),
+        ("[1]", "no-collections"),
+        ("1[0]", "no-subscripts"),
+        ("f(1)", "unknown-function"),
+        ("sin", "unknown-name"),
+        ("sin(1, 2)", "wrong-arguments"),
+        ("0x1f", "malformed-number"),
+        ("1_000", "malformed-number"),
+        ("1 // 2", "foreign-operator"),
+        ("sqrt(-1)", "not-finite"),
+        ("1/0", "not-finite"),
+        ("1e400", "number-overflow"),
+        ("1" * 1001, "expression-too-long"),
+    ],
+)
+def test_what_is_no_expression(expression: str, code: str) -> None:
+    """Nothing but the operators and functions that are listed, and finite constants."""
+    assert codes(f"neurons: {{A: {{bias: '{expression}'}}}}\n") == [code]
+
+
+def test_reserved_names_of_parameters() -> None:
+    """Functions bar no names, the given names do."""
+    names = ["t", "k", "dt", "i", "j", "n", "pi", "e"]
+    listed = ", ".join(f"{name}: 1" for name in names)
+    assert codes(f"neurons: {{A: {{}}}}\nparameters: {{{listed}}}\n") == ["reserved-name"] * len(names)
+    assert codes("neurons: {A: {bias: sin(sin)}}\nparameters: {sin: 2}\n") == []
