@@ -98,11 +98,11 @@ def load(path: str | Path) -> Recording:
     return formats.load(path)
 
 
-def schema() -> dict[str, object]:
-    """The JSON Schema (2020-12) of the language, for editors."""
+def schema(*, included: bool = False) -> dict[str, object]:
+    """The JSON Schema (2020-12) of the language, for editors: of a spec, or of a file that specs include."""
     from neurovis_spec.language.schema import json_schema
 
-    return json_schema()
+    return json_schema(included)
 
 
 def backends() -> list[tuple[str, bool, str]]:
@@ -143,12 +143,13 @@ def _finish(document: SourceDocument | None, request: Request, findings: Finding
     spec = None if document is None else pipeline.shape(document, findings)
     request = request if spec is None else pipeline.include(spec, request, findings)
     network = None if spec is None else pipeline.build(spec, request, findings)
+    memory = None if spec is None or network is None else pipeline.remember(spec, request, network, findings)
     pipeline.allow(findings)
     findings.check()
     if spec is None or network is None:
         span = Span(file, 1, 1, 1, 2)
         raise SpecError((Diagnostic("internal", "no network came out, and no finding says why", span),))
-    return CompiledNetwork(network, spec, request, findings.sorted(), dict(findings.sources))
+    return CompiledNetwork(network, spec, request, findings.sorted(), dict(findings.sources), memory)
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,6 +161,8 @@ class CompiledNetwork:
     request: Request
     warnings: tuple[Diagnostic, ...]
     sources: Mapping[str, str]
+    #: the earlier layout that the spec names (``layout.file``)
+    memory: Layout | None = None
 
     @property
     def name(self) -> str:
@@ -206,13 +209,14 @@ class CompiledNetwork:
         """
         return pipeline.simulate(self.network, steps, inputs, backend, every, start, progress)
 
-    def layout(self, engine: str | None = None) -> NetworkLayout:
-        """Where everything is. Raises LayoutRefusalError where an engine cannot do what is asked."""
-        return NetworkLayout(self, pipeline.arrange(self.network, engine))
+    def layout(self, engine: str | None = None, *, earlier: Layout | None = None) -> NetworkLayout:
+        """Where everything is. What an ``earlier`` layout knew (default: that of ``layout.file``) stays where it was.
+        Raises LayoutRefusalError where an engine cannot do what is asked."""
+        return NetworkLayout(self, pipeline.arrange(self.network, engine, earlier or self.memory))
 
     @cached_property
     def _layout(self) -> Layout:
-        return pipeline.arrange(self.network)
+        return pipeline.arrange(self.network, memory=self.memory)
 
     @cached_property
     def gains(self) -> Gains:
@@ -251,7 +255,7 @@ class CompiledNetwork:
         """
         suffix = Path(path).suffix
         renderer_for(suffix, moving=False)
-        layout = self._layout if engine is None else pipeline.arrange(self.network, engine)
+        layout = self._layout if engine is None else pipeline.arrange(self.network, engine, self.memory)
         snapshot = self._snapshot(step, recording, progress)
         scene = pipeline.picture(self.network, layout, snapshot, self.gains, self._settings(theme))
         content = pipeline.draw(scene, suffix)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 from typing import cast
@@ -9,14 +10,17 @@ from typing import cast
 import hostile
 import pytest
 import yaml
+from click.testing import CliRunner
 from jsonschema import Draft202012Validator
 
 import neurovis_spec as nv
 from neurovis_spec import api
+from neurovis_spec.cli.commands import neurovis
 
 HERE = Path(__file__).parent
 SPECS = sorted((HERE.parent / "specs").glob("*.yaml"))
 SCHEMA = api.schema()
+INCLUDED = api.schema(included=True)
 VALIDATOR = Draft202012Validator(SCHEMA)
 #: Findings about shapes: these a schema can know.
 SHAPE = {"wrong-type", "unknown-key", "missing-key", "unknown-value", "one-key", "no-value", "unknown-section"}
@@ -31,6 +35,81 @@ def messages(text: str) -> list[str]:
 def test_it_is_a_schema() -> None:
     Draft202012Validator.check_schema(SCHEMA)
     assert SCHEMA["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+
+
+def test_every_reference_leads_somewhere() -> None:
+    """Also those of parts that no example has, such as 'scale' of a connection."""
+    for schema in (SCHEMA, INCLUDED):
+        Draft202012Validator.check_schema(schema)
+        known = {f"#/$defs/{name}" for name in cast(dict[str, object], schema["$defs"])}
+        used = set(re.findall(r'"\$ref": "([^"]*)"', json.dumps(schema)))
+        assert used
+        assert used <= known
+
+
+def test_connections_have_one_shape_everywhere() -> None:
+    definitions = cast(dict[str, dict[str, dict[str, object]]], SCHEMA["$defs"])
+    properties = cast(dict[str, dict[str, object]], SCHEMA["properties"])
+    inside = definitions["ModuleModel"]["properties"]["connections"]
+    assert cast(dict[str, object], inside)["$ref"] == properties["connections"]["$ref"] == "#/$defs/Connections"
+
+
+@pytest.mark.parametrize("place", ["properties", "ModuleModel", "InstanceModel", "LayoutModel", "ModuleLayoutModel"])
+def test_every_key_is_described(place: str) -> None:
+    definitions = cast(dict[str, dict[str, dict[str, object]]], SCHEMA["$defs"])
+    keys = SCHEMA["properties"] if place == "properties" else definitions[place]["properties"]
+    for name, schema in cast(dict[str, dict[str, object]], keys).items():
+        assert schema.get("description"), name
+
+
+PARTS = """
+modules:
+  toe: {neurons: {K: {}}, connections: {K -> K: 1}}
+  leg:
+    title: A leg
+    parameters: {gain: 1, slow: {value: 2*gain, min: 0}}
+    neurons: {S: {input: load}, K: {count: 2}}
+    inputs: {load: {}}
+    instances: {toe: {module: toe, count: 3, set: {}, inputs: {}}}
+    connections: [{S -> K: gain}, {K -> K: {matrix: [[0, 1], [1, 0]], scale: {norm: 1}}, toe.K -> S: }]
+    layout: {positions: {S: [0, 0]}, arrange: {K: row}, boxes: {All: [S, K]}, mirror: [[K1, K2]], align: [[K1, K2]]}
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "spec", "included"),
+    [
+        (PARTS, True, True),
+        ("include: legs.yaml", True, True),
+        ("include: [a.yaml, b/c.yaml]\nrules: {r: {weight: {each_step: weight}}}", True, True),
+        ("instances: {left: {module: leg, count: 3, set: {gain: 0.8*i}, inputs: {load: go}}}", True, False),
+        ("layout: {mirror: [[left, right]], align: [[left1, left2]], file: x.layout.json}", True, False),
+        ("neurons: {A: {}}", True, False),
+        ("instances: {left: {count: 3}}", False, False),
+        ("instances: {left: {module: leg, first: 0}}", False, False),
+        ("instances: {left: {module: leg, set: [1]}}", False, False),
+        ("layout: {mirror: [[left, right, up]]}", False, False),
+        ("layout: {align: [left, right]}", False, False),
+        ("include: {legs: 1}", False, False),
+        ("modules: {leg: {neurons: {K: {acivation: tanh}}}}", False, False),
+        ("modules: {leg: {outputs: {a: K}}}", False, False),
+        ("modules: {leg: {neurons: {K: {}}, connections: {K to K: 1}}}", False, False),
+        ("modules: {leg: {neurons: {K: {}}, connections: {K -> K: {wieght: 1}}}}", False, False),
+        ("modules: {leg: {neurons: {K: {}}, connections: {K -> K: {scale: {nrm: 1}}}}}", False, False),
+        ("modules: {leg: {layout: {engine: grid}}}", False, False),
+        ("modules: {1leg: {}}", False, False),
+    ],
+)
+def test_modules_instances_and_includes(text: str, spec: bool, included: bool) -> None:
+    assert (messages(f"neurovis: 1\nname: x\n{text}") == []) == spec
+    assert (not list(Draft202012Validator(INCLUDED).iter_errors(yaml.safe_load(text)))) == included
+
+
+def test_the_command_prints_both() -> None:
+    for given, schema in (([], SCHEMA), (["--included"], INCLUDED)):
+        result = CliRunner().invoke(neurovis, ["schema", *given])
+        assert result.exit_code == 0
+        assert json.loads(result.output) == schema
 
 
 @pytest.mark.parametrize("path", [*SPECS, HERE / "rich.yaml"], ids=lambda path: path.stem)

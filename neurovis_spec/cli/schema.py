@@ -7,8 +7,14 @@ import click
 from neurovis_spec.cli.options import examples
 
 
-@click.command(epilog=examples("neurovis schema > neurovis.schema.json"))
-def command() -> None:
+@click.command(
+    epilog=examples(
+        "neurovis schema > neurovis.schema.json",
+        "neurovis schema --included > included.schema.json",
+    )
+)
+@click.option("--included", is_flag=True, help="That of files that specs include: modules and definitions alone.")
+def command(included: bool) -> None:
     """Print the JSON Schema of the language, for editors.
 
     An editor that knows JSON Schema completes and checks specs with it.
@@ -17,4 +23,4 @@ def command() -> None:
 
     from neurovis_spec import api
 
-    click.echo(json.dumps(api.schema(), indent=2))
+    click.echo(json.dumps(api.schema(included=included), indent=2))
