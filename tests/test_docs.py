@@ -55,6 +55,9 @@ def docs(*arguments: str) -> subprocess.CompletedProcess[str]:
 def test_an_example_of_a_key_compiles(path: str, tmp_path: Path) -> None:
     (tmp_path / "data").mkdir()
     np.savetxt(tmp_path / "data" / "sensed.csv", [[0.5]], delimiter=",")
+    (tmp_path / "library").mkdir()
+    (tmp_path / "library" / "legs.yaml").write_text("modules: {leg: {neurons: {K: {bias: 1}}}}", encoding="utf-8")
+    (tmp_path / "legs.layout.yaml").write_text("neurovis_layout: 1\npositions: {A: [0, 0]}", encoding="utf-8")
     assert path in {key.path for key in keys()}
     network = nv.compile_text(completed(examples()[path]), folder=tmp_path)
     assert codes(network) == set()

@@ -16,7 +16,10 @@ from typing import Any, Final, Literal
 import yaml
 
 VALIDATE: Final = "neurovis validate spec.yaml"
-CHAPTERS: Final = ("text", "shape", "names", "values", "expressions", "connections", "files", "layout", "warnings")
+CHAPTERS: Final = (
+    *("text", "shape", "names", "values", "expressions"),
+    *("connections", "modules", "files", "layout", "warnings"),
+)
 
 
 @dataclass(frozen=True)

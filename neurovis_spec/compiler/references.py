@@ -151,11 +151,10 @@ def piece(text: Located[str], start: int, end: int) -> Located[str]:
 def parts(text: Located[str]) -> Iterator[tuple[str, Span]]:
     """The references that are joined with ``+``, each with its place.
 
-        >>> from neurovis_spec.language.source import Scalar
-    from neurovis_spec.language.spec import Spec
-        >>> node = Scalar("K1 + K3", Span("x", 1, 1, 1, 8))
-        >>> [(name, span.column) for name, span in parts(Located("K1 + K3", node))]
-        [('K1', 1), ('K3', 6)]
+    >>> from neurovis_spec.language.source import Scalar
+    >>> node = Scalar("K1 + K3", Span("x", 1, 1, 1, 8))
+    >>> [(name, span.column) for name, span in parts(Located("K1 + K3", node))]
+    [('K1', 1), ('K3', 6)]
     """
     start = 0
     for piece in text.value.split("+"):

@@ -54,7 +54,7 @@ class ModuleModel(Model):
     )
     neurons: Named[GroupModel] = Field(default_factory=dict, description="Groups of neurons.")
     instances: Named[InstanceModel] = Field(default_factory=dict, description="Uses of other modules.")
-    connections: ConnectionsField = Field(default=(), description="FROM -> TO: a weight or a body, as in a spec.")
+    connections: ConnectionsField = Field(default=(), description="FROM -> TO: a weight or a body.")
     layout: ModuleLayoutModel | None = Field(None, description="How every instance is laid out.")
 
 

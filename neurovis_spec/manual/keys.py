@@ -13,6 +13,8 @@ from functools import cache
 from typing import get_args
 
 from neurovis_spec.language.model import Model
+from neurovis_spec.language.modules import InstanceModel, ModuleModel
+from neurovis_spec.language.sections import ConnectionModel, GroupModel, InputModel
 from neurovis_spec.language.spec import Spec
 
 _DEFAULT = re.compile(r" \(default ([^()]*)\)")
@@ -49,6 +51,9 @@ _PARAMETER = (
     Key("parameters.description", "text", "What it is."),
 )
 
+#: What a module has in common with a spec: its keys are those of the section of the same name at the top level.
+_SHARED = (GroupModel, ConnectionModel, InputModel, InstanceModel)
+
 
 @cache
 def keys() -> tuple[Key, ...]:
@@ -70,14 +75,17 @@ def _walk(model: type[Model], prefix: str) -> Iterator[Key]:
         about = field.description or ""
         default = _DEFAULT.search(about)
         below = _model_in(field.annotation)
+        again = model is ModuleModel and (below in _SHARED or shown == "parameters")
         yield Key(
             path=prefix + shown,
             kind=kind(shapes[shown]),
-            about=_DEFAULT.sub("", about),
+            about=f"{about} Written as at the top level." if again else _DEFAULT.sub("", about),
             default="" if default is None else default[1],
             required=field.is_required(),
             model=below,
         )
+        if again:
+            continue
         if below is not None:
             yield from _walk(below, f"{prefix}{shown}.")
         elif shown == "parameters" and not prefix:
