@@ -1,0 +1,154 @@
+"""What layouts are worth, ours beside dot, sfdp and networkx on the same graphs in one run.
+
+In: nothing; ``--graphs FOLDER`` (see ``networks.py``), ``--all`` for the large ones, ``--only WORD`` for rows whose
+name holds it, ``--peers dot,sfdp``, ``--engines layered,large``, ``--limit SECONDS`` for a peer. Out: a table, in
+Markdown, on standard output: crossings of the routes as drawn, discs that overlap, routes over foreign discs, the share
+of connections along the direction (of those in no loop), area, CPU seconds, and our crossings by the best peer's that
+draws a direction (dot, multipartite) or, where we draw none, by the best peer's. Sets of graphs are summed up, flow is
+averaged. Only ratios of one run can be compared.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from layout_peers import PEERS
+from networks import connectome, layers, reservoir, sample, small_worlds
+
+import neurovis_spec as nv
+from neurovis_spec.layout import LayoutProblem, LayoutRefusalError
+from neurovis_spec.layout.arrange import lay_out_problem
+from neurovis_spec.layout.metrics import metrics
+from neurovis_spec.layout.problem import problem_of
+
+HEXAPOD = Path(__file__).resolve().parent.parent / "specs" / "hexapod"
+#: These draw a direction.
+_DIRECTED = ("dot", "multipartite", "layered", "auto")
+_HEAD = ("graph", "by", "crossings", "overlaps", "over discs", "flow", "area", "CPU", "ratio")
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A row: one graph or a set of them; ``slow`` ones are for ``--all``; ``directed`` where a direction is drawn."""
+
+    name: str
+    problems: Sequence[LayoutProblem]
+    engines: Sequence[str] = ("layered",)
+    peers: Sequence[str] = ("dot", "sfdp", "spring", "multipartite")
+
+
+@dataclass(frozen=True, slots=True)
+class Worth:
+    """Metrics summed up over a row, and the CPU seconds."""
+
+    crossings: int
+    overlaps: int
+    over: int
+    flow: float
+    area: float
+    seconds: float
+
+
+def cases(folder: Path | None, slow: bool) -> Iterator[Case]:
+    yield Case("10-20-10", [layers(10, 20, 10)])
+    rome, name = sample(folder, "rome")
+    yield Case(name, rome)
+    north, name = sample(folder, "north")
+    yield Case(name, north)
+    for path in sorted(HEXAPOD.glob("*.yaml")) if HEXAPOD.is_dir() else ():
+        yield Case(f"specs/hexapod/{path.name}", [problem_of(nv.compile(path).network)], peers=("dot", "sfdp"))
+    yield Case("small worlds 300/2,500", [small_worlds(300, 2500)], ("layered", "large"))
+    if slow:
+        worm, name = connectome(folder)
+        yield Case(f"{name} 302/2,194", [worm], ("layered", "large"))
+        yield Case("reservoir 300/1,700", [reservoir(300)], ("layered", "auto"))
+        peers = ("sfdp",)
+        yield Case("small worlds 2,000/10,000", [small_worlds(2000, 10_000)], ("large", "layered"), peers)
+        yield Case("small worlds 10,000/50,000", [small_worlds(10_000, 50_000)], ("large",), peers)
+
+
+def by_peer(case: Case, peer: str, limit: float) -> Worth | None:
+    found: list[Worth] = []
+    for problem in case.problems:
+        made = PEERS[peer](problem, limit)
+        if made is None:
+            return None
+        found.append(_worth(metrics(made[0], problem), made[1]))
+    return _sum(found)
+
+
+def by_us(case: Case, engine: str) -> Worth:
+    found: list[Worth] = []
+    for problem in case.problems:
+        begun = time.process_time()
+        layout = lay_out_problem(problem, engine)
+        seconds = time.process_time() - begun
+        found.append(_worth(metrics(layout, problem), seconds))
+    return _sum(found)
+
+
+def _worth(of: dict[str, float | int], seconds: float) -> Worth:
+    return Worth(
+        int(of["crossings"]), int(of["overlaps"]), int(of["edges_over_neurons"]), of["flow"], of["area"], seconds
+    )
+
+
+def _sum(found: Sequence[Worth]) -> Worth:
+    return Worth(
+        sum(worth.crossings for worth in found),
+        sum(worth.overlaps for worth in found),
+        sum(worth.over for worth in found),
+        sum(worth.flow for worth in found) / len(found),
+        sum(worth.area for worth in found),
+        sum(worth.seconds for worth in found),
+    )
+
+
+def row(name: str, by: str, worth: Worth | None, ratio: float | None, limit: float) -> None:
+    if worth is None:
+        print(f"| {name} | {by} | – | – | – | – | – | over {limit:.0f} s | |", flush=True)
+        return
+    cells = [f"{worth.crossings:,}", f"{worth.overlaps:,}", f"{worth.over:,}", f"{worth.flow:.3f}"]
+    cells += [f"{worth.area:,.0f}", f"{worth.seconds:.2f} s", "" if ratio is None else f"{ratio:.2f}"]
+    print(f"| {name} | {by} | {' | '.join(cells)} |", flush=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--graphs", type=Path)
+    parser.add_argument("--all", action="store_true")
+    parser.add_argument("--only", default="")
+    parser.add_argument("--peers", default=",".join(PEERS))
+    parser.add_argument("--engines", default="")
+    parser.add_argument("--limit", type=float, default=150.0)
+    asked = parser.parse_args()
+    print(f"| {' | '.join(_HEAD)} |\n|{' --- |' * len(_HEAD)}")
+    for case in cases(asked.graphs, asked.all or bool(asked.only)):
+        if asked.only not in case.name:
+            continue
+        best: dict[str, Worth] = {}
+        for peer in (peer for peer in case.peers if peer in asked.peers.split(",")):
+            worth = by_peer(case, peer, asked.limit)
+            row(case.name, peer, worth, None, asked.limit)
+            if worth:
+                best[peer] = worth
+        for engine in asked.engines.split(",") if asked.engines else case.engines:
+            try:
+                worth = by_us(case, engine)
+            except LayoutRefusalError as refusal:
+                print(f"| {case.name} | {engine}: {refusal} | | | | | | | |", flush=True)
+                continue
+            same = [w for peer, w in best.items() if (peer in _DIRECTED) == (engine in _DIRECTED)] or [*best.values()]
+            least = min((w.crossings for w in same), default=0)
+            row(case.name, f"**{engine}**", worth, worth.crossings / least if least else None, asked.limit)
+
+
+if __name__ == "__main__":
+    main()

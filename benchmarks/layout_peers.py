@@ -1,0 +1,119 @@
+"""Peers of the layout engines: graphviz' dot and sfdp, networkx's spring and multipartite layouts.
+
+In: a LayoutProblem. Out: what the peer makes of the same graph, as one of our layouts, and its CPU seconds. A unit is a
+disc's neighbour's distance for all of them: dot's nodes are as wide as our discs and its ranks as far apart; what knows
+no sizes is scaled until no two discs overlap as far as a common factor can do that.
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import subprocess
+import time
+from collections.abc import Callable, Sequence
+
+import networkx as nx
+import numpy as np
+
+from neurovis_spec.layout import Layout, LayoutProblem, Point, Route
+from neurovis_spec.layout.geometry import straight
+
+Timed = tuple[Layout, float]
+#: Points of graphviz in a unit of ours.
+_UNIT = 72.0
+
+
+def dot(problem: LayoutProblem, limit: float) -> Timed | None:
+    """dot with its own ranks and splines; None where it takes longer than ``limit`` seconds."""
+    style = 'node [shape=circle, width=0.6, fixedsize=true, label=""]; nodesep=0.4; ranksep=1.4'
+    return _graphviz(problem, "dot", style, limit)
+
+
+def sfdp(problem: LayoutProblem, limit: float) -> Timed | None:
+    """sfdp, overlaps removed, straight lines."""
+    style = 'node [shape=circle, width=0.6, fixedsize=true, label=""]; overlap=prism; K=1; splines=line'
+    return _graphviz(problem, "sfdp", style, limit)
+
+
+def spring(problem: LayoutProblem, limit: float) -> Timed | None:
+    """Fruchterman and Reingold's, of networkx."""
+    graph = _graph(problem)
+    begun = time.process_time()
+    found = nx.spring_layout(graph, seed=1)
+    seconds = time.process_time() - begun
+    return _lines(problem, "spring", np.array([found[i] for i in range(len(problem.neurons))])), seconds
+
+
+def multipartite(problem: LayoutProblem, limit: float) -> Timed | None:
+    """networkx's layers, which are the generations of the graph without what closes loops; it orders nothing."""
+    begun = time.process_time()
+    graph = _graph(problem)
+    graph.remove_edges_from([(a, b) for a, b in graph.edges if a >= b])
+    for generation, nodes in enumerate(nx.topological_generations(graph)):
+        for node in nodes:
+            graph.nodes[node]["subset"] = generation
+    found = nx.multipartite_layout(graph, align="horizontal")
+    seconds = time.process_time() - begun
+    return _lines(problem, "multipartite", np.array([found[i] for i in range(len(problem.neurons))])), seconds
+
+
+PEERS: dict[str, Callable[[LayoutProblem, float], Timed | None]] = {
+    "dot": dot,
+    "sfdp": sfdp,
+    "spring": spring,
+    "multipartite": multipartite,
+}
+
+
+def _graph(problem: LayoutProblem) -> nx.DiGraph[int]:
+    graph: nx.DiGraph[int] = nx.DiGraph()
+    graph.add_nodes_from(range(len(problem.neurons)))
+    graph.add_edges_from((edge.source, edge.target) for edge in problem.edges)
+    return graph
+
+
+def _graphviz(problem: LayoutProblem, engine: str, style: str, limit: float) -> Timed | None:
+    edges = [f"{edge.source} -> {edge.target} [id={number}]" for number, edge in enumerate(problem.edges)]
+    nodes = "; ".join(map(str, range(len(problem.neurons))))
+    text = f"digraph {{ {style}; {nodes}; {'; '.join(edges)} }}"
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    try:
+        done = subprocess.run([engine, "-Tjson"], input=text, capture_output=True, text=True, check=True, timeout=limit)
+    except subprocess.TimeoutExpired:
+        return None
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    seconds = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+    drawing = json.loads(done.stdout)
+    centres: list[Point] = [(0.0, 0.0)] * len(problem.neurons)
+    for item in drawing["objects"]:
+        if "pos" in item:
+            centres[int(item["name"])] = _point(item["pos"])
+    routes: dict[str, Route] = {}
+    for item in drawing["edges"]:
+        edge = problem.edges[int(item["id"])]
+        pieces = [_point(piece) for piece in item["pos"].split() if piece[0] not in "es"]
+        # a spline ends at the discs and its arrowhead: straight pieces lead on to the centres
+        source, target = centres[edge.source], centres[edge.target]
+        routes[edge.name] = (*straight(source, pieces[0]), *pieces[1:], *straight(pieces[-1], target)[1:])
+    if engine == "sfdp":
+        routes = _straight(problem, centres)
+    return Layout(problem.network, engine, dict(zip(problem.neurons, centres, strict=True)), routes), seconds
+
+
+def _point(text: str) -> Point:
+    x, y = text.split(",")[:2]
+    return float(x) / _UNIT, -float(y) / _UNIT
+
+
+def _straight(problem: LayoutProblem, centres: Sequence[Point]) -> dict[str, Route]:
+    """Lines; what a neuron does to itself is left at its centre."""
+    return {edge.name: straight(centres[edge.source], centres[edge.target]) for edge in problem.edges}
+
+
+def _lines(problem: LayoutProblem, name: str, places: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> Layout:
+    """As wide as a square with a place of its own for each neuron, and half as much again."""
+    extent = float((places.max(axis=0) - places.min(axis=0)).max()) or 1.0
+    places = places * (1.5 * len(places) ** 0.5 / extent)
+    centres: list[Point] = [(float(x), float(y)) for x, y in places]
+    return Layout(problem.network, name, dict(zip(problem.neurons, centres, strict=True)), _straight(problem, centres))
