@@ -158,3 +158,15 @@ def test_reserved_names_of_parameters() -> None:
     listed = ", ".join(f"{name}: 1" for name in names)
     assert codes(f"neurons: {{A: {{}}}}\nparameters: {{{listed}}}\n") == ["reserved-name"] * len(names)
     assert codes("neurons: {A: {bias: sin(sin)}}\nparameters: {sin: 2}\n") == []
+
+
+def test_positions_may_be_expressions_over_the_index() -> None:
+    """Any number in a group may use ``i`` and ``n``; one ``[x, y]`` with expressions does for the whole group."""
+    ring = "A: {count: 4, bias: 1, position: [cos(2*pi*i/n), g*i]}"
+    text = f"parameters: {{g: 2}}\nneurons: {{{ring}, B: {{count: 2, bias: 1, position: [[i, n], [n, i]]}}}}\n"
+    places = nv.compile_text(HEAD + text).network.neurons.position
+    assert places[:4].ravel() == pytest.approx([1, 0, 0, 2, -1, 4, 0, 6], abs=1e-15)
+    assert places[4:].tolist() == [[0, 2], [2, 1]]
+    assert codes("neurons: {A: {count: 3, bias: 1, position: [1, 2]}}\n") == ["wrong-size"]
+    assert codes("neurons: {A: {count: 3, bias: 1, position: [i, z]}}\n") == ["unknown-name"]
+    assert codes("neurons: {A: {count: 3, bias: 1, position: [1/i, 0]}}\n") == ["not-finite"]

@@ -1,32 +1,59 @@
 """Positions of neurons as data: ``[x, y]``, a list of these, or a file.
 
-In: the node of a group's ``position``. Out: (n, 2) numbers, NaN where there is none.
+In: the node of a group's ``position``. Out: (n, 2) numbers, NaN where there is none. A number may be an expression over
+the parameters, ``i`` and ``n``; with expressions one ``[x, y]`` does for a whole group: ``[cos(2*pi*i/n),
+sin(2*pi*i/n)]``.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
-from neurovis_spec.compiler.constants import Constants
+from neurovis_spec.compiler.constants import Constants, Value
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import FloatArray
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.language.located import formula_of
-from neurovis_spec.language.source import Node, Packed, Sequence
+from neurovis_spec.language.source import Node, Packed, Scalar, Sequence
 from neurovis_spec.language.values import FileReference
 
 
-def _point(node: Node, constants: Constants) -> tuple[float, float] | None:
+def _point(node: Node, index: int, n: int, constants: Constants) -> tuple[float, float] | None:
     if not isinstance(node, Sequence) or len(node.items) != 2:
         constants.findings.error("wrong-type", node.span, "a position is two numbers [x, y]")
         return None
     values = []
     for item in node.items:
         formula = formula_of(item, constants.findings)
-        value = None if formula is None else constants.scalar(formula)
+        value = None if formula is None else constants.value(formula, {"i": float(index), "n": float(n)})
         if value is not None:
-            values.append(value)
+            values.append(float(value))
     return (values[0], values[1]) if len(values) == 2 else None
+
+
+def _is_formula(items: Iterable[Node]) -> bool:
+    """Whether this is one ``[x, y]`` that differs from neuron to neuron, or can."""
+    numbers = tuple(items)
+    return (
+        len(numbers) == 2
+        and all(isinstance(item, Scalar) for item in numbers)
+        and any(isinstance(item, Scalar) and isinstance(item.value, str) for item in numbers)
+    )
+
+
+def _one_for_all(items: Iterable[Node], n: int, constants: Constants) -> FloatArray | None:
+    result, good = np.empty((n, 2)), True
+    for axis, item in enumerate(items):
+        formula = formula_of(item, constants.findings)
+        extra: dict[str, Value] = {"i": np.arange(n, dtype=np.float64), "n": float(n)}
+        value = None if formula is None else constants.value(formula, extra)
+        if value is None:
+            good = False
+        else:
+            result[:, axis] = value
+    return result if good else None
 
 
 def positions_of(
@@ -40,11 +67,13 @@ def positions_of(
     items = node.items
     if n == 1 and items and not isinstance(items[0], (Sequence, Packed)):
         items = (Sequence(items, node.span),)
+    elif _is_formula(items):
+        return _one_for_all(items, n, constants)
     if len(items) != n:
         message = f"{plural(len(items), 'position')} for {plural(n, 'neuron')}"
         constants.findings.error("wrong-size", node.span, message)
         return None
-    points = [_point(item, constants) for item in items]
+    points = [_point(item, index, n, constants) for index, item in enumerate(items)]
     if any(point is None for point in points):
         return None
     return np.array([point for point in points if point is not None], dtype=np.float64)
