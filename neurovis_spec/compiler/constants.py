@@ -35,8 +35,8 @@ RESERVED = frozenset({"t", "k", "dt", "i", "j", "n", "pi", "e"})
 _ELSEWHERE: Mapping[str, str] = {
     "k": "the step is known in a run; this value is worked out once, before it",
     "t": "the time is known in a run; this value is worked out once, before it",
-    "i": "'i' is known within a group (the neuron's index) and a connection (the source's)",
-    "j": "'j' is known within a connection (the target's index)",
+    "i": "'i' is known within a group (the neuron's index) and in a connection's weight and centre (the source's)",
+    "j": "'j' is known in a connection's weight and centre (the target's index)",
     "n": "'n' is known within a group (its count); a connection has n_from and n_to",
     "n_from": "'n_from' is known in the weight and the centre of a connection",
     "n_to": "'n_to' is known in the weight and the centre of a connection",
