@@ -20,7 +20,9 @@ import yaml
 from hostile import Data
 
 TESTS = Path(__file__).parent
-FOLDERS = (TESTS.parent / "specs", TESTS / "errors", TESTS / "corpus")
+#: Folders of specs that are right, and of others.
+RIGHT = (TESTS.parent / "specs", TESTS / "corpus" / "right")
+WRONG = (TESTS / "errors", TESTS / "corpus")
 
 #: Pieces that mean something to YAML, to an expression, to a reader of numbers or to a terminal.
 NASTY = (
@@ -62,7 +64,7 @@ class Seed:
 def corpus() -> tuple[Seed, ...]:
     """All seeds, in an order of their own."""
     found = [Seed(hostile.RICH, TESTS, yaml.safe_load(hostile.RICH))]
-    for folder in FOLDERS:
+    for folder in (*RIGHT, *WRONG):
         for path in sorted(folder.glob("*.yaml")):
             text = path.read_bytes().decode("utf-8", "replace")
             try:
@@ -76,7 +78,7 @@ def corpus() -> tuple[Seed, ...]:
 @cache
 def right() -> tuple[Seed, ...]:
     """The seeds that hold no mistake."""
-    return tuple(seed for seed in corpus() if seed.folder in (TESTS, FOLDERS[0]))
+    return tuple(seed for seed in corpus() if seed.folder in (TESTS, *RIGHT))
 
 
 @cache
