@@ -30,6 +30,7 @@ from neurovis_spec.language.source import SourceDocument
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.layout import Layout
 from neurovis_spec.layout.arrange import lay_out
+from neurovis_spec.layout.remember import read_memory
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.record import record
 from neurovis_spec.runtime.recording import Recording, Snapshot
@@ -84,9 +85,15 @@ def simulate(
     return record(network, steps, inputs, backend, every, start, progress)
 
 
-def arrange(network: Network, engine: str | None = None) -> Layout:
+def remember(spec: Spec, request: Request, network: Network, findings: Findings) -> Layout | None:
+    """The earlier layout that the spec names, if it names one."""
+    file = None if spec.layout is None else spec.layout.file
+    return None if file is None else read_memory(file, request.base, request.root, network, findings)
+
+
+def arrange(network: Network, engine: str | None = None, memory: Layout | None = None) -> Layout:
     """A position for every neuron, a route for every connection."""
-    return lay_out(network, engine)
+    return lay_out(network, engine, memory)
 
 
 def measure(network: Network, progress: Progress | None = None) -> Gains:

@@ -14,7 +14,7 @@ class CircularEngine:
     """Neurons on a ring."""
 
     name = "circular"
-    capabilities = Capabilities(pins=True, arrange=False, boxes=True, direction=True, neurons=100_000)
+    capabilities = Capabilities(pins=True, arrange=False, boxes=True, direction=True, memory=True, neurons=100_000)
 
     def lay_out(self, problem: LayoutProblem) -> Layout:
         """Place the neurons round a circle, members of a box side by side, and route the edges."""

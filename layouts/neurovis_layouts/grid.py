@@ -14,7 +14,7 @@ class GridEngine:
     """Neurons in rows and columns."""
 
     name = "grid"
-    capabilities = Capabilities(pins=True, arrange=False, boxes=True, direction=True, neurons=100_000)
+    capabilities = Capabilities(pins=True, arrange=False, boxes=True, direction=True, memory=True, neurons=100_000)
 
     def lay_out(self, problem: LayoutProblem) -> Layout:
         """Place the neurons row by row, members of a box one after the other, and route the edges."""

@@ -59,9 +59,11 @@ class Cells:
         self._cells: dict[tuple[int, int], list[Point]] = {}
 
     def add(self, point: Point) -> None:
+        """Note a centre."""
         self._cells.setdefault((math.floor(point[0]), math.floor(point[1])), []).append(point)
 
     def free(self, point: Point, clear: float) -> bool:
+        """Whether no centre is closer than ``clear``, at most 1."""
         column, row = math.floor(point[0]), math.floor(point[1])
         return all(
             distance(point, other) >= clear

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from neurovis_layouts.frame import to_picture
+from neurovis_layouts.kept import kept
 from neurovis_layouts.pins import fit
 from neurovis_layouts.routing import route_all
 from neurovis_spec.layout.geometry import snap
@@ -40,9 +41,10 @@ def place(problem: LayoutProblem, engine: str, order: Sequence[int], places: Seq
         free[neuron] = to_picture((snap(x), snap(y)), problem.direction)
     centres, _, _ = fit(free, problem.pins)
     routes = route_all(problem.edges, centres)
-    return Layout(
+    fresh = Layout(
         problem.network,
         engine,
         dict(zip(problem.neurons, centres, strict=True)),
         {edge.name: route for edge, route in zip(problem.edges, routes, strict=True)},
     )
+    return kept(problem, fresh)

@@ -20,6 +20,7 @@ from neurovis_spec.cli.progress import progress
 if TYPE_CHECKING:
     from neurovis_spec.api import CompiledNetwork
     from neurovis_spec.compiler.network import FloatArray, Network
+    from neurovis_spec.layout import Layout
     from neurovis_spec.runtime.recording import Recording
 
 STDIN: Final = "<stdin>"
@@ -67,6 +68,29 @@ def standard_input() -> str:
         message = f"the byte 0x{data[error.start]:02x} is not UTF-8"
         shown = {STDIN: data.decode("utf-8", "replace")}
         raise SpecError([Diagnostic("invalid-utf8", message, span, hint="save the text as UTF-8")], shown) from None
+
+
+def earlier_layout(path: Path) -> Layout | None:
+    """The layout in a file, if it is there: all that it says, of neurons that are gone as well. Raises SpecError for
+    what is no layout file."""
+    from neurovis_spec.diagnostics import Findings, Span
+    from neurovis_spec.language.reader import LARGEST
+    from neurovis_spec.language.reader_files import FileFault, read_bytes
+    from neurovis_spec.layout.file import parse
+
+    data = read_bytes(path, LARGEST)
+    findings = Findings()
+    layout = None
+    if not isinstance(data, FileFault):
+        try:
+            layout = parse(data.decode("utf-8"), str(path), findings)
+        except UnicodeDecodeError as error:
+            span = Span(str(path), 1, 1, 1, 1)
+            findings.error("invalid-utf8", span, f"the byte 0x{data[error.start]:02x} is not UTF-8")
+    elif data.code != "file-missing":
+        findings.error(data.code, Span(str(path), 1, 1, 1, 1), f"the file {data.reason}")
+    findings.check()
+    return layout
 
 
 def recording_of(path: str | None) -> Recording | None:

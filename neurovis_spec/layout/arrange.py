@@ -33,9 +33,10 @@ _LARGE, _DENSE = 40, 2.5
 _MOST_IN_RING = 120
 
 
-def lay_out(network: Network, engine: str | None = None) -> Layout:
-    """The layout of a network, by the engine named here, else by the spec's. Raises LayoutRefusalError."""
-    return lay_out_problem(problem_of(network), engine or network.layout.engine)
+def lay_out(network: Network, engine: str | None = None, memory: Layout | None = None) -> Layout:
+    """The layout of a network, by the engine named here, else by the spec's; what an earlier one (``memory``) knew
+    stays where it was. Raises LayoutRefusalError."""
+    return lay_out_problem(problem_of(network, memory), engine or network.layout.engine)
 
 
 def lay_out_problem(problem: LayoutProblem, engine: str = "auto") -> Layout:
@@ -114,6 +115,7 @@ def refuse_what_it_cannot(problem: LayoutProblem, name: str, can: Capabilities) 
         "layout-boxes-unsupported": (bool(problem.boxes), can.boxes, "keep the members of a box together"),
         "layout-mirror-unsupported": (bool(problem.mirrors), can.mirrors, "draw mirror images (layout.mirror)"),
         "layout-align-unsupported": (bool(problem.align), can.align, "put neurons on one line (layout.align)"),
+        "layout-memory-unsupported": (problem.memory is not None, can.memory, "remember a layout (layout.file)"),
         "layout-direction-unsupported": (problem.direction != "down", can.direction, "draw in another direction"),
     }
     for code, (wanted, possible, what) in asked.items():
@@ -164,7 +166,7 @@ def _check(problem: LayoutProblem, name: str, result: Layout) -> None:
 def _tidy(problem: LayoutProblem, name: str, result: Layout) -> Layout:
     """On the grid, at the origin where nothing is pinned, neurons in natural order, ends exactly at centres."""
     shift = (0.0, 0.0)
-    if not problem.pins and problem.neurons:
+    if not problem.pins and problem.memory is None and problem.neurons:
         shift = (
             min(snap(x) for x, _ in result.positions.values()),
             min(snap(y) for _, y in result.positions.values()),

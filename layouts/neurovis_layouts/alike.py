@@ -1,0 +1,105 @@
+"""Alike: which neurons stand in places that follow from one another's, and how.
+
+In: a problem and the places of some of its neurons. Out: for a neuron, those that are drawn like it: the same one in
+other instances of one make, and its mirror image, each with the move that takes its place to theirs. The moves are read
+off what is placed already.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from neurovis_spec.layout.model import LayoutMirror, LayoutModule, LayoutProblem, Point
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """A point p becomes shift + flip · p, coordinate by coordinate; a flip is 1 or −1."""
+
+    flip: Point = (1.0, 1.0)
+    shift: Point = (0.0, 0.0)
+
+    def then(self, other: Move) -> Move:
+        """This move, then the other."""
+        (fx, fy), (x, y) = other.flip, other.shift
+        return Move((self.flip[0] * fx, self.flip[1] * fy), (x + fx * self.shift[0], y + fy * self.shift[1]))
+
+
+class Alike:
+    """Looks up who is drawn like whom."""
+
+    def __init__(self, problem: LayoutProblem, placed: Mapping[int, Point]) -> None:
+        self._placed = placed
+        self._makes: dict[str, list[LayoutModule]] = {}
+        self._around: dict[int, list[tuple[LayoutModule, int]]] = {}
+        for module in problem.modules:
+            self._makes.setdefault(module.template, []).append(module)
+            for place, neuron in enumerate(module.members):
+                self._around.setdefault(neuron, []).append((module, place))
+        self._images: dict[int, tuple[int, Move]] = {}
+        for mirror in problem.mirrors:
+            move = self._reflection(mirror, 0 if problem.direction in ("down", "up") else 1)
+            if move is not None:
+                for a, b in mirror.pairs:
+                    self._images[a] = b, move
+                    self._images[b] = a, move
+
+    def of(self, neuron: int) -> list[tuple[int, Move]]:
+        """The neurons drawn like this one, itself first, each with the move from its place."""
+        found: dict[int, Move] = {neuron: Move()}
+        waiting = [neuron]
+        while waiting:
+            one = waiting.pop(0)
+            for mate, move in self._next(one):
+                if mate not in found:
+                    found[mate] = found[one].then(move)
+                    waiting.append(mate)
+        return list(found.items())
+
+    def image(self, module: LayoutModule) -> tuple[tuple[int, ...], Move] | None:
+        """The mirror images of an instance's neurons, if all of them have one, and the move to them."""
+        images = [self._images.get(neuron) for neuron in module.members]
+        known = [image for image in images if image is not None]
+        if not known or len(known) < len(images) or any(move != known[0][1] for _, move in known):
+            return None
+        mates = tuple(mate for mate, _ in known)
+        return None if set(mates) & set(module.members) else (mates, known[0][1])
+
+    def _next(self, neuron: int) -> Iterator[tuple[int, Move]]:
+        for module, place in self._around.get(neuron, ()):
+            for other in self._makes[module.template]:
+                move = None if other is module else self._move(module, other)
+                if move is not None:
+                    yield other.members[place], move
+        if neuron in self._images:
+            yield self._images[neuron]
+
+    def _move(self, one: LayoutModule, other: LayoutModule) -> Move | None:
+        """What takes one instance to the other, where neurons of both are placed; None where they are not drawn
+        alike."""
+        pairs = [
+            (self._placed[a], self._placed[b])
+            for a, b in zip(one.members, other.members, strict=True)
+            if a in self._placed and b in self._placed
+        ]
+        if not pairs:
+            return None
+        flips: list[float] = []
+        for axis in (0, 1):
+            first, image = pairs[0][0][axis], pairs[0][1][axis]
+            apart = next(((a[axis] - first, b[axis] - image) for a, b in pairs if a[axis] != first), None)
+            flips.append(-1.0 if apart is not None and apart[0] == -apart[1] else 1.0)
+        flip = (flips[0], flips[1])
+        (ax, ay), (bx, by) = pairs[0]
+        shift = (bx - flip[0] * ax, by - flip[1] * ay)
+        kept = all((shift[0] + flip[0] * a[0], shift[1] + flip[1] * a[1]) == b for a, b in pairs)
+        return Move(flip, shift) if kept else None
+
+    def _reflection(self, mirror: LayoutMirror, across: int) -> Move | None:
+        """The reflection on the axis of a mirror, where a pair is placed."""
+        for a, b in mirror.pairs:
+            if a in self._placed and b in self._placed:
+                total = self._placed[a][across] + self._placed[b][across]
+                return Move((-1.0, 1.0), (total, 0.0)) if across == 0 else Move((1.0, -1.0), (0.0, total))
+        return None

@@ -1,0 +1,252 @@
+"""Memory (§10, ``file``): what an earlier layout placed stays there, what is new finds a free place, alike where it is
+drawn alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import neurovis_spec as nv
+from neurovis_spec.cli.commands import neurovis
+from neurovis_spec.diagnostics import Findings
+from neurovis_spec.layout.arrange import lay_out_problem
+from neurovis_spec.layout.file import parse
+from neurovis_spec.layout.geometry import distance
+from neurovis_spec.layout.model import Layout, LayoutProblem, Point
+from neurovis_spec.layout.problem import canonical
+
+ENGINES = ("layered", "circular", "grid")
+LEG = """
+neurovis: 1
+name: legs
+modules:
+  leg:
+    neurons: {S: {bias: 1}, K: {count: 3}EXTRA}
+    connections: {S -> K: 1, K -> S: 0.2INNER}
+instances: {left: {module: leg, count: COUNT}, right: {module: leg, count: COUNT}}
+neurons: {C: {count: 2, bias: 0.1}, M: {}NEW}
+connections:
+  C -> C: {pattern: all_to_all}
+  C1 -> left.S: 1
+  C2 -> right.S: 1
+  left.K + right.K -> M: 0.5
+  MORE
+MIRROR
+"""
+
+
+def legs(
+    count: int = 2, extra: str = "", inner: str = "", new: str = "", more: str = "C1 -> M: 0.1", mirror: str = ""
+) -> nv.CompiledNetwork:
+    text = LEG
+    for key, value in (("COUNT", str(count)), ("EXTRA", extra), ("INNER", inner), ("NEW", new), ("MORE", more)):
+        text = text.replace(key, value)
+    return nv.compile_text(text.replace("MIRROR", mirror))
+
+
+def after(earlier: nv.CompiledNetwork, later: nv.CompiledNetwork, engine: str = "layered") -> tuple[Layout, Layout]:
+    before = earlier.layout(engine).value
+    return before, later.layout(engine, earlier=before).value
+
+
+def apart(layout: Layout) -> bool:
+    return all(distance(a, b) >= 0.6 for a, b in combinations(layout.positions.values(), 2))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_same_network_gives_the_same_file(engine: str) -> None:
+    before, now = after(legs(), legs(), engine)
+    assert now == before
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_new_connection_moves_nobody_and_reroutes_nothing_else(engine: str) -> None:
+    before, now = after(legs(), legs(more="M -> C1: 0.1"), engine)
+    assert now.positions == before.positions
+    shared = [name for name in before.routes if name in now.routes]
+    assert len(shared) == len(before.routes) - 1
+    assert all(now.routes[name] == before.routes[name] for name in shared)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_new_neuron_finds_a_free_place_near_its_neighbour(engine: str) -> None:
+    before, now = after(legs(), legs(new=", N: {}", more="M -> N: 1"), engine)
+    assert all(now.positions[name] == point for name, point in before.positions.items())
+    assert apart(now)
+    assert distance(now.positions["N"], now.positions["M"]) < 4
+
+
+def test_what_is_gone_leaves_the_rest_where_it_was() -> None:
+    before, now = after(legs(count=3), legs(count=2))
+    assert set(now.positions) < set(before.positions)
+    assert all(before.positions[name] == point for name, point in now.positions.items())
+
+
+def test_a_new_instance_is_drawn_like_the_others_and_its_frame_is_its_own() -> None:
+    before, now = after(legs(count=1), legs(count=2))
+    assert all(now.positions[name] == point for name, point in before.positions.items())
+    assert apart(now)
+    for path in ("left", "right"):
+        own = {name: point for name, point in now.positions.items() if name.startswith(f"{path}2.")}
+        frame = (*map(min, zip(*own.values(), strict=True)), *map(max, zip(*own.values(), strict=True)))
+        for name, (x, y) in now.positions.items():
+            assert name in own or not (frame[0] < x < frame[2] and frame[1] < y < frame[3]), name
+        assert relative(now.positions, f"{path}2") in (
+            relative(now.positions, "left1"),
+            relative(now.positions, "right1"),
+            {name: (-x, y) for name, (x, y) in relative(now.positions, "left1").items()},
+        )
+
+
+def relative(positions: Mapping[str, Point], path: str) -> dict[str, Point]:
+    x, y = positions[f"{path}.S"]
+    return {name[len(path) :]: (a - x, b - y) for name, (a, b) in positions.items() if name.startswith(f"{path}.")}
+
+
+def test_a_new_neuron_of_a_module_stands_alike_in_all_instances() -> None:
+    """The instances are drawn alike by hand; a neuron that the module gets new stands alike in them as well."""
+    earlier, later = legs(), legs(extra=", X: {}", inner=", K1 -> X: 1")
+    leg = {"S": (0.0, 0.0), "K1": (-1.0, 2.0), "K2": (0.0, 2.0), "K3": (1.0, 2.0)}
+    flips = {"left1": (0.0, 1.0), "left2": (4.0, 1.0), "right1": (12.0, -1.0), "right2": (8.0, -1.0)}
+    positions = {
+        f"{path}.{name}": (x0 + flip * x, 4 + y) for path, (x0, flip) in flips.items() for name, (x, y) in leg.items()
+    }
+    positions |= {"C1": (5.0, 0.0), "C2": (7.0, 0.0), "M": (6.0, 9.0)}
+    before = Layout("legs", "layered", positions, {})
+    now = later.layout("layered", earlier=before).value
+    assert earlier.layout("layered", earlier=before).positions == positions
+    assert all(now.positions[name] == point for name, point in positions.items())
+    first = now.positions["left1.X"]
+    for path, (x0, flip) in flips.items():
+        assert now.positions[f"{path}.X"] == (x0 + flip * first[0], first[1])
+    assert apart(now)
+    one = now.routes["left1.K1 -> left1.X"]
+    for path, (x0, flip) in flips.items():
+        assert now.routes[f"{path}.K1 -> {path}.X"] == tuple((x0 + flip * x, y) for x, y in one)
+
+
+def test_new_neurons_of_a_mirrored_pair_are_mirror_images() -> None:
+    groups = "neurovis: 1\nname: x\nneurons: {A: {count: N, bias: 1}, B: {count: N, bias: 1}, C: {}}\n"
+    text = f"{groups}connections: {{A -> C: 1, B -> C: 1}}\nlayout: {{mirror: [[A, B]]}}"
+    later = nv.compile_text(text.replace("N", "3"))
+    before = Layout("x", "layered", {"A1": (0, 0), "A2": (1, 0), "B1": (6, 0), "B2": (5, 0), "C": (3, 2)}, {})
+    now = later.layout("layered", earlier=before).value
+    (ax, ay), (bx, by) = now.positions["A3"], now.positions["B3"]
+    assert (ax + bx, ay) == (6, by)
+    assert apart(now)
+
+
+def test_a_pin_goes_before_memory() -> None:
+    text = "neurovis: 1\nname: x\nneurons: {A: {bias: 1}, B: {}}\nconnections: {A -> B: 1}\n"
+    before = Layout("x", "layered", {"A": (0.0, 0.0), "B": (0.0, 2.0)}, {})
+    pinned = nv.compile_text(text + "layout: {positions: {B: [5.3, 7]}}")
+    assert pinned.layout(earlier=before).positions == {"A": (0.0, 0.0), "B": (5.3, 7.0)}
+    on_top = nv.compile_text(text + "layout: {positions: {B: [0.1, 0]}}")
+    now = on_top.layout(earlier=before).value
+    assert now.positions["B"] == (0.1, 0.0)
+    assert apart(now)
+
+
+@st.composite
+def _edits(draw: st.DrawFn) -> tuple[LayoutProblem, LayoutProblem]:
+    """A small network, and the same with a few neurons and connections more or less."""
+    size = draw(st.integers(1, 12))
+    names = [f"N{i}" for i in range(size)]
+    pairs = draw(st.sets(st.tuples(st.sampled_from(names), st.sampled_from(names)), max_size=20))
+    gone = draw(st.sets(st.sampled_from(names), max_size=2))
+    new = [f"M{i}" for i in range(draw(st.integers(0, 3)))]
+    more = draw(st.sets(st.tuples(st.sampled_from(names + new), st.sampled_from(names + new)), max_size=6))
+    left = [name for name in names if name not in gone] + new
+    kept = [(a, b) for a, b in sorted(pairs | more) if a in left and b in left]
+    return (
+        canonical("x", names, edges=[(f"{a} -> {b}", a, b, 1) for a, b in sorted(pairs)]),
+        canonical("x", left or ["Z"], edges=[(f"{a} -> {b}", a, b, 1) for a, b in kept]),
+    )
+
+
+@given(_edits(), st.sampled_from(ENGINES))
+@settings(max_examples=60, deadline=None)
+def test_who_was_there_stays_and_nobody_overlaps(edit: tuple[LayoutProblem, LayoutProblem], engine: str) -> None:
+    earlier, later = edit
+    before = lay_out_problem(earlier, engine)
+    now = lay_out_problem(replace(later, memory=before), engine)
+    assert all(now.positions[name] == before.positions[name] for name in now.positions if name in before.positions)
+    assert apart(now)
+    assert now == lay_out_problem(replace(later, memory=before), engine)
+
+
+def run(*words: str | Path) -> Result:
+    return CliRunner().invoke(neurovis, list(map(str, words)))
+
+
+SPEC = "neurovis: 1\nname: x\nneurons: {A: {bias: 1}, B: {}}\nconnections: {A -> B: 1}\nlayout: {file: x.layout.yaml}\n"
+
+
+def test_update_makes_the_file_keeps_it_and_takes_in_what_is_new(tmp_path: Path) -> None:
+    spec, lock = tmp_path / "x.yaml", tmp_path / "x.layout.yaml"
+    spec.write_text(SPEC)
+    first = run("layout", spec, "--update", lock)
+    assert first.exit_code == 0
+    assert "0 neurons where they were, 2 new" in first.stdout
+    assert "layout-file-missing" in first.stderr
+    text = lock.read_text()
+    again = run("layout", spec, "--update", lock)
+    assert "2 neurons where they were, 0 new" in again.stdout
+    assert again.stderr == ""
+    assert lock.read_text() == text
+    spec.write_text(SPEC.replace("B: {}", "B: {}, D: {}").replace("A -> B: 1", "A -> B: 1, A -> D: 1"))
+    third = run("layout", spec, "--update", lock)
+    assert "2 neurons where they were, 1 new" in third.stdout
+    old, new = text.splitlines(), lock.read_text().splitlines()
+    assert [line for line in old if line not in new] == []
+    assert len(new) == len(old) + 2
+
+
+def test_a_spec_is_drawn_as_its_file_says(tmp_path: Path) -> None:
+    spec = tmp_path / "x.yaml"
+    spec.write_text(SPEC)
+    (tmp_path / "x.layout.yaml").write_text("neurovis_layout: 1\npositions: {A: [3, 1], B: [7, -2]}\n")
+    network = nv.compile(spec)
+    assert network.layout().positions == {"A": (3.0, 1.0), "B": (7.0, -2.0)}
+    assert network.warnings == ()
+
+
+def test_names_that_are_gone_are_a_warning_and_update_takes_them_out(tmp_path: Path) -> None:
+    spec, lock = tmp_path / "x.yaml", tmp_path / "x.layout.yaml"
+    spec.write_text(SPEC)
+    lock.write_text("neurovis_layout: 1\npositions: {A: [3, 1], B: [7, -2], Z: [0, 0]}\n")
+    (warning,) = nv.compile(spec).warnings
+    assert (warning.code, warning.span.line, warning.span.column) == ("forgotten-neuron", 5, 16)
+    assert "1 gone" in run("layout", spec, "--update", lock).stdout
+    findings = Findings()
+    kept = parse(lock.read_text(), "x", findings)
+    assert kept is not None
+    assert kept.positions == {"A": (3.0, 1.0), "B": (7.0, -2.0)}
+    assert nv.compile(spec).warnings == ()
+
+
+def test_a_file_that_is_no_layout_is_the_inputs_fault_and_is_left_alone(tmp_path: Path) -> None:
+    spec, lock = tmp_path / "x.yaml", tmp_path / "x.layout.yaml"
+    spec.write_text(SPEC)
+    lock.write_text("neurovis_layout: 1\npositions: {A: [3]}\n")
+    with pytest.raises(nv.SpecError) as caught:
+        nv.compile(spec)
+    (finding,) = caught.value.diagnostics
+    assert (Path(finding.span.file).name, finding.span.line, finding.span.column) == ("x.layout.yaml", 2, 16)
+    spec.write_text(SPEC.replace("layout: {file: x.layout.yaml}", ""))
+    done = run("layout", spec, "--update", lock)
+    assert done.exit_code == 1
+    assert lock.read_text() == "neurovis_layout: 1\npositions: {A: [3]}\n"
+
+
+def test_update_and_output_exclude_each_other(tmp_path: Path) -> None:
+    spec = tmp_path / "x.yaml"
+    spec.write_text(SPEC)
+    assert run("layout", spec, "--update", tmp_path / "a", "-o", tmp_path / "b").exit_code == 2
