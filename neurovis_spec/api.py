@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -35,13 +36,21 @@ from neurovis_spec.runtime.files import replacing
 from neurovis_spec.runtime.inputs import InputError
 from neurovis_spec.runtime.recording import Recording, RecordingError, Snapshot
 from neurovis_spec.runtime.simulation import Simulation
-from neurovis_spec.scene.gains import Gains
-from neurovis_spec.scene.renderers import RendererError, renderer_for
 
-OutputError = RendererError
+if TYPE_CHECKING:  # what draws is imported by who draws
+    from neurovis_spec.scene.gains import Gains
 
 #: Frames a second where the spec writes no dt, and the most there are.
 DEFAULT_FPS, MOST_FPS = 25.0, 60.0
+
+
+def __getattr__(name: str) -> object:
+    """``OutputError``, which what draws raises for a kind of file that nobody makes."""
+    if name != "OutputError":
+        raise AttributeError(f"module 'neurovis_spec.api' has no attribute {name!r}")
+    from neurovis_spec.scene.renderers import RendererError
+
+    return RendererError
 
 
 def compile(
@@ -253,6 +262,8 @@ class CompiledNetwork:
         Without ``step`` it is the last of the recording, or of a default run. Without ``recording`` the network runs
         as far as the step. Raises OutputError for a kind that nobody draws, before anything is run.
         """
+        from neurovis_spec.scene.renderers import renderer_for
+
         suffix = Path(path).suffix
         renderer_for(suffix, moving=False)
         layout = self._layout if engine is None else pipeline.arrange(self.network, engine, self.memory)
@@ -277,6 +288,8 @@ class CompiledNetwork:
 
         ``fps`` defaults to 1/dt, at most 60, and to 25 where the spec writes no dt.
         """
+        from neurovis_spec.scene.renderers import renderer_for
+
         suffix = Path(path).suffix
         renderer_for(suffix, moving=True)
         if fps is None:

@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy.typing as npt
 
@@ -28,18 +29,13 @@ from neurovis_spec.language.reader import read_file, read_text
 from neurovis_spec.language.shape import read_spec
 from neurovis_spec.language.source import SourceDocument
 from neurovis_spec.language.spec import Spec
-from neurovis_spec.layout import Layout
-from neurovis_spec.layout.arrange import lay_out
-from neurovis_spec.layout.remember import read_memory
+from neurovis_spec.layout.model import Layout
 from neurovis_spec.progress import Progress
-from neurovis_spec.runtime.record import record
-from neurovis_spec.runtime.recording import Recording, Snapshot
-from neurovis_spec.scene import Film, Scene
-from neurovis_spec.scene.encode import encode
-from neurovis_spec.scene.film import film
-from neurovis_spec.scene.gains import Gains
-from neurovis_spec.scene.probe import probe
-from neurovis_spec.scene.renderers import renderer_for
+
+if TYPE_CHECKING:  # what only some stages need is imported there: a spec is validated without all of it
+    from neurovis_spec.runtime.recording import Recording, Snapshot
+    from neurovis_spec.scene import Film, Scene
+    from neurovis_spec.scene.gains import Gains
 
 
 def read(path: Path, name: str, findings: Findings) -> SourceDocument | None:
@@ -82,27 +78,42 @@ def simulate(
     progress: Progress | None = None,
 ) -> Recording:
     """Run the update program, record activities and weights."""
+
+    from neurovis_spec.runtime.record import record
+
     return record(network, steps, inputs, backend, every, start, progress)
 
 
 def remember(spec: Spec, request: Request, network: Network, findings: Findings) -> Layout | None:
     """The earlier layout that the spec names, if it names one."""
+
+    from neurovis_spec.layout.remember import read_memory
+
     file = None if spec.layout is None else spec.layout.file
     return None if file is None else read_memory(file, request.base, request.root, network, findings)
 
 
 def arrange(network: Network, engine: str | None = None, memory: Layout | None = None) -> Layout:
     """A position for every neuron, a route for every connection."""
+
+    from neurovis_spec.layout.arrange import lay_out
+
     return lay_out(network, engine, memory)
 
 
 def measure(network: Network, progress: Progress | None = None) -> Gains:
     """The gains of Eqs. 2–5: the author's, else such that the range of a default run shows."""
+
+    from neurovis_spec.scene.probe import probe
+
     return probe(network, progress)
 
 
 def picture(network: Network, layout: Layout, snapshot: Snapshot, gains: Gains, settings: RenderSettings) -> Scene:
     """One step as discs, splines and texts."""
+
+    from neurovis_spec.scene.encode import encode
+
     return encode(network, layout, snapshot, gains, settings)
 
 
@@ -115,14 +126,23 @@ def moving(
     fps: float,
 ) -> Film:
     """Several steps as a scene whose colours and widths change."""
+
+    from neurovis_spec.scene.film import film
+
     return film(network, layout, snapshots, gains, settings, fps)
 
 
 def draw(scene: Scene, suffix: str) -> bytes:
     """A scene as the content of a file of this kind. Raises RendererError where nobody draws such files."""
+
+    from neurovis_spec.scene.renderers import renderer_for
+
     return renderer_for(suffix, moving=False).draw(scene, suffix)
 
 
 def animate(moving_scene: Film, suffix: str, progress: Progress | None = None) -> bytes:
     """A film as the content of a file of this kind. Raises RendererError where nobody makes such films."""
+
+    from neurovis_spec.scene.renderers import renderer_for
+
     return renderer_for(suffix, moving=True).animate(moving_scene, suffix, progress)

@@ -212,3 +212,10 @@ def test_structural_parameters_cannot_be_set() -> None:
     with pytest.raises(nv.SpecError) as caught:
         nv.compile_text(text + "events: [{at: 1, set: {d: 3}}]")
     assert [d.code for d in caught.value.diagnostics] == ["structural-parameter"]
+
+
+def test_set_changes_no_initial_activity() -> None:
+    """§9: what is set at step 0 already changes the bias, but not the activity at step 0 that the group begins with."""
+    text = "neurovis: 1\nname: x\nparameters: {g: 1}\nneurons: {A: {initial: g, bias: g}}\n"
+    recording = nv.compile_text(text + "events: [{at: 0, set: {g: 2}}]").run(steps=3)
+    assert recording["A"].tolist() == [1.0, 2.0, 2.0]

@@ -6,6 +6,7 @@ module nor anything heavy is imported before that command is called, so that ``n
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 import warnings
@@ -103,6 +104,7 @@ class Commands(click.Group):
         **extra: object,
     ) -> NoReturn:
         """Run, and end the process with the status that the module ``neurovis_spec.cli`` states."""
+        gc.set_threshold(50_000, 20, 100)  # a process that soon ends need not look for cycles all the time
         for stream in (sys.stdout, sys.stderr):
             if hasattr(stream, "reconfigure"):
                 stream.reconfigure(errors="backslashreplace")

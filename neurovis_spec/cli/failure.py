@@ -61,11 +61,11 @@ def said(error: OSError) -> str:
 
 def _input_errors() -> tuple[type[Exception], ...]:
     """What running and drawing raise where the input is at fault; imported when something has gone wrong."""
-    from neurovis_spec import api
     from neurovis_spec.plugins import PluginError
     from neurovis_spec.runtime.backend import BackendError
     from neurovis_spec.runtime.inputs import InputError
     from neurovis_spec.runtime.recording import RecordingError, UnknownNameError
     from neurovis_spec.runtime.simulation import ParameterError
+    from neurovis_spec.scene.renderers import RendererError
 
-    return (api.OutputError, BackendError, InputError, ParameterError, PluginError, RecordingError, UnknownNameError)
+    return (RendererError, BackendError, InputError, ParameterError, PluginError, RecordingError, UnknownNameError)

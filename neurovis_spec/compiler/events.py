@@ -161,7 +161,8 @@ def with_phases(
             made = recompile(chosen)
             if made is None:
                 return network
-            base = made
+            # the parameter that is set does not reach back to the activity at step 0
+            base = replace(made, neurons=replace(made.neurons, initial=network.neurons.initial))
         phases.append((step, _altered(base, events, step)))
     return replace(network, phases=tuple(phases))
 

@@ -40,7 +40,7 @@ def make_blocks(population: Population, sources: IntArray, targets: IntArray, le
     parts: dict[_Key, list[_Part]] = {}
     for group, kind in zip(population.neurons.groups, population.kinds, strict=True):
         own = levels[group.start : group.start + group.count]
-        for level in np.unique(own).tolist():
+        for level in np.flatnonzero(np.bincount(own)).tolist():
             key = (level, kind.activation.name, kind.model.name, group.combine)
             parts.setdefault(key, []).append(_Part(kind, group.start, np.flatnonzero(own == level)))
     order = sorted(parts, key=lambda key: (key[0], parts[key][0].members[0]))

@@ -71,7 +71,7 @@ def _inputs(compiled: Compiled, findings: Findings) -> None:
     read = set(network.neurons.input.tolist())
     for plasticity in network.plasticity:
         for signal in plasticity.signals.values():
-            read.update((np.unique(signal) - n).tolist())
+            read.update(place - n for place in set(signal.tolist()))
     for section, units in compiled.sections():
         handed = {outer.value for instance in section.instances.values() for outer in instance.inputs.values()}
         for name in section.inputs.keys() - handed:

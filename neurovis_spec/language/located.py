@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Annotated, Generic, NoReturn, TypeAlias, TypeVar
 
@@ -25,6 +26,9 @@ N = TypeVar("N", bound=Node)
 
 #: The error by which a validator says that the finding is already noted.
 REPORTED = "reported"
+
+#: Findings of one list, after which the rest of it is not looked at.
+_PATIENCE = 20
 
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,63}")
 
@@ -87,8 +91,11 @@ def as_text(node: Node, info: ValidationInfo) -> Located[str]:
     """A text; numbers and truth values are answered with a hint to quote them."""
     if isinstance(node, Scalar) and isinstance(node.value, str):
         return Located(node.value, node)
-    quoted = isinstance(node, Scalar) and node.value is not None
-    refuse(info, node, "a text", "put it in quotes" if quoted else None)
+    hint = "put it in quotes" if isinstance(node, Scalar) else None
+    if hint and isinstance(node, Scalar) and node.value is None:
+        written = node.span.end_column > node.span.column
+        hint = "YAML reads this as null: put it in quotes, or take another name" if written else None
+    refuse(info, node, "a text", hint)
 
 
 def as_identifier(node: Node, info: ValidationInfo) -> Located[str]:
@@ -166,10 +173,19 @@ def as_integer(node: Node, info: ValidationInfo) -> Located[int]:
 
 
 def as_texts(node: Node, info: ValidationInfo) -> tuple[Located[str], ...]:
-    """A text or a list of texts."""
-    if isinstance(node, (Sequence, Packed)):
-        return tuple(as_text(item, info) for item in node.items)
-    return (as_text(node, info),)
+    """A text or a list of texts; each that is none is noted."""
+    if not isinstance(node, (Sequence, Packed)):
+        return (as_text(node, info),)
+    result: list[Located[str]] = []
+    before = findings_of(info).errors
+    for item in node.items:
+        with suppress(PydanticCustomError):
+            result.append(as_text(item, info))
+        if findings_of(info).errors - before >= _PATIENCE:
+            break
+    if findings_of(info).errors > before:
+        give_up()
+    return tuple(result)
 
 
 def one_of(*words: str) -> Callable[[Node, ValidationInfo], Located[str]]:
