@@ -1,0 +1,266 @@
+"""Use case 3 of the paper, held to what it says: ripples and gaits, learning at an obstacle, memory of the floor."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import neurovis_spec as nv
+from neurovis_spec.runtime.recording import Recording
+
+FOLDER = Path(__file__).parent.parent / "specs" / "hexapod"
+SPEC = FOLDER / "hexapod.yaml"
+#: in the order in which the ripple of the delay line passes them
+LEGS = ("right3", "right2", "right1", "left3", "left2", "left1")
+#: radians a step, by the number of ripples
+PHI = {1: 0.1048, 2: 0.2095, 3: 0.3142}
+#: where each of them is settled in the run of the spec
+SETTLED = {1: slice(120, 360), 2: slice(420, 540), 3: slice(600, 2900)}
+SWING = 10  # steps that a leg is lifted
+FIRST, EVERY, BEAMS = 600, 180, 8  # steps at which the front legs come to a beam
+#: steps later than the front leg that a beam comes to a leg, and that a leg is held high
+LATER, CLEARING = {"1": 0, "2": 45, "3": 80}, 12
+NEWS = ("left1.dp -> left2.dp", "left2.dp -> left3.dp", "right1.dp -> right2.dp", "right2.dp -> right3.dp")
+
+Flags = npt.NDArray[np.bool_]
+
+
+@pytest.fixture(scope="module")
+def walk() -> Recording:
+    return nv.compile(SPEC).run()
+
+
+def line(recording: Recording) -> Flags:
+    """Which neurons of the second delay line are active: steps × 6."""
+    return np.stack([recording[f"DL{number}"] for number in range(6, 12)], axis=1) > 0.5
+
+
+def ripples(active: Flags) -> npt.NDArray[np.int_]:
+    """Runs of active neurons along the line, at each step."""
+    before = np.pad(active, ((0, 0), (1, 0)))[:, :-1]
+    return np.asarray((active & ~before).sum(axis=1))
+
+
+def lifted(recording: Recording) -> Flags:
+    """Which legs the rhythm lifts, as far as the motor neurons say: steps × 6 (LEGS)."""
+    return np.stack([recording[f"{leg}.CF"] for leg in LEGS], axis=1) > 0.5
+
+
+def onsets(signal: npt.NDArray[np.float64], level: float = 0.5) -> list[int]:
+    """Steps at which a signal rises above a level."""
+    return [int(step) + 1 for step in np.flatnonzero((signal[:-1] <= level) & (signal[1:] > level))]
+
+
+def swings(recording: Recording, leg: str, window: slice) -> list[tuple[int, int]]:
+    """First step and length of every swing that begins and ends in a window."""
+    up = (recording[f"{leg}.CF"][window] > 0.5).astype(int)
+    begins, ends = np.flatnonzero(np.diff(up) == 1) + 1, np.flatnonzero(np.diff(up) == -1) + 1
+    ends = ends[ends > begins[0]]
+    return [(window.start + int(b), int(e - b)) for b, e in zip(begins, ends, strict=False)]
+
+
+def steps_to_act(recording: Recording, leg: str) -> list[int]:
+    """For each beam, how long after the front leg's hit a leg steps high for the last time."""
+    high = onsets(recording[f"{leg}.over"])
+    times = [[step - start for step in high if start <= step < start + EVERY] for start in beams()]
+    return [max(of_beam) for of_beam in times]
+
+
+def hits(recording: Recording, leg: str) -> list[int]:
+    """For each beam, whether the leg hits it."""
+    late = LATER[leg[-1]]
+    return [int(recording[f"{leg}.T"][start + late : start + late + EVERY // 2].max() > 0.1) for start in beams()]
+
+
+def beams() -> list[int]:
+    return [FIRST + EVERY * number for number in range(BEAMS)]
+
+
+# The network
+
+
+def test_it_is_as_large_as_the_paper_says() -> None:
+    network = nv.compile(SPEC).network
+    assert (len(network.neurons), len(network.connections)) == (148, 199)
+    names = network.neurons.names
+    assert {"C0", "C1", *(f"DL{number}" for number in range(12))} <= set(names)
+    for part in ("BC", "CF", "FT", "dr", "dp", "S", "K"):
+        assert sum(name.endswith(f".{part}") for name in names) == 6
+
+
+def test_six_legs_are_one_module_and_mirrored() -> None:
+    network = nv.compile(SPEC).network
+    of_leg = {leg: [n[len(leg) :] for n in network.neurons.names if n.startswith(f"{leg}.")] for leg in LEGS}
+    assert len(of_leg["left1"]) == 22
+    assert all(names == of_leg["left1"] for names in of_leg.values())
+    (mirror,) = network.layout.mirrors
+    assert len(mirror.pairs) == 3 * 22
+
+
+def test_the_data_are_what_their_program_makes(tmp_path: Path) -> None:
+    program = tmp_path / "make_data.py"
+    program.write_bytes((FOLDER / "data" / "make_data.py").read_bytes())
+    subprocess.run([sys.executable, program], check=True, timeout=60)
+    made = {path.name: path.read_bytes() for path in tmp_path.glob("*.csv")}
+    assert made == {path.name: path.read_bytes() for path in (FOLDER / "data").glob("*.csv")}
+    assert sum(len(content) for content in made.values()) < 64 * 1024
+
+
+# Dynamics: ripples and gaits
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_the_frequency_says_how_many_ripples_are_on_the_line(walk: Recording, count: int) -> None:
+    assert set(ripples(line(walk))[SETTLED[count]].tolist()) == {count}
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_the_frequency_may_be_set_while_it_runs(count: int) -> None:
+    simulation = nv.compile(SPEC, phi=PHI[count % 3 + 1]).simulator()
+    active = []
+    for step in range(355):
+        if step == 100:
+            simulation.set(phi=PHI[count])
+        simulation.step()
+        active.append(simulation.activity > 0.5)
+    names = nv.compile(SPEC).network.neurons.names
+    columns = [names.index(f"DL{number}") for number in range(6, 12)]
+    assert set(ripples(np.stack(active)[200:, columns]).tolist()) == {count}
+
+
+def test_in_the_wave_gait_one_leg_lifts_after_the_other(walk: Recording) -> None:
+    window = SETTLED[1]
+    assert set(lifted(walk)[window].sum(axis=1).tolist()) == {1}
+    first = [swings(walk, leg, window)[0][0] for leg in LEGS]
+    period = 6 * SWING
+    assert [(step - first[0]) % period for step in first] == [0, 10, 20, 30, 40, 50]
+
+
+def test_in_the_caterpillar_gait_pairs_lift_from_hind_to_front(walk: Recording) -> None:
+    window = SETTLED[2]
+    first = {leg: [step for step, _ in swings(walk, leg, window)] for leg in LEGS}
+    for place in "123":
+        assert first[f"left{place}"] == first[f"right{place}"]
+    assert [(first[f"left{place}"][0] - first["left3"][0]) % (3 * SWING) for place in "321"] == [0, 10, 20]
+    assert set(lifted(walk)[window].sum(axis=1).tolist()) == {2}
+
+
+def test_in_the_tripod_gait_three_legs_lift_in_turn_with_the_others(walk: Recording) -> None:
+    window = slice(2100, 2900)  # no obstacles any more
+    up = dict(zip(LEGS, lifted(walk)[window].T, strict=True))
+    assert up["left1"].tolist() == up["right2"].tolist() == up["left3"].tolist()
+    assert up["right1"].tolist() == up["left2"].tolist() == up["right3"].tolist()
+    assert (up["left1"] != up["right1"]).all()
+
+
+@pytest.mark.parametrize(("count", "window"), [(1, SETTLED[1]), (2, SETTLED[2]), (3, slice(2100, 2900))])
+def test_a_swing_takes_as_long_at_every_speed_and_goes_forward(walk: Recording, count: int, window: slice) -> None:
+    for leg in LEGS:
+        begins, lengths = zip(*swings(walk, leg, window), strict=True)
+        assert set(lengths) == {SWING}
+        strides = set(np.diff(begins).tolist())
+        assert strides == {6 // count * SWING}
+        angle = walk[f"{leg}.qBC"]
+        assert all(angle[begin + SWING] - angle[begin] > 1.2 for begin in begins[:-1])
+
+
+# Plasticity: the obstacle
+
+
+def test_before_the_first_beam_nothing_is_learned(walk: Recording) -> None:
+    for name in NEWS:
+        assert set(walk.weight(name)[: FIRST + 1].tolist()) == {1.0}
+
+
+def test_while_the_news_comes_too_early_the_weights_grow(walk: Recording) -> None:
+    for name in NEWS:
+        leg = name.split(" -> ")[1].split(".")[0]
+        weights = walk.weight(name)[[start - 1 for start in (*beams(), FIRST + EVERY * BEAMS)]]
+        missed = hits(walk, leg)
+        assert missed == sorted(missed, reverse=True)  # once it is learned it stays so
+        assert 3 <= sum(missed) <= 6
+        grown = np.diff(weights)
+        assert (grown[: sum(missed)] > 0.02).all()
+        assert set(grown[sum(missed) :].tolist()) == {0.0}
+        assert weights[-1] > 1.2
+
+
+def test_the_news_passes_more_slowly_until_it_comes_with_the_beam(walk: Recording) -> None:
+    for leg in ("left2", "left3", "right2", "right3"):
+        times = steps_to_act(walk, leg)
+        assert times == sorted(times)
+        arrival = LATER[leg[-1]]
+        assert arrival - times[0] > 20  # too early by more than half a second: the leg is down again
+        assert 0 <= arrival - times[-1] < CLEARING
+        assert len(set(times[-3:])) == 1
+
+
+def test_after_the_last_beam_the_weights_stay(walk: Recording) -> None:
+    for name in NEWS:
+        after = walk.weight(name)[FIRST + EVERY * (BEAMS - 3) + EVERY - 1 :]
+        assert set(after.tolist()) == {float(after[0])}
+        assert walk.weight(name).max() < 2  # nowhere near its bound of 4
+    assert walk.weight(NEWS[0]).tolist() == walk.weight(NEWS[2]).tolist()
+
+
+def test_the_front_legs_cannot_be_warned(walk: Recording) -> None:
+    for leg in ("left1", "right1"):
+        assert hits(walk, leg) == [1] * BEAMS
+        assert walk[f"{leg}.over"].max() == 0
+
+
+def test_without_learning_every_beam_is_hit() -> None:
+    recording = nv.compile(SPEC, eta=0, eta_hind=0).run(steps=FIRST + EVERY * BEAMS)
+    for leg in ("left2", "left3", "right2", "right3"):
+        assert hits(recording, leg) == [1] * BEAMS
+
+
+def test_a_leg_that_is_warned_lifts_higher_than_in_a_step(walk: Recording) -> None:
+    last = beams()[-1] + LATER["2"]
+    assert walk["left2.qCF"][last : last + 4].min() > 1
+    assert walk["left2.qCF"][SETTLED[1]].max() < 1
+
+
+# Memory: the floor
+
+
+def test_on_the_rigid_floor_k_has_a_level(walk: Recording) -> None:
+    level = walk["right1.K"][2100:2310]
+    assert level.mean() == pytest.approx(0.138, abs=0.003)
+    assert np.ptp(level) < 0.06 * level.mean()
+
+
+def test_k_hardly_changes_while_s_vanishes(walk: Recording) -> None:
+    gap = slice(2310, 2370)
+    before = walk["right1.K"][2250:2310].mean()
+    assert walk["right1.S"][gap].max() == 0
+    assert walk["right1.S"][2250:2310].sum() == 12  # three strides, four steps each
+    assert np.abs(walk["right1.K"][gap] / before - 1).max() < 0.01
+    assert np.abs(walk["right1.K"][2370:2500] / before - 1).max() < 0.06
+
+
+def test_k_goes_to_a_new_level_when_s_changes(walk: Recording) -> None:
+    assert walk["right1.S"][2440:2500].sum() == 12
+    assert walk["right1.S"][2800:2860].sum() == 21  # three strides, seven steps each
+    old, new = walk["right1.K"][2440:2500].mean(), walk["right1.K"][2840:2900].mean()
+    assert new > 2 * old
+    half = np.flatnonzero(walk["right1.K"][2500:] > (old + new) / 2)[0]
+    assert 30 < half < 150  # neither at once nor never
+    # each gait step returns to its level: the hormone does not follow single contacts
+    assert np.ptp(walk["right1.K"][2840:2900]) < 0.1 * new
+
+
+def test_five_legs_are_on_the_soft_floor_before_the_sixth(walk: Recording) -> None:
+    levels = {leg: walk[f"{leg}.K"][2440:2500].mean() for leg in LEGS}
+    assert levels.pop("right1") < 0.15
+    assert all(level > 0.28 for level in levels.values())
+
+
+def test_k_stretches_the_leg(walk: Recording) -> None:
+    rigid, soft = (walk["right1.FT"][window].min() for window in (slice(2240, 2300), slice(2840, 2900)))
+    assert soft - rigid == pytest.approx(0.17, abs=0.02)
