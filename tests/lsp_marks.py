@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from neurovis_spec.lsp.document import Document, check
+from neurovis_spec.lsp.check import check
+from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.text import Place, Text
 
 MARK = "¦"

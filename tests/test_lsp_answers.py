@@ -10,15 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lsp_marks import marked
 
-from neurovis_spec.diagnostics import Diagnostic, Span
+from neurovis_spec.lsp.check import check
 from neurovis_spec.lsp.completion import Completion, complete
 from neurovis_spec.lsp.definition import definition
-from neurovis_spec.lsp.document import Document, check
+from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.hover import hover
 from neurovis_spec.lsp.rename import RenameError, apply, prepare, rename
 from neurovis_spec.lsp.symbols import symbols
 from neurovis_spec.lsp.text import Place
-from neurovis_spec.lsp.wire import diagnostics
 
 SPECS = sorted((Path(__file__).parents[1] / "specs").glob("*.yaml"))
 BASE = """neurovis: 1
@@ -151,14 +150,6 @@ def test_the_size_of_a_group_is_that_of_the_network() -> None:
     found = hover(*marked(text))
     assert found is not None
     assert "2*beta - 1 neurons" in found.markdown
-
-
-def test_a_finding_of_an_included_file_stands_where_that_is_included() -> None:
-    document = Document("neurovis: 1\ninclude: [a.yaml, more.yaml]\n", "spec.yaml")
-    elsewhere = Diagnostic("no-value", "'x' has no value", Span("lib/more.yaml", 7, 3, 7, 4), hint="write one")
-    (found,) = diagnostics(document, [elsewhere])
-    assert found.message == "lib/more.yaml:7:3: 'x' has no value\nhelp: write one"
-    assert (found.range.start.line, found.range.start.character) == (1, 18)
 
 
 def test_hover_and_definition_work_in_a_broken_document() -> None:

@@ -8,10 +8,10 @@ to. Findings about what an included file holds point into that file.
 from __future__ import annotations
 
 import os.path
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeAlias
 
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.data_files import locate
@@ -25,6 +25,8 @@ from neurovis_spec.language.spec import Spec
 #: The most files that a spec may include, and how deep files may include one another.
 MOST: Final = 1000
 DEEPEST: Final = 64
+#: Gives at most so many bytes of a file, or says why not.
+ReadBytes: TypeAlias = Callable[[Path, int], bytes | FileFault]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,13 +45,13 @@ class Includes:
     complete: bool = True
 
 
-def read_includes(spec: Spec, folder: Path, root: Path, findings: Findings) -> Includes:
-    """The files that a spec includes, and those that these include.
+def read_includes(spec: Spec, folder: Path, root: Path, findings: Findings, read: ReadBytes = read_bytes) -> Includes:
+    """The files that a spec includes, and those that these include; ``read`` gives the bytes of a file.
 
     Codes: those of data files (``path-outside``, ``file-missing``, …), ``include-cycle``, ``too-many``, ``too-deep``,
     and whatever is found in the files.
     """
-    reader = _Reader(root, findings)
+    reader = _Reader(root, findings, read)
     own = folder / Path(spec.source.span.file).name
     reader.follow(spec.include, spec.source.span.file, folder, (own.resolve(),))
     return Includes(tuple(reader.found), reader.complete and "include" not in spec.lost)
@@ -59,6 +61,7 @@ def read_includes(spec: Spec, folder: Path, root: Path, findings: Findings) -> I
 class _Reader:
     root: Path
     findings: Findings
+    bytes_of: ReadBytes
     found: list[Included] = field(default_factory=list)
     read: set[Path] = field(default_factory=set)
     complete: bool = True
@@ -89,7 +92,7 @@ class _Reader:
         if len(way) > DEEPEST:
             self.findings.error("too-deep", path.span, f"files include one another at most {DEEPEST} deep")
             return
-        data = read_bytes(place, LARGEST)
+        data = self.bytes_of(place, LARGEST)
         if isinstance(data, FileFault):
             self.findings.error(data.code, path.span, f"the file '{shown(path.value)}' {data.reason}")
             return

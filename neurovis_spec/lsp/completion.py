@@ -27,8 +27,12 @@ from neurovis_spec.lsp.words import GIVEN, PATTERN_SETTINGS, PATTERNS, THEMES, f
 
 _WORD = re.compile(r"(?:(?<![\w.])[A-Za-z_]\w*\.(?!\.))*(?:(?<!\w)[A-Za-z_]\w*)?$", re.ASCII)
 _REST = re.compile(r"\w*", re.ASCII)
-#: Of a larger group only the first and the last neuron are offered.
+#: The instances on the way to a name that is being typed, and the begin of a range that it ends.
+_WAY = re.compile(r"(?:(?<![\w.])|(?<=\.\.))(?:[A-Za-z_]\w*\.(?!\.))+$", re.ASCII)
+_RANGE = re.compile(r"(?<![\w.])[A-Za-z_][\w.]*\.\.(?=(?:[A-Za-z_]\w*\.)*$)", re.ASCII)
+#: Of a larger group only the first and the last neuron are offered; of one that is larger than any, none.
 _FEW = 40
+_MANY = 999_999
 #: A path that no document has, for asking what a key of a mapping is.
 _ANY = "\0"
 
@@ -65,20 +69,20 @@ def complete(document: Document, place: Place) -> tuple[Completion, ...]:
     index = document.index
     result: list[Completion] = []
     if at.mapping is not None:
-        result += _keys(at, at.mapping, place, document.file, index)
+        result += _keys(at, at.mapping, place, document)
         result += _offers(at, place, document, index, (*at.mapping, _ANY), True)
     if at.value is not None:
         result += _offers(at, place, document, index, at.value, False)
     return tuple({(item.label, item.insert): item for item in reversed(result)}.values())[::-1]
 
 
-def _keys(at: Where, mapping: Path, place: Place, file: str, index: Index) -> Iterator[Completion]:
+def _keys(at: Where, mapping: Path, place: Place, document: Document) -> Iterator[Completion]:
     """The keys of the language that are not written yet, the required ones first."""
     own = (*mapping, at.typed + at.rest)
-    span = _span(file, place, at.typed, at.rest)
-    for key in sorted(keys_at(mapping), key=lambda key: not key.required):
+    span = _span(document.file, place, at.typed, at.rest)
+    for key in sorted(keys_at(mapping, library=document.page.library), key=lambda key: not key.required):
         path = (*mapping, key.name)
-        if path == own or path not in index.keys:
+        if path == own or path not in document.index.keys:
             yield Completion(key.name, "key", key.name if at.colon else key.name + ": ", span, "", key.description)
 
 
@@ -113,12 +117,12 @@ def _of_role(role: Role | None, scope: Scope, path: Path, front: str, index: Ind
         return
     match role.use:
         case "formula":
-            yield from _formula(role, scope, index, place)
+            yield from _formula(role, scope, path, index, place)
         case "ends" | "references":
             yield from _neurons(scope, front, index, single=path[-2:-1] == ("positions",))
         case "choice":
             assert role.kind is not None
-            yield from _definitions(known(role.kind, index.items).values())
+            yield from _definitions(known(role.kind, index.all_items).values())
         case "setting" | "setting value":
             yield from _settings(role, scope, path, front, index, place)
         case "pattern":
@@ -132,23 +136,34 @@ def _of_role(role: Role | None, scope: Scope, path: Path, front: str, index: Ind
             module = _owner(path, scope, index)
             yield from _parameters(index.declared("parameter", module), index)
         case "names" if role.kind == "module":
-            yield from (_Offer(name.text, "module") for name in index.declared("module"))
+            yield from _modules(index)
         case "names" if role.kind == "output":
             yield from (_Offer(name.text, "word", "output") for name in index.declared("output"))
 
 
+def _modules(index: Index) -> Iterator[_Offer]:
+    for name in index.declared("module"):
+        told = index.attribute(name, "description") or index.attribute(name, "title")
+        yield _Offer(name.text, "module", "", "" if told is None else told.text)
+
+
 def _owner(path: Path, scope: Scope, index: Index) -> str | None:
-    """The module whose parameters and inputs are named: that of the instance in ``instances: {left: {set: …}}``."""
-    return index.module_of(str(path[-3]), scope.module) if path[-4:-3] == ("instances",) else scope.module
+    """The module whose parameters and inputs are named: that of the instance in the keys of its ``set`` and ``inputs``,
+    else the one around."""
+    if path[-4:-3] == ("instances",) and path[-1] == _ANY:
+        return index.module_of(str(path[-3]), scope.module)
+    return scope.module
 
 
-def _formula(role: Role, scope: Scope, index: Index, place: Place) -> Iterator[_Offer]:
+def _formula(role: Role, scope: Scope, path: Path, index: Index, place: Place) -> Iterator[_Offer]:
     """Parameters, what is given here, functions. A parameter may use those before it."""
     if scope.definition is None:
         names = index.declared("parameter", scope.module)
-        earlier = [name for name in names if (name.span.end_line, name.span.end_column) <= (place.line, place.column)]
-        within = any(_surrounds(name, place) for name in names)
-        yield from _parameters([name for name in earlier if not _surrounds(name, place)] if within else names, index)
+        if path[2 * (scope.module is not None) :][:1] == ("parameters",):
+            own = path[: 2 + 2 * (scope.module is not None)]
+            here = (place.line, place.column)
+            names = tuple(n for n in names if (n.span.end_line, n.span.end_column) <= here and n.item.path != own)
+        yield from _parameters(names, index)
     else:
         for name in index.locals(*scope.definition):
             yield _Offer(name.text, "local", str(name.item.path[2]))
@@ -158,14 +173,9 @@ def _formula(role: Role, scope: Scope, index: Index, place: Place) -> Iterator[_
         yield _Offer(function, "function", usage, meaning)
 
 
-def _surrounds(name: Name, place: Place) -> bool:
-    whole = name.item.whole
-    return whole.line <= place.line <= whole.end_line
-
-
 def _parameters(names: Iterable[Name], index: Index) -> Iterator[_Offer]:
     for name in names:
-        value = index.attribute(name, "value") or index.values.get(name.item.path)
+        value = index.attribute(name, "value") or index.value(name)
         description = index.attribute(name, "description")
         yield _Offer(
             name.text,
@@ -176,30 +186,59 @@ def _parameters(names: Iterable[Name], index: Index) -> Iterator[_Offer]:
 
 
 def _neurons(scope: Scope, front: str, index: Index, single: bool = False, signals: bool = False) -> Iterator[_Offer]:
-    """Groups, then neurons; behind a dot those of the instance's module. ``single`` leaves groups of several out."""
-    module: str | None = scope.module
-    instance = re.search(r"([A-Za-z_]\w*)\.$", front)
-    if instance:
-        module = index.module_of(instance[1], scope.module)
-        if module is None:
+    """Groups, instances, then neurons; behind a dot those of the instance's module, behind two what may end the range.
+    ``single`` leaves groups of several out."""
+    low = _RANGE.search(front)
+    way = _WAY.search(front)
+    module = index.module_at(way[0].split(".")[:-1] if way else (), scope.module)
+    if way and module is None:
+        return
+    if low:
+        yield from _ends_of(low[0].removesuffix(".."), scope, index)
+        if not way:
             return
     groups = index.declared("neuron", module)
     for group in groups:
         numbers = index.numbers(group)
-        if not (single and (numbers is not None or (*group.item.path, "names") in index.keys)):
+        if not (single and (numbers is not None or (*group.item.path, "names") in index.home(group).keys)):
             description = index.attribute(group, "description")
-            many = "" if numbers is None or len(numbers) > 999_999 else f"{len(numbers)} neurons"
+            many = "" if numbers is None or len(numbers) > _MANY else f"{len(numbers)} neurons"
             yield _Offer(group.text, "neuron", many, "" if description is None else description.text)
-    if not instance:
-        yield from (_Offer(name.text, "module", "instance") for name in index.declared("instance", module))
+    yield from _instances(module, index)
     if signals:
         yield from (_Offer(name.text, "input", "input") for name in index.declared("input", module))
         return
     for group in groups:
+        yield from (_Offer(name, "neuron", f"of {group.text}") for name in _numbered(group, index))
+
+
+def _instances(module: str | None, index: Index) -> Iterator[_Offer]:
+    for name in index.declared("instance", module):
+        made = index.attribute(name, "module")
+        detail = "instance" if made is None else f"instance of {made.text}"
+        yield _Offer(name.text, "module", detail)
+        yield from (_Offer(one, "module", detail) for one in _numbered(name, index))
+
+
+def _numbered(declaration: Name, index: Index) -> Iterator[str]:
+    """The names with numbers of a counted group or instance: of many the first and the last."""
+    numbers = index.numbers(declaration) or range(0)
+    if len(numbers) <= _MANY:
+        few = numbers if len(numbers) <= _FEW else (numbers[0], numbers[-1])
+        yield from (f"{declaration.text}{number}" for number in few)
+
+
+def _ends_of(low: str, scope: Scope, index: Index) -> Iterator[_Offer]:
+    """What may end a range that begins with a neuron: those of its group that follow it."""
+    *way, name = low.split(".")
+    module = index.module_at(way, scope.module)
+    for group in () if way and module is None else index.declared("neuron", module):
         numbers = index.numbers(group) or range(0)
-        if len(numbers) <= 999_999:
-            few = numbers if len(numbers) <= _FEW else (numbers[0], numbers[-1])
-            yield from (_Offer(f"{group.text}{number}", "neuron", f"of {group.text}") for number in few)
+        start = name.removeprefix(group.text)
+        if name.startswith(group.text) and start.isdecimal() and len(start) < 12 and int(start) in numbers:
+            for other in _numbered(group, index):
+                if int(other.removeprefix(group.text)) > int(start):
+                    yield _Offer(other, "neuron", f"of {group.text}")
 
 
 def _definitions(found: Iterable[Definition]) -> Iterator[_Offer]:
@@ -210,7 +249,7 @@ def _definitions(found: Iterable[Definition]) -> Iterator[_Offer]:
 def _settings(role: Role, scope: Scope, path: Path, front: str, index: Index, place: Place) -> Iterator[_Offer]:
     """The settings of a definition; the value of one: a reference for a signal, else an expression."""
     assert role.kind is not None
-    definition = known(role.kind, index.items).get(str(path[-2]))
+    definition = known(role.kind, index.all_items).get(str(path[-2]))
     if role.use == "setting":
         for parameter in () if definition is None else definition.parameters:
             yield _Offer(parameter.name, "parameter", f"= {parameter.default}", parameter.description)
@@ -219,7 +258,7 @@ def _settings(role: Role, scope: Scope, path: Path, front: str, index: Index, pl
     elif definition is not None and path[-1] in definition.signals:
         yield from _neurons(scope, front, index, signals=True)
     else:
-        yield from _formula(role, Scope(scope.module), index, place)
+        yield from _formula(role, Scope(scope.module), path, index, place)
 
 
 def _patterns(path: Path) -> Iterator[_Offer]:

@@ -1,7 +1,8 @@
 """Where something is declared.
 
-In: a Document and a place in it. Out: the file and the span of the declaration: a group for ``K3``, a parameter for its
-name in an expression, an own definition or that of an included file, the YAML of a built-in, a data file.
+In: a Document and a place in it. Out: the file and the span of the declaration: a group for ``K3`` or ``left1.K3``, a
+parameter for its name in an expression, a definition or a module here or in an included file, the YAML of a built-in, a
+file that is named.
 """
 
 from __future__ import annotations
@@ -39,8 +40,9 @@ def definition(document: Document, place: Place) -> Location | None:
         return None if item is None else _file(document, item)
     found = document.index.find(name)
     if found is not None:
-        return Location(None, found.declaration.span)
-    return _elsewhere(document, name)
+        span = found.declaration.span
+        return Location(None if span.file == document.file else Path(span.file), span)
+    return _shipped(name)
 
 
 def _file(document: Document, item: Item) -> Location | None:
@@ -52,22 +54,20 @@ def _file(document: Document, item: Item) -> Location | None:
 
 
 def _located(document: Document, item: Item) -> Path | None:
-    return locate(item.text, document.folder, document.folder, item.span, Findings())
+    return locate(item.text, document.root, document.folder, item.span, Findings())
 
 
-def _elsewhere(document: Document, name: Name) -> Location | None:
-    """A definition or a module of another file: an included one, else one that ships."""
+def _shipped(name: Name) -> Location | None:
+    """A definition of a library that ships, or a part of one."""
     wanted: list[Keys]
     if name.kind == "local" and name.scope.definition is not None:
         section, owner = name.scope.definition
         wanted = [(section, owner, part, name.text) for part in ("parameters", "state", "let")]
-    elif name.kind in ("activation", "model", "rule"):
+    elif name.kind in SECTIONS:
         wanted = [(SECTIONS[name.kind], name.text)]
-    elif name.kind == "module":
-        wanted = [("modules", name.text)]
     else:
         return None
-    for path in (*_included(document), *_shipped()):
+    for path in _libraries():
         source = read_file(path, str(path), Findings())
         for item in () if source is None else outline(source.root):
             signal = not item.is_key and item.path[2:3] == ("signals",) and item.text == name.text
@@ -76,26 +76,7 @@ def _elsewhere(document: Document, name: Name) -> Location | None:
     return None
 
 
-def _included(document: Document) -> Iterator[Path]:
-    """The included files, and those that they include."""
-    waiting = [item for item in document.items if item.path[:1] == ("include",) and not item.is_key]
-    seen: set[Path] = set()
-    folder = document.folder
-    places = [(item.text, folder, item.span) for item in waiting]
-    while places:
-        text, base, span = places.pop(0)
-        path = locate(text, folder, base, span, Findings())
-        if path is None or path in seen or not path.is_file():
-            continue
-        seen.add(path)
-        yield path
-        source = read_file(path, str(path), Findings())
-        for item in () if source is None else outline(source.root):
-            if item.path[:1] == ("include",) and not item.is_key:
-                places.append((item.text, path.parent, item.span))
-
-
-def _shipped() -> Iterator[Path]:
+def _libraries() -> Iterator[Path]:
     """The library files, where they are files that an editor can open."""
     for name in plugins.names(plugins.LIBRARIES):
         folder = files(plugins.package(plugins.LIBRARIES, name))

@@ -1,26 +1,24 @@
 """An open document: its text, what can be said of it at this moment, and what was known when it last was sound.
 
-In: a text, the name that findings call it by, and its folder. Out: the Items and Names, exact where the text can be
-read, guessed where it cannot; findings and the network, by the same way that ``neurovis validate`` goes.
+In: a text, the name that findings call it by, its folder, and the files around it. Out: the Items and Names of the
+text, which may lead to what other files declare: those that it includes and, of a file to be included, those that are
+open and include it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-from neurovis_spec import api
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError
-from neurovis_spec.language.reader import read_text
-from neurovis_spec.language.source import SourceDocument
-from neurovis_spec.lsp.definitions import builtin_signals
+from neurovis_spec.lsp.files import Files
 from neurovis_spec.lsp.index import Index
 from neurovis_spec.lsp.names import Name
-from neurovis_spec.lsp.outline import Item, item_at, outline
+from neurovis_spec.lsp.outline import Item
+from neurovis_spec.lsp.page import Page
 from neurovis_spec.lsp.text import Place, Text, holds
-from neurovis_spec.lsp.tolerant import outline_of_text
 
 
 @dataclass(frozen=True)
@@ -33,37 +31,70 @@ class Document:
     folder: Path = field(default_factory=Path)
     network: Network | None = None
     encoding: str = "utf-16"
+    files: Files = field(default_factory=Files)
 
     @cached_property
+    def page(self) -> Page:
+        """The text by itself."""
+        return Page(self.source, self.file, self.encoding)
+
+    @property
     def text(self) -> Text:
         """The text, with its lines."""
-        return Text(self.source, self.encoding)
+        return self.page.text
 
-    @cached_property
-    def read(self) -> SourceDocument | None:
-        """The values that know their places; None where the text cannot be read at this moment."""
-        return read_text(self.text.text, self.file, Findings())
-
-    @cached_property
+    @property
     def items(self) -> tuple[Item, ...]:
         """All keys and texts, but those in lists of edges."""
-        if self.read is None:
-            return outline_of_text(self.text, self.file)
-        return tuple(outline(self.read.root, edges=False))
+        return self.page.items
+
+    @cached_property
+    def path(self) -> Path:
+        """Where the file is, or would be."""
+        try:
+            return (self.folder / Path(self.file).name).resolve()
+        except (OSError, RuntimeError, ValueError):  # no name of a file
+            return self.folder / "document"
+
+    @property
+    def root(self) -> Path:
+        """The folder that what it names may not leave."""
+        return self.files.root(self.path, self.page)
+
+    @cached_property
+    def included(self) -> tuple[Page, ...]:
+        """The files that it includes, directly or through others."""
+        return self.files.included(self.path, self.page)
+
+    @cached_property
+    def reach(self) -> tuple[Page, ...]:
+        """The other files whose modules and definitions it may use."""
+        found = {page.file: page for page in self.included}
+        if self.page.library:
+            for user, included in self.files.users(self.path, everywhere=False):
+                found.update({page.file: page for page in (user, *included)})
+        return tuple(page for page in found.values() if Path(page.file) != self.path)
 
     @cached_property
     def index(self) -> Index:
         """All that is declared, and the names outside of lists of edges."""
-        return self._index(self.items)
+        return self.page.index(self._others(), self._sizes)
 
     @cached_property
     def whole(self) -> Index:
         """All names of the document."""
-        return self.index if self.read is None else self._index(tuple(outline(self.read.root)))
+        return self.page.index(self._others(), self._sizes, whole=True)
 
-    def _index(self, items: tuple[Item, ...]) -> Index:
-        groups = () if self.network is None else self.network.neurons.groups
-        return Index(items, self.text, {group.name: group.count for group in groups}, builtin_signals())
+    def _others(self) -> Iterable[Index]:
+        return (page.alone for page in self.reach)
+
+    @property
+    def _sizes(self) -> dict[str, int]:
+        return {} if self.network is None else {group.name: group.count for group in self.network.neurons.groups}
+
+    def page_of(self, file: str) -> Page:
+        """The page of a file in reach by its name; the document's own for any other."""
+        return next((page for page in self.reach if page.file == file), self.page)
 
     def name_at(self, place: Place) -> Name | None:
         """The name at a place; of two that touch there the second."""
@@ -75,23 +106,4 @@ class Document:
 
     def item_at(self, place: Place) -> Item | None:
         """The key or the text at a place."""
-        if self.read is not None:
-            return item_at(self.read.root, place)
-        return next((item for item in self.items if holds(item.span, place)), None)
-
-
-@dataclass(frozen=True)
-class Checked:
-    """What compiling a document gave: all findings, and the network where there is one."""
-
-    findings: tuple[Diagnostic, ...]
-    network: Network | None
-
-
-def check(document: Document) -> Checked:
-    """Compile a document as ``neurovis validate`` does; data files are looked for in its folder."""
-    try:
-        compiled = api.compile_text(document.text.text, file=document.file, folder=document.folder)
-    except SpecError as error:
-        return Checked(error.diagnostics, None)
-    return Checked(compiled.warnings, compiled.network)
+        return self.page.item_at(place)

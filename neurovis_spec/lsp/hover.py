@@ -1,18 +1,20 @@
 """What stands under the pointer, explained.
 
-In: a Document and a place. Out: Markdown and the stretch it is about: a group's size, activation and model, a
-parameter's value, the equation and the description of a definition as shipped, the meaning of a key.
+In: a Document and a place. Out: Markdown and the stretch it is about: a group's size, activation and model, and the
+module that it is of; a parameter's value, a module's parameters and inputs, the equation and the description of a
+definition, the meaning of a key.
 """
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from pathlib import Path
 
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.lsp.definitions import known
 from neurovis_spec.lsp.document import Document
-from neurovis_spec.lsp.index import Found
+from neurovis_spec.lsp.index import Found, Index
 from neurovis_spec.lsp.names import Name
 from neurovis_spec.lsp.outline import Item
 from neurovis_spec.lsp.roles import DEFINITIONS, Role, role_of
@@ -71,29 +73,67 @@ def _given(item: Item, role: Role, place: Place) -> Hover | None:
 
 def _name(document: Document, name: Name) -> str | None:
     if name.kind in ("activation", "model", "rule"):
-        definition = known(name.kind, document.items).get(name.text)
+        definition = known(name.kind, document.index.all_items).get(name.text)
         return None if definition is None else definition.markdown
     found = document.index.find(name)
     if found is None:
         return _setting(document, name) if name.kind == "local" else None
-    match found.declaration.kind:
+    declaration = found.declaration
+    match declaration.kind:
         case "neuron":
             return _group(document, name, found)
         case "parameter":
-            return _parameter(document, found.declaration)
+            return _parameter(document, declaration)
         case "local":
-            return _setting(document, found.declaration)
+            return _setting(document, declaration)
         case "input":
-            return _input(document, found.declaration)
+            return _input(document, name, declaration)
         case "instance":
-            module = document.index.attribute(found.declaration, "module")
-            numbers = document.index.numbers(found.declaration)
+            module = document.index.attribute(declaration, "module")
+            numbers = document.index.numbers(declaration)
             many = f" ({len(numbers)} of them)" if numbers is not None and len(numbers) < 1_000_000 else ""
-            return (
-                f"**{found.declaration.text}**{many}: instance of the module `{'' if module is None else module.text}`"
-            )
+            head = f"**{_called(name)}**{many}: instance of the module `{'' if module is None else module.text}`"
+            return _described(document, declaration, head)
+        case "module":
+            return _module(document, declaration)
         case kind:
-            return _described(document, found.declaration, f"**{found.declaration.text}** ({kind})")
+            return _described(document, declaration, f"**{declaration.text}** ({kind})")
+
+
+def _called(name: Name) -> str:
+    """A name with those of the instances in front of it: ``left1.knee.K``."""
+    parts = [name.text]
+    via = name.via
+    while via is not None:
+        parts.append(via.text)
+        via = via.via
+    return ".".join(reversed(parts))
+
+
+def _within(document: Document, declaration: Name) -> str:
+    """The module that something is declared in, and its file where that is another."""
+    module = declaration.scope.module
+    return "" if module is None else f" of the module `{module}`{_file(document, declaration)}"
+
+
+def _file(document: Document, declaration: Name) -> str:
+    """The file that something is declared in, where that is another."""
+    file = declaration.span.file
+    return "" if file == document.file else f" (in {Path(file).name})"
+
+
+def _module(document: Document, declaration: Name) -> str:
+    """A module with its parameters and inputs."""
+    index = document.index
+    title = index.attribute(declaration, "title")
+    lines = [f"**{declaration.text}** (module){_file(document, declaration)}" + (f": {title.text}" if title else "")]
+    own: list[str] = []
+    for parameter in index.declared("parameter", declaration.text):
+        value = index.attribute(parameter, "value") or index.value(parameter)
+        own.append(f"- parameter `{parameter.text}`" + ("" if value is None else f" = `{value.text}`"))
+    own += [f"- input `{name.text}`" for name in index.declared("input", declaration.text)]
+    own += [f"- neurons `{name.text}`" for name in index.declared("neuron", declaration.text) if name.item.is_key]
+    return _described(document, declaration, "\n".join([*lines, "", *own]) if own else lines[0])
 
 
 def _described(document: Document, declaration: Name, head: str) -> str:
@@ -103,7 +143,7 @@ def _described(document: Document, declaration: Name, head: str) -> str:
 
 def _group(document: Document, name: Name, found: Found) -> str:
     """A group's size, activation and model: those of the network as it last was, else as written."""
-    group, index = found.declaration, document.index
+    group, index = found.declaration, document.index.home(found.declaration)
     if not group.item.is_key:  # one of the names of a group
         owner = group.item.path[:-2]
         group = next((other for other in index.declarations if other.item.path == owner), group)
@@ -119,18 +159,19 @@ def _group(document: Document, name: Name, found: Found) -> str:
     else:
         count = index.attribute(group, "count")
         size = f"{'' if count is None else count.text} neurons"
-    facts = {key: _choice(document, group, key) for key in ("activation", "model", "combine", "input", "bias")}
+    facts = {key: _choice(index, group, key) for key in ("activation", "model", "combine", "input", "bias")}
     facts = {"activation": "identity", "model": "static", "combine": "sum"} | {k: v for k, v in facts.items() if v}
     lines = [f"- {key}: `{value}`" for key, value in facts.items()]
     head = f"**{group.text}**: {size}"
-    if name.text != group.text:
-        head = f"**{name.text}**, a neuron of {head}"
+    if (called := _called(name)) != group.text:
+        head = f"**{called}**: {size}" if name.text == group.text else f"**{called}**, a neuron of {head}"
+    head += _within(document, group)
     return _described(document, group, "\n".join([head, "", *lines]))
 
 
-def _choice(document: Document, group: Name, key: str) -> str:
+def _choice(index: Index, group: Name, key: str) -> str:
     """A choice as it is written, with its settings: ``gaussian(sigma = 40)``."""
-    path, index = (*group.item.path, key), document.index
+    path = (*group.item.path, key)
     plain = index.values.get(path)
     if plain is not None:
         return plain.text
@@ -143,7 +184,7 @@ def _choice(document: Document, group: Name, key: str) -> str:
 
 def _parameter(document: Document, declaration: Name) -> str:
     index, network = document.index, document.network
-    value = index.attribute(declaration, "value") or index.values.get(declaration.item.path)
+    value = index.attribute(declaration, "value") or index.value(declaration)
     written = "" if value is None else value.text
     head = f"**{declaration.text}** = `{written}`"
     if network is not None and declaration.scope.module is None and isinstance(value and value.scalar.value, str):
@@ -152,11 +193,11 @@ def _parameter(document: Document, declaration: Name) -> str:
     low, high = index.attribute(declaration, "min"), index.attribute(declaration, "max")
     if low is not None or high is not None:
         head += f" (from {'-∞' if low is None else low.text} to {'∞' if high is None else high.text})"
-    return _described(document, declaration, head)
+    return _described(document, declaration, head + _within(document, declaration))
 
 
-def _input(document: Document, declaration: Name) -> str:
-    index = document.index
+def _input(document: Document, name: Name, declaration: Name) -> str:
+    index = document.index.home(declaration)
     expression, file = index.attribute(declaration, "expression"), index.attribute(declaration, "file")
     source = f"`{expression.text}`" if expression else f"the file `{file.text}`" if file else "from outside"
     if any(path[:3] == (*declaration.item.path, "values") for path in index.values):
@@ -164,7 +205,8 @@ def _input(document: Document, declaration: Name) -> str:
     size = None
     if document.network is not None and declaration.scope.module is None:
         size = next((entry.size for entry in document.network.inputs if entry.name == declaration.text), None)
-    head = f"**{declaration.text}** (input{'' if size is None else f', size {size}'}): {source}"
+    head = f"**{_called(name)}** (input{'' if size is None else f', size {size}'}): {source}"
+    head += _within(document, declaration)
     return _described(document, declaration, head)
 
 
@@ -173,7 +215,7 @@ def _setting(document: Document, name: Name) -> str | None:
     if name.scope.definition is None:
         return None
     section, owner = name.scope.definition
-    definition = known(DEFINITIONS[section], document.items).get(owner)
+    definition = known(DEFINITIONS[section], document.index.all_items).get(owner)
     if definition is None:
         return None
     for parameter in definition.parameters:

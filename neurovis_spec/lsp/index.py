@@ -1,15 +1,17 @@
 """Who is called what in a document: declarations, and to which of them a name leads.
 
-In: the Items and Names of a document. Out: for a name its declaration and the part of it that is the declared one (the
-``K`` of ``K3``); all names that lead to a declaration. Groups, inputs and instances of a module share their names.
+In: the Items and Names of a document, and the indices of other files in reach. Out: for a name its declaration and the
+part of it that is the declared one (the ``K`` of ``K3``); all names that lead to a declaration. Groups, inputs and
+instances of a module share their names. Of another file the modules and the definitions are known here, nothing else.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import chain
 from typing import Final
 
 from neurovis_spec.diagnostics import Span
@@ -23,6 +25,8 @@ _NUMBER = re.compile(r"0|[1-9][0-9]*")
 _LONGEST = 64
 #: The kinds that share one namespace.
 SHARED: Final[tuple[Kind, ...]] = ("neuron", "input", "instance")
+#: The kinds that a file shares with those that it includes, or that include it.
+COMMON: Final[tuple[Kind, ...]] = ("module", "activation", "model", "rule")
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,12 +40,14 @@ class Found:
 @dataclass(frozen=True)
 class Index:
     """The names of one document. ``sizes`` are those of groups whose ``count`` is no plain number, as far as they are
-    known; ``builtin_signals`` the signals of the built-in rules."""
+    known; ``builtin_signals`` the signals of the built-in rules; ``others`` know what other files in reach declare."""
 
     items: tuple[Item, ...]
     text: Text
+    file: str = ""
     sizes: Mapping[str, int] = field(default_factory=dict)
     builtin_signals: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    others: tuple[Index, ...] = ()
 
     @cached_property
     def values(self) -> Mapping[tuple[str | int, ...], Item]:
@@ -79,16 +85,36 @@ class Index:
         return result
 
     def declared(self, kind: Kind, module: str | None = None) -> tuple[Name, ...]:
-        """The declarations of a kind in a module (None: the spec itself)."""
-        return tuple(name for name in self.declarations if name.kind == kind and name.scope.module == module)
+        """The declarations of a kind in a module (None: the spec itself), wherever that is."""
+        found = tuple(name for name in self.declarations if name.kind == kind and name.scope.module == module)
+        if module is not None or kind in COMMON:
+            found += tuple(name for other in self.others for name in other.declared(kind, module))
+        return found
 
     def locals(self, section: str, definition: str) -> tuple[Name, ...]:
         """What an own definition declares: parameters, states, signals, intermediate values."""
         wanted = (section, definition)
         return tuple(n for n in self.declarations if n.kind == "local" and n.scope.definition == wanted)
 
+    @property
+    def all_items(self) -> Iterator[Item]:
+        """The items of all files in reach, the document's own last."""
+        return chain(*(other.items for other in self.others), self.items)
+
+    def home(self, declaration: Name) -> Index:
+        """The index of the file that declares something."""
+        if declaration.span.file == self.file:
+            return self
+        return next((other for other in self.others if other.file == declaration.span.file), self)
+
     def find(self, name: Name) -> Found | None:
-        """Where a name leads; None where nothing in this document declares it."""
+        """Where a name leads; None where no file in reach declares it."""
+        found = self._find(name)
+        if found is None and is_common(name):
+            found = next((found for other in self.others if (found := other.find(name)) is not None), None)
+        return found
+
+    def _find(self, name: Name) -> Found | None:
         if name.declares:
             key = (name.kind, name.scope.module, name.scope.definition, name.text)
             return Found(self._declared.get(key, name), name.span)
@@ -108,15 +134,22 @@ class Index:
         """All names that lead to a declaration, itself among them, with the part that bears the declared name."""
         for name in self.names:
             found = self.find(name)
-            if found is not None and found.declaration is declaration:
+            if found is not None and same(found.declaration, declaration):
                 yield name, found.part
 
     def attribute(self, declaration: Name, key: str) -> Item | None:
         """The value of a key of what a name declares."""
-        return self.values.get((*declaration.item.path, key))
+        return self.home(declaration).values.get((*declaration.item.path, key))
+
+    def value(self, declaration: Name) -> Item | None:
+        """The value of what a name declares, where that is a single one."""
+        return self.home(declaration).values.get(declaration.item.path)
 
     def numbers(self, declaration: Name) -> range | None:
         """The numbers of a counted group or instance; None where it is single or has names. An open end is far away."""
+        home = self.home(declaration)
+        if home is not self:
+            return home.numbers(declaration)
         path = declaration.item.path
         if (*path, "count") not in self.keys or not declaration.item.is_key:
             return None
@@ -157,14 +190,35 @@ class Index:
         length = len(instance)
         while length and (outer, instance[:length]) not in self._modules and instance[length - 1].isdigit():
             length -= 1
-        return self._modules.get((outer, instance[:length]))
+        found = self._modules.get((outer, instance[:length]))
+        if found is None and outer is not None:
+            found = next((found for other in self.others if (found := other.module_of(instance, outer))), None)
+        return found
+
+    def module_at(self, way: Iterable[str], outer: str | None = None) -> str | None:
+        """The module at the end of a way through instances, as ``left1.knee``; ``outer`` where there is none."""
+        for instance in way:
+            outer = self.module_of(instance, outer)
+            if outer is None:
+                return None
+        return outer
 
     def _is_signal(self, rule: str, setting: str) -> bool:
-        own = [path for path in self.keys if path[:2] == ("rules", rule)]
-        if not own:
-            return setting in self.builtin_signals.get(rule, ())
-        wanted = ("rules", rule, "signals")
-        return any(path[:3] == wanted and item.text == setting for path, item in self.values.items())
+        for index in (self, *self.others):
+            if ("rules", rule) in index.keys:
+                wanted = ("rules", rule, "signals")
+                return any(path[:3] == wanted and item.text == setting for path, item in index.values.items())
+        return setting in self.builtin_signals.get(rule, ())
+
+
+def same(one: Name, other: Name) -> bool:
+    """Whether two names are one: the same characters of the same file, for the same purpose."""
+    return one.span == other.span and one.kind == other.kind
+
+
+def is_common(name: Name) -> bool:
+    """Whether what a name leads to may be declared in another file: a part of a module, or a definition."""
+    return name.scope.module is not None or name.scope.definition is not None or name.kind in COMMON
 
 
 def _head(name: Name, length: int) -> Span:

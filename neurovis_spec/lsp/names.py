@@ -79,6 +79,9 @@ def _names(item: Item, role: Role, scope: Scope, text: Text, lookup: Lookup) -> 
             elif item.is_key and item.path[-4:-3] == ("instances",):
                 scope = Scope(lookup.module_of(str(item.path[-3]), scope.module))
             declares = role.use == "declares"
+            if role.kind == "input" and "." in item.text:  # one of an instance: left1.load
+                yield from _references(item, scope, text, lookup)
+                return
             if role.kind in ("module", "activation", "model", "rule"):
                 scope = Scope()
             yield _whole(item, role.kind, scope, text, declares)
@@ -109,10 +112,16 @@ def _references(item: Item, scope: Scope, text: Text, lookup: Lookup) -> Iterato
             parts.append((at, at + len(part)))
             at += len(part) + 1
     places = iter(_inside(item, text, parts))
+    low: list[tuple[str, Scope | None, Name | None]] = []  # the instances of the name before, with where they lead
+    end = 0
     for match in found:
-        via: Name | None = None
-        here: Scope | None = Scope(scope.module)
         *instances, last = match[0].split(".")
+        # the second end of a range may leave out what it has in common with the first: left1.K1..K3
+        common = low[: len(low) - len(instances)] if item.text[end : match.start()].strip() == ".." else []
+        if [part for part, _, _ in low[len(common) :]] != instances:
+            common = []
+        here, via = common[-1][1:] if common else (Scope(scope.module), None)
+        low, end = list(common), match.end()
         for part in instances:
             span, exact = next(places)
             if here is not None:
@@ -120,6 +129,7 @@ def _references(item: Item, scope: Scope, text: Text, lookup: Lookup) -> Iterato
                 yield via
                 module = lookup.module_of(part, here.module)
                 here = None if module is None else Scope(module)
+            low.append((part, here, via))
         span, exact = next(places)
         if here is not None:
             yield Name("neuron", last, span, here, item, False, exact, via)

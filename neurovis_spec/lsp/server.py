@@ -19,11 +19,12 @@ from pygls.exceptions import JsonRpcInvalidParams
 from pygls.lsp.server import LanguageServer
 from pygls.uris import from_fs_path, to_fs_path
 
-from neurovis_spec.compiler.network import Network
 from neurovis_spec.lsp import wire
+from neurovis_spec.lsp.check import Checked, check
 from neurovis_spec.lsp.completion import complete
 from neurovis_spec.lsp.definition import definition
-from neurovis_spec.lsp.document import Document, check
+from neurovis_spec.lsp.desk import Desk
+from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.formatting import formatting
 from neurovis_spec.lsp.hover import hover
 from neurovis_spec.lsp.rename import RenameError, prepare, rename
@@ -43,22 +44,18 @@ class SpecServer(LanguageServer):
         # Whole texts: pygls counts the lines of changes in a way of its own.
         super().__init__("neurovis", __version__, text_document_sync_kind=types.TextDocumentSyncKind.Full)
         self._pause = pause
-        self._networks: dict[str, Network] = {}
-        self._documents: dict[str, Document] = {}
+        self._desk = Desk(_path_of)
         self._checks: dict[str, asyncio.Task[None]] = {}
         self._compiler = ThreadPoolExecutor(max_workers=1)
 
     def document(self, uri: str) -> Document:
-        """An open document as it is now; the same object until it changes."""
-        source = self.workspace.get_text_document(uri).source
-        known = self._documents.get(uri)
-        network = self._networks.get(uri)
-        if known is None or known.source != source or known.network is not network:
-            path = to_fs_path(uri) if uri.startswith("file:") else None
-            folder = Path.cwd() if path is None else Path(path).parent
-            known = Document(source, path or uri, folder, network, str(self._encoding))
-            self._documents[uri] = known
-        return known
+        """An open document as it is now; the same object until it, or a file that it includes, changes."""
+        sources = {other: document.source for other, document in self.workspace.text_documents.items()}
+        roots = [_path_of(folder.uri) for folder in self.workspace.folders.values()]
+        if not roots and self.workspace.root_uri:
+            roots = [_path_of(self.workspace.root_uri)]
+        self._desk.update(sources, tuple(root.resolve() for root in roots if root is not None), self._encoding)
+        return self._desk.document(uri, self.workspace.get_text_document(uri).source)
 
     @property
     def _encoding(self) -> str:
@@ -66,17 +63,41 @@ class SpecServer(LanguageServer):
         return encoding.value if isinstance(encoding, types.PositionEncodingKind) else encoding or "utf-16"
 
     def changed(self, uri: str, pause: float | None = None) -> None:
-        """Look for findings, once nothing has changed for a moment."""
-        self._forget_check(uri)
-        wait = self._pause if pause is None else pause
-        self._checks[uri] = asyncio.get_running_loop().create_task(self._check(uri, wait))
+        """Look for findings, once nothing has changed for a moment; also in those who include it."""
+        for other in dict.fromkeys((uri, *self._desk.readers(self._desk.place(uri)))):
+            self._check_soon(other, pause)
+
+    def check_again(self) -> None:
+        """Look at all that include files: one of these may have changed, or may be there now."""
+        including = self._desk.including()
+        self._desk.refresh()
+        for uri in including:
+            self._check_soon(uri, 0.0)
 
     def closed(self, uri: str) -> None:
         """Forget a document, and take its findings away."""
         self._forget_check(uri)
-        self._documents.pop(uri, None)
-        self._networks.pop(uri, None)
+        path, read = self._desk.place(uri), self._desk.read_by(uri)
+        for left in self._desk.close(uri):
+            if left != path:
+                self._publish(left)
         self.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri, []))
+        for other in (*self._desk.readers(path), *self._desk.libraries(read)):
+            self._check_soon(other, 0.0)
+
+    def uri_of(self, path: Path) -> str | None:
+        """The URI of a file, that by which it is open if it is."""
+        return next(self._desk.uris(path), None) or from_fs_path(str(path))
+
+    def text_of(self, path: Path, document: Document) -> Text:
+        """The text of a file near a document; empty where it cannot be read (then only lines are right)."""
+        page = document.files.page(path)
+        return Text("", document.encoding) if page is None else page.text
+
+    def _check_soon(self, uri: str, pause: float | None) -> None:
+        self._forget_check(uri)
+        wait = self._pause if pause is None else pause
+        self._checks[uri] = asyncio.get_running_loop().create_task(self._check(uri, wait))
 
     def _forget_check(self, uri: str) -> None:
         task = self._checks.pop(uri, None)
@@ -88,14 +109,36 @@ class SpecServer(LanguageServer):
         document = self.document(uri)
         version = self.workspace.get_text_document(uri).version
         try:
-            checked = await asyncio.get_running_loop().run_in_executor(self._compiler, check, document)
+            if document.page.library and self._desk.readers(document.path):
+                checked = Checked((), None)  # what is said of it where it is included is all
+            else:
+                checked = await asyncio.get_running_loop().run_in_executor(self._compiler, check, document)
         except Exception:  # a mistake of ours must not end the server: the editor would restart it for ever
             _log.exception("the check of %s has failed", uri)
             return
-        if checked.network is not None:
-            self._networks[uri] = checked.network
-        found = wire.diagnostics(document, checked.findings)
-        self.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri, found, version))
+        for path in self._desk.keep(uri, document, checked):
+            self._publish(path)
+        self._publish(document.path, uri, version)
+
+    def _publish(self, path: Path, uri: str | None = None, version: int | None = None) -> None:
+        """Say what is known of a file."""
+        uri = uri or self.uri_of(path)
+        if uri is None:
+            return
+        found = self._desk.findings(path)
+        if uri in self.workspace.text_documents:
+            document = self.document(uri)
+            told = wire.diagnostics(document.text, found)
+            told += wire.included_faults(document, self._desk.around(uri, path))
+        else:
+            page = self._desk.page(path)
+            told = [] if page is None else wire.diagnostics(page.text, found)
+        self.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri, told, version))
+
+
+def _path_of(uri: str) -> Path | None:
+    path = to_fs_path(uri) if uri.startswith("file:") else None
+    return None if path is None else Path(path)
 
 
 def make_server(pause: float = PAUSE) -> SpecServer:
@@ -121,6 +164,11 @@ def _follow(server: SpecServer) -> None:
     @server.feature(types.TEXT_DOCUMENT_DID_SAVE)
     async def did_save(params: types.DidSaveTextDocumentParams) -> None:
         server.changed(params.text_document.uri, 0.0)
+        server.check_again()
+
+    @server.feature(types.WORKSPACE_DID_CHANGE_WATCHED_FILES)
+    async def did_change_files(params: types.DidChangeWatchedFilesParams) -> None:
+        server.check_again()
 
     @server.feature(types.TEXT_DOCUMENT_DID_CLOSE)
     async def did_close(params: types.DidCloseTextDocumentParams) -> None:
@@ -149,10 +197,10 @@ def _answer(server: SpecServer) -> None:
             return None
         if found.path is None:
             return types.Location(params.text_document.uri, wire.range_of(document.text, found.span))
-        uri = from_fs_path(str(found.path))
+        uri = server.uri_of(found.path)
         if uri is None:
             return None
-        return types.Location(uri, wire.range_of(_text_of(found.path, document.encoding), found.span))
+        return types.Location(uri, wire.range_of(server.text_of(found.path, document), found.span))
 
     @server.feature(types.TEXT_DOCUMENT_DOCUMENT_SYMBOL)
     def document_symbol(params: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
@@ -179,20 +227,19 @@ def _edit(server: SpecServer) -> None:
             edits = rename(document, wire.place_of(document, params.position), params.new_name)
         except RenameError as error:
             raise JsonRpcInvalidParams(str(error)) from None
-        return wire.workspace_edit(document, params.text_document.uri, edits)
+        changes = []
+        for file in dict.fromkeys(edit.span.file for edit in edits):
+            own = [edit for edit in edits if edit.span.file == file]
+            uri = params.text_document.uri if file == document.file else server.uri_of(Path(file))
+            text = document.text if file == document.file else server.text_of(Path(file), document)
+            if uri is not None:
+                changes.append((uri, text, own))
+        return wire.workspace_edit(changes)
 
     @server.feature(types.TEXT_DOCUMENT_FORMATTING)
     def on_formatting(params: types.DocumentFormattingParams) -> list[types.TextEdit]:
         document = server.document(params.text_document.uri)
-        return wire.text_edits(document, formatting(document))
-
-
-def _text_of(path: Path, encoding: str) -> Text:
-    """The text of a file, for counting its columns; empty where it cannot be read (then only the line is right)."""
-    try:
-        return Text(path.read_text(encoding="utf-8"), encoding)
-    except (OSError, UnicodeDecodeError):
-        return Text("", encoding)
+        return wire.text_edits(document.text, formatting(document))
 
 
 def serve() -> None:

@@ -9,18 +9,23 @@ from __future__ import annotations
 import types
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, TypeAlias, Union, get_args, get_origin
+from typing import Annotated, Final, TypeAlias, Union, get_args, get_origin
 
 from pydantic import WithJsonSchema
 from pydantic.fields import FieldInfo
 
 from neurovis_spec.language.located import Leaf
 from neurovis_spec.language.model import Model
+from neurovis_spec.language.modules import IncludedModel
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.lsp.outline import Path
 
 #: What may stand somewhere: a model, a type annotation, or the JSON Schema of a leaf.
 _Kind: TypeAlias = object
+
+#: What only a spec has at its top level, and what makes a file without it one to be included.
+SPEC_ALONE: Final = frozenset(Spec.model_fields) - frozenset(IncludedModel.model_fields)
+LIBRARY_ALONE: Final = frozenset({"modules", "activations", "models", "rules"})
 
 #: Keys of leaves, whose schemas carry no words of their own.
 _LEAF_KEYS = {
@@ -42,10 +47,11 @@ class Key:
     required: bool = False
 
 
-def keys_at(path: Path) -> tuple[Key, ...]:
-    """The keys that the language knows in the mapping at a path; none where the author chooses them."""
+def keys_at(path: Path, *, library: bool = False) -> tuple[Key, ...]:
+    """The keys that the language knows in the mapping at a path, of a spec or of a file to be included (``library``);
+    none where the author chooses them."""
     found: dict[str, Key] = {}
-    for kind in _expected(path):
+    for kind in _expected(path) if path or not library else (IncludedModel,):
         for key in _keys(kind):
             found.setdefault(key.name, key)
     return tuple(found.values())

@@ -1,17 +1,19 @@
 """From our values to those of the protocol.
 
-In: a Document's spans, findings, completions, symbols. Out: what ``lsprotocol`` writes as JSON. The only other module
+In: spans, findings, completions, symbols of a text. Out: what ``lsprotocol`` writes as JSON. The only other module
 that knows the protocol is ``server``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Final
 
 from lsprotocol import types
 
-from neurovis_spec.diagnostics import Diagnostic, Span
+from neurovis_spec.diagnostics import Diagnostic, Findings, Span
+from neurovis_spec.language.data_files import locate
 from neurovis_spec.lsp.completion import Completion
 from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.hover import Hover
@@ -55,26 +57,38 @@ def range_of(text: Text, span: Span) -> types.Range:
     return types.Range(types.Position(*start), types.Position(*end))
 
 
-def diagnostics(document: Document, findings: Iterable[Diagnostic]) -> list[types.Diagnostic]:
-    """Findings with their suggestions. Those of another file stand where it is included, with their place in words."""
+def diagnostics(text: Text, findings: Iterable[Diagnostic]) -> list[types.Diagnostic]:
+    """Findings of one text with their suggestions."""
     result = []
     for finding in findings:
-        message, span = finding.message, finding.span
-        if span.file != document.file:
-            message = f"{span.file}:{span.line}:{span.column}: {message}"
-            span = _inclusion(document, span.file)
         severity = types.DiagnosticSeverity.Error if finding.severity == "error" else types.DiagnosticSeverity.Warning
-        told = message if finding.hint is None else f"{message}\nhelp: {finding.hint}"
-        result.append(types.Diagnostic(range_of(document.text, span), told, severity, finding.code, source="neurovis"))
+        told = finding.message if finding.hint is None else f"{finding.message}\nhelp: {finding.hint}"
+        result.append(types.Diagnostic(range_of(text, finding.span), told, severity, finding.code, source="neurovis"))
     return result
 
 
-def _inclusion(document: Document, file: str) -> Span:
-    """Where a file is included; the beginning of the document if that is done by another."""
-    for item in document.items:
-        if item.path[:1] == ("include",) and not item.is_key and item.text and file.endswith(item.text):
+def included_faults(document: Document, findings: Mapping[Path, Sequence[Diagnostic]]) -> list[types.Diagnostic]:
+    """Where a document includes files that are at fault, directly or through others: one finding for each."""
+    result = []
+    for path, found in findings.items():
+        errors = [finding for finding in found if finding.severity == "error"]
+        if errors:
+            many = f"{len(errors)} errors, the first" if len(errors) > 1 else "an error"
+            told = f"'{path.name}' has {many} in line {errors[0].span.line}: {errors[0].message}"
+            place = range_of(document.text, _inclusion(document, path))
+            result.append(
+                types.Diagnostic(place, told, types.DiagnosticSeverity.Error, errors[0].code, source="neurovis")
+            )
+    return result
+
+
+def _inclusion(document: Document, path: Path) -> Span:
+    """Where a document includes a file; the first of its includes if that is done by another file."""
+    own = document.page.includes
+    for item in own:
+        if locate(item.text, document.root, document.path.parent, item.span, Findings()) == path:
             return item.span
-    return Span(document.file, 1, 1, 1, 1)
+    return own[0].span if own else Span(document.file, 1, 1, 1, 1)
 
 
 def completion_list(document: Document, found: Iterable[Completion]) -> types.CompletionList:
@@ -113,11 +127,11 @@ def symbol_of(document: Document, symbol: Symbol) -> types.DocumentSymbol:
     )
 
 
-def workspace_edit(document: Document, uri: str, edits: Iterable[Edit]) -> types.WorkspaceEdit:
-    """Edits of one document."""
-    return types.WorkspaceEdit(changes={uri: text_edits(document, edits)})
+def workspace_edit(edits: Iterable[tuple[str, Text, Sequence[Edit]]]) -> types.WorkspaceEdit:
+    """Edits of several texts, each with its URI."""
+    return types.WorkspaceEdit(changes={uri: text_edits(text, own) for uri, text, own in edits})
 
 
-def text_edits(document: Document, edits: Iterable[Edit]) -> list[types.TextEdit]:
-    """Edits with their ranges."""
-    return [types.TextEdit(range_of(document.text, edit.span), edit.text) for edit in edits]
+def text_edits(text: Text, edits: Iterable[Edit]) -> list[types.TextEdit]:
+    """Edits of a text with their ranges."""
+    return [types.TextEdit(range_of(text, edit.span), edit.text) for edit in edits]

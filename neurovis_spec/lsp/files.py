@@ -1,0 +1,137 @@
+"""The files around a document: as an editor has them open, else as they are on disk.
+
+In: the texts that are open, the folders of the workspace. Out: Pages; which files one includes, which include it. What
+has been read is kept until it changes.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Final, TypeAlias
+
+from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.data_files import locate
+from neurovis_spec.language.includes import MOST
+from neurovis_spec.language.reader import LARGEST
+from neurovis_spec.language.reader_files import FileFault, read_bytes
+from neurovis_spec.lsp.page import Page
+
+#: How many entries of the folders of a workspace are looked through for specs, and the largest of these.
+_MOST_ENTRIES: Final = 20_000
+_LARGEST_SPEC: Final = 4 << 20
+_PASSED_OVER: Final = frozenset({"node_modules", "__pycache__", "venv", "build", "dist"})
+#: What a file was when it was read: the text that is open, else time and size.
+_Stamp: TypeAlias = str | tuple[int, int]
+
+
+class CrowdedError(Exception):
+    """A workspace holds too many files to look through them."""
+
+
+@dataclass(frozen=True)
+class Files:
+    """What the files of a workspace hold; ``open`` are the texts in the editor, by their resolved paths."""
+
+    open: Mapping[Path, str] = field(default_factory=dict)
+    roots: tuple[Path, ...] = ()
+    encoding: str = "utf-16"
+    kept: dict[Path, tuple[_Stamp, Page]] = field(default_factory=dict, compare=False, repr=False)
+
+    def holding(self, texts: Mapping[Path, str]) -> Files:
+        """The same with other texts in the place of some files."""
+        return replace(self, open={**self.open, **texts})
+
+    def read(self, path: Path, most: int) -> bytes | FileFault:
+        """The bytes of a file, as ``read_bytes`` gives those on disk."""
+        text = self.open.get(path)
+        return read_bytes(path, most) if text is None else text.encode("utf-8", "replace")
+
+    def page(self, path: Path) -> Page | None:
+        """A file as it is now, the same object until it changes; None where it cannot be read."""
+        stamp = self._stamp(path)
+        if stamp is None:
+            return None
+        known = self.kept.get(path)
+        if known is not None and known[0] == stamp and known[1].encoding == self.encoding:
+            return known[1]
+        data = self.read(path, LARGEST)
+        if isinstance(data, FileFault):
+            return None
+        page = Page(data.decode("utf-8", "replace"), str(path), self.encoding)
+        self.kept[path] = (stamp, page)
+        return page
+
+    def _stamp(self, path: Path) -> _Stamp | None:
+        text = self.open.get(path)
+        if text is not None:
+            return text
+        try:
+            status = path.stat()
+        except (OSError, ValueError):
+            return None
+        return status.st_mtime_ns, status.st_size
+
+    def unchanged(self, pages: tuple[Page, ...]) -> bool:
+        """Whether these pages of files are as they are now."""
+        return all(self.page(Path(page.file)) is page for page in pages)
+
+    def root(self, path: Path, page: Page) -> Path:
+        """The folder that what a file names may not leave: that of a spec; for a file to be included the folder of the
+        workspace, since the spec may lie above it."""
+        around = self._around(path) if page.library else None
+        return path.parent if around is None else around
+
+    def _around(self, path: Path) -> Path | None:
+        return next((root for root in self.roots if path.is_relative_to(root)), None)
+
+    def has(self, path: Path) -> bool:
+        """Whether a file belongs to the workspace, or is open."""
+        return path in self.open or self._around(path) is not None
+
+    def included(self, path: Path, page: Page) -> tuple[Page, ...]:
+        """The files that a file includes, and those that they include, each once, without itself."""
+        root = self.root(path, page)
+        found: dict[Path, Page] = {}
+        waiting = deque((path.parent, item) for item in page.includes)
+        while waiting and len(found) < MOST:
+            folder, item = waiting.popleft()
+            place = locate(item.text, root, folder, item.span, Findings())
+            other = None if place is None or place in found or place == path else self.page(place)
+            if place is not None and other is not None:
+                found[place] = other
+                waiting.extend((place.parent, below) for below in other.includes)
+        return tuple(found.values())
+
+    def users(self, path: Path, *, everywhere: bool) -> Iterator[tuple[Page, tuple[Page, ...]]]:
+        """The files that include a file, directly or through others, each with all that it includes: the open ones, and
+        ``everywhere`` in the workspace. Raises CrowdedError."""
+        among = dict.fromkeys(self.open)
+        if everywhere:
+            among.update(dict.fromkeys(self._specs()))
+        for other in among:
+            page = None if other == path else self.page(other)
+            if page is None or not page.includes:
+                continue
+            included = self.included(other, page)
+            if any(Path(one.file) == path for one in included):
+                yield page, included
+
+    def _specs(self) -> Iterator[Path]:
+        """The YAML files of the workspace that may include others."""
+        seen = 0
+        for root in self.roots:
+            for folder, folders, names in os.walk(root):
+                folders[:] = [name for name in folders if name not in _PASSED_OVER and not name.startswith(".")]
+                seen += len(folders) + len(names)
+                if seen > _MOST_ENTRIES:
+                    raise CrowdedError
+                for name in names:
+                    if name.endswith((".yaml", ".yml")):
+                        path = Path(folder, name)
+                        data = read_bytes(path, _LARGEST_SPEC)
+                        if not isinstance(data, FileFault) and b"include" in data:
+                            yield path.resolve()
