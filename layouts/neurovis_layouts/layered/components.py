@@ -17,10 +17,12 @@ from neurovis_spec.layout.model import LayoutProblem, Point
 _APART = 1.5
 
 
-def components_of(problem: LayoutProblem, units: Sequence[Unit]) -> tuple[list[list[int]], list[int]]:
+def components_of(
+    problem: LayoutProblem, units: Sequence[Unit], bonds: Sequence[int]
+) -> tuple[list[list[int]], list[int]]:
     """Components of several connected units or of one block, as unit indices; and units without connections.
 
-    Components that a box joins are one.
+    Components that a box or a bond joins are one.
     """
     owner = {member: i for i, unit in enumerate(units) for member in unit.members}
     graph: nx.Graph[int] = nx.Graph()
@@ -28,6 +30,11 @@ def components_of(problem: LayoutProblem, units: Sequence[Unit]) -> tuple[list[l
     graph.add_edges_from((owner[edge.source], owner[edge.target]) for edge in problem.edges)
     for _, members in problem.boxes:
         mates = [owner[m] for m in members if graph.degree(owner[m]) or units[owner[m]].places is not None]
+        graph.add_edges_from(pairwise(mates))
+    tied: dict[int, list[int]] = {}
+    for unit, bond in enumerate(bonds):
+        tied.setdefault(bond, []).append(unit)
+    for mates in tied.values():
         graph.add_edges_from(pairwise(mates))
     connected: list[list[int]] = []
     alone: list[int] = []

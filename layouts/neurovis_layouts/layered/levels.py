@@ -20,13 +20,16 @@ _MOST_PASSAGES = 60_000
 @dataclass(frozen=True, slots=True)
 class Node:
     """Something in a rank. ``members`` with their offsets; none for a passage. ``reach`` is how far centres lie from
-    its middle, across and along; ``kin`` is shared by neurons of a group that keep their order."""
+    its middle, across and along; ``kin`` is shared by neurons of a group that keep their order; ``lift`` is how far the
+    middle stands behind the line of the rank; ``framed`` says that nothing may come within its reach."""
 
     rank: int
     members: tuple[tuple[int, float, float], ...] = ()
     reach: tuple[float, float] = (0.0, 0.0)
     kin: int = -1
     box: int = -1
+    lift: float = 0.0
+    framed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,11 +87,18 @@ def levels_of(problem: LayoutProblem, units: Sequence[Unit], rank: Sequence[int]
 
 def _nodes(unit: Unit, rank: int, boxes: dict[int, int], groups: dict[int, int]) -> list[Node]:
     if unit.places is None:
-        return [Node(rank, ((m, 0.0, 0.0),), (0.0, 0.0), groups.get(m, -1), boxes.get(m, -1)) for m in unit.members]
+        return [
+            Node(rank, ((m, 0.0, 0.0),), (0.0, 0.0), groups.get(m, -1), boxes.get(m, -1), unit.lift)
+            for m in unit.members
+        ]
     members = tuple((m, dx, dy) for m, (dx, dy) in zip(unit.members, unit.places, strict=True))
-    reach = (max(abs(dx) for _, dx, _ in members), max(abs(dy) for _, _, dy in members))
+    reach = unit.reach or (max(abs(dx) for _, dx, _ in members), max(abs(dy) for _, _, dy in members))
     shared = {boxes.get(m, -1) for m in unit.members}
-    return [Node(rank, members, reach, -1, shared.pop() if len(shared) == 1 else -1)]
+    return [
+        Node(
+            rank, members, reach, unit.kin, shared.pop() if len(shared) == 1 else -1, unit.lift, unit.reach is not None
+        )
+    ]
 
 
 def _add(levels: Levels, node: Node) -> int:

@@ -25,17 +25,31 @@ _FLAT = 14.0
 _HARDLY = 1e-7
 
 
-def placed(levels: Levels, order: Sequence[Sequence[int]], neuron_spacing: float, rank_spacing: float) -> list[Point]:
-    """x across (the middle of the whole is 0) and y along (the first rank is at 0) of every node."""
+def placed(
+    levels: Levels,
+    order: Sequence[Sequence[int]],
+    neuron_spacing: float,
+    rank_spacing: float,
+    partner: Sequence[int] | None = None,
+) -> list[Point]:
+    """x across (the middle of the whole is 0) and y along (the first rank is at 0) of every node.
+
+    With ``partner``, for each node the one that is its mirror image (each rank's order turned round is that of the
+    partners), the axis is at 0, and places are mirror images to the last bit.
+    """
     neuron_spacing = max(neuron_spacing, 0.65)
     gaps = _gaps(levels, order, neuron_spacing)
+    if partner is not None:
+        gaps = [[max(pair) for pair in zip(row, row[::-1], strict=True)] for row in gaps]
     across = _across(levels, order, gaps)
+    if partner is not None:
+        across = [(x - across[partner[node]]) / 2 for node, x in enumerate(across)]
     along = _along(levels, order, across, rank_spacing)
     if not across:
         return []
     xs = [across[i] for i, node in enumerate(levels.nodes) if node.members]
-    middle = (min(xs) + max(xs)) / 2
-    return [(snap(x - middle), along[node.rank]) for x, node in zip(across, levels.nodes, strict=True)]
+    middle = 0.0 if partner is not None else (min(xs) + max(xs)) / 2
+    return [(snap(x - middle), along[node.rank] + node.lift) for x, node in zip(across, levels.nodes, strict=True)]
 
 
 def _gaps(levels: Levels, order: Sequence[Sequence[int]], spacing: float) -> list[list[float]]:
@@ -111,7 +125,9 @@ def _pull(
 
 
 def _along(levels: Levels, order: Sequence[Sequence[int]], x: Sequence[float], spacing: float) -> list[float]:
-    heights = [max((levels.nodes[node].reach[1] for node in rank), default=0.0) for rank in order]
+    reaches = [[(levels.nodes[node].reach[1], levels.nodes[node].lift) for node in rank] for rank in order]
+    before = [max((reach - lift for reach, lift in rank), default=0.0) for rank in reaches]
+    behind = [max((reach + lift for reach, lift in rank), default=0.0) for rank in reaches]
     result: list[float] = []
     for r in range(len(order)):
         if r == 0:
@@ -119,5 +135,5 @@ def _along(levels: Levels, order: Sequence[Sequence[int]], x: Sequence[float], s
             continue
         longest = max((abs(x[s.upper] + s.a - x[s.lower] - s.b) for s in levels.segments[r - 1]), default=0.0)
         wide = max(1.0, min(2.5, longest / _FLAT))
-        result.append(snap(result[-1] + heights[r - 1] + heights[r] + max(spacing, 0.75) * wide))
+        result.append(snap(result[-1] + behind[r - 1] + before[r] + max(spacing, 0.75) * wide))
     return result

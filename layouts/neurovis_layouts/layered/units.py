@@ -8,6 +8,7 @@ a loop (a half-centre oscillator, a ring, a reservoir) are one block: a row wher
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 
 import networkx as nx
@@ -30,12 +31,25 @@ class Unit:
 
     members: tuple[int, ...]
     places: tuple[Point, ...] | None = None
+    #: how far a frame reaches from its middle, across and along; None: as far as its neurons
+    reach: Point | None = None
+    #: frames of one ``kin`` keep their order; those that may be drawn as their mirror images ``turns``
+    kin: int = -1
+    turns: bool = False
+    #: how far the middle stands behind the line of its rank
+    lift: float = 0.0
 
 
-def units_of(problem: LayoutProblem) -> tuple[Unit, ...]:
-    """The units, ordered by their first neuron. Raises LayoutRefusalError where a neuron is arranged twice."""
-    found = _arranged(problem)
-    taken = {member for unit in found for member in unit.members}
+def units_of(
+    problem: LayoutProblem, frames: Sequence[Unit] = (), absent: AbstractSet[int] = frozenset()
+) -> tuple[Unit, ...]:
+    """The units, ordered by their first neuron, ``frames`` among them as they are; ``absent`` neurons are in none.
+
+    Raises LayoutRefusalError where a neuron is arranged twice.
+    """
+    framed = {member for unit in frames for member in unit.members} | absent
+    found = [*frames, *_arranged(problem, framed)]
+    taken = framed | {member for unit in found for member in unit.members}
     lone: list[int] = []
     for group in problem.groups:
         members = [member for member in group.members if member not in taken]
@@ -50,11 +64,14 @@ def units_of(problem: LayoutProblem) -> tuple[Unit, ...]:
     return tuple(sorted(found, key=lambda unit: min(unit.members)))
 
 
-def _arranged(problem: LayoutProblem) -> list[Unit]:
+def _arranged(problem: LayoutProblem, framed: AbstractSet[int]) -> list[Unit]:
     spacing = max(problem.neuron_spacing, 0.65)
     found: list[Unit] = []
     taken: set[int] = set()
-    for members, how in problem.arrange:
+    for whole, how in problem.arrange:
+        members = tuple(member for member in whole if member not in framed)
+        if not members:
+            continue
         twice = [m for m in members if m in taken]
         if twice:
             name = problem.neurons[twice[0]]
@@ -156,7 +173,7 @@ def _without_needless_loops(problem: LayoutProblem, found: list[Unit]) -> list[U
     quotient: nx.DiGraph[int] = nx.DiGraph()
     quotient.add_nodes_from(range(len(found)))
     for edge in problem.edges:
-        if owner[edge.source] != owner[edge.target]:
+        if edge.source in owner and edge.target in owner and owner[edge.source] != owner[edge.target]:
             quotient.add_edge(owner[edge.source], owner[edge.target])
     split: set[int] = set()
     for loop in nx.strongly_connected_components(quotient):

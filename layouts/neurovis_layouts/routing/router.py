@@ -31,17 +31,25 @@ def route_all(
     centres: Sequence[Point],
     waypoints: Mapping[int, Sequence[Waypoint]] | None = None,
     bowed: AbstractSet[int] = frozenset(),
+    lateral: Mapping[int, Sequence[Waypoint]] | None = None,
 ) -> list[Route]:
     """Routes by edge index.
 
     Without ``waypoints`` every edge runs from anywhere to anywhere; with them, edges not in ``bowed`` run along the
-    direction (through their waypoints, if they have any).
+    direction (through their waypoints, if they have any). Those in ``lateral`` run across it, through waypoints with x
+    and y exchanged.
     """
     near = Obstacles(centres)
     obstacles = near if len(edges) <= _MOST_CAREFULLY else Obstacles(())
     routes: dict[int, Route] = {}
+    if lateral:
+        exchanged = [(y, x) for x, y in centres]
+        beside = Obstacles(exchanged if len(edges) <= _MOST_CAREFULLY else ())
+        across = _curves(edges, exchanged, sorted(lateral), lateral, beside)
+        routes.update({i: tuple((x, y) for y, x in route) for i, route in across.items()})
     if waypoints is not None:
-        along = [i for i, edge in enumerate(edges) if i not in bowed and _runs_along(edge, centres)]
+        chosen = bowed if lateral is None else bowed | lateral.keys()
+        along = [i for i, edge in enumerate(edges) if i not in chosen and _runs_along(edge, centres)]
         routes.update(_curves(edges, centres, along, waypoints, obstacles))
     rest = [i for i, edge in enumerate(edges) if i not in routes and edge.source != edge.target]
     routes.update(_bows(edges, centres, rest, obstacles))

@@ -1,0 +1,214 @@
+"""The book of a problem's instances: which are drawn alike, and what each is on its own.
+
+In: a LayoutProblem. Out: for every kind of instance one problem of its own, in which the connections, hints, mirrors
+and lines of all instances of that kind are joined, so that one drawing serves them all. Instances of one template are
+of one kind, and so are two that are mirror images of each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import TypeAlias
+
+from neurovis_spec.layout.model import (
+    LayoutEdge,
+    LayoutGroup,
+    LayoutMirror,
+    LayoutModule,
+    LayoutProblem,
+    LayoutRefusalError,
+)
+
+#: A connection by its ends and its number among those that share them.
+Key: TypeAlias = tuple[int, int, int]
+_Pairs: TypeAlias = list[tuple[int, int]]
+_Lines: TypeAlias = list[tuple[int, ...]]
+
+
+def keys_of(edges: Iterable[LayoutEdge]) -> list[Key]:
+    """The key of each edge."""
+    times: dict[tuple[int, int], int] = {}
+    result: list[Key] = []
+    for edge in edges:
+        ends = edge.source, edge.target
+        times[ends] = number = times.get(ends, -1) + 1
+        result.append((*ends, number))
+    return result
+
+
+class Book:
+    """Kinds of instances by number, and the problem that each is."""
+
+    def __init__(self, problem: LayoutProblem) -> None:
+        """Raises LayoutRefusalError where a mirror pairs what cannot be mirror images."""
+        self._problem = problem
+        self._keys = keys_of(problem.edges)
+        modules = problem.modules
+        self._around: list[list[int]] = [[] for _ in problem.neurons]
+        for number, module in enumerate(modules):
+            for member in module.members:
+                self._around[member].append(number)
+        self._root = list(range(len(modules)))
+        self._number = {module.path: number for number, module in enumerate(modules)}
+        first: dict[str, int] = {}
+        for number, module in enumerate(modules):
+            self._join(first.setdefault(module.template, number), number)
+        self._pairs: dict[int, _Pairs] = {}
+        self._lines: dict[int, _Lines] = {}
+        for mirror in problem.mirrors:
+            for a, b in mirror.pairs:
+                self._mirror(mirror.scope, a, b)
+        for line in problem.align:
+            self._align(-1, line)
+        self._inner: list[list[int]] = [[] for _ in modules]
+        self._driven: list[set[int]] = [set() for _ in modules]
+        self._driving: list[set[int]] = [set() for _ in modules]
+        for index, edge in enumerate(problem.edges):
+            source, target = self._around[edge.source], self._around[edge.target]
+            for number in source:
+                (self._inner[number].append(index) if number in target else self._driving[number].add(edge.source))
+            for number in target:
+                if number not in source:
+                    self._driven[number].add(edge.target)
+        self._copies: dict[int, list[int]] = {}
+        for number in range(len(modules)):
+            self._copies.setdefault(self._find(number), []).append(number)
+
+    def _find(self, number: int) -> int:
+        while self._root[number] != number:
+            number = self._root[number]
+        return number
+
+    def _join(self, one: int, other: int) -> None:
+        low, high = sorted((self._find(one), self._find(other)))
+        self._root[high] = low
+
+    def _inside(self, scope: int, neuron: int) -> int:
+        """The instance right below ``scope`` that a neuron is in, −1 without one."""
+        chain = self._around[neuron]
+        place = chain.index(scope) + 1 if scope >= 0 else 0
+        return chain[place] if place < len(chain) else -1
+
+    def _mirror(self, scope: int, a: int, b: int) -> None:
+        one, other = self._inside(scope, a), self._inside(scope, b)
+        if one == other and one >= 0:
+            self._mirror(one, a, b)
+            return
+        if one >= 0 or other >= 0:
+            modules, names = self._problem.modules, self._problem.neurons
+            fits = one >= 0 and other >= 0 and len(modules[one].members) == len(modules[other].members)
+            if not fits or modules[one].members.index(a) != modules[other].members.index(b):
+                raise LayoutRefusalError(
+                    "mirror-frames",
+                    f"'{names[a]}' and '{names[b]}' cannot be mirror images: they do not stand in the same place of "
+                    "instances of equal make",
+                    "mirror the instances, or neurons outside of all instances",
+                )
+            self._join(one, other)
+        self._pairs.setdefault(scope, []).append((a, b))
+
+    def _align(self, scope: int, line: Sequence[int]) -> None:
+        self._lines.setdefault(scope, []).append(tuple(line))
+        within: dict[int, list[int]] = {}
+        for member in line:
+            within.setdefault(self._inside(scope, member), []).append(member)
+        for number, members in within.items():
+            if number >= 0 and len(members) > 1:
+                self._align(number, members)
+
+    def whole(self) -> LayoutProblem:
+        """The problem itself, modules named by their kinds, mirrors and lines those that concern it directly."""
+        problem = self._problem
+        return replace(
+            problem,
+            modules=tuple(replace(m, template=str(self._find(i))) for i, m in enumerate(problem.modules)),
+            mirrors=_mirror(self._pairs.get(-1, [])),
+            align=tuple(self._lines.get(-1, [])),
+        )
+
+    def problem_of(self, kind: int) -> LayoutProblem:
+        """What an instance of this kind is on its own, its neurons counted from 0."""
+        copies = self._copies[kind]
+        modules = self._problem.modules
+        local = {number: {n: i for i, n in enumerate(modules[number].members)} for number in copies}
+        edges: dict[Key, int] = {}
+        entries: set[int] = set()
+        exits: set[int] = set()
+        pairs: set[tuple[int, int]] = set()
+        lines: set[tuple[int, ...]] = set()
+        pins: dict[int, tuple[float, float]] = {}
+        for number in copies:
+            place = local[number]
+            for index in self._inner[number]:
+                source, target, times = self._keys[index]
+                edges.setdefault((place[source], place[target], times), self._problem.edges[index].delay)
+            entries.update(place[n] for n in self._driven[number])
+            entries.update(place[n] for n in self._problem.entries if n in place)
+            exits.update(place[n] for n in self._driving[number])
+            exits.update(place[n] for n in self._problem.exits if n in place)
+            pairs.update((place[a], place[b]) for a, b in self._pairs.get(number, ()))
+            lines.update(tuple(place[n] for n in line) for line in self._lines.get(number, ()))
+            for neuron, point in modules[number].pins.items():
+                pins.setdefault(place[neuron], point)
+        part = restricted(self._problem, modules[copies[0]].members, copies[0])
+        return replace(
+            part,
+            edges=tuple(LayoutEdge(f"{k}", k[0], k[1], delay) for k, delay in sorted(edges.items())),
+            entries=tuple(sorted(entries - exits)),
+            exits=tuple(sorted(exits - entries)),
+            modules=tuple(replace(m, template=str(self._find(self._number[m.path]))) for m in part.modules),
+            mirrors=_mirror(sorted(pairs)),
+            align=tuple(sorted(lines)),
+            pins=dict(sorted(pins.items())),
+        )
+
+
+def _mirror(pairs: Sequence[tuple[int, int]]) -> tuple[LayoutMirror, ...]:
+    return (LayoutMirror(-1, tuple(sorted(set(pairs)))),) if pairs else ()
+
+
+def restricted(problem: LayoutProblem, members: Sequence[int], within: int = -1) -> LayoutProblem:
+    """The problem of these neurons alone, counted from 0 in the order given, without edges, pins, mirrors and lines.
+
+    ``within`` is the instance that they are, whose own instances are the outermost then.
+    """
+    place = {neuron: i for i, neuron in enumerate(members)}
+
+    def inside(neurons: Sequence[int]) -> tuple[int, ...]:
+        return tuple(place[n] for n in neurons if n in place)
+
+    whole = len(members)
+    groups = tuple(LayoutGroup(g.name, found) for g in problem.groups if (found := inside(g.members)))
+    arrange = tuple((found, how) for of, how in problem.arrange if len(found := inside(of)) == len(of))
+    boxes = tuple((name, found) for name, of in problem.boxes if len(found := inside(of)) == len(of) < whole)
+    kept = [i for i, m in enumerate(problem.modules) if i != within and all(n in place for n in m.members)]
+    number = {old: new for new, old in enumerate(kept)}
+    modules = tuple(
+        LayoutModule(
+            problem.modules[i].path,
+            problem.modules[i].module,
+            number.get(problem.modules[i].parent, -1),
+            inside(problem.modules[i].members),
+            problem.modules[i].template,
+            _at(problem.modules[i].pins, place),
+        )
+        for i in kept
+        if problem.modules[i].members
+    )
+    return LayoutProblem(
+        problem.network,
+        tuple(problem.neurons[n] for n in members),
+        groups,
+        (),
+        direction=problem.direction,
+        arrange=arrange,
+        boxes=boxes,
+        neuron_spacing=problem.neuron_spacing,
+        rank_spacing=problem.rank_spacing,
+        modules=modules,
+    )
+
+
+def _at(pins: Mapping[int, tuple[float, float]], place: Mapping[int, int]) -> dict[int, tuple[float, float]]:
+    return {place[n]: point for n, point in pins.items()}

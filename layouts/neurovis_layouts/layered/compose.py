@@ -1,0 +1,157 @@
+"""Compose: drawings of frames, from the inside out, put together into the drawing of the whole.
+
+In: a problem. Out: a Drawing. Every kind of instance is drawn once, by itself, with the instances in it as blocks; the
+drawing is then a block in what is around it, moved or reflected by steps of the grid, so that copies are exact. A box
+becomes such a frame where neurons that are not its own would stand in it otherwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from neurovis_layouts.layered.bonds import bonded
+from neurovis_layouts.layered.book import Book, Key, keys_of, restricted
+from neurovis_layouts.layered.drawing import Drawing, Move, Piece, Rect
+from neurovis_layouts.layered.halves import symmetric_units
+from neurovis_layouts.layered.links import linked
+from neurovis_layouts.layered.parts import Part, firm, images_of, may_be_frame, parts_of
+from neurovis_layouts.layered.settle import Settled, settled
+from neurovis_layouts.layered.sheet import Plan, planned
+from neurovis_layouts.layered.units import Unit
+from neurovis_spec.layout.model import LayoutMirror, LayoutProblem, Route
+
+#: A box is drawn no closer round its neurons than this.
+_LINE = 0.6
+
+
+class Composer:
+    """Draws a problem; each kind of instance in it once."""
+
+    def __init__(self, problem: LayoutProblem) -> None:
+        """Raises LayoutRefusalError where a mirror pairs what cannot be mirror images."""
+        self._book = Book(problem)
+        self._kinds: dict[int, Drawing] = {}
+
+    def whole(self) -> Drawing:
+        """The drawing of the problem. Raises LayoutRefusalError for what cannot be met."""
+        return self.compose(self._book.whole())
+
+    def kind(self, number: int) -> Drawing:
+        """The drawing of a kind of instance."""
+        if number not in self._kinds:
+            self._kinds[number] = self.compose(self._book.problem_of(number))
+        return self._kinds[number]
+
+    def compose(self, problem: LayoutProblem) -> Drawing:
+        """The drawing of one problem, its modules named by their kinds."""
+        pair = {a: b for mirror in problem.mirrors for one in mirror.pairs for a, b in (one, one[::-1])}
+        frames = firm(problem, pair)
+        loose = {i for i in range(len(problem.boxes)) if i not in frames and may_be_frame(problem, i, pair)}
+        while True:
+            drawing = self._attempt(problem, parts_of(problem, frames, pair), pair)
+            entered = {i for i in loose - frames if _entered(drawing, problem.boxes[i][1])}
+            if not entered:
+                return drawing
+            frames |= entered
+
+    def _attempt(self, problem: LayoutProblem, parts: Sequence[Part], pair: Mapping[int, int]) -> Drawing:
+        pieces: list[Piece] = []
+        for part in parts:
+            pieces.append(self._piece(problem, part, pieces, pair))
+        frames = [_unit(problem, piece, i, pieces, pair) for i, piece in enumerate(pieces)]
+        units = symmetric_units(problem, frames, pair)
+        families: dict[tuple[str, int], list[int]] = {}
+        for piece in pieces:
+            if piece.part.family:
+                families.setdefault((piece.part.family, piece.part.kind), []).append(min(piece.part.members))
+        units, bonds = bonded(problem, units, pair, list(families.values()))
+        plan = planned(problem, units, bonds, pair)
+        rests = settled(problem, plan, [_resting(plan, piece) for piece in pieces], pair)
+        return _joined(problem, plan, rests, units, pair)
+
+    def _piece(self, problem: LayoutProblem, part: Part, before: Sequence[Piece], pair: Mapping[int, int]) -> Piece:
+        if part.image_of >= 0:
+            drawing = before[part.image_of].drawing
+        elif part.kind >= 0:
+            drawing = self.kind(part.kind)
+        else:
+            drawing = self.compose(_boxed(problem, part, pair))
+        rect = drawing.rect()
+        x = (rect[0] + rect[2]) / 2 if drawing.axis is None else drawing.axis
+        return Piece(part, drawing, (x, (rect[1] + rect[3]) / 2), rect)
+
+
+def _unit(problem: LayoutProblem, piece: Piece, number: int, pieces: Sequence[Piece], pair: Mapping[int, int]) -> Unit:
+    part, (x, y), rect = piece.part, piece.middle, piece.rect
+    flip = part.image_of >= 0
+    places = tuple((-(px - x) + 0.0 if flip else px - x, py - y) for px, py in piece.drawing.places)
+    reach = max(rect[2] - x, x - rect[0]), rect[3] - y
+    mates = [i for i, other in enumerate(pieces) if other.part.family and other.part.family == part.family]
+    alone = not images_of(part, pair) and piece.drawing.axis is None
+    return Unit(part.members, places, reach, len(problem.groups) + mates[0] if mates else -1, alone)
+
+
+def _resting(plan: Plan, piece: Piece) -> tuple[Piece, Move]:
+    """Where a piece has come to stand."""
+    first = piece.part.members[0]
+    flip = (piece.part.image_of >= 0) != (min(piece.part.members) in plan.turned)
+    x, y = plan.places[first]
+    dx, dy = Move((0.0, 0.0), flip).point(piece.drawing.places[0])
+    return piece, Move((x - dx, y - dy), flip)
+
+
+def _boxed(problem: LayoutProblem, part: Part, pair: Mapping[int, int]) -> LayoutProblem:
+    """A box as a problem of its own."""
+    place = {neuron: i for i, neuron in enumerate(part.members)}
+    driven = {e.target for e in problem.edges if e.target in place and e.source not in place} | set(problem.entries)
+    drives = {e.source for e in problem.edges if e.source in place and e.target not in place} | set(problem.exits)
+    edges = [(place[e.source], place[e.target], e) for e in problem.edges if e.source in place and e.target in place]
+    pairs = tuple(
+        (place[a], place[b]) for mirror in problem.mirrors for a, b in mirror.pairs if a in place and b in place
+    )
+    lines = (tuple(place[m] for m in line if m in place) for line in problem.align)
+    return replace(
+        restricted(problem, part.members),
+        edges=tuple(replace(e, source=a, target=b) for a, b, e in edges),
+        entries=tuple(sorted(place[m] for m in driven - drives if m in place)),
+        exits=tuple(sorted(place[m] for m in drives - driven if m in place)),
+        mirrors=(LayoutMirror(-1, pairs),) if pairs else (),
+        align=tuple(line for line in lines if len(line) > 1),
+    )
+
+
+def _joined(
+    problem: LayoutProblem, plan: Plan, rests: Settled, units: Sequence[Unit], pair: Mapping[int, int]
+) -> Drawing:
+    """Neurons, what is within frames, and the connections between them."""
+    places = rests.places
+    routes: dict[Key, Route] = {}
+    frames: list[tuple[tuple[int, ...], Rect]] = []
+    keys = keys_of(problem.edges)
+    known = set(keys)
+    for piece, move in rests.pieces:
+        part, drawing = piece.part, piece.drawing
+        for (a, b, number), route in drawing.routes.items():
+            key = part.members[a], part.members[b], number
+            if key in known:
+                ends = places[key[0]], places[key[1]]
+                routes[key] = (ends[0], *move.route(route)[1:-1], ends[1])
+        frames += [(tuple(part.members[m] for m in own), move.rect(rect)) for own, rect in drawing.frames]
+        if part.module >= 0 or part.box >= 0:
+            frames.append((part.members, move.rect(piece.rect)))
+    links = [i for i, key in enumerate(keys) if key not in routes]
+    routes.update(linked(problem, links, keys, plan, rests, units, frames, pair))
+    return Drawing(tuple(places), routes, tuple(frames), rests.axis if pair else None)
+
+
+def _entered(drawing: Drawing, members: Sequence[int]) -> bool:
+    """Whether a neuron stands, or a frame reaches, where the line round these neurons is drawn."""
+    own = set(members)
+    xs, ys = [drawing.places[m][0] for m in members], [drawing.places[m][1] for m in members]
+    x0, y0, x1, y1 = min(xs) - _LINE, min(ys) - _LINE, max(xs) + _LINE, max(ys) + _LINE
+    if any(x0 < x < x1 and y0 < y < y1 for i, (x, y) in enumerate(drawing.places) if i not in own):
+        return True
+    return any(
+        not own & set(inside) and r[0] < x1 and x0 < r[2] and r[1] < y1 and y0 < r[3] for inside, r in drawing.frames
+    )

@@ -1,0 +1,89 @@
+"""A drawing: a part of a network laid out on its own, to be put somewhere as a whole, as it is or reflected.
+
+In: places, routes and frames. Out: the same moved, and the room that they take up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from neurovis_layouts.layered.book import Key
+from neurovis_layouts.layered.parts import Part
+from neurovis_spec.layout.geometry import sampled
+from neurovis_spec.layout.model import GRID, Point, Route
+
+#: x0, y0, x1, y1
+Rect: TypeAlias = tuple[float, float, float, float]
+
+#: From centres, from routes and from frames within to the line of a frame; on top there is room for a title.
+_PAD, _PAD_ROUTE, _PAD_FRAME = 0.65, 0.2, 0.35
+_TITLE = 0.25
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """Neurons by index, routes by key, frames with their members; ``axis`` is where its own mirror stands, if it has
+    one."""
+
+    places: tuple[Point, ...]
+    routes: Mapping[Key, Route]
+    frames: tuple[tuple[tuple[int, ...], Rect], ...] = ()
+    axis: float | None = None
+    #: its coordinates are given by pins, so that its origin means something
+    fixed: bool = False
+
+    def rect(self) -> Rect:
+        """The frame around all of it."""
+        return around(self.places, self.routes.values(), [rect for _, rect in self.frames])
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """A point p becomes shift + p, reflected on the line along the direction through 0 before that if ``flip``."""
+
+    shift: Point
+    flip: bool = False
+
+    def point(self, point: Point) -> Point:
+        """A point moved."""
+        return self.shift[0] + (-point[0] if self.flip else point[0]), self.shift[1] + point[1]
+
+    def route(self, route: Route) -> Route:
+        """A route moved."""
+        return tuple(self.point(point) for point in route)
+
+    def rect(self, rect: Rect) -> Rect:
+        """A rectangle moved."""
+        (ax, ay), (bx, by) = self.point((rect[0], rect[1])), self.point((rect[2], rect[3]))
+        return min(ax, bx), ay, max(ax, bx), by
+
+
+def around(places: Iterable[Point], routes: Iterable[Route], frames: Sequence[Rect]) -> Rect:
+    """The frame around neurons, routes and frames: on the grid, so that it moves exactly."""
+    points = list(places)
+    line = [point for route in routes for point in sampled(route, 0.3)]
+    x0 = min([x - _PAD for x, _ in points] + [x - _PAD_ROUTE for x, _ in line] + [r[0] - _PAD_FRAME for r in frames])
+    x1 = max([x + _PAD for x, _ in points] + [x + _PAD_ROUTE for x, _ in line] + [r[2] + _PAD_FRAME for r in frames])
+    y0 = min([y - _PAD for _, y in points] + [y - _PAD_ROUTE for _, y in line] + [r[1] - _PAD_FRAME for r in frames])
+    y1 = max([y + _PAD for _, y in points] + [y + _PAD_ROUTE for _, y in line] + [r[3] + _PAD_FRAME for r in frames])
+    return _down(x0), _down(y0 - _TITLE), _up(x1), _up(y1)
+
+
+def _down(value: float) -> float:
+    return value // (2 * GRID) * (2 * GRID)
+
+
+def _up(value: float) -> float:
+    return -_down(-value)
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A part, its drawing with the frame around it, and the point of it that is the middle of its unit."""
+
+    part: Part
+    drawing: Drawing
+    middle: Point
+    rect: Rect

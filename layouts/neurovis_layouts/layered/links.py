@@ -1,0 +1,97 @@
+"""Links: the connections between what stands in one frame, in no frame within it.
+
+In: places, frames, the plan's waypoints. Out: a route for each; those of mirror images are reflections of each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from neurovis_layouts.layered.book import Key
+from neurovis_layouts.layered.drawing import Rect
+from neurovis_layouts.layered.settle import Settled
+from neurovis_layouts.layered.sheet import Plan
+from neurovis_layouts.layered.units import Unit
+from neurovis_layouts.routing import Waypoint, route_all
+from neurovis_layouts.routing.channels import channels
+from neurovis_spec.layout.geometry import snap
+from neurovis_spec.layout.model import LayoutEdge, LayoutProblem, Point, Route
+
+#: How far the two of a pair that drive each other bow, as a share of their distance.
+_SWERVE = 0.16
+
+
+def linked(
+    problem: LayoutProblem,
+    links: Sequence[int],
+    keys: Sequence[Key],
+    plan: Plan,
+    rests: Settled,
+    units: Sequence[Unit],
+    frames: Sequence[tuple[tuple[int, ...], Rect]],
+    pair: Mapping[int, int],
+) -> dict[Key, Route]:
+    """Routes of these edges by key."""
+    edges = [problem.edges[i] for i in links]
+    if rests.pieces:
+        framed = [(frozenset(members), rect) for members, rect in frames]
+        ways, lateral = channels(dict(enumerate(edges)), rests.places, framed)
+        routes = route_all(edges, rests.places, ways, _bowed(edges, units), lateral)
+    else:
+        routes = route_all(edges, rests.places, _passing(problem, plan, rests), _bowed(edges, units))
+    found = {keys[i]: tuple(_snapped(route)) for i, route in zip(links, routes, strict=True)}
+    return _reflected(found, rests, pair) if pair else found
+
+
+def _snapped(route: Route) -> list[Point]:
+    return [route[0], *((snap(x), snap(y)) for x, y in route[1:-1]), route[-1]]
+
+
+def _bowed(edges: Sequence[LayoutEdge], units: Sequence[Unit]) -> frozenset[int]:
+    """Edges within a block that is no frame."""
+    block = {
+        m: k for k, unit in enumerate(units) if unit.places is not None and unit.reach is None for m in unit.members
+    }
+    return frozenset(i for i, e in enumerate(edges) if e.source in block and block[e.source] == block.get(e.target))
+
+
+def _passing(problem: LayoutProblem, plan: Plan, rests: Settled) -> dict[int, list[Waypoint]]:
+    """The plan's waypoints, of edges whose ends stand where the plan has them."""
+    ways: dict[int, list[Waypoint]] = {}
+    dx, dy = rests.shift
+    for i, line in sorted(plan.ways.items()):
+        edge = problem.edges[i]
+        if edge.source not in rests.moved and edge.target not in rests.moved:
+            passing = [Waypoint(way.x + dx, way.y + dy, way.half) for way in line]
+            ways[i] = passing if plan.places[edge.source][1] < plan.places[edge.target][1] else passing[::-1]
+    return ways
+
+
+def _reflected(routes: dict[Key, Route], rests: Settled, pair: Mapping[int, int]) -> dict[Key, Route]:
+    """For every two routes that are mirror images the second as the reflection of the first."""
+    twice = 2 * rests.axis
+    result: dict[Key, Route] = {}
+    for key, route in sorted(routes.items()):
+        source, target, number = key
+        image = pair.get(source, source), pair.get(target, target), number
+        if key in result or image == key or image not in routes:
+            result.setdefault(key, route)
+            continue
+        one = route if pair.get(source) != target else _swerving(route[0], route[-1], number)
+        ends = rests.places[image[0]], rests.places[image[1]]
+        result[key] = one
+        result[image] = (ends[0], *((twice - x, y) for x, y in one[1:-1]), ends[1])
+    return result
+
+
+def _swerving(start: Point, end: Point, number: int) -> Route:
+    """From a neuron to its mirror image and back: each keeps to its own left in its first half, and they cross on the
+    axis, since reflections of one bow would share its line."""
+    wide = (_SWERVE + 0.08 * number) * (end[0] - start[0])
+    reach = (end[0] - start[0]) / 3
+    return (
+        start,
+        (snap(start[0] + reach), snap(start[1] - abs(wide))),
+        (snap(end[0] - reach), snap(end[1] + abs(wide))),
+        end,
+    )

@@ -1,0 +1,105 @@
+"""Parts: the outermost frames of a problem, instances and boxes, and who is whose mirror image among them.
+
+In: a problem, and which of its boxes are to be frames. Out: parts: disjoint, each with its neurons; the neurons in none
+stand between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
+
+from neurovis_spec.layout.model import LayoutProblem
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A frame: its neurons (in the order in which its drawing counts them), the kind of instance that it is or the
+    box, what instances declared together have in common, and the part that it is the mirror image of."""
+
+    members: tuple[int, ...]
+    kind: int = -1
+    box: int = -1
+    module: int = -1
+    family: str = ""
+    image_of: int = -1
+
+
+def parts_of(problem: LayoutProblem, boxes: AbstractSet[int], pair: Mapping[int, int]) -> list[Part]:
+    """The parts in the order of their first neurons; those of which the second is a mirror image come first.
+
+    ``boxes`` are the places of boxes to be frames; ``pair`` says whose mirror image a neuron is, both ways.
+    """
+    found = [
+        Part(m.members, int(m.template), module=i, family=f"{m.module} {m.path.rstrip('0123456789')}")
+        for i, m in enumerate(problem.modules)
+        if m.parent < 0
+    ]
+    chosen = [Part(problem.boxes[i][1], box=i) for i in sorted(boxes)]
+    # of frames in frames the outermost; of a box that is an instance, the instance
+    parts: list[Part] = []
+    taken: set[int] = set()
+    for part in sorted([*found, *chosen], key=lambda p: (-len(p.members), p.module < 0, p.members)):
+        if not taken.intersection(part.members):
+            parts.append(part)
+            taken.update(part.members)
+    parts.sort(key=lambda p: min(p.members))
+    return _imaged(parts, pair)
+
+
+def _imaged(parts: Sequence[Part], pair: Mapping[int, int]) -> list[Part]:
+    """Mirror images marked as such; a box that has no box for its image gets one without a line."""
+    first = [
+        part
+        for part in parts
+        if not (images := images_of(part, pair)) or set(images) == set(part.members) or _leads(part, pair)
+    ]
+    result = list(first)
+    by_members = {frozenset(part.members): part for part in parts}
+    for number, part in enumerate(first):
+        images = images_of(part, pair)
+        if images and set(images) != set(part.members):
+            other = by_members.get(frozenset(images))
+            result.append(
+                Part(images, part.kind, -1 if other is None else other.box, -1 if other is None else other.module,
+                     "" if other is None else other.family, number)
+            )  # fmt: skip
+    return result
+
+
+def _leads(part: Part, pair: Mapping[int, int]) -> bool:
+    """Whether a part is the first of a mirrored pair: that with the first neuron."""
+    images = images_of(part, pair)
+    return bool(images) and min(part.members) < min(images)
+
+
+def images_of(part: Part, pair: Mapping[int, int]) -> tuple[int, ...]:
+    """The mirror images of a part's neurons in its order, none if not all have one."""
+    images = tuple(pair[m] for m in part.members if m in pair)
+    return images if len(images) == len(part.members) else ()
+
+
+def firm(problem: LayoutProblem, pair: Mapping[int, int]) -> set[int]:
+    """Boxes that have to be frames from the start: around whole instances."""
+    outer = [set(m.members) for m in problem.modules if m.parent < 0]
+    return {
+        i
+        for i, (_, members) in enumerate(problem.boxes)
+        if may_be_frame(problem, i, pair) and any(m <= set(members) for m in outer)
+    }
+
+
+def may_be_frame(problem: LayoutProblem, box: int, pair: Mapping[int, int]) -> bool:
+    """Whether a box can be a frame here: it cuts through no instance, is in none, and mirrors as a whole."""
+    own = set(problem.boxes[box][1])
+    if len(own) == len(problem.neurons):
+        return False
+    if any(own & set(m.members) and not set(m.members) <= own for m in problem.modules if m.parent < 0):
+        return False
+    images = {pair[m] for m in own if m in pair}
+    return not images or images == own - _free(own, pair) or (len(images) == len(own) and not images & own)
+
+
+def _free(own: Iterable[int], pair: Mapping[int, int]) -> set[int]:
+    return {m for m in own if m not in pair}

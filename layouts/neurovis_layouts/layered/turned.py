@@ -1,0 +1,76 @@
+"""Turned: frames drawn as their mirror images where that saves crossings.
+
+In: Levels in order, and which frames may be turned. Out: Levels in which some are, and which these are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import replace
+
+from neurovis_layouts.layered.levels import Levels, Segment
+from neurovis_layouts.layered.place import placed
+
+#: With more segments in a gap than this nobody sees the difference.
+_MOST = 1500
+
+
+def turned(levels: Levels, order: Sequence[Sequence[int]], may: AbstractSet[int]) -> tuple[Levels, set[int]]:
+    """The levels with frames turned, and the first neurons of these; ``may`` are first neurons of frames."""
+    frames = [n for rank in order for n in rank if levels.nodes[n].members and _first(levels, n) in may]
+    frames = [n for n in frames if any(dx for _, dx, _ in levels.nodes[n].members)]
+    if not frames:
+        return levels, set()
+    x = [place[0] for place in placed(levels, order, 1.0, 2.0)]
+    flipped: set[int] = set()
+    for _ in range(2):
+        before = set(flipped)
+        for node in frames:
+            now, other = (_crossings(levels, x, flipped ^ change, node) for change in (set(), {node}))
+            if other < now:
+                flipped ^= {node}
+        if flipped == before:
+            break
+    return _turn(levels, flipped), {_first(levels, node) for node in flipped}
+
+
+def _first(levels: Levels, node: int) -> int:
+    return min(member for member, _, _ in levels.nodes[node].members)
+
+
+def _crossings(levels: Levels, x: Sequence[float], flipped: AbstractSet[int], node: int) -> int:
+    """Crossings of the segments at a node, as straight lines."""
+    total = 0
+    rank = levels.nodes[node].rank
+    for gap in (rank - 1, rank):
+        if not 0 <= gap < len(levels.segments) or len(levels.segments[gap]) > _MOST:
+            continue
+        lines = [
+            (x[s.upper] + _offset(s.upper, s.a, flipped), x[s.lower] + _offset(s.lower, s.b, flipped), s)
+            for s in levels.segments[gap]
+        ]
+        own = [line for line in lines if node in (line[2].upper, line[2].lower)]
+        for a, b, segment in own:
+            for c, d, other in lines:
+                if segment is not other and (a - c) * (b - d) < 0:
+                    total += 1 if node in (other.upper, other.lower) else 2
+    return total
+
+
+def _offset(node: int, offset: float, flipped: AbstractSet[int]) -> float:
+    return -offset if node in flipped else offset
+
+
+def _turn(levels: Levels, flipped: AbstractSet[int]) -> Levels:
+    nodes = list(levels.nodes)
+    for node in flipped:
+        nodes[node] = replace(nodes[node], members=tuple((m, -dx + 0.0, dy) for m, dx, dy in nodes[node].members))
+    segments = [
+        [
+            Segment(s.upper, _offset(s.upper, s.a, flipped), s.lower, _offset(s.lower, s.b, flipped), s.weight)
+            for s in gap
+        ]
+        for gap in levels.segments
+    ]
+    return Levels(nodes, levels.ranks, segments, levels.passages)

@@ -1,0 +1,189 @@
+"""Channels: ways between neurons of different frames, row by row through the gaps that discs and frames leave.
+
+In: edges, centres, frames that nothing foreign may run through. Out: waypoints of the edges that run along the
+direction, and of those that run across it. A way is the shortest through the free places of every row of discs between its ends
+(dynamic programming over rows); ways that share a gap keep apart.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import TypeAlias
+
+from neurovis_layouts.routing.curves import Waypoint
+from neurovis_spec.layout.model import LayoutEdge, Point
+
+Rect: TypeAlias = tuple[float, float, float, float]
+Frame: TypeAlias = tuple[frozenset[int], Rect]
+_Span: TypeAlias = tuple[float, float]
+
+_DISC, _ROW = 0.45, 0.42
+_BESIDE_FRAME = 0.2
+#: Rows closer than this are one.
+_FINE = 0.15
+_INSET = 0.25
+_NARROW = 0.3
+_APART = 0.22
+#: What it costs to share a gap, to squeeze between two discs, and to run across rather than along.
+_SHARED, _SQUEEZED, _ACROSS = 1.5, 0.4, 1.25
+_LEAST = 0.75
+#: With more edges than this nobody can follow one: they take the straight way.
+_MOST = 1500
+
+
+def channels(
+    edges: Mapping[int, LayoutEdge], centres: Sequence[Point], frames: Sequence[Frame]
+) -> tuple[dict[int, list[Waypoint]], dict[int, list[Waypoint]]]:
+    """Waypoints of edges by index: of those along the direction, and (x and y exchanged) of those across it."""
+    along: dict[int, list[Waypoint]] = {}
+    across: dict[int, list[Waypoint]] = {}
+    if len(edges) > _MOST:
+        return {i: [] for i in edges}, {}
+    down = _Rows(centres, frames)
+    side = _Rows([(y, x) for x, y in centres], [(own, (r[1], r[0], r[3], r[2])) for own, r in frames])
+    for i, edge in sorted(edges.items(), key=lambda item: (_length(item[1], centres), item[0])):
+        if edge.source == edge.target:
+            continue
+        found = [
+            (cost * factor, place, path)
+            for place, (rows, factor) in enumerate(((down, 1.0), (side, _ACROSS)))
+            for cost, path in [rows.way(edge.source, edge.target)]
+        ]
+        cost, place, path = min(found, key=lambda item: item[:2])
+        if math.isinf(cost):
+            continue
+        (down, side)[place].use(path)
+        (along, across)[place][i] = (down, side)[place].knots(path, edge.source, edge.target)
+    return along, across
+
+
+def _length(edge: LayoutEdge, centres: Sequence[Point]) -> float:
+    (ax, ay), (bx, by) = centres[edge.source], centres[edge.target]
+    return abs(ax - bx) + abs(ay - by)
+
+
+class _Rows:
+    """Discs and frames by rows, and where ways run already."""
+
+    def __init__(self, centres: Sequence[Point], frames: Sequence[Frame]) -> None:
+        self._centres = centres
+        self._frames = frames
+        self._sorted = sorted((y, x, i) for i, (x, y) in enumerate(centres))
+        self._heights = [y for y, _, _ in self._sorted]
+        self._used: dict[float, list[float]] = {}
+        stops = sorted(set(self._heights) | {y for _, r in frames for y in (r[1], r[3])})
+        self._rows: list[float] = []
+        for y in stops:
+            if not self._rows or y - self._rows[-1] >= _FINE:
+                self._rows.append(y)
+
+    def way(self, source: int, target: int) -> tuple[float, list[Point]]:
+        """The cost of the best way, infinite where the ends are level, and its points: both ends, one in each row."""
+        start, end = self._centres[source], self._centres[target]
+        if start[1] > end[1]:
+            cost, path = self.way(target, source)
+            return cost, path[::-1]
+        if end[1] - start[1] < _LEAST:
+            return math.inf, []
+        best: list[tuple[float, float, int]] = [(0.0, start[0], -1)]
+        layers = [best]
+        rows = [y for y in self._rows if start[1] + _ROW < y < end[1] - _ROW]
+        before = start[1]
+        for y in rows:
+            row: list[tuple[float, float, int]] = []
+            for x, extra in self._places(y, source, target, start, end):
+                ways = [(cost + _step(x - px, y - before), k) for k, (cost, px, _) in enumerate(best)]
+                cost, k = min(ways)
+                row.append((cost + extra, x, k))
+            layers.append(row)
+            best, before = row, y
+        cost, k = min((cost + _step(end[0] - x, end[1] - before), k) for k, (cost, x, _) in enumerate(best))
+        path = [end]
+        for row, y in zip(layers[:0:-1], rows[::-1], strict=True):
+            path.append((row[k][1], y))
+            k = row[k][2]
+        return cost, [*path, start][::-1]
+
+    def spans(self, y: float, source: int, target: int) -> list[_Span]:
+        """What is free in a row."""
+        low, high = bisect_left(self._heights, y - _ROW), bisect_left(self._heights, y + _ROW)
+        blocked = [(x - _DISC, x + _DISC) for _, x, i in self._sorted[low:high] if i not in (source, target)]
+        for own, (x0, y0, x1, y1) in self._frames:
+            if y0 <= y <= y1 and source not in own and target not in own:
+                blocked.append((x0 - _BESIDE_FRAME, x1 + _BESIDE_FRAME))
+        blocked.sort()
+        free: list[_Span] = []
+        edge = -math.inf
+        for low_x, high_x in blocked:
+            if low_x > edge:
+                free.append((edge, low_x))
+            edge = max(edge, high_x)
+        return [*free, (edge, math.inf)]
+
+    def _places(self, y: float, source: int, target: int, start: Point, end: Point) -> list[tuple[float, float]]:
+        """Where a way may run through a row, and what that costs."""
+        line = start[0] + (end[0] - start[0]) * (y - start[1]) / (end[1] - start[1])
+        used = self._used.get(y, ())
+        found: dict[float, float] = {}
+        for low, high in self.spans(y, source, target):
+            if high < min(start[0], end[0]) - 20 or low > max(start[0], end[0]) + 20:
+                continue
+            inset = min(_INSET, (high - low) / 2)
+            wishes = [line, start[0], end[0], low + inset, high - inset]
+            for other in used:
+                wishes += [other - _APART, other + _APART]
+            for wish in wishes:
+                x = min(max(wish, low + inset), high - inset)
+                if math.isfinite(x):
+                    crowd = sum(1 - abs(x - other) / _APART for other in used if abs(x - other) < _APART)
+                    found[x] = _SHARED * crowd + (_SQUEEZED if high - low < _NARROW else 0.0)
+        return sorted(found.items())
+
+    def use(self, path: Sequence[Point]) -> None:
+        """Note where a way runs."""
+        for x, y in path[1:-1]:
+            self._used.setdefault(y, []).append(x)
+
+    def knots(self, path: Sequence[Point], source: int, target: int) -> list[Waypoint]:
+        """The points of a way at which it bends; what lies on a line that is free is left out."""
+        free = [self.spans(y, source, target) for _, y in path]
+        knots: list[Waypoint] = []
+        at = 0
+        while at < len(path) - 1:
+            reach = next(n for n in range(len(path) - 1, at, -1) if n == at + 1 or self._clear(path, free, at, n))
+            if reach < len(path) - 1:
+                x, y = path[reach]
+                narrow = any(low <= x <= high and high - low < 1.2 for low, high in free[reach])
+                knots.append(Waypoint(x, y, 0.2 if narrow else 0.0))
+            at = reach
+        return _spaced(knots)
+
+    def _clear(self, path: Sequence[Point], free: Sequence[Sequence[_Span]], at: int, to: int) -> bool:
+        (ax, ay), (bx, by) = path[at], path[to]
+        for n in range(at + 1, to):
+            y = path[n][1]
+            x = ax + (bx - ax) * (y - ay) / (by - ay)
+            if abs(x - path[n][0]) > 0.6 or not any(low <= x <= high for low, high in free[n]):
+                return False
+            if any(abs(x - other) < 0.12 for other in self._used.get(y, ()) if other != path[n][0]):
+                return False
+        return True
+
+
+def _step(dx: float, dy: float) -> float:
+    return math.sqrt(dx * dx + dy * dy) + 0.12 * dx * dx / max(dy, 0.1)
+
+
+def _spaced(knots: list[Waypoint]) -> list[Waypoint]:
+    """Knots are straight as far as there is room to their neighbours."""
+    result = list(knots)
+    for i, (a, b) in enumerate(pairwise(knots)):
+        room = abs(b.y - a.y) / 2 - 0.05
+        if a.half > room:
+            result[i] = Waypoint(a.x, a.y, 0.0)
+        if b.half > room:
+            result[i + 1] = Waypoint(b.x, b.y, 0.0)
+    return result
