@@ -22,6 +22,7 @@ from neurovis_spec.version import __version__
 
 ROOT = Path(__file__).parents[1]
 SPECS = ROOT / "specs"
+HEXAPOD = SPECS / "hexapod" / "hexapod.yaml"
 ERRORS = sorted((ROOT / "tests" / "errors").glob("*.yaml"))
 SMALL = """\
 neurovis: 1
@@ -192,7 +193,7 @@ def test_bytes_that_are_no_text_get_a_finding_at_their_place(folder: Path) -> No
 
 
 def test_validate_says_ok_for_each_spec_of_several() -> None:
-    specs = sorted(SPECS.glob("*.yaml"))
+    specs = [*sorted(SPECS.glob("*.yaml")), HEXAPOD]
     lines = good("validate", *specs).splitlines()
     assert [line.split(": ok (")[0] for line in lines] == [str(spec) for spec in specs]
     assert f"{SPECS / 'cpg_rbf.yaml'}: ok (12 neurons, 28 connections)" in lines
@@ -311,7 +312,7 @@ def test_schema_is_a_json_schema_that_the_examples_meet() -> None:
 
     schema = json.loads(good("schema"))
     jsonschema.Draft202012Validator.check_schema(schema)
-    for path in SPECS.glob("*.yaml"):
+    for path in (*SPECS.glob("*.yaml"), HEXAPOD):
         jsonschema.Draft202012Validator(schema).validate(yaml.safe_load(path.read_text(encoding="utf-8")))
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.Draft202012Validator(schema).validate({"neurovis": 1, "name": "x", "neurns": {}})
@@ -465,10 +466,10 @@ def test_new_writes_a_spec_that_goes_all_the_way(folder: Path) -> None:
     good("render", "first.yaml", "-o", "first.svg")
 
 
-@pytest.mark.parametrize("example", [path.stem for path in sorted(SPECS.glob("*.yaml"))])
-def test_new_from_an_example_is_that_example_under_another_name(folder: Path, example: str) -> None:
-    good("new", "mine", "--from", example)
-    mine, theirs = nv.compile("mine.yaml"), nv.compile(SPECS / f"{example}.yaml")
+@pytest.mark.parametrize("example", [*sorted(SPECS.glob("*.yaml")), HEXAPOD], ids=lambda path: path.stem)
+def test_new_from_an_example_is_that_example_under_another_name(folder: Path, example: Path) -> None:
+    good("new", "mine", "--from", example.stem)
+    mine, theirs = nv.compile("mine.yaml"), nv.compile(example)
     assert mine.name == "mine"
     np.testing.assert_array_equal(mine.run(50).activity, theirs.run(50).activity)
 
@@ -486,7 +487,13 @@ def test_new_overwrites_nothing(folder: Path) -> None:
 def test_new_may_share_the_data_of_an_example(folder: Path) -> None:
     assert good("new", "one", "--from", "cpg_rbf").split() == ["one.yaml", str(Path("data", "centres.csv"))]
     assert good("new", "two", "--from", "cpg_rbf").split() == ["two.yaml"]
-    assert "cpg_rbf" in good("new", "x", "--from", "list").split()
+    assert {"cpg_rbf", "hexapod"} <= set(good("new", "x", "--from", "list").split())
+
+
+def test_new_copies_what_an_example_includes(folder: Path) -> None:
+    tables = [str(Path("data", f"{name}.csv")) for name in ("obstacle", "floor_left", "floor_right")]
+    assert good("new", "one", "--from", "hexapod").split() == ["one.yaml", str(Path("modules", "leg.yaml")), *tables]
+    assert good("new", "two", "--from", "hexapod").split() == ["two.yaml"]
 
 
 # The process

@@ -30,7 +30,7 @@ from neurovis_spec.language.source import Mapping, Node, Scalar
 ROOT = Path(__file__).parents[1]
 CANONICAL = sorted(
     [
-        *(ROOT / "specs").glob("*.yaml"),
+        *(ROOT / "specs").glob("**/*.yaml"),
         *(ROOT / "neurovis_spec" / "library").glob("*.yaml"),
         ROOT / "neurovis_spec" / "cli" / "starter.yaml",
     ]

@@ -15,7 +15,7 @@ from neurovis_spec.codes import catalogue
 from neurovis_spec.language.allow import allows
 
 ROOT = Path(__file__).parents[1]
-SPECS = sorted((ROOT / "specs").glob("*.yaml"))
+SPECS = [*sorted((ROOT / "specs").glob("*.yaml")), ROOT / "specs" / "hexapod" / "hexapod.yaml"]
 PAIR = "neurons: {A: {bias: 1}, B: {}}\n"
 
 

@@ -65,6 +65,9 @@ def test_the_wheel_holds_the_packages_the_library_and_the_examples(wheel: Path) 
         "neurovis_spec/cli/starter.yaml",
         "neurovis_spec/examples/cpg_rbf.yaml",
         "neurovis_spec/examples/data/centres.csv",
+        "neurovis_spec/examples/hexapod/hexapod.yaml",
+        "neurovis_spec/examples/hexapod/modules/leg.yaml",
+        "neurovis_spec/examples/hexapod/data/obstacle.csv",
     }
     assert expected <= names
     tops = {name.split("/")[0] for name in names if ".dist-info" not in name}
@@ -88,6 +91,11 @@ def test_an_installed_neurovis_draws_its_own_example(programs: Path, tmp_path: P
     assert picture.count("data-connection=") == 28
     call([neurovis, "render", "walk.yaml", "--step", "160", "-o", "walk.png"], tmp_path)
     assert (tmp_path / "walk.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_an_installed_neurovis_copies_an_example_with_what_it_includes(programs: Path, tmp_path: Path) -> None:
+    call([programs / "neurovis", "new", "walk", "--from", "hexapod"], tmp_path)
+    assert "ok (148 neurons, 199 connections)" in call([programs / "neurovis", "validate", "walk.yaml"], tmp_path)
 
 
 def test_an_installed_neurovis_writes_a_starter(programs: Path, tmp_path: Path) -> None:

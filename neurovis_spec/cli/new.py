@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Mapping
 from importlib.resources import files as package_files
 from importlib.resources.abc import Traversable
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import click
 
@@ -17,6 +17,7 @@ from neurovis_spec.cli.options import examples, known
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,63}")
 _NAME_LINE = re.compile(r"^name:[^\n]*$", re.MULTILINE)
 _DATA_FILE = re.compile(r"\bfile: *([^\s,}\]]+)")
+_INCLUDED = re.compile(r"^include: *\[([^\]]*)\]", re.MULTILINE)
 
 
 def example_folder() -> Traversable:
@@ -26,12 +27,16 @@ def example_folder() -> Traversable:
     return inside if inside.is_dir() else Path(str(package)).parent / "specs"
 
 
-def example_names() -> Iterable[str]:
-    """The names of the examples."""
+def examples_at_hand() -> Mapping[str, Traversable]:
+    """The examples by name, with the folder of each: that of all, or one of its own with the same name."""
     folder = example_folder()
-    if not folder.is_dir():
-        return ()
-    return sorted(entry.name.removesuffix(".yaml") for entry in folder.iterdir() if entry.name.endswith(".yaml"))
+    found: dict[str, Traversable] = {}
+    for entry in folder.iterdir() if folder.is_dir() else ():
+        if entry.name.endswith(".yaml"):
+            found[entry.name.removesuffix(".yaml")] = folder
+        elif entry.is_dir() and entry.joinpath(f"{entry.name}.yaml").is_file():
+            found[entry.name] = entry
+    return dict(sorted(found.items()))
 
 
 @click.command(
@@ -42,8 +47,8 @@ def example_names() -> Iterable[str]:
     "--from",
     "example",
     metavar="EXAMPLE",
-    callback=known("example", lambda: ("list", *example_names())),
-    help="Copy an example with its data files; 'list' shows which there are.",
+    callback=known("example", lambda: ("list", *examples_at_hand())),
+    help="Copy an example with its data and included files; 'list' shows which there are.",
 )
 def command(name: str, example: str | None) -> None:
     """Write a commented starter spec NAME.yaml, or a copy of an example.
@@ -51,7 +56,7 @@ def command(name: str, example: str | None) -> None:
     Nothing is overwritten.
     """
     if example == "list":
-        click.echo("\n".join(example_names()))
+        click.echo("\n".join(examples_at_hand()))
         return
     target = Path(name.removesuffix(".yaml") + ".yaml")
     if not _NAME.fullmatch(target.stem):
@@ -64,24 +69,30 @@ def command(name: str, example: str | None) -> None:
     else:
         wanted = copies(example, target)
     wanted[target] = _NAME_LINE.sub(f"name: {target.stem}", wanted[target].decode(), count=1).encode()
-    write_new(wanted)
+    write_new(wanted, target)
 
 
 def copies(example: str, target: Path) -> dict[Path, bytes]:
-    """The files of an example, and where they go: the spec to ``target``, its data files beside it as it names them."""
-    folder = example_folder()
-    content = folder.joinpath(f"{example}.yaml").read_bytes()
-    wanted = {target: content}
-    for name in _DATA_FILE.findall(content.decode()):
-        wanted[target.parent / name] = folder.joinpath(*name.split("/")).read_bytes()
+    """The files of an example, and where they go: the spec to ``target``, what it reads beside it as it names them."""
+    folder = examples_at_hand()[example]
+    wanted: dict[Path, bytes] = {}
+    waiting = [PurePosixPath(f"{example}.yaml")]
+    while waiting:
+        path = waiting.pop(0)
+        content = folder.joinpath(*path.parts).read_bytes()
+        wanted[target.parent / path if wanted else target] = content
+        if path.suffix == ".yaml":
+            text = content.decode()
+            included = [name.strip() for names in _INCLUDED.findall(text) for name in names.split(",")]
+            waiting += [path.parent / name for name in (*included, *_DATA_FILE.findall(text))]
     return wanted
 
 
-def write_new(wanted: dict[Path, bytes]) -> None:
-    """Write files none of which is there yet with other content; else nothing is written."""
+def write_new(wanted: Mapping[Path, bytes], target: Path) -> None:
+    """Write files; nothing is written if ``target`` is there, or another one with other content."""
     missing = []
     for path, content in wanted.items():
-        if path.exists() and (not path.is_file() or path.read_bytes() != content or path.suffix == ".yaml"):
+        if path.exists() and (not path.is_file() or path.read_bytes() != content or path == target):
             raise fault(f"{path} is already there", "choose another name, or remove it first")
         if not path.exists():
             missing.append(path)
