@@ -7,6 +7,7 @@ are shown (text, JSON) is in ``neurovis_spec.findings``.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -14,6 +15,8 @@ from difflib import SequenceMatcher
 from typing import Literal
 
 Severity = Literal["error", "warning"]
+#: A number in a message, with what belongs to it.
+_NUMBER = re.compile(r"-?\d[\d.,]*(e[+-]?\d+)?")
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -89,7 +92,8 @@ class Findings:
         return span in self._faults
 
     def sorted(self) -> tuple[Diagnostic, ...]:
-        """All findings by place, each once.
+        """All findings by place, each once, and once also where it is the same but for numbers: a module is looked at
+        in each of its instances.
 
         Where a stretch of the text is at fault in one way, what later stages make of it is a follow-up and held back.
         """
@@ -97,8 +101,11 @@ class Findings:
         for item in self._items:
             if item.severity == "error":
                 first.setdefault(item.span, item.code)
-        kept = [item for item in dict.fromkeys(self._items) if first.get(item.span, item.code) == item.code]
-        return tuple(sorted(kept, key=lambda d: (d.span, d.severity, d.code, d.message)))
+        told: dict[tuple[Span, str, str], Diagnostic] = {}
+        for item in self._items:
+            if first.get(item.span, item.code) == item.code:
+                told.setdefault((item.span, item.code, _NUMBER.sub("0", item.message)), item)
+        return tuple(sorted(told.values(), key=lambda d: (d.span, d.severity, d.code, d.message)))
 
     def check(self) -> None:
         """Raise SpecError if there is an error."""
@@ -160,8 +167,13 @@ def suggest(name: str, known: Iterable[str], what: str = "known") -> str | None:
     names = tuple(dict.fromkeys(known))
     close = nearest(name, names)
     if close:
-        return "did you mean " + " or ".join(f"'{c}'" for c in close) + "?"
+        return did_you_mean(close)
     if not names:
         return None
     shown = ", ".join(names[:12]) + (", …" if len(names) > 12 else "")
     return f"{what}: {shown}"
+
+
+def did_you_mean(names: Iterable[str]) -> str:
+    """The help line that offers these names."""
+    return "did you mean " + " or ".join(f"'{name}'" for name in names) + "?"

@@ -142,16 +142,24 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
 
 
 def _look_at_unused(expander: Expander, limits: Limits, seed: int) -> None:
-    """A module that nobody uses is looked at by itself, with its own parameters: mistakes are found at once."""
-    for name, module in expander.library.modules.items():
-        if name not in expander.used:
-            constants = constants_of(module, expander.dt, expander.findings)
-            make_parameters(module.model, constants, {})
-            units = expander.expand(module.model, constants, module.folder, name).units
-            population = populate(units, limits, seed)
-            connect(units, population, limits, seed)
-            make_noises(units, population, 0)
-            layout_settings(None, units, population, expander.findings)
+    """A module that nobody uses is looked at by itself, with its own parameters: mistakes are found at once. Modules
+    that others hold come last, since they are looked at in these; and together they may be as large as a network."""
+    modules = expander.library.modules
+    inner = {instance.module.value for module in modules.values() for instance in module.model.instances.values()}
+    neurons, connections = limits.neurons, limits.connections
+    for name in sorted(modules, key=inner.__contains__):
+        if name in expander.used or min(neurons, connections) < 0:
+            continue
+        module = modules[name]
+        constants = constants_of(module, expander.dt, expander.findings)
+        make_parameters(module.model, constants, {})
+        units = expander.expand(module.model, constants, module.folder, name).units
+        population = populate(units, limits, seed)
+        bundles = connect(units, population, limits, seed)
+        make_noises(units, population, 0)
+        layout_settings(None, units, population, expander.findings)
+        neurons -= len(population.neurons)
+        connections -= sum(len(bundle.sources) for bundle in bundles or ())
 
 
 def _instances(units: tuple[Unit, ...], population: Population) -> tuple[Instance, ...]:

@@ -12,13 +12,11 @@ from dataclasses import dataclass, field, replace
 from neurovis_spec.diagnostics import nearest
 from neurovis_spec.language.library import Library
 from neurovis_spec.language.model import lost_names
-from neurovis_spec.language.modules import ModuleModel
+from neurovis_spec.language.modules import INCLUDED, ModuleModel
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.spec import Spec
 
 SECTIONS = ("parameters", "inputs", "neurons", "instances", "modules", "activations", "models", "rules")
-#: what an included file may hold
-INCLUDED = ("modules", "activations", "models", "rules")
 _NAMING = frozenset({"count", "first", "names"})
 
 

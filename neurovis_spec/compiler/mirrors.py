@@ -11,6 +11,7 @@ from typing import Literal
 
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Mirror
+from neurovis_spec.compiler.pins import Pins
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import Directory, resolve, resolve_end
 from neurovis_spec.compiler.units import Unit
@@ -129,33 +130,37 @@ def lines_of(units: tuple[Unit, ...], population: Population, findings: Findings
 def check_pins(
     mirrors: tuple[Mirror, ...],
     lines: tuple[tuple[int, ...], ...],
-    pins: Mapping[int, tuple[float, float]],
+    pins: Pins,
     direction: Literal["down", "up", "right", "left"],
     names: tuple[str, ...],
-    place: Located[str] | None,
     findings: Findings,
 ) -> None:
-    """Pins that no mirror, or no line, can keep are a finding at ``place``."""
-    if place is None:
-        return
+    """Pins that no mirror, or no line, can keep are a finding: those of the spec, and those of each instance that are
+    relative to its origin."""
     across, along = (0, 1) if direction in ("down", "up") else (1, 0)
-    axis: tuple[float, str] | None = None
-    for a, b in (pair for mirror in mirrors if not mirror.scope for pair in mirror.pairs):
-        if a not in pins or b not in pins:
-            continue
-        shown_pair = f"'{names[a]}' and '{names[b]}'"
-        middle = (pins[a][across] + pins[b][across]) / 2
-        if abs(pins[a][along] - pins[b][along]) > _SLACK:
-            message = f"{shown_pair} are mirror images; their pins are not on one line across the axis"
-            findings.error("mirror-pins", place.span, message)
-        elif axis is not None and abs(axis[0] - middle) > _SLACK:
-            message = f"the pins of {shown_pair} put the mirror's axis at {middle:g}, those of {axis[1]} at {axis[0]:g}"
-            findings.error("mirror-pins", place.span, message)
-        axis = axis or (middle, shown_pair)
-    for line in lines:
-        pinned = [index for index in line if index in pins]
-        for index in pinned[1:]:
-            if abs(pins[index][along] - pins[pinned[0]][along]) > _SLACK:
-                message = f"'{names[pinned[0]]}' and '{names[index]}' are aligned; their pins are not on one line"
-                findings.error("align-pins", place.span, message)
-                break
+    for frame, places in (("", pins.places), *pins.relative):
+        skip = len(frame) + 1 if frame else 0
+        axes: dict[str, tuple[float, str]] = {}
+        for mirror in mirrors:
+            for a, b in mirror.pairs:
+                if a not in places or b not in places:
+                    continue
+                shown_pair = f"'{names[a][skip:]}' and '{names[b][skip:]}'"
+                middle = (places[a][across] + places[b][across]) / 2
+                axis = axes.setdefault(mirror.scope, (middle, shown_pair))
+                message = ""
+                if abs(places[a][along] - places[b][along]) > _SLACK:
+                    message = f"{shown_pair} are mirror images; their pins are not on one line across the axis"
+                elif abs(axis[0] - middle) > _SLACK:
+                    message = f"the pins of {shown_pair} put the mirror's axis at {middle:g}, "
+                    message += f"those of {axis[1]} at {axis[0]:g}"
+                if message:
+                    findings.error("mirror-pins", max(pins.spans[a], pins.spans[b]), message)
+        for line in lines:
+            pinned = [index for index in line if index in places]
+            for index in pinned[1:]:
+                if abs(places[index][along] - places[pinned[0]][along]) > _SLACK:
+                    shown_pair = f"'{names[pinned[0]][skip:]}' and '{names[index][skip:]}'"
+                    message = f"{shown_pair} are aligned; their pins are not on one line"
+                    findings.error("align-pins", max(pins.spans[pinned[0]], pins.spans[index]), message)
+                    break

@@ -8,24 +8,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
 
 from neurovis_spec.compiler.builtin import builtin_definitions
 from neurovis_spec.compiler.definitions import Definitions, define
-from neurovis_spec.compiler.gaps import INCLUDED, Gaps, gaps_of
+from neurovis_spec.compiler.gaps import Gaps, gaps_of
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.includes import Includes
 from neurovis_spec.language.library import Library as LanguageLibrary
 from neurovis_spec.language.model import opening
-from neurovis_spec.language.modules import ModuleModel
+from neurovis_spec.language.modules import INCLUDED, ModuleModel
 from neurovis_spec.language.source import Mapping as SourceMapping
 from neurovis_spec.language.spec import Spec
 
 T = TypeVar("T")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Module:
     """A module, and where it is from: ``own`` is the spec itself, not a file that it includes."""
 
@@ -33,6 +34,11 @@ class Module:
     model: ModuleModel
     folder: Path
     own: bool
+
+    @cached_property
+    def gaps(self) -> Gaps:
+        """What of it could not be read."""
+        return gaps_of(self.model)
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,6 +36,8 @@ class Pins:
     places: Mapping[int, Place]
     relative: tuple[tuple[str, Mapping[int, Place]], ...] = ()
     origins: Mapping[str, Place] = field(default_factory=dict)
+    #: where the place of each neuron was said
+    spans: Mapping[int, Span] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,10 @@ class _Pin:
 
     def moved(self, by: Place) -> _Pin:
         return _Pin(self.x + by[0], self.y + by[1], self.key, self.span)
+
+    def at(self, origin: _Pin) -> _Pin:
+        """The pin of an instance whose origin was said elsewhere."""
+        return _Pin(self.x + origin.x, self.y + origin.y, origin.key, origin.span)
 
 
 @dataclass
@@ -81,10 +87,10 @@ def pins_of(units: tuple[Unit, ...], population: Population, findings: Findings)
     origins = said[0].origins
     for base, pins in sorted(groups.items()):
         if base in origins:
-            own.update({neuron: pin.moved((origins[base].x, origins[base].y)) for neuron, pin in pins.items()})
+            own.update({neuron: pin.at(origins[base]) for neuron, pin in pins.items()})
         else:
-            _check_apart(pins, findings)
-    _check_apart(own, findings)
+            _check_apart(pins, population.neurons.names, len(units[base].called("")), findings)
+    _check_apart(own, population.neurons.names, 0, findings)
     return Pins(
         {neuron: (pin.x, pin.y) for neuron, pin in own.items()},
         tuple(
@@ -92,6 +98,7 @@ def pins_of(units: tuple[Unit, ...], population: Population, findings: Findings)
             for base, pins in sorted(groups.items())
         ),
         {units[index].path: (pin.x, pin.y) for index, pin in origins.items()},
+        {neuron: pin.span for pins in (own, *groups.values()) for neuron, pin in pins.items()},
     )
 
 
@@ -154,16 +161,18 @@ def _neuron(key: Located[str], directory: Directory, findings: Findings) -> int 
     return None if members is None else members[0]
 
 
-def _check_apart(pins: Mapping[int, _Pin], findings: Findings) -> None:
-    """Pins that are closer than discs are wide. Each is compared with those in the cells next to its own."""
-    cells: dict[tuple[int, int], list[_Pin]] = {}
-    for pin in pins.values():
+def _check_apart(pins: Mapping[int, _Pin], names: tuple[str, ...], skip: int, findings: Findings) -> None:
+    """Pins that are closer than discs are wide, a finding for each that was said. Each is compared with those in the
+    cells next to its own. ``skip``: so many characters of the names are those of the instance that they are in."""
+    cells: dict[tuple[int, int], list[tuple[int, _Pin]]] = {}
+    told: set[Span] = set()
+    for neuron, pin in pins.items():
         column, row = math.floor(pin.x / DIAMETER), math.floor(pin.y / DIAMETER)
         near = (other for i in (-1, 0, 1) for j in (-1, 0, 1) for other in cells.get((column + i, row + j), ()))
-        for other in near:
-            if math.dist((other.x, other.y), (pin.x, pin.y)) < DIAMETER - 1e-9:
-                line = other.key.span.line
-                names = f"'{pin.key.value}' and '{other.key.value}' (line {line})"
-                findings.error("pins-overlap", pin.span, f"the pins of {names} are closer than {DIAMETER}")
+        for partner, other in near:
+            if math.dist((other.x, other.y), (pin.x, pin.y)) < DIAMETER - 1e-9 and pin.span not in told:
+                told.add(pin.span)
+                shown_pair = f"'{names[neuron][skip:]}' and '{names[partner][skip:]}' (line {other.key.span.line})"
+                findings.error("pins-overlap", pin.span, f"the pins of {shown_pair} are closer than {DIAMETER}")
                 break
-        cells.setdefault((column, row), []).append(pin)
+        cells.setdefault((column, row), []).append((neuron, pin))

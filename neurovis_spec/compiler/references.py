@@ -15,7 +15,7 @@ from typing import TypeAlias
 from neurovis_spec.compiler.gaps import Gaps
 from neurovis_spec.compiler.limits import MOST_HINTS, PATIENCE
 from neurovis_spec.compiler.network import Group
-from neurovis_spec.diagnostics import Findings, Span, suggest
+from neurovis_spec.diagnostics import Findings, Span, did_you_mean, nearest, suggest
 from neurovis_spec.language.located import Located, shown
 from neurovis_spec.language.modules import ModuleModel
 from neurovis_spec.language.source import Mapping as SourceMapping
@@ -59,7 +59,7 @@ class Directory:
             hint = self.instances[head][0].hint(rest)
             return None if hint is None else _QUOTED.sub(rf"'{head}.\1'", hint)
         if dot:
-            return suggest(head, few(head, tuple(self.instances)), "instances") or "there are no instances here"
+            return self._hint_of_instance(head, rest)
         hint = suggest(name, few(name, self.known), "groups and neurons")
         if not self.known and self.instances:
             hint = suggest(name, few(name, tuple(self.instances)), "instances")
@@ -69,6 +69,19 @@ class Directory:
             numbers = f"'{stem}' has the numbers {first} to {first + self.groups[stem].count - 1}"
             hint = numbers if hint is None else f"{hint} {numbers}"
         return hint
+
+    def _hint_of_instance(self, head: str, rest: str) -> str:
+        """What ``head`` in ``head.rest`` may be meant for."""
+        if self.find(head) is not None:
+            return f"'{head}' is no instance, nothing is in it"
+        if not self.instances:
+            return "there are no instances here"
+        stem = head.rstrip("0123456789")
+        if stem in self.instances and f"{stem}1" in self.instances:
+            return f"'{stem}' has the numbers 1 to {len(self.instances[stem])}"
+        close = nearest(head, few(head, tuple(self.instances)))
+        whole = [f"{name}.{rest}" for name in close if self.find(f"{name}.{rest}") is not None]
+        return did_you_mean(whole) if whole else suggest(head, few(head, tuple(self.instances)), "instances") or ""
 
     def find(self, name: str) -> tuple[int, ...] | None:
         """The neurons of a group, or one neuron; ``left.K`` is K in all instances that ``left`` names."""

@@ -64,9 +64,7 @@ def layout_settings(
     direction = cast(
         Literal["down", "up", "right", "left"], "down" if model.direction is None else model.direction.value
     )
-    entry = model.source.entry("positions")
-    place = None if entry is None else Located(entry.name, entry.key)
-    check_pins(mirrors, lines, pins.places, direction, population.neurons.names, place, findings)
+    check_pins(mirrors, lines, pins, direction, population.neurons.names, findings)
     spacing = model.spacing
     neuron = 1.0 if spacing is None or spacing.neuron is None else spacing.neuron.value
     rank = 2.0 if spacing is None or spacing.rank is None else spacing.rank.value

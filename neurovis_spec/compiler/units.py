@@ -10,10 +10,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import NoReturn
 
+from neurovis_spec.compiler.census import Census, TooManyError
 from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.definitions import Definitions
-from neurovis_spec.compiler.gaps import Gaps, gaps_of
+from neurovis_spec.compiler.gaps import Gaps
 from neurovis_spec.compiler.limits import DEEPEST, MOST_INSTANCES, amount, plural
 from neurovis_spec.compiler.modules import Library, Module
 from neurovis_spec.compiler.network import Input
@@ -111,6 +113,9 @@ class Expander:
     #: one for each folder, so that each file is read once
     files: dict[Path, Files] = field(default_factory=dict)
     used: set[str] = field(default_factory=set)
+    #: how many units were made, and whether there would have been too many
+    made: int = 0
+    stopped: bool = False
 
     def expand(self, section: Section, constants: Constants, folder: Path, module: str | None = None) -> Expansion:
         """The units of a section whose parameters are known, and the inputs of the network. ``module``: it is a module
@@ -123,6 +128,7 @@ class Expander:
             root = self._at(0)
             gaps = root.gaps.with_section("instances")
             self.units = [replace(root, definitions=replace(root.definitions, gaps=gaps))]
+        self.made += len(self.units)
         return Expansion(tuple(map(self._at, range(len(self.units)))), tuple(self.inputs))
 
     def files_in(self, folder: Path) -> Files:
@@ -148,7 +154,7 @@ class Expander:
         files = self.files_in(folder)
         own = self._inputs(section, constants, files, place, bound or {})
         lost = section.inputs.keys() - own.keys()
-        gaps = self.library.definitions.gaps if not way and module is None else gaps_of(section)
+        gaps = self.library.definitions.gaps if module is None else self.library.modules[module].gaps
         gaps = gaps.with_names("inputs", gaps.names["inputs"] | lost)
         if module is not None:
             gaps = replace(gaps, sections=gaps.sections - {"modules"}).joined(_definitions_only(self.library))
@@ -166,6 +172,8 @@ class Expander:
             settings=settings or {},
         )
         self.units[index] = unit
+        if not way:
+            self._count(unit)
         children: dict[str, tuple[int, ...]] = {}
         absent: set[str] = set()
         for name, model in section.instances.items():
@@ -185,6 +193,34 @@ class Expander:
             unit, children=children, inputs={**own, **inner}, definitions=replace(unit.definitions, gaps=gaps)
         )
         return index
+
+    def _count(self, unit: Unit) -> None:
+        """Refuse more instances than there may be before any of them is made. Modules that are looked at by themselves
+        share what there may be: behind that, those within them are left out."""
+        if self.stopped:
+            raise _StoppedError
+        census, total = Census(self.library.modules, self.dt), 0
+        for name, model in unit.section.instances.items():
+            quiet = replace(unit.constants, findings=Findings(), structural=set())
+            try:
+                total += census.of_entry(model, quiet)
+            except TooManyError:
+                self._refuse_many(model, unit, name, None)
+            if total > MOST_INSTANCES:
+                self._refuse_many(model, unit, name, total)
+        if self.made + total > MOST_INSTANCES and unit.module is not None:
+            raise _StoppedError
+
+    def _refuse_many(self, model: InstanceModel, unit: Unit, name: str, total: int | None) -> NoReturn:
+        span = key_span(unit.section, "instances", name) if model.count is None else model.count.span
+        many = f"more than {MOST_INSTANCES:,}" if total is None else amount(total)
+        message = f"this makes {many} instances; {MOST_INSTANCES:,} are the most"
+        self._stop("too-many", span, message)
+
+    def _stop(self, code: str, span: Span, message: str) -> NoReturn:
+        self.stopped = True
+        self.findings.error(code, span, message)
+        raise _StoppedError
 
     def _at(self, index: int) -> Unit:
         unit = self.units[index]
@@ -247,15 +283,12 @@ class Expander:
         if module is None or "count" in model.lost or (model.count is not None and count is None):
             self._look(model, unit)
             return None
-        span = key_span(unit.section, "instances", name) if model.count is None else model.count.span
-        total = len(self.units) + (count or 1)
-        if total - 1 > MOST_INSTANCES:
-            message = f"this makes {amount(total - 1)} instances; {MOST_INSTANCES:,} are the most"
-            self.findings.error("too-many", span, message)
-            raise _StoppedError
+        total = len(self.units) - 1 + (count or 1)
+        if total > MOST_INSTANCES:
+            self._refuse_many(model, unit, name, total)
         if len(way) > DEEPEST:
-            self.findings.error("too-deep", span, f"modules are nested at most {DEEPEST} deep")
-            raise _StoppedError
+            span = key_span(unit.section, "instances", name)
+            self._stop("too-deep", span, f"modules are nested at most {DEEPEST} deep")
         called = [name] if count is None else [f"{name}{number}" for number in range(1, count + 1)]
         if len(called[-1]) > 64:
             self.findings.error("bad-name", key_span(unit.section, "instances", name), bad_name(called[-1]), NAME_RULE)
@@ -292,7 +325,7 @@ class Expander:
 
     def _check_keys(self, model: InstanceModel, module: Module) -> None:
         """What ``set`` and ``inputs`` name must be the module's."""
-        gaps = gaps_of(module.model)
+        gaps = module.gaps
         parts: tuple[tuple[str, Mapping[str, object], str, Mapping[str, object]], ...] = (
             ("set", model.set, "parameter", module.model.parameters),
             ("inputs", model.inputs, "input", module.model.inputs),
@@ -351,8 +384,7 @@ class Expander:
 
 def constants_of(module: Module, dt: float, findings: Findings) -> Constants:
     """Constants for the parameters of a module, before these are known."""
-    gaps = gaps_of(module.model)
-    lost, incomplete = set(gaps.names["parameters"]), "parameters" in gaps.sections
+    lost, incomplete = set(module.gaps.names["parameters"]), "parameters" in module.gaps.sections
     return Constants({}, dt, findings, broken=lost, incomplete=incomplete)
 
 

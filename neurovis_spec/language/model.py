@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, ClassVar, Final, TypeVar
 
 from pydantic import (
@@ -99,7 +100,9 @@ class Model(BaseModel):
         for name, field in fields.items():
             if field.is_required() and name not in result:
                 if name not in perhaps:
-                    findings.error("missing-key", opening(data), f"the key '{name}' is missing")
+                    findings.error(
+                        "missing-key", opening(data), f"the key '{name}' is missing", cls._without(name, data)
+                    )
                 if name in cls.STAND_INS:
                     result[name] = Scalar(cls.STAND_INS[name], opening(data))
                 else:
@@ -107,6 +110,11 @@ class Model(BaseModel):
         if hopeless:
             give_up()
         return result
+
+    @classmethod
+    def _without(cls, name: str, data: Mapping) -> str | None:
+        """A help line for a required key that is missing."""
+        return None
 
     @classmethod
     def _unknown(cls, entry: Entry, fields: dict[str, FieldInfo], findings: Findings) -> tuple[str, ...]:
@@ -127,7 +135,7 @@ class Model(BaseModel):
         findings.error("unknown-key", span, f"unknown key '{shown(name)}'", hint)
         return close
 
-    @property
+    @cached_property
     def lost(self) -> frozenset[str]:
         """The keys of the source that are not in the model: unknown ones, and those whose value is at fault."""
         taken = {

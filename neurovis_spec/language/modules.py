@@ -9,14 +9,22 @@ from __future__ import annotations
 from typing import Annotated, ClassVar
 
 from pydantic import Field
+from pydantic.fields import FieldInfo
 
+from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.drawing import ModuleLayoutModel
 from neurovis_spec.language.library import Library, version_field
 from neurovis_spec.language.located import FormulaField, IdentifierField, Leaf, Located, TextField, TextsField
 from neurovis_spec.language.model import Model, Named
 from neurovis_spec.language.sections import ConnectionsField, GroupModel, InputModel
-from neurovis_spec.language.source import ScalarValue
+from neurovis_spec.language.source import Entry, ScalarValue
 from neurovis_spec.language.values import ParameterField
+
+#: the sections of an included file
+INCLUDED = ("modules", "activations", "models", "rules")
+#: sections of a spec that say something of a network of its own
+_OF_A_NETWORK = frozenset({"name", "time", "seed", "parameters", "inputs", "neurons", "instances", "connections"})
+_OF_A_NETWORK |= {"outputs", "events", "layout", "render", "ros"}
 
 
 class InstanceModel(Model):
@@ -72,3 +80,12 @@ class IncludedModel(Library):
     references: TextsField | None = Field(None, description="What it goes back to.")
     include: TextsField = Field(default=(), description="Files whose modules and definitions are used here.")
     modules: Named[ModuleModel] = Field(default_factory=dict, description="Networks to be used several times.")
+
+    @classmethod
+    def _unknown(cls, entry: Entry, fields: dict[str, FieldInfo], findings: Findings) -> tuple[str, ...]:
+        if entry.name not in _OF_A_NETWORK:
+            return super()._unknown(entry, fields, findings)
+        message = f"'{entry.name}' is of a network of its own; an included file holds modules and definitions"
+        hint = "leave it to the specs that include this file, or make a module of it"
+        findings.error("unknown-key", entry.key.span, message, hint)
+        return ()

@@ -22,7 +22,7 @@ from neurovis_spec.language.located import (
     refuse,
 )
 from neurovis_spec.language.model import Model, Named
-from neurovis_spec.language.modules import InstanceModel, ModuleModel
+from neurovis_spec.language.modules import INCLUDED, InstanceModel, ModuleModel
 from neurovis_spec.language.sections import ConnectionsField, EventsField, GroupModel, InputModel, Time
 from neurovis_spec.language.source import Mapping, Node, ScalarValue
 from neurovis_spec.language.values import ParameterField, ReferenceField
@@ -77,3 +77,11 @@ class Spec(Library):
     layout: LayoutModel | None = Field(None, description="How it is laid out.")
     render: RenderModel | None = Field(None, description="How it is drawn.")
     ros: RosModel | None = Field(None, description="How it meets ROS.")
+
+    @classmethod
+    def _without(cls, name: str, data: Mapping) -> str | None:
+        """A file of modules or definitions alone is no spec, but may be one that specs include."""
+        there = {entry.name for entry in data.entries}
+        if name == "name" and there & set(INCLUDED) and not there & {"neurons", "instances", "connections"}:
+            return "this is a file to be included: a spec uses what it holds with include: [FILE]"
+        return None
