@@ -87,8 +87,15 @@ class Workspace:
         return {item.label for item in found.items}
 
 
-def work(folder: Path, scenario: Callable[[Workspace], Awaitable[None]], *, rooted: bool = True) -> None:
-    """Start ``neurovis lsp`` in a workspace, run a scenario with it, and end it."""
+def work(
+    folder: Path,
+    scenario: Callable[[Workspace], Awaitable[None]],
+    *,
+    rooted: bool = True,
+    watched: list[types.Registration] | None = None,
+) -> None:
+    """Start ``neurovis lsp`` in a workspace, run a scenario with it, and end it. ``watched``: the client watches files
+    for the server, and this is what it is asked for."""
 
     async def session() -> None:
         config = ClientServerConfig(server_command=[sys.executable, "-m", "neurovis_spec", "lsp", "--stdio"])
@@ -96,6 +103,14 @@ def work(folder: Path, scenario: Callable[[Workspace], Awaitable[None]], *, root
         assert isinstance(client, LanguageClient)
         folders = [types.WorkspaceFolder(folder.as_uri(), "work")] if rooted else None
         capabilities = types.ClientCapabilities()
+        if watched is not None:
+            watches = types.DidChangeWatchedFilesClientCapabilities(dynamic_registration=True)
+            capabilities.workspace = types.WorkspaceClientCapabilities(did_change_watched_files=watches)
+
+            @client.feature(types.CLIENT_REGISTER_CAPABILITY)
+            def register(params: types.RegistrationParams) -> None:
+                watched.extend(params.registrations)
+
         await client.initialize_session(types.InitializeParams(capabilities, workspace_folders=folders))
         try:
             await scenario(Workspace(client, folder))
@@ -108,6 +123,8 @@ def work(folder: Path, scenario: Callable[[Workspace], Awaitable[None]], *, root
 
 
 def test_findings_of_an_included_file_stand_in_that_file_and_go_away(tmp_path: Path) -> None:
+    watched: list[types.Registration] = []
+
     async def scenario(space: Workspace) -> None:
         space.write("library/legs.yaml", BROKEN)
         space.open("spec.yaml")
@@ -127,8 +144,9 @@ def test_findings_of_an_included_file_stand_in_that_file_and_go_away(tmp_path: P
         await space.until(knees=[("unknown-neuron", 6)], spec=[("unknown-neuron", 2)])
         space.close("spec.yaml")
         await space.until(legs=[], spec=[], knees=[])
+        assert [registration.method for registration in watched] == [types.WORKSPACE_DID_CHANGE_WATCHED_FILES]
 
-    work(tmp_path, scenario)
+    work(tmp_path, scenario, watched=watched)
 
 
 def test_what_is_typed_in_an_included_file_is_seen_by_the_spec(tmp_path: Path) -> None:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from lsp_marks import marked
 
 from neurovis_spec.lsp.check import check
@@ -14,7 +17,8 @@ from neurovis_spec.lsp.definition import definition
 from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.files import Files
 from neurovis_spec.lsp.hover import hover
-from neurovis_spec.lsp.rename import RenameError, apply, prepare, rename
+from neurovis_spec.lsp.rename import Edit, RenameError, apply, prepare, rename
+from neurovis_spec.lsp.symbols import symbols
 from neurovis_spec.lsp.text import Place
 
 LEGS = """neurovis: 1
@@ -257,12 +261,16 @@ def test_an_included_path_leads_to_the_file(folder: Path) -> None:
 
 def renamed(document: Document, place: Place, new: str) -> dict[str, str]:
     """The texts that a rename changes, by the names of their files."""
-    edits = rename(document, place, new)
+    return {path.name: text for path, text in renamed_texts(document, rename(document, place, new)).items()}
+
+
+def renamed_texts(document: Document, edits: tuple[Edit, ...]) -> dict[Path, str]:
+    """The texts that edits change."""
     result = {}
     for file in {edit.span.file for edit in edits}:
         page = document.page if file == document.file else document.files.page(Path(file))
         assert page is not None
-        result[Path(file).name] = apply(Document(page.source, file), edits).source
+        result[Path(file)] = apply(Document(page.source, file), edits).source
     return result
 
 
@@ -404,3 +412,69 @@ def test_what_cannot_be_read_is_passed_over(folder: Path) -> None:
     assert hover(*at(folder, "right.knee.J¦ ->")) is None
     (folder / "library" / "legs.yaml").write_bytes(b"modules: {leg: {neurons: {S: {}, \xff")
     assert "S" in offered(*at(folder, "  left1.¦K1 +"))
+
+
+# ---- whatever somebody is typing -----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def somewhere(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("work").resolve()
+    (folder / "library").mkdir()
+    (folder / "library" / "legs.yaml").write_text(LEGS)
+    (folder / "library" / "knees.yaml").write_text(KNEES)
+    (folder / "spec.yaml").write_text(SPEC)
+    return folder
+
+
+@settings(deadline=None, max_examples=150)
+@given(st.data())
+def test_nothing_breaks_on_whatever_somebody_is_typing(somewhere: Path, data: st.DataObject) -> None:
+    name = data.draw(st.sampled_from(["spec.yaml", "library/legs.yaml", "library/knees.yaml"]))
+    path = somewhere / name
+    whole = path.read_text(encoding="utf-8")
+    at = data.draw(st.integers(0, len(whole)))
+    cut = data.draw(st.integers(at, min(len(whole), at + 60)))
+    typed = data.draw(st.text(st.sampled_from("aK1.,:+->{}[]\"'#| \n\t"), max_size=6))
+    source = whole[:at] + typed + whole[cut:]
+    document = Document(source, str(path), path.parent, files=Files({path: source}, (somewhere,)))
+    for place in (Place(*document.text.lines.place(at)), Place(*document.text.lines.place(at + len(typed)))):
+        for completion in complete(document, place):
+            assert completion.span.line == place.line
+            assert completion.span.column <= place.column <= completion.span.end_column
+        found = hover(document, place)
+        assert found is None or found.markdown
+        leads = definition(document, place)
+        assert leads is None or leads.path is None or leads.path.is_file()
+        with suppress(RenameError):
+            span, old = prepare(document, place)
+            assert old.startswith(document.text.part(span)[: len(old)])
+    symbols(document)
+    check(document)
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.data())
+def test_a_rename_there_and_back_changes_nothing(somewhere: Path, data: st.DataObject) -> None:
+    """Whatever is renamed, wherever it is named: what is said stays, and the way back leads to the very same texts."""
+    texts = {somewhere / name: (somewhere / name).read_text() for name in ("spec.yaml", "library/legs.yaml")}
+    path = data.draw(st.sampled_from(sorted(texts)))
+    at = data.draw(st.integers(0, len(texts[path])))
+    document = Document(texts[path], str(path), path.parent, files=Files(texts, (somewhere,)))
+    place = Place(*document.text.lines.place(at))
+    try:
+        span, old = prepare(document, place)
+        edits = rename(document, place, "Zebra")
+    except RenameError:
+        return
+    after = renamed_texts(document, edits)
+    assert after != {}
+    changed = Files({**texts, **after}, (somewhere,))
+    again = Document(after.get(path, texts[path]), str(path), path.parent, files=changed)
+    main = somewhere / "spec.yaml"
+    found = check(Document(changed.open[main], str(main), somewhere, files=changed)).findings
+    assert [item for item in found if item.severity == "error"] == []
+    before = [edit for edit in edits if (edit.span.file, edit.span.line) == (document.file, span.line)]
+    moved = sum(len("Zebra") - len(old) for edit in before if edit.span.column < span.column)
+    back = rename(again, Place(span.line, span.column + moved + 1), old)
+    assert {**texts, **after, **renamed_texts(again, back)} == {**texts, **{p: p.read_text() for p in after}}

@@ -74,6 +74,17 @@ class SpecServer(LanguageServer):
         for uri in including:
             self._check_soon(uri, 0.0)
 
+    async def watch(self) -> None:
+        """Ask to be told when a file changes that may be included, where the client can be asked."""
+        workspace = self.client_capabilities.workspace
+        watching = None if workspace is None else workspace.did_change_watched_files
+        if watching is not None and watching.dynamic_registration:
+            method = types.WORKSPACE_DID_CHANGE_WATCHED_FILES
+            files = types.DidChangeWatchedFilesRegistrationOptions([types.FileSystemWatcher("**/*.{yaml,yml}")])
+            await self.client_register_capability_async(
+                types.RegistrationParams([types.Registration("neurovis-files", method, files)])
+            )
+
     def closed(self, uri: str) -> None:
         """Forget a document, and take its findings away."""
         self._forget_check(uri)
@@ -151,7 +162,11 @@ def make_server(pause: float = PAUSE) -> SpecServer:
 
 
 def _follow(server: SpecServer) -> None:
-    """Open, change, close."""
+    """Open, change, close; files that change outside of the editor."""
+
+    @server.feature(types.INITIALIZED)
+    async def initialized(params: types.InitializedParams) -> None:
+        await server.watch()
 
     @server.feature(types.TEXT_DOCUMENT_DID_OPEN)
     async def did_open(params: types.DidOpenTextDocumentParams) -> None:
