@@ -8,14 +8,14 @@ import stat
 import subprocess
 from collections import Counter
 from pathlib import Path
-from typing import TypeAlias
+from typing import TypeAlias, cast
 
 import pytest
 import yaml
 from click.testing import CliRunner, Result
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from random_specs import Plain, Spec, specs
+from random_specs import Plain, Spec, section, specs
 
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
@@ -92,6 +92,30 @@ PAIRS: dict[str, tuple[str, str]] = {
     "connections in other places": (
         "connections: [{A->B: 1}, {A->B: 2}]\nmodules: {m: {connections: {S->K: 1}}}\n",
         "connections: [{A -> B: 1}, {A -> B: 2}]\nmodules: {m: {connections: {S -> K: 1}}}\n",
+    ),
+    "modules": (
+        "modules:\n   leg:   # one\n\n      parameters:   {gain:1 ,slow : 2}\n      neurons:\n"
+        "        S:   {input: load}  # two\n"
+        "        # three\n      connections:\n        S->K1+K3..K5:   gain\n        knee.J  ->K:\n          matrix:\n"
+        "          - [1, -2.5,3]\n          - [-10,0.25 ,null]\n",
+        "modules:\n  leg:    # one\n    parameters: {gain:1, slow: 2}\n    neurons:\n      S: {input: load}  # two\n"
+        "      # three\n    connections:\n      S -> K1 + K3..K5: gain\n      knee.J -> K:\n        matrix:\n"
+        "          - [  1, -2.5,     3]\n          - [-10,  0.25, null]\n",
+    ),
+    "instances and layout": (
+        "instances:\n    left:  {module: leg,count: 3 , set: {gain: 0.8*i}, inputs: {load:  torque}} # one\n"
+        "connections:\n  left1.K+left2.K1..left2.K3->right.knee.S: 1\n"
+        "layout:\n   mirror: [[ left,right ]]\n   align:\n   - [left1.K,left2.K]\n   - [A, B]\n",
+        "instances:\n  left: {module: leg, count: 3, set: {gain: 0.8*i}, inputs: {load: torque}}  # one\n"
+        "connections:\n  left1.K + left2.K1..left2.K3 -> right.knee.S: 1\n"
+        "layout:\n  mirror: [[left, right]]\n  align:\n    - [left1.K, left2.K]\n    - [A,       B]\n",
+    ),
+    "a file to be included": (
+        "# legs\ninclude:\n- more.yaml   # one\n- [ ]\nmodules: {leg: {neurons: {K: {}},connections: {K->K: 1}}}\n"
+        "rules:\n     mine:   {weight: {each_step:   weight}}\n",
+        "# legs\ninclude:\n  - more.yaml  # one\n  - []\n"
+        "modules: {leg: {neurons: {K: {}}, connections: {K -> K: 1}}}\n"
+        "rules:\n  mine: {weight: {each_step: weight}}\n",
     ),
     "keys that would become the same": ("connections: {A->B: 1, A -> B: 2}\n", "connections: {A->B: 1, A -> B: 2}\n"),
     "a matrix of expressions": (
@@ -329,6 +353,56 @@ def test_formatting_keeps_values_hash_and_comments(spec: Spec, seed: int, end: s
     assert "\r" not in written
     assert not re.search(r"[ \t]$", written, re.MULTILINE)
     assert not re.search(r"\n\n\n|\A\n|\n\n\Z", written)
+
+
+@given(specs(), specs(), st.integers(0, 2**32), st.booleans())
+@settings(max_examples=40, deadline=None)
+def test_modules_and_included_files_keep_values_hash_and_comments(
+    folder_of_specs: Path, one: Spec, other: Spec, seed: int, included: bool
+) -> None:
+    writer = Writer(seed)
+    library: Spec = {"modules": {"leg": module(one), "arm": module(other)}}
+    spec: Spec = {
+        "neurovis": 1,
+        "name": "modular",
+        "inputs": {"wave": {"expression": "0.3*sin(k/3)"}},
+        **({"include": ["library.yaml"]} if included else library),
+        "instances": {
+            "left": {"module": "leg", "count": 2, "set": {"shift": "0.1*i"}, "inputs": {"wave": "wave"}},
+            "right": {"module": "arm"},
+        },
+        "connections": {"left1.Ga -> left2.Ga": {"weight": 0.1, "pattern": "one_to_one"}},
+        "outputs": {"out": ["left.Ga", "right.Ga"]},
+    }
+    hashes = []
+    texts = {"spec.yaml": writer.document(spec), "library.yaml": writer.document({"neurovis": 1, **library})}
+    for text in texts.values():
+        written = formatted(text)
+        assert values(written) == values(text)
+        assert comments(written) == comments(text)
+    for form in (str, formatted):
+        for name, text in texts.items():
+            (folder_of_specs / name).write_text(form(text), encoding="utf-8")
+        hashes.append(nv.compile(folder_of_specs / "spec.yaml").hash)
+    assert len(set(hashes)) == 1
+
+
+@pytest.fixture(scope="module")
+def folder_of_specs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("modular")
+
+
+def module(spec: Spec) -> dict[str, Plain]:
+    """The network of a spec as a module, with a parameter and an input of its own."""
+    groups = {name: dict(cast("dict[str, Plain]", group)) for name, group in section(spec, "neurons").items()}
+    groups["Ga"]["bias"] = "shift"
+    neurons: dict[str, Plain] = dict(groups)
+    return {
+        "parameters": {"shift": 0.5},
+        "inputs": {"wave": {}},
+        "neurons": neurons,
+        "connections": spec["connections"],
+    }
 
 
 _KEYS = st.text(st.characters(codec="utf-8", exclude_categories=["C", "Z"]) | st.sampled_from(" \n#:,[]{}&*!|>'\"%@`-"))

@@ -107,10 +107,11 @@ def work(
             watches = types.DidChangeWatchedFilesClientCapabilities(dynamic_registration=True)
             capabilities.workspace = types.WorkspaceClientCapabilities(did_change_watched_files=watches)
 
-            @client.feature(types.CLIENT_REGISTER_CAPABILITY)
             def register(params: types.RegistrationParams) -> None:
                 watched.extend(params.registrations)
 
+            feature: Callable[[str], Callable[[object], object]] = client.feature  # has no annotations of its own
+            feature(types.CLIENT_REGISTER_CAPABILITY)(register)
         await client.initialize_session(types.InitializeParams(capabilities, workspace_folders=folders))
         try:
             await scenario(Workspace(client, folder))
