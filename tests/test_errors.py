@@ -1,8 +1,9 @@
 """Every defective spec of tests/errors is answered at the right place, with the right code, and in words that help.
 
 The expected findings stand in the specs, beside the offending lines: ``# error: LINE:COLUMN CODE  WORDS``, or
-``# warning: …``; the words must occur in the message or the hint. Specs in ``layout`` compile, and a layout engine
-refuses them: ``# refused: CODE  WORDS``. The files in ``layout_files`` are layout files.
+``# warning: …``; the words must occur in the message or the hint. What they include lies in ``include``, with the
+findings of its own. Specs in ``layout`` compile, and a layout engine refuses them: ``# refused: CODE  WORDS``. The
+files in ``layout_files`` are layout files.
 """
 
 from __future__ import annotations
@@ -20,17 +21,20 @@ from neurovis_spec.layout.model import LayoutRefusalError
 
 FOLDER = Path(__file__).parent / "errors"
 SPECS = sorted(FOLDER.glob("*.yaml"))
+INCLUDED = sorted((FOLDER / "include").glob("*.yaml"))
 REFUSED = sorted((FOLDER / "layout").glob("*.yaml"))
 LAYOUT_FILES = sorted((FOLDER / "layout_files").glob("*.yaml"))
 EXPECTED = re.compile(r"# (error|warning): (\d+):(\d+) ([\w-]+)(?:  (.*?))?(?=\s+# error|\s+# warning|$)", re.MULTILINE)
 REFUSAL = re.compile(r"# refused: ([\w-]+)  (.*)")
 
 
-def findings(path: Path) -> tuple[Diagnostic, ...]:
+def findings(path: Path) -> tuple[tuple[Diagnostic, ...], set[str]]:
+    """The findings of a spec, and the files that were read."""
     try:
-        return nv.compile(path).warnings
+        network = nv.compile(path)
     except nv.SpecError as error:
-        return error.diagnostics
+        return error.diagnostics, set(error.sources)
+    return network.warnings, set(network.sources)
 
 
 def text_of(path: Path) -> str:
@@ -38,23 +42,26 @@ def text_of(path: Path) -> str:
     return path.read_text(encoding="utf-8", errors="replace")
 
 
-def hold(path: Path, found: tuple[Diagnostic, ...]) -> None:
-    """The findings are those that the file expects."""
-    expected = EXPECTED.findall(text_of(path))
+def hold(found: tuple[Diagnostic, ...], files: set[str]) -> None:
+    """The findings are those that the files expect."""
+    expected = [(file, *item) for file in sorted(files) for item in EXPECTED.findall(text_of(FOLDER / file))]
     assert expected, "a spec of this folder says what is wrong with it"
-    assert [(d.severity, d.span.line, d.span.column, d.code) for d in found] == [
-        (severity, int(line), int(column), code) for severity, line, column, code, _ in expected
+    assert [(str(FOLDER / d.span.file), d.severity, d.span.line, d.span.column, d.code) for d in found] == [
+        (str(FOLDER / file), severity, int(line), int(column), code)
+        for file, severity, line, column, code, _ in expected
     ]
     for diagnostic, (*_, words) in zip(found, expected, strict=True):
         assert words.strip() in f"{diagnostic.message} {diagnostic.hint or ''}"
 
 
 def test_there_are_many() -> None:
-    assert len(SPECS) >= 150
+    assert len(SPECS) >= 240
 
 
 def test_every_code_is_covered() -> None:
-    covered = {code for path in (*SPECS, *LAYOUT_FILES) for _, _, _, code, _ in EXPECTED.findall(text_of(path))}
+    covered = {
+        code for path in (*SPECS, *INCLUDED, *LAYOUT_FILES) for _, _, _, code, _ in EXPECTED.findall(text_of(path))
+    }
     covered |= {code for path in REFUSED for code, _ in REFUSAL.findall(text_of(path))}
     wanted = {code.name for code in catalogue().values() if code.rare is None}
     elsewhere = {name for name in wanted if catalogue()[name].command.startswith("neurovis run")}
@@ -64,14 +71,16 @@ def test_every_code_is_covered() -> None:
 
 @pytest.mark.parametrize("path", SPECS, ids=lambda path: path.stem)
 def test_finding(path: Path) -> None:
-    hold(path, findings(path))
+    found, files = findings(path)
+    assert str(path) in files
+    hold(found, files)
 
 
 @pytest.mark.parametrize("path", LAYOUT_FILES, ids=lambda path: path.stem)
 def test_layout_file(path: Path) -> None:
     found = Findings()
-    assert parse(text_of(path), path.name, found) is None
-    hold(path, found.sorted())
+    assert parse(text_of(path), f"layout_files/{path.name}", found) is None
+    hold(found.sorted(), {f"layout_files/{path.name}"})
 
 
 @pytest.mark.parametrize("path", REFUSED, ids=lambda path: path.stem)

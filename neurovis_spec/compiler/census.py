@@ -1,9 +1,9 @@
 """The census: how many instances a spec makes, counted before any of them is made.
 
-In: the entries of ``instances``, the Constants around them, the modules. Out: a number. Modules within modules multiply,
-so that a few lines can ask for more than any machine holds. A module is counted once for each set of values that its
-counts depend on, however often it is used; what is at fault counts as nothing here, and is found where the instances
-are made.
+In: the entries of ``instances``, the Constants around them, the modules. Out: a number. Modules within modules
+multiply, so that a few lines can ask for more than any machine holds. A module is counted once for each set of values
+that its counts depend on, however often it is used; what is at fault counts as nothing here, and is found where the
+instances are made.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ def mirrors_of(units: tuple[Unit, ...], population: Population, findings: Findin
     """All mirrors. A neuron that stands on two sides, or twice on one, is a finding."""
     paths = {id(directory): unit.path for unit, directory in zip(units, population.directories, strict=True)}
     result: list[Mirror] = []
-    taken: dict[int, int] = {}
+    taken: set[int] = set()
     for unit, directory in zip(units, population.directories, strict=True):
         layout = unit.section.layout
         for reference in () if layout is None else layout.mirror:
@@ -36,13 +36,13 @@ def mirrors_of(units: tuple[Unit, ...], population: Population, findings: Findin
                 continue
             twice = next((m for pair in mirror.pairs for m in pair if m in taken), None)
             itself = next((a for a, b in mirror.pairs if a == b), None)
-            for pair in mirror.pairs:
-                taken.update({pair[0]: pair[1], pair[1]: pair[0]})
             if itself is not None:
                 name = population.neurons.names[itself]
                 hint = "what stands on the axis needs no mirror"
                 findings.error("bad-mirror", reference.span, f"'{name}' would be its own mirror image", hint)
-            elif twice is not None:
+                continue
+            taken.update(index for pair in mirror.pairs for index in pair)
+            if twice is not None:
                 name = population.neurons.names[twice]
                 findings.error("bad-mirror", reference.span, f"'{name}' has a mirror image already")
             else:

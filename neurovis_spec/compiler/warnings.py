@@ -11,8 +11,6 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
-
 from neurovis_spec.compiler.connect import Bundle
 from neurovis_spec.compiler.idle import idle_neurons
 from neurovis_spec.compiler.inert import changes_nothing
