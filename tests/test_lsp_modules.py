@@ -154,6 +154,15 @@ def test_what_is_offered_in_an_included_file(folder: Path, mark: str, there: lis
     assert [name for name in missing if name in found] == []
 
 
+def test_inputs_of_instances_that_come_from_outside_are_offered(folder: Path) -> None:
+    text = SPEC.replace("  K: {bias: gain}", "  K: {bias: gain, input: }")
+    assert "right.load" in offered(*at(folder, "gain, input: ¦}", text))
+    text = SPEC.replace(", inputs: {load: torque}", "") + "ros: {subscribe: {"
+    found = offered(*at(folder, "subscribe: {¦", text))
+    assert {"left1.load", "left3.load", "right.load", "torque"} <= found
+    assert {"load", "foot.load", "left4.load"}.isdisjoint(found)
+
+
 def test_completion_goes_by_the_file_as_it_is_open_in_the_editor(folder: Path) -> None:
     document, place = at(folder, "  left1.¦K1 +")
     changed = LEGS.replace("{S: {input: load}", "{Shin: {input: load}")
@@ -199,6 +208,18 @@ def test_what_hover_tells(folder: Path, mark: str, told: list[str]) -> None:
     found = hover(*at(folder, mark))
     assert found is not None
     assert [part for part in told if part not in found.markdown] == []
+
+
+def test_the_size_of_a_group_of_a_module_is_that_of_the_network(folder: Path) -> None:
+    text = SPEC.replace("T: {count: 2}", "T: {count: gain}")
+    text = text.replace("right.knee.J -> foot.T: {pattern: one_to_one}", "right.knee.J1 -> foot.T1 + foot.T2: 1")
+    for mark, told in (("foot.T¦1]", "2 neurons (T1 … T2)"), ("left.K¦ ->", "3 neurons (K1 … K3)")):
+        document, place = at(folder, mark, text)
+        checked = check(document)
+        assert checked.network is not None, checked.findings
+        found = hover(replace(document, network=checked.network), place)
+        assert found is not None
+        assert told in found.markdown
 
 
 @pytest.mark.parametrize(

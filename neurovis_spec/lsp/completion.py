@@ -132,6 +132,8 @@ def _of_role(role: Role | None, scope: Scope, path: Path, front: str, index: Ind
         case "names" if role.kind == "input":
             module = _owner(path, scope, index)
             yield from (_Offer(name.text, "input") for name in index.declared("input", module))
+            if "instances" not in path:
+                yield from _inner_inputs(module, index)
         case "names" if role.kind == "parameter":
             module = _owner(path, scope, index)
             yield from _parameters(index.declared("parameter", module), index)
@@ -171,6 +173,18 @@ def _formula(role: Role, scope: Scope, path: Path, index: Index, place: Place) -
         yield _Offer(given, "constant", GIVEN.get(given, ""))
     for function, (usage, meaning) in functions(role.random, role.functions).items():
         yield _Offer(function, "function", usage, meaning)
+
+
+def _inner_inputs(module: str | None, index: Index) -> Iterator[_Offer]:
+    """The inputs of instances that come from outside: ``left1.load``."""
+    for instance in index.declared("instance", module):
+        made = index.module_of(instance.text, module)
+        given = index.home(instance).keys
+        for name in () if made is None else index.declared("input", made):
+            if (*instance.item.path, "inputs", name.text) not in given:
+                single = index.numbers(instance) is None
+                for one in (instance.text,) if single else _numbered(instance, index):
+                    yield _Offer(f"{one}.{name.text}", "input", f"input of {made}")
 
 
 def _parameters(names: Iterable[Name], index: Index) -> Iterator[_Offer]:

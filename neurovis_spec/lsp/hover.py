@@ -148,6 +148,9 @@ def _group(document: Document, name: Name, found: Found) -> str:
         owner = group.item.path[:-2]
         group = next((other for other in index.declarations if other.item.path == owner), group)
     numbers = index.numbers(group)
+    made = _made(document, name, group)
+    if numbers is not None and made is not None:
+        numbers = range(numbers.start, numbers.start + made)
     named = [item for path, item in index.values.items() if path[:-1] == (*group.item.path, "names")]
     if named:
         size = f"{len(named)} neurons ({named[0].text} … {named[-1].text})"
@@ -167,6 +170,23 @@ def _group(document: Document, name: Name, found: Found) -> str:
         head = f"**{called}**: {size}" if name.text == group.text else f"**{called}**, a neuron of {head}"
     head += _within(document, group)
     return _described(document, group, "\n".join([head, "", *lines]))
+
+
+def _made(document: Document, name: Name, group: Name) -> int | None:
+    """How many neurons a group of an instance has in the network as it last was; the same in each of a counted one."""
+    if name.via is None or document.network is None:
+        return None
+    index = document.index
+    way = [group.text]
+    via: Name | None = name.via
+    while via is not None:
+        found = index.find(via)
+        numbers = None if found is None else index.numbers(found.declaration)
+        whole = found is not None and numbers is not None and found.declaration.text == via.text
+        way.append(f"{via.text}{numbers.start}" if whole and numbers is not None else via.text)
+        via = via.via
+    wanted = ".".join(reversed(way))
+    return next((one.count for one in document.network.neurons.groups if one.name == wanted), None)
 
 
 def _choice(index: Index, group: Name, key: str) -> str:
