@@ -28,12 +28,12 @@ REST = {
     "neurons": "neurons: {A: {}, B: {}, O: {}, T: {}, K: {count: 4}}",
 }
 #: Warnings that a part of a spec, or a built-in written down again, causes.
-PARTIAL = {"idle-neuron", "unused-definition", "unused-input", "unused-parameter", "replaces-builtin"}
+PARTIAL = {"idle-neuron", "unused-definition", "unused-input", "unused-parameter", "unused-module", "replaces-builtin"}
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A folder with the data files that the examples name."""
+    """A folder with the files that the examples name."""
     data = tmp_path / "data"
     data.mkdir()
     np.savetxt(data / "sensed.csv", [[0.5], [0.25]], delimiter=",")
@@ -41,6 +41,9 @@ def folder(tmp_path: Path) -> Path:
     np.savez_compressed(data / "trained.npz", weights=np.ones((2, 4)), bias=np.zeros(4))
     (data / "feedback.mtx").write_text("%%MatrixMarket matrix coordinate pattern general\n4 2 2\n1 1\n4 2\n")
     (data / "edges.csv").write_text("from,to,weight,delay\nK1,O,0.5,1\nK2,O,,2\n", encoding="utf-8")
+    (tmp_path / "library").mkdir()
+    (included,) = (block for block in PARTS if block.startswith("# library/legs.yaml\n"))
+    (tmp_path / "library" / "legs.yaml").write_text(included, encoding="utf-8")
     return tmp_path
 
 
@@ -122,6 +125,23 @@ def test_the_vehicle_turns_to_the_light() -> None:
     for _ in range(3):
         left, right = np.asarray(vehicle.step(light=[1, 0.2])["motors"]).tolist()
     assert right > left  # the light is on the left
+
+
+def test_the_oscillators_fall_into_step() -> None:
+    """Coupled they keep the same time, half a period apart; each by itself has its own."""
+
+    def beats(coupling: float) -> tuple[int, int, float]:
+        run = nv.compile_text(example("gait"), coupling=coupling).run()
+        left, right = run["left.C1"][-1000:], run["right.C1"][-1000:]
+        rises = [int((np.diff(np.sign(leg)) > 0).sum()) for leg in (left, right)]
+        return rises[0], rises[1], float(np.corrcoef(left, right)[0, 1])
+
+    left, right, alike = beats(0.03)
+    assert left == right == 16
+    assert alike < -0.95
+    left, right, alike = beats(0)
+    assert right - left == 2
+    assert abs(alike) < 0.5
 
 
 def test_the_names_of_parameters_that_are_taken() -> None:

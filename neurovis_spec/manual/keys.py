@@ -154,6 +154,8 @@ def _list(shape: Mapping[str, object]) -> str:
     if shape.get("minItems") == shape.get("maxItems") == 2:
         return "pair [a, b]"
     if isinstance(items, dict) and items.get("type") == "array":
+        if items.get("items") == {"type": "string"} and items.get("maxItems") is None:
+            return "list of lists"
         return "list of pairs" if items.get("maxItems") == 2 else "list of rows"
     return "list of texts" if isinstance(items, dict) and _one(items) == "text" else "list"
 
