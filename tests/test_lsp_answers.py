@@ -19,7 +19,7 @@ from neurovis_spec.lsp.rename import RenameError, apply, prepare, rename
 from neurovis_spec.lsp.symbols import symbols
 from neurovis_spec.lsp.text import Place
 
-SPECS = sorted((Path(__file__).parents[1] / "specs").glob("*.yaml"))
+SPECS = sorted((Path(__file__).parents[1] / "specs").glob("**/*.yaml"))
 BASE = """neurovis: 1
 name: small
 parameters:
@@ -215,6 +215,16 @@ def test_renaming_a_group_renames_its_neurons_and_ranges() -> None:
     assert "{positions: {Leg1: [0, 0]}, arrange: {Leg3..Leg4: row}}" in result
     assert check(Document(result)).network is not None
     assert renamed(result.replace("Leg: {count", "Le¦g: {count"), "K") == BASE + REST
+
+
+def test_weights_and_delays_of_edges_are_expressions() -> None:
+    text = BASE.replace("  beta:", "  late: 2\n  beta:")
+    text += "connections:\n  K -> K: {edges: [[K1, K2, alpha, late + 1], [K4, K5, 2*alpha]]}\n"
+    result = renamed(text.replace("  alpha: 1.5", "  al¦pha: 1.5"), "gain")
+    assert "[[K1, K2, gain, late + 1], [K4, K5, 2*gain]]" in result
+    assert "[[K1, K2, alpha, lag + 1], [K4" in renamed(text.replace("  late: 2", "  la¦te: 2"), "lag")
+    assert {"alpha", "sin"} <= set(offered(text.replace("2*alpha", "2*¦alpha"))) - {"K1"}
+    assert {"K", "K1"} <= set(offered(text.replace("[K4", "[¦K4"))) - {"alpha"}
 
 
 def test_renaming_a_parameter_leaves_other_scopes_alone() -> None:

@@ -17,7 +17,7 @@ from neurovis_spec.lsp.text import Place, Text, holds
 from neurovis_spec.lsp.tolerant import outline_of_text, where
 
 ROOT = Path(__file__).parents[1]
-SPECS = sorted([*ROOT.glob("specs/*.yaml"), *ROOT.glob("neurovis_spec/library/*.yaml")])
+SPECS = sorted([*ROOT.glob("specs/**/*.yaml"), *ROOT.glob("neurovis_spec/library/*.yaml")])
 TEXTS = st.text(st.sampled_from("aé𝜎😀\n\r \ufeff{:,-}[#'\""), max_size=40)
 
 

@@ -174,6 +174,8 @@ def role_of(path: Path, is_key: bool) -> tuple[Role | None, Scope]:
     if len(path) > 2 and path[0] == "modules" and isinstance(path[1], str):
         module, path = path[1], path[2:]
     role = _role(tuple(0 if isinstance(part, int) else part for part in path), is_key)
+    if path[-3:-2] == ("edges",) and path[-1] in (2, 3):  # behind its two ends an edge has a weight and a delay
+        role = _FORMULA
     definition = None
     if len(path) > 2 and path[0] in DEFINITIONS:
         definition = (str(path[0]), str(path[1]))
