@@ -245,21 +245,22 @@ def test_k_hardly_changes_while_s_vanishes(walk: Recording) -> None:
 
 def test_k_goes_to_a_new_level_when_s_changes(walk: Recording) -> None:
     assert walk["right1.S"][2440:2500].sum() == 12
-    assert walk["right1.S"][2800:2860].sum() == 21  # three strides, seven steps each
+    assert walk["right1.S"][2800:2860].sum() == 18  # three strides, six steps each
     old, new = walk["right1.K"][2440:2500].mean(), walk["right1.K"][2840:2900].mean()
-    assert new > 2 * old
+    assert new > 1.8 * old
     half = np.flatnonzero(walk["right1.K"][2500:] > (old + new) / 2)[0]
     assert 30 < half < 150  # neither at once nor never
-    # each gait step returns to its level: the hormone does not follow single contacts
+    assert walk["right1.F"][2800:2860].sum() == 6  # contact is late, but it comes
+    # within a stride it hardly moves: the hormone does not follow single contacts
     assert np.ptp(walk["right1.K"][2840:2900]) < 0.1 * new
 
 
 def test_five_legs_are_on_the_soft_floor_before_the_sixth(walk: Recording) -> None:
     levels = {leg: walk[f"{leg}.K"][2440:2500].mean() for leg in LEGS}
     assert levels.pop("right1") < 0.15
-    assert all(level > 0.28 for level in levels.values())
+    assert all(level > 0.22 for level in levels.values())
 
 
 def test_k_stretches_the_leg(walk: Recording) -> None:
     rigid, soft = (walk["right1.FT"][window].min() for window in (slice(2240, 2300), slice(2840, 2900)))
-    assert soft - rigid == pytest.approx(0.17, abs=0.02)
+    assert soft - rigid == pytest.approx(0.115, abs=0.015)
