@@ -1,72 +1,228 @@
 """Order: who stands beside whom in a rank, so that few segments cross.
 
-In: Levels. Out: node indices by rank, in order. Sweeps by barycentres from two starts, then swaps of neighbours.
-Members of a box stay together; neurons of a group keep the order of their numbers unless crossings gain clearly.
+In: Levels. Out: node indices by rank, in order. Sweeps by barycentres from several starts, sifting after each, then the
+best order shaken and sifted again, as often as its size allows (an iterated local search; the shaking is the same every
+time). Members of a box stay together; neurons of a group keep the order of their numbers unless crossings gain clearly.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import repeat
 
+import numpy as np
+
+from neurovis_layouts.layered.crossings import Floats, Ints, Segments
+from neurovis_layouts.layered.exchange import Exchange
 from neurovis_layouts.layered.levels import Levels
-
-_CLEARLY = 0.85
-_SMALL = 3000
-
-
-class _Graph:
-    """Neighbours above and below with the offsets of the ends, scaled so that a block is one place wide."""
-
-    def __init__(self, levels: Levels) -> None:
-        count = len(levels.nodes)
-        self.nodes = levels.nodes
-        self.above: list[list[tuple[int, float, float]]] = [[] for _ in range(count)]
-        self.below: list[list[tuple[int, float, float]]] = [[] for _ in range(count)]
-        self.size = 0
-        for segment in (segment for gap in levels.segments for segment in gap):
-            a = self._part(segment.upper, segment.a)
-            b = self._part(segment.lower, segment.b)
-            self.below[segment.upper].append((segment.lower, a, b))
-            self.above[segment.lower].append((segment.upper, b, a))
-            self.size += 1
-
-    def _part(self, node: int, offset: float) -> float:
-        return 0.45 * offset / (self.nodes[node].reach[0] + 0.5)
-
+from neurovis_layouts.layered.sifting import HELD, sifted, sifted_in_boxes
 
 Order = list[list[int]]
+
+_CLEARLY = 0.85
+#: Work is counted as pairs of segments that a pass of sifting compares, and this for each rank.
+_A_RANK = 3000
+#: Beyond this a pass takes too long; within it the best order is shaken as often as this allows, or this many times.
+_SIFTED, _SHAKEN, _MOST_TIMES = 1_500_000, 4_000_000, 60
+#: Sweeps from each start, with sifting and without.
+_SWEEPS, _PLAIN_SWEEPS = 4, 14
+#: How far nodes are shaken, as a share of the rank, in 1/1024; and how many sweeps follow.
+_SHAKES = ((100, 0), (200, 2), (400, 0), (100, 2), (200, 0), (400, 2))
+_PATIENCE = 24
 
 
 def ordered(levels: Levels) -> Order:
     """The ranks in order. Deterministic: every tie falls to the order before, in the end to that of the names."""
-    graph = _Graph(levels)
+    if not any(levels.segments):
+        return [_grouped_start(levels, rank) for rank in levels.ranks]
+    segments = Segments(levels)
     natural = [_grouped_start(levels, rank) for rank in levels.ranks]
-    sweeps = 12 if graph.size < _SMALL else 6 if graph.size < 20_000 else 3
-    strict = _best(graph, [natural, _by_descent(graph, natural)], sweeps, True)
-    if graph.size == 0 or strict[0] == 0:
+    held = _Search(levels, segments, True)
+    strict = held.best([natural, _by_descent(levels, natural)])
+    if strict[0] == 0 or not any(held.kin):
         return strict[1]
-    free = _best(graph, [strict[1], natural], sweeps, False)
+    free = _Search(levels, segments, False).best([strict[1], natural])
     return free[1] if free[0] < _CLEARLY * strict[0] else strict[1]
 
 
-def _best(graph: _Graph, starts: Sequence[Order], sweeps: int, strict: bool) -> tuple[int, Order]:
-    best: tuple[int, Order] | None = None
-    for start in starts:
-        order = [list(rank) for rank in start]
-        for sweep in range(sweeps):
-            crossings = count(graph, order)
-            if best is None or crossings < best[0]:
-                best = crossings, [list(rank) for rank in order]
-            if crossings == 0:
-                return best
-            _sweep(graph, order, sweep % 2 == 0, strict)
-            if graph.size < _SMALL:
-                _swap(graph, order, strict)
-        crossings = count(graph, order)
-        if best is None or crossings < best[0]:
-            best = crossings, order
-    assert best is not None
-    return best
+def crossings(levels: Levels, order: Order) -> int:
+    """How many segments cross in this order."""
+    return Segments(levels).count(_places(len(levels.nodes), [np.array(rank, dtype=np.int64) for rank in order]))
+
+
+def _places(count: int, order: Sequence[Ints]) -> Ints:
+    place = np.zeros(count, dtype=np.int64)
+    for rank in order:
+        place[rank] = np.arange(len(rank), dtype=np.int64)
+    return place
+
+
+class _Search:
+    """One search; with ``strict`` neurons of a group keep their order in each rank."""
+
+    def __init__(self, levels: Levels, segments: Segments, strict: bool) -> None:
+        self.levels, self.segments, self.strict = levels, segments, strict
+        self.ids = [np.array(rank, dtype=np.int64) for rank in levels.ranks]
+        boxes = np.array([node.box for node in levels.nodes], dtype=np.int64)
+        self.boxes = [_shared(boxes[ids]) for ids in self.ids]
+        self.kin = [_kin(levels, rank) if strict else [] for rank in levels.ranks]
+        self.work = sum(len(side.other) ** 2 + _A_RANK for side in (*segments.above, *segments.below)) // 2
+
+    def best(self, starts: Sequence[Order]) -> tuple[int, Order]:
+        sift = self.work <= _SIFTED
+        best: tuple[int, list[Ints]] | None = None
+        for start in starts:
+            state = _State(self, [np.array(rank, dtype=np.int64) for rank in start])
+            state.shake(repeat(0), 0)
+            for sweep in range((_SWEEPS if sift else _PLAIN_SWEEPS) + 1):
+                if sweep:
+                    state.sweep(sweep % 2 == 1, sift)
+                now = state.copy()
+                crossings = now.count() - (now.sift() if sift else 0)
+                if best is None or crossings < best[0]:
+                    best = crossings, now.order
+                if crossings == 0:
+                    return 0, [rank.tolist() for rank in now.order]
+        assert best is not None
+        best = self._shaken(*best) if sift else Exchange(self.segments, self._classes()).improved(*best)
+        return best[0], [rank.tolist() for rank in best[1]]
+
+    def _classes(self) -> tuple[Ints, Ints]:
+        """Boxes and, where their order is kept, groups by node."""
+        nodes = self.levels.nodes
+        box = np.array([node.box for node in nodes], dtype=np.int64)
+        return box, np.array([node.kin if self.strict else -1 for node in nodes], dtype=np.int64)
+
+    def _shaken(self, crossings: int, order: list[Ints]) -> tuple[int, list[Ints]]:
+        best, now = (crossings, order), (crossings, order)
+        dice, since = _dice(), 0
+        for turn in range(min(_MOST_TIMES, _SHAKEN // self.work)):
+            far, sweeps = _SHAKES[turn % len(_SHAKES)]
+            state = _State(self, list(now[1]))
+            state.shake(dice, far)
+            for sweep in range(sweeps):
+                state.sweep((sweep + turn) % 2 == 0, True)
+            found = state.count() - state.sift()
+            since = 0 if found < best[0] else since + 1
+            if found <= now[0]:
+                now = found, state.order
+            if found < best[0]:
+                best = now
+            if found == 0 or since > _PATIENCE:
+                break
+        return best
+
+
+class _State:
+    """An order that is worked on; rank arrays are replaced, never changed."""
+
+    def __init__(self, search: _Search, order: list[Ints]) -> None:
+        self.search, self.order = search, order
+        self.place = _places(len(search.levels.nodes), order)
+
+    def copy(self) -> _State:
+        return _State(self.search, list(self.order))
+
+    def count(self) -> int:
+        return self.search.segments.count(self.place)
+
+    def set(self, r: int, local: Ints) -> None:
+        rank = self.search.ids[r][local]
+        self.order[r] = rank
+        self.place[rank] = np.arange(len(rank), dtype=np.int64)
+
+    def sweep(self, down: bool, sift: bool) -> None:
+        """Each rank by the barycentres of what lies above (else below), and sifted with regard to it."""
+        segments, count = self.search.segments, len(self.order)
+        for r in range(1, count) if down else range(count - 2, -1, -1):
+            side = (segments.above if down else segments.below)[r]
+            order = segments.local[self.order[r]]
+            means = segments.means(len(order), side, self.place)[order]
+            known = ~np.isnan(means)
+            if not known.any():
+                continue
+            # what is connected to nothing there stays behind what it stands behind
+            last = np.maximum.accumulate(np.where(known, np.arange(len(means)), -1))
+            order = self._settled(r, order, np.where(last >= 0, means[last], -1.0))
+            if sift:
+                order = self._sifted(r, order, False, down)[0]
+            self.set(r, order)
+
+    def sift(self) -> int:
+        """All ranks sifted with regard to both sides, down and up, until none gains; how many crossings that saved."""
+        count, saved = len(self.order), 0
+        due = [len(rank) > 1 for rank in self.order]
+        down = True
+        while any(due):
+            for r in range(count) if down else range(count - 1, -1, -1):
+                if due[r]:
+                    order, gain = self._sifted(r, self.search.segments.local[self.order[r]], True, True)
+                    due[r] = False
+                    if gain:
+                        self.set(r, order)
+                        saved += gain
+                        for beside in (r - 1, r + 1):
+                            if 0 <= beside < count:
+                                due[beside] = len(self.order[beside]) > 1
+            down = not down
+        return saved
+
+    def shake(self, dice: Iterator[int], far: int) -> None:
+        """Every node somewhere near, at most ``far`` 1024ths of its rank behind; groups in their order if they keep
+        it."""
+        for r, rank in enumerate(self.order):
+            count = len(rank)
+            moved = np.array([i * 1024 + next(dice) * count * far // 1024 for i in range(count)], dtype=np.float64)
+            self.set(r, self._settled(r, self.search.segments.local[rank], moved))
+
+    def _sifted(self, r: int, order: Ints, both: bool, down: bool) -> tuple[Ints, int]:
+        search = self.search
+        sides = [search.segments.above[r]] if both or down else []
+        sides += [search.segments.below[r]] if both or not down else []
+        costs = search.segments.differences(len(order), sides, self.place)
+        for mates in search.kin[r]:
+            costs[mates[:, None], mates] = np.sign(mates[:, None] - mates) * HELD
+        boxes = search.boxes[r]
+        return sifted(costs, order) if boxes is None else sifted_in_boxes(costs, order, boxes)
+
+    def _settled(self, r: int, order: Ints, value: Floats) -> Ints:
+        """Sorted by value, boxes as a whole; neurons of a group take the places that they got in natural order."""
+        boxes = self.search.boxes[r]
+        if boxes is None:
+            result = order[np.argsort(value, kind="stable")]
+        else:
+            box = boxes[order]
+            inside = box >= 0
+            sums = np.bincount(box[inside], value[inside])
+            mean = np.where(inside, (sums / np.maximum(np.bincount(box[inside]), 1))[np.maximum(box, 0)], value)
+            result = order[np.lexsort((np.arange(len(order)), value, box, mean))]
+        for mates in self.search.kin[r]:
+            places = np.flatnonzero(np.isin(result, mates))
+            result[places] = mates
+        return result
+
+
+def _shared(boxes: Ints) -> Ints | None:
+    """Boxes by node, if any holds two of a rank."""
+    inside = boxes[boxes >= 0]
+    return boxes if len(inside) > len(np.unique(inside)) else None
+
+
+def _kin(levels: Levels, rank: Sequence[int]) -> list[Ints]:
+    """Places in ``ranks[r]`` of neurons of one group in one box, in their order, where there are several."""
+    kin: dict[tuple[int, int], list[int]] = {}
+    for i, node in enumerate(rank):
+        if levels.nodes[node].kin >= 0:
+            kin.setdefault((levels.nodes[node].kin, levels.nodes[node].box), []).append(i)
+    return [np.array(mates, dtype=np.int64) for mates in kin.values() if len(mates) > 1]
+
+
+def _dice() -> Iterator[int]:
+    """Numbers from 0 to 1023, the same every time (a linear congruential generator, its high bits)."""
+    state = 1
+    while True:
+        state = (state * 1664525 + 1013904223) % (1 << 32)
+        yield state >> 22
 
 
 def _grouped_start(levels: Levels, rank: Sequence[int]) -> list[int]:
@@ -78,127 +234,17 @@ def _grouped_start(levels: Levels, rank: Sequence[int]) -> list[int]:
     return sorted(rank, key=lambda node: key[node])
 
 
-def _by_descent(graph: _Graph, natural: Order) -> Order:
+def _by_descent(levels: Levels, natural: Order) -> Order:
     """Nodes in the order in which a walk down from the first rank meets them: keeps what hangs together together."""
+    below: list[list[int]] = [[] for _ in levels.nodes]
+    for segment in (segment for gap in levels.segments for segment in gap):
+        below[segment.upper].append(segment.lower)
     met: dict[int, int] = {}
     for root in (node for rank in natural for node in rank):
         stack = [root]
         while stack:
             node = stack.pop()
-            if node in met:
-                continue
-            met[node] = len(met)
-            stack.extend(other for other, _, _ in reversed(graph.below[node]) if other not in met)
-    order = [sorted(rank, key=lambda node: met[node]) for rank in natural]
-    return [_settle(graph, rank, {node: float(i) for i, node in enumerate(rank)}, True) for rank in order]
-
-
-def _sweep(graph: _Graph, order: Order, down: bool, strict: bool) -> None:
-    ranks = range(1, len(order)) if down else range(len(order) - 2, -1, -1)
-    near = graph.above if down else graph.below
-    for r in ranks:
-        place = {node: i for i, node in enumerate(order[r - 1 if down else r + 1])}
-        value: dict[int, float] = {}
-        last = -1.0
-        for node in order[r]:
-            ends = [place[other] + offset for other, _, offset in near[node]]
-            last = sum(ends) / len(ends) if ends else last
-            value[node] = last
-        order[r] = _settle(graph, order[r], value, strict)
-
-
-def _settle(graph: _Graph, rank: list[int], value: dict[int, float], strict: bool) -> list[int]:
-    """Sort by value, boxes as a whole; with ``strict`` neurons of a group take the places they got in natural order."""
-    boxes: dict[int, list[float]] = {}
-    for node in rank:
-        if graph.nodes[node].box >= 0:
-            boxes.setdefault(graph.nodes[node].box, []).append(value[node])
-    middle = {box: sum(values) / len(values) for box, values in boxes.items()}
-    at = {node: i for i, node in enumerate(rank)}
-
-    def key(node: int) -> tuple[float, int, float, int]:
-        box = graph.nodes[node].box
-        return (middle.get(box, value[node]), box, value[node], at[node])
-
-    result = sorted(rank, key=key)
-    if strict:
-        slots: dict[tuple[int, int], list[int]] = {}
-        for i, node in enumerate(result):
-            if graph.nodes[node].kin >= 0:
-                slots.setdefault((graph.nodes[node].kin, graph.nodes[node].box), []).append(i)
-        for places in slots.values():
-            for i, node in zip(places, sorted(result[i] for i in places), strict=True):
-                result[i] = node
-    return result
-
-
-def _swap(graph: _Graph, order: Order, strict: bool) -> None:
-    """Swap neighbours where that saves crossings, until none does (at most a few rounds)."""
-    for _ in range(4):
-        better = False
-        for r, rank in enumerate(order):
-            upper = {node: i for i, node in enumerate(order[r - 1])} if r > 0 else {}
-            lower = {node: i for i, node in enumerate(order[r + 1])} if r + 1 < len(order) else {}
-            up = {n: sorted(upper[o] + f for o, _, f in graph.above[n]) for n in rank} if upper else {}
-            low = {n: sorted(lower[o] + f for o, _, f in graph.below[n]) for n in rank} if lower else {}
-            for i in range(len(rank) - 1):
-                a, b = rank[i], rank[i + 1]
-                if not _may_swap(graph, a, b, strict):
-                    continue
-                gain = sum(_cross(s[a], s[b]) - _cross(s[b], s[a]) for s in (up, low) if s)
-                if gain > 0:
-                    rank[i], rank[i + 1] = b, a
-                    better = True
-        if not better:
-            return
-
-
-def _may_swap(graph: _Graph, a: int, b: int, strict: bool) -> bool:
-    first, second = graph.nodes[a], graph.nodes[b]
-    return first.box == second.box and not (strict and first.kin >= 0 and first.kin == second.kin)
-
-
-def _cross(left: Sequence[float], right: Sequence[float]) -> int:
-    """How many pairs cross when ``left``'s node stands to the left: ends of right before ends of left."""
-    total, j = 0, 0
-    for end in left:
-        while j < len(right) and right[j] < end:
-            j += 1
-        total += j
-    return total
-
-
-def count(graph: _Graph, order: Order) -> int:
-    """Crossings of all segments: inversions, by a Fenwick tree (Barth, Mutzel and Jünger 2004)."""
-    total = 0
-    for r in range(len(order) - 1):
-        place = {node: i for i, node in enumerate(order[r + 1])}
-        pairs = sorted(
-            (i + a, place[other] + b) for i, node in enumerate(order[r]) for other, a, b in graph.below[node]
-        )
-        ends = {end: i + 1 for i, end in enumerate(sorted({end for _, end in pairs}))}
-        tree = [0] * (len(ends) + 1)
-        waiting: list[int] = []
-        seen, start = 0, None
-        for begin, end in pairs:
-            if begin != start:  # segments from one point do not cross: they are entered when it is done
-                for i in waiting:
-                    _enter(tree, i)
-                seen, waiting, start = seen + len(waiting), [], begin
-            total += seen - _up_to(tree, ends[end])
-            waiting.append(ends[end])
-    return total
-
-
-def _enter(tree: list[int], i: int) -> None:
-    while i < len(tree):
-        tree[i] += 1
-        i += i & -i
-
-
-def _up_to(tree: Sequence[int], i: int) -> int:
-    total = 0
-    while i > 0:
-        total += tree[i]
-        i -= i & -i
-    return total
+            if node not in met:
+                met[node] = len(met)
+                stack.extend(other for other in reversed(below[node]) if other not in met)
+    return [_grouped_start(levels, sorted(rank, key=lambda node: met[node])) for rank in natural]

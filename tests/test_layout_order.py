@@ -1,0 +1,161 @@
+"""The order of ranks: exact counts of crossings, the best order of tiny graphs by trying all, and the contract."""
+
+from __future__ import annotations
+
+from itertools import pairwise, permutations, product
+from random import Random
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from neurovis_layouts.layered.crossings import Ints, Segments, inversions
+from neurovis_layouts.layered.exchange import Exchange
+from neurovis_layouts.layered.levels import Levels, Node, Segment
+from neurovis_layouts.layered.order import Order, crossings, ordered
+from neurovis_layouts.layered.sifting import HELD, sifted, sifted_in_boxes
+
+
+def levels_by_hand(nodes: list[list[Node]], segments: list[list[tuple[int, float, int, float]]]) -> Levels:
+    """Segments are (place in the rank, offset, place in the next, offset)."""
+    levels = Levels()
+    for rank in nodes:
+        levels.ranks.append(list(range(len(levels.nodes), len(levels.nodes) + len(rank))))
+        levels.nodes += rank
+    for r, gap in enumerate(segments):
+        above, below = levels.ranks[r], levels.ranks[r + 1]
+        levels.segments.append([Segment(above[i], a, below[j], b, 1.0) for i, a, j, b in gap])
+    return levels
+
+
+@st.composite
+def some_levels(
+    draw: st.DrawFn, most: int = 6, ranks: int = 4, boxes: bool = False, kin: bool = False, ports: bool = True
+) -> Levels:
+    """Some ranks with segments between; nodes of boxes and groups if asked."""
+    offsets = st.sampled_from([-0.5, 0.0, 0.5]) if ports else st.just(0.0)
+    sizes = draw(st.lists(st.integers(1, most), min_size=2, max_size=ranks))
+    nodes = [
+        [
+            Node(
+                r,
+                ((0, 0.0, 0.0),),
+                (0.5, 0.0),
+                draw(st.integers(-1, 1)) if kin else -1,
+                draw(st.integers(-1, 1)) if boxes else -1,
+            )
+            for _ in range(size)
+        ]
+        for r, size in enumerate(sizes)
+    ]
+    gaps = [
+        draw(
+            st.lists(st.tuples(st.integers(0, a - 1), offsets, st.integers(0, b - 1), offsets), min_size=1, max_size=14)
+        )
+        for a, b in pairwise(sizes)
+    ]
+    return levels_by_hand(nodes, gaps)
+
+
+def by_pairs(levels: Levels, order: Order) -> int:
+    """Crossings, pair by pair, from the definition."""
+    total = 0
+    for r, gap in enumerate(levels.segments):
+        upper = {node: i for i, node in enumerate(order[r])}
+        lower = {node: i for i, node in enumerate(order[r + 1])}
+        ends = [((upper[s.upper], s.a), (lower[s.lower], s.b)) for s in gap]
+        total += sum(a < c and d < b for (a, b), (c, d) in product(ends, ends))
+    return total
+
+
+@given(st.lists(st.integers(0, 9), max_size=40))
+def test_inversions_are_pairs_out_of_order(values: list[int]) -> None:
+    expected = sum(a > b for i, a in enumerate(values) for b in values[i + 1 :])
+    assert inversions(np.array(values, dtype=np.int64)) == expected
+
+
+@given(some_levels(), st.randoms(use_true_random=False))
+def test_the_fast_count_is_the_plain_one(levels: Levels, random: Random) -> None:
+    order = [random.sample(rank, len(rank)) for rank in levels.ranks]
+    assert crossings(levels, order) == by_pairs(levels, order)
+
+
+@given(some_levels(most=4, ranks=3))
+@settings(deadline=None, max_examples=40)
+def test_tiny_graphs_are_ordered_as_well_as_can_be(levels: Levels) -> None:
+    every = product(*map(permutations, levels.ranks))
+    best = min(by_pairs(levels, [list(rank) for rank in order]) for order in every)
+    assert by_pairs(levels, ordered(levels)) == best
+
+
+@given(some_levels(boxes=True, kin=True))
+@settings(deadline=None, max_examples=40)
+def test_every_rank_keeps_its_nodes_and_its_boxes_together(levels: Levels) -> None:
+    order = ordered(levels)
+    assert [sorted(rank) for rank in order] == levels.ranks
+    for rank in order:
+        boxes = [levels.nodes[node].box for node in rank]
+        runs = [box for i, box in enumerate(boxes) if i == 0 or boxes[i - 1] != box]
+        assert len([box for box in runs if box >= 0]) == len({box for box in boxes if box >= 0})
+
+
+def test_a_group_keeps_its_order_unless_crossings_gain_clearly() -> None:
+    group = [Node(0, ((i, 0.0, 0.0),), kin=0) for i in range(3)]
+    alone = [Node(1, ((i + 3, 0.0, 0.0),), kin=i + 1) for i in range(3)]
+    turned = levels_by_hand([group, alone], [[(0, 0.0, 2, 0.0), (1, 0.0, 1, 0.0), (2, 0.0, 0, 0.0)]])
+    assert ordered(turned) == [[0, 1, 2], [5, 4, 3]]  # what is in no group makes way
+    both = levels_by_hand([group, [Node(1, ((i + 3, 0.0, 0.0),), kin=1) for i in range(3)]], [
+        [(0, 0.0, 2, 0.0), (1, 0.0, 1, 0.0), (2, 0.0, 0, 0.0)]
+    ])  # fmt: skip
+    assert by_pairs(both, ordered(both)) == 0  # a clear gain
+
+
+def test_complete_layers_stay_in_the_order_of_their_numbers() -> None:
+    sizes = (4, 6, 3)
+    ranks = [[Node(r, ((10 * r + i, 0.0, 0.0),), kin=r) for i in range(size)] for r, size in enumerate(sizes)]
+    gaps = [[(i, 0.0, j, 0.0) for i in range(a) for j in range(b)] for a, b in pairwise(sizes)]
+    levels = levels_by_hand(ranks, gaps)
+    assert ordered(levels) == levels.ranks
+
+
+@given(some_levels(ports=False))
+@settings(deadline=None, max_examples=40)
+def test_the_order_of_segments_does_not_show(levels: Levels) -> None:
+    turned = Levels(levels.nodes, levels.ranks, [gap[::-1] for gap in levels.segments])
+    assert [*map(set, ordered(turned))] == [*map(set, levels.ranks)]
+    assert by_pairs(turned, ordered(turned)) == by_pairs(levels, ordered(levels))
+
+
+@given(some_levels(boxes=True))
+def test_differences_are_what_sifting_saves(levels: Levels) -> None:
+    segments = Segments(levels)
+    place = np.zeros(len(levels.nodes), dtype=np.int64)
+    for rank in levels.ranks:
+        place[rank] = np.arange(len(rank))
+    for r, rank in enumerate(levels.ranks):
+        costs = segments.differences(len(rank), (segments.above[r], segments.below[r]), place)
+        boxes: Ints = np.array([levels.nodes[node].box for node in rank], dtype=np.int64)
+        start = np.lexsort((np.arange(len(rank)), boxes))
+        first = [[*other] for other in levels.ranks]
+        first[r] = [rank[i] for i in start]
+        for found, saved in (sifted(costs, start), sifted_in_boxes(costs, start, boxes)):
+            order = [[*other] for other in first]
+            order[r] = [rank[i] for i in found]
+            assert by_pairs(levels, order) == by_pairs(levels, first) - saved
+
+
+def test_what_is_held_is_never_passed() -> None:
+    costs = np.array([[0, 5], [-5, 0]], dtype=np.int64)
+    assert sifted(costs, np.array([0, 1]))[0].tolist() == [1, 0]
+    costs[0, 1], costs[1, 0] = -HELD, HELD
+    assert sifted(costs, np.array([0, 1]))[0].tolist() == [0, 1]
+
+
+@given(some_levels(boxes=True, kin=True))
+def test_exchanges_save_what_they_say(levels: Levels) -> None:
+    classes = np.array([n.box for n in levels.nodes]), np.array([n.kin for n in levels.nodes])
+    ranks: list[Ints] = [np.array(rank, dtype=np.int64) for rank in levels.ranks]
+    before = by_pairs(levels, levels.ranks)
+    after, order = Exchange(Segments(levels), classes).improved(before, ranks)
+    assert after == by_pairs(levels, [rank.tolist() for rank in order]) <= before
+    kept = [[n for n in rank if levels.nodes[n].kin == 0 and levels.nodes[n].box == -1] for rank in order]
+    assert all(nodes == sorted(nodes) for nodes in kept)
