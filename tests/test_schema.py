@@ -123,6 +123,21 @@ def test_right_specs_pass(path: Path) -> None:
         assert as_included == []
 
 
+PAGE = (HERE.parent / "docs" / "language.md").read_text(encoding="utf-8")
+MANUAL = HERE.parent / "neurovis_spec" / "manual" / "examples.yaml"
+
+
+@pytest.mark.parametrize("text", re.findall(r"^```yaml\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL))
+def test_examples_of_the_language_page_pass(text: str) -> None:
+    assert list(VALIDATOR.iter_errors({"neurovis": 1, "name": "x", **yaml.safe_load(text)})) == []
+
+
+@pytest.mark.parametrize("key", yaml.safe_load(MANUAL.read_text(encoding="utf-8")))
+def test_examples_of_the_manual_pass(key: str) -> None:
+    example = yaml.safe_load(yaml.safe_load(MANUAL.read_text(encoding="utf-8"))[key])
+    assert list(VALIDATOR.iter_errors({"neurovis": 1, "name": "x", **example})) == []
+
+
 @pytest.mark.parametrize(
     "text",
     [
