@@ -25,6 +25,8 @@ from neurovis_spec.lsp.roles import role_of
 from neurovis_spec.lsp.text import Place, Text
 from neurovis_spec.lsp.words import GIVEN
 
+#: How many specs that share a declaration are compiled to see whether a rename does harm; each takes its time.
+_MOST_CHECKED = 8
 _NOTHING = "there is no name here that this document declares"
 
 
@@ -85,7 +87,7 @@ def _families(document: Document, declaration: Name) -> list[tuple[Page, ...]]:
     """The files that share a declaration: a spec, or a file that none includes, first, then what it includes."""
     if not is_common(declaration):
         return [(document.page,)]
-    families = [(document.page, *document.included)]
+    families = {document.file: (document.page, *document.included)}
     page = document.page_of(declaration.span.file)
     if page.library:
         path = document.path if page is document.page else Path(page.file)
@@ -95,9 +97,9 @@ def _families(document: Document, declaration: Name) -> list[tuple[Page, ...]]:
             message = f"the workspace holds too many files to find all that include '{path.name}': rename it by hand"
             raise RenameError(message) from None
         for user, included in users:
-            family = (user, *included)
-            families.append(tuple(document.page if Path(one.file) == document.path else one for one in family))
-    return list({family[0].file: family for family in reversed(families)}.values())[::-1]
+            family = (document.page if Path(one.file) == document.path else one for one in (user, *included))
+            families.setdefault(user.file, tuple(family))
+    return list(families.values())
 
 
 def _indices(family: tuple[Page, ...]) -> Iterator[Index]:
@@ -192,7 +194,7 @@ def _numbered(name: str, group: str, numbers: range) -> bool:
 
 
 def _check_result(document: Document, families: list[tuple[Page, ...]], edits: tuple[Edit, ...], new: str) -> None:
-    """Compile what would be: what goes wrong only then is the new name's doing."""
+    """Compile what would be, of many specs some: what goes wrong only then is the new name's doing."""
     pages = {page.file: page for family in families for page in family}
     texts: dict[Path, str] = {}
     for page in pages.values():
@@ -200,7 +202,7 @@ def _check_result(document: Document, families: list[tuple[Page, ...]], edits: t
         if own:
             texts[document.path if page is document.page else Path(page.file)] = _applied(page.text, own)
     after = document.files.holding(texts)
-    for head, *_ in families:
+    for head, *_ in families[:_MOST_CHECKED]:
         before = document
         if head is not document.page:
             path = Path(head.file)
