@@ -33,8 +33,8 @@ def test_expressions(part: int) -> None:
 
 
 def test_the_same_seed_gives_the_same_texts() -> None:
-    assert [fuzz_texts.make(3, number) for number in range(300, 320)] == [
-        fuzz_texts.make(3, number) for number in range(300, 320)
+    assert [fuzz_texts.make(3, number) for number in range(3000, 3020)] == [
+        fuzz_texts.make(3, number) for number in range(3000, 3020)
     ]
-    assert fuzz_texts.make(3, 300) != fuzz_texts.make(4, 300)
+    assert fuzz_texts.make(3, 3000) != fuzz_texts.make(4, 3000)
     assert fuzz_expressions.make(3, 1) == fuzz_expressions.make(3, 1)
