@@ -105,6 +105,33 @@ PICTURES = (
         "An episode has just ended, and all connections to O change at once: by how much, reward and policy say "
         "(dotted). L reaches B twice, at once and a step later, with opposite signs: B is the difference.",
     ),
+    Picture(
+        "hexapod",
+        "hexapod/hexapod",
+        588,
+        "Use case 3, walking: three ripples on the line",
+        "The rhythm enters the upper delay line at DL6 and passes over the right legs, from hind to front, then over "
+        "the left ones. At this frequency every second neuron of DL6 to DL11 is active, and three legs are lifted: "
+        "left2, right1 and right3. This is the tripod gait. The lower line swings them forward.",
+    ),
+    Picture(
+        "hexapod_obstacle",
+        "hexapod/hexapod",
+        1189,
+        "Use case 3, learning to step over a beam",
+        "The front legs hit the fourth beam 49 steps ago, and dp carries the news to the legs behind. The middle legs "
+        "stepped high too early and have just hit the beam, too (H is active): the connection that warned them glows. "
+        "Thicker, it keeps the news up for longer, and they will step later.",
+    ),
+    Picture(
+        "hexapod_floor",
+        "hexapod/hexapod",
+        2341,
+        "Use case 3, remembering the floor",
+        "All legs but the right front one walk on the soft floor, where contact comes late: S is active in left2 and "
+        "right3, which have just come down, and K is high in all five. The S of right1 has been silenced for 31 steps; "
+        "its K, lower since its floor is rigid, is where it was.",
+    ),
 )
 
 

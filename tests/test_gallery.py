@@ -13,10 +13,14 @@ SHOWN = re.findall(r"!\[[^\]]+\]\(pictures/(\w+)\.svg\)", PAGE)
 
 
 def test_every_example_is_shown_with_the_command_that_draws_it() -> None:
-    specs = {path.stem for path in (HERE / "specs").glob("*.yaml")}
-    assert specs <= set(SHOWN)
+    folder = HERE / "specs"
+    specs = {
+        path.relative_to(folder).with_suffix("").as_posix()
+        for path in (*folder.glob("*.yaml"), *folder.glob("*/*.yaml"))
+    }
+    assert {Path(spec).name for spec in specs} <= set(SHOWN)
     assert {"cpg_rbf_dark", "cpg_rbf_learning"} <= set(SHOWN)
-    drawn = re.findall(r"`neurovis (?:render|animate) specs/(\w+)\.yaml .* -o (\w+)\.svg`", PAGE)
+    drawn = re.findall(r"`neurovis (?:render|animate) specs/([\w/]+)\.yaml .* -o (\w+)\.svg`", PAGE)
     assert [name for _, name in drawn] == SHOWN
     assert {spec for spec, _ in drawn} == specs
 

@@ -25,9 +25,9 @@ from neurovis_spec.api import CompiledNetwork
 from neurovis_spec.scene import Scene
 
 HERE = Path(__file__).parent
-SPECS = sorted((HERE.parent / "specs").glob("*.yaml"))
+SPECS = sorted([*(HERE.parent / "specs").glob("*.yaml"), *(HERE.parent / "specs").glob("*/*.yaml")])
 #: the step that the scene shows
-STEPS = {"cpg_rbf": 160, "mlp": 3, "hebbian": 250, "reward": 630}
+STEPS = {"cpg_rbf": 160, "mlp": 3, "hebbian": 250, "reward": 630, "hexapod": 1189}
 Plain: TypeAlias = "bool | int | float | str | list[Plain] | dict[str, Plain] | None"
 
 
