@@ -126,20 +126,20 @@ def _cyclic(modules: Mapping[str, Module], findings: Findings) -> Iterator[str]:
     """The modules that hold themselves, directly or through others; a finding for each cycle."""
     done: set[str] = set()
     for root in modules:
-        way: list[str] = []
+        way: dict[str, None] = {}  # in order, the innermost last
         waiting = [(root, 0)]
         while waiting:
             name, depth = waiting.pop()
-            for left in way[depth:]:
-                done.add(left)
-            del way[depth:]
+            while len(way) > depth:
+                done.add(way.popitem()[0])
             if name in done:
                 continue
-            way.append(name)
+            way[name] = None
             for instance in modules[name].model.instances.values():
                 used = instance.module.value
                 if used in way:
-                    names = [*way[way.index(used) :], used]
+                    before = [*way]
+                    names = [*before[before.index(used) :], used]
                     shown = names if len(names) <= 8 else [*names[:4], "…", *names[-3:]]
                     message = f"these modules hold each other: {' -> '.join(shown)}"
                     if len(names) == 2:
