@@ -13,7 +13,8 @@ import neurovis_spec as nv
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.layout.file import parse
 
-EXAMPLES = sorted((Path(__file__).parent.parent / "specs").glob("*.yaml"))
+FOLDER = Path(__file__).parent.parent / "specs"
+EXAMPLES = sorted([*FOLDER.glob("*.yaml"), *FOLDER.glob("*/*.yaml")])
 
 
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
