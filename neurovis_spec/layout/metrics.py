@@ -44,7 +44,7 @@ def metrics(layout: Layout, problem: LayoutProblem) -> dict[str, float | int]:
         "overlaps": _overlaps(centres),
         "edges_over_neurons": _edges_over_neurons(segments, ends, centres),
         "flow": _flow(layout, problem),
-        "symmetry": 1,
+        "symmetry": _symmetry(centres, problem),
         "area": _area(centres),
         "pins_moved": sum(layout.positions[problem.neurons[i]] != point for i, point in problem.pins.items()),
     }
@@ -216,6 +216,25 @@ def _flow(layout: Layout, problem: LayoutProblem) -> float:
     open_edges = [edge for edge in problem.edges if component[edge.source] != component[edge.target]]
     forward = sum(along[edge.target] > along[edge.source] for edge in open_edges)
     return forward / len(open_edges) if open_edges else 1.0
+
+
+def _symmetry(centres: FloatArray, problem: LayoutProblem) -> float:
+    """Share of the mirrored pairs that are mirror images on the axis of their scope (the median of the middles between
+    pairs), to a billionth; 1 for none."""
+    if not problem.mirrors:
+        return 1.0
+    across = 0 if problem.direction in ("down", "up") else 1
+    scopes: dict[int, list[tuple[int, int]]] = {}
+    for mirror in problem.mirrors:
+        scopes.setdefault(mirror.scope, []).extend(mirror.pairs)
+    kept = 0
+    for pairs in scopes.values():
+        first, second = centres[[a for a, _ in pairs]], centres[[b for _, b in pairs]]
+        middle = (first[:, across] + second[:, across]) / 2
+        axis = np.sort(middle)[len(middle) // 2]
+        level = np.abs(first[:, 1 - across] - second[:, 1 - across]) <= _SLACK
+        kept += int((level & (np.abs(middle - axis) <= _SLACK)).sum())
+    return kept / sum(len(pairs) for pairs in scopes.values())
 
 
 def _area(centres: FloatArray) -> float:

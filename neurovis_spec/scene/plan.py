@@ -15,7 +15,7 @@ import numpy as np
 from neurovis_spec.compiler.network import Network, RenderSettings
 from neurovis_spec.layout.model import RADIUS, Layout
 from neurovis_spec.scene import delays, legend, texts
-from neurovis_spec.scene.boxes import Box, box_title, boxes_of
+from neurovis_spec.scene.boxes import Box, box_title, boxes_of, outline
 from neurovis_spec.scene.frame import MARGIN, MOST, Frame, Wishes, fit
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.geometry import FloatArray, Point, Rect, bounds, sample
@@ -196,15 +196,26 @@ def _box_frames(boxes: Sequence[Box], frame: Frame, theme: Theme) -> list[Group]
         x0, y0, x1, y1 = _mapped(box.rect, frame)
         radius = min(10.0, 0.2 * frame.scale)
         shape = Rectangle((x0, y0), x1 - x0, y1 - y0, radius, theme.box_fill, theme.box_line, 1.0)
-        groups.append(Group((shape,), id=f"box:{box.name}", title=box.name))
+        groups.append(Group((shape,), id=f"{box.kind}:{box.path}", title=box.path))
     return groups
 
 
 def _box_titles(boxes: Sequence[Box], frame: Frame, obstacles: Obstacles, theme: Theme, picture: Rect) -> list[Group]:
     if frame.scale < 12:  # the boxes are smaller than their titles
         return []
-    found = [box_title(box, _mapped(box.rect, frame), obstacles, theme, picture) for box in boxes]
-    return [Group((text,), id=f"title:{box.name}") for box, text in zip(boxes, found, strict=True) if text is not None]
+    for box in boxes:
+        obstacles.add_line(outline(_mapped(box.rect, frame)))
+    found = [
+        box_title(box, _mapped(box.rect, frame), obstacles, theme, _room(box, boxes, frame, picture)) for box in boxes
+    ]
+    return [Group((text,), id=f"title:{box.path}") for box, text in zip(boxes, found, strict=True) if text is not None]
+
+
+def _room(box: Box, boxes: Sequence[Box], frame: Frame, picture: Rect) -> Rect:
+    """Where a title may stand: within the smallest instance that holds the box, else anywhere."""
+    around = [b for b in boxes if b.kind == "instance" and b is not box and set(box.members) <= set(b.members)]
+    outer = [b for b in around if b.kind != box.kind or len(b.path) < len(box.path)]
+    return _mapped(min(outer, key=lambda b: (len(b.members), -len(b.path))).rect, frame) if outer else picture
 
 
 def _mapped(rect: Rect, frame: Frame) -> Rect:

@@ -19,10 +19,13 @@ from neurovis_layouts.layered.parts import Part, firm, images_of, may_be_frame, 
 from neurovis_layouts.layered.settle import Settled, settled
 from neurovis_layouts.layered.sheet import Plan, planned
 from neurovis_layouts.layered.units import Unit
-from neurovis_spec.layout.model import LayoutMirror, LayoutProblem, Route
+from neurovis_spec.layout.geometry import distance, snap
+from neurovis_spec.layout.model import LayoutMirror, LayoutProblem, Point, Route
 
 #: A box is drawn no closer round its neurons than this.
 _LINE = 0.6
+#: What a module pins gives way to pins closer than this.
+_OFF = 0.75
 
 
 class Composer:
@@ -35,7 +38,30 @@ class Composer:
 
     def whole(self) -> Drawing:
         """The drawing of the problem. Raises LayoutRefusalError for what cannot be met."""
-        return self.compose(self._book.whole())
+        problem = self._book.whole()
+        return self.compose(replace(problem, pins=self._with_origins(problem)))
+
+    def _with_origins(self, problem: LayoutProblem) -> dict[int, Point]:
+        """The pins, and for instances whose origin is pinned the places of all of their neurons that keep off these.
+
+        The origin of an instance whose module pins nothing is where its smallest x and y are.
+        """
+        second = {b for mirror in problem.mirrors for _, b in mirror.pairs}
+        found: dict[int, Point] = {}
+        for module in problem.modules:
+            if module.origin is None:
+                continue
+            drawing = self.kind(int(module.template))
+            flip = not drawing.fixed and module.members[0] in second
+            places = [Move((0.0, 0.0), flip).point(place) for place in drawing.places]
+            x, y = module.origin
+            if not drawing.fixed:
+                x, y = x - min(px for px, _ in places), y - min(py for _, py in places)
+            for member, (px, py) in zip(module.members, places, strict=True):
+                place = (x + px, y + py)
+                if all(distance(place, other) >= _OFF for other in problem.pins.values()):
+                    found[member] = place
+        return dict(sorted({**found, **problem.pins}.items()))
 
     def kind(self, number: int) -> Drawing:
         """The drawing of a kind of instance."""
@@ -67,7 +93,14 @@ class Composer:
                 families.setdefault((piece.part.family, piece.part.kind), []).append(min(piece.part.members))
         units, bonds = bonded(problem, units, pair, list(families.values()))
         plan = planned(problem, units, bonds, pair)
-        rests = settled(problem, plan, [_resting(plan, piece) for piece in pieces], pair)
+
+        def redraw(piece: Piece, pins: Mapping[int, Point]) -> Piece:
+            inner = (
+                self._book.problem_of(piece.part.kind) if piece.part.kind >= 0 else _boxed(problem, piece.part, pair)
+            )
+            return _as_piece(piece.part, self.compose(replace(inner, pins=_around_pins(piece.drawing, pins, inner))))
+
+        rests = settled(problem, plan, [_resting(plan, piece) for piece in pieces], pair, redraw)
         return _joined(problem, plan, rests, units, pair)
 
     def _piece(self, problem: LayoutProblem, part: Part, before: Sequence[Piece], pair: Mapping[int, int]) -> Piece:
@@ -77,9 +110,27 @@ class Composer:
             drawing = self.kind(part.kind)
         else:
             drawing = self.compose(_boxed(problem, part, pair))
-        rect = drawing.rect()
-        x = (rect[0] + rect[2]) / 2 if drawing.axis is None else drawing.axis
-        return Piece(part, drawing, (x, (rect[1] + rect[3]) / 2), rect)
+        return _as_piece(part, drawing)
+
+
+def _as_piece(part: Part, drawing: Drawing) -> Piece:
+    rect = drawing.rect()
+    x = (rect[0] + rect[2]) / 2 if drawing.axis is None else drawing.axis
+    return Piece(part, drawing, (x, (rect[1] + rect[3]) / 2), rect)
+
+
+def _around_pins(drawing: Drawing, pins: Mapping[int, Point], inner: LayoutProblem) -> dict[int, Point]:
+    """Absolute pins of a part, and those of its module that keep off them, their origin where the others fit best."""
+    if not inner.pins:
+        return dict(sorted(pins.items()))
+    apart = [(x - drawing.places[i][0], y - drawing.places[i][1]) for i, (x, y) in sorted(pins.items())]
+    origin = snap(sum(x for x, _ in apart) / len(apart)), snap(sum(y for _, y in apart) / len(apart))
+    found = dict(pins)
+    for i, (x, y) in inner.pins.items():
+        place = (x + origin[0], y + origin[1])
+        if i not in found and all(distance(place, other) >= _OFF for other in pins.values()):
+            found[i] = place
+    return dict(sorted(found.items()))
 
 
 def _unit(problem: LayoutProblem, piece: Piece, number: int, pieces: Sequence[Piece], pair: Mapping[int, int]) -> Unit:
@@ -142,7 +193,7 @@ def _joined(
             frames.append((part.members, move.rect(piece.rect)))
     links = [i for i, key in enumerate(keys) if key not in routes]
     routes.update(linked(problem, links, keys, plan, rests, units, frames, pair))
-    return Drawing(tuple(places), routes, tuple(frames), rests.axis if pair else None)
+    return Drawing(tuple(places), routes, tuple(frames), rests.axis if pair else None, bool(problem.pins))
 
 
 def _entered(drawing: Drawing, members: Sequence[int]) -> bool:

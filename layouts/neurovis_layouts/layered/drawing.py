@@ -19,7 +19,7 @@ Rect: TypeAlias = tuple[float, float, float, float]
 
 #: From centres, from routes and from frames within to the line of a frame; on top there is room for a title.
 _PAD, _PAD_ROUTE, _PAD_FRAME = 0.65, 0.2, 0.35
-_TITLE = 0.25
+_TITLE = 0.35
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,9 +17,6 @@ from neurovis_layouts.routing.channels import channels
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import LayoutEdge, LayoutProblem, Point, Route
 
-#: How far the two of a pair that drive each other bow, as a share of their distance.
-_SWERVE = 0.16
-
 
 def linked(
     problem: LayoutProblem,
@@ -74,24 +71,25 @@ def _reflected(routes: dict[Key, Route], rests: Settled, pair: Mapping[int, int]
     for key, route in sorted(routes.items()):
         source, target, number = key
         image = pair.get(source, source), pair.get(target, target), number
+        if pair.get(source) == target and (target, source, 0) in routes:
+            ends = rests.places[source], rests.places[target]
+            route = _swerving(routes[(*min(key, image)[:2], 0)], ends, rests.axis, number)
         if key in result or image == key or image not in routes:
             result.setdefault(key, route)
             continue
-        one = route if pair.get(source) != target else _swerving(route[0], route[-1], number)
         ends = rests.places[image[0]], rests.places[image[1]]
-        result[key] = one
-        result[image] = (ends[0], *((twice - x, y) for x, y in one[1:-1]), ends[1])
+        result[key] = route
+        result[image] = (ends[0], *((twice - x, y) for x, y in route[1:-1]), ends[1])
     return result
 
 
-def _swerving(start: Point, end: Point, number: int) -> Route:
-    """From a neuron to its mirror image and back: each keeps to its own left in its first half, and they cross on the
-    axis, since reflections of one bow would share its line."""
-    wide = (_SWERVE + 0.08 * number) * (end[0] - start[0])
-    reach = (end[0] - start[0]) / 3
-    return (
-        start,
-        (snap(start[0] + reach), snap(start[1] - abs(wide))),
-        (snap(end[0] - reach), snap(end[1] + abs(wide))),
-        end,
-    )
+def _swerving(route: Route, ends: tuple[Point, Point], axis: float, number: int) -> Route:
+    """From a neuron to its mirror image, where another connection comes back: sunk by a little before the axis and
+    raised behind it, so that the two cross on the axis, since they would share a line that is symmetric."""
+    line = route[1:-1] if route[0] == ends[0] else route[-2:0:-1]
+    mates = zip(line, line[::-1], strict=True)
+    middle = [(snap(axis + (x - other) / 2), snap((y + height) / 2)) for (x, y), (other, height) in mates]
+    far = abs(ends[1][0] - ends[0][0])
+    sway = snap(max(0.14, min(0.4, 0.12 * far)) if len(middle) == 2 else 0.14) * (number + 1)
+    swayed = [(x, y + (sway if 2 * i < len(middle) - 1 else -sway)) for i, (x, y) in enumerate(middle)]
+    return ends[0], *swayed, ends[1]

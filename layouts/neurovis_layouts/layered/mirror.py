@@ -9,7 +9,7 @@ an image get one that nothing passes, so that the room they take is the same on 
 from __future__ import annotations
 
 from bisect import bisect_right, insort
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 
 from neurovis_layouts.layered.book import keys_of
@@ -37,11 +37,33 @@ def mirrored(problem: LayoutProblem, levels: Levels, pair: Mapping[int, int]) ->
     order = _unfolded(levels, ordered(half[0]), half[1], image, side)
     if sum(len(gap) for gap in levels.segments) <= _MOST_SEGMENTS:
         order = _improved(levels, order, image, side)
+    for rank in order:
+        _about(levels, rank, side, pair)
     result: list[int] = [0] * len(levels.nodes)
     for rank in order:
         for node, other in zip(rank, rank[::-1], strict=True):
             result[node] = other
     return order, result
+
+
+def symmetric(members: Iterable[int], pair: Mapping[int, int]) -> bool:
+    """Whether these neurons, which are their own image, have to stand on the axis, since they hold mirror images."""
+    return any(member in pair for member in members)
+
+
+def _about(levels: Levels, rank: list[int], side: Mapping[int, int], pair: Mapping[int, int]) -> None:
+    """What has to stand on the axis in the middle, what need not beside it, with room for as much on the other side."""
+    centre = [n for n in rank if side[n] == 0]
+    fixed = [n for n in centre if symmetric((m for m, _, _ in levels.nodes[n].members), pair)]
+    if not fixed or len(centre) == 1:
+        return
+    loose = [n for n in centre if n not in fixed]
+    start, half = rank.index(centre[0]), len(loose) // 2
+    before, behind = loose[:half], loose[half:]
+    if len(loose) % 2:
+        levels.nodes.append(Node(levels.nodes[fixed[0]].rank, reach=levels.nodes[loose[-1]].reach))
+        before.insert(0, len(levels.nodes) - 1)
+    rank[start : start + len(centre)] = [*before, fixed[0], *behind]
 
 
 def _left_of(problem: LayoutProblem, pair: Mapping[int, int]) -> set[int]:

@@ -12,7 +12,7 @@ from itertools import pairwise
 from neurovis_layouts.formations import columns, grid
 from neurovis_layouts.layered.components import components_of, packed
 from neurovis_layouts.layered.levels import Levels, levels_of
-from neurovis_layouts.layered.mirror import mirrored
+from neurovis_layouts.layered.mirror import mirrored, symmetric
 from neurovis_layouts.layered.order import ordered
 from neurovis_layouts.layered.place import placed
 from neurovis_layouts.layered.ranks import INSTANT, ranks_of
@@ -106,6 +106,8 @@ def _component(
 ) -> Plan:
     everyone = [*units, *guests]
     rank = _ranks(problem, units, bonds, edges)
+    if pair:
+        rank = _one_on_axis(units, bonds, rank, pair)
     rank += [max(rank)] * len(guests)
     levels = levels_of(problem, everyone, rank, edges)
     partner: list[int] | None = None
@@ -141,6 +143,25 @@ def _ranks(problem: LayoutProblem, units: Sequence[Unit], bonds: Sequence[int], 
     last = {owner[m] for m in problem.exits if m in owner}
     ranks = ranks_of(len(numbers), arcs, first, last)
     return [ranks[numbers[bond]] for bond in bonds]
+
+
+def _one_on_axis(
+    units: Sequence[Unit], bonds: Sequence[int], rank: Sequence[int], pair: Mapping[int, int]
+) -> list[int]:
+    """Ranks in which no two units have to stand on the axis."""
+    fixed = [
+        u for u, unit in enumerate(units) if symmetric(unit.members, pair) and pair.get(unit.members[0]) in unit.members
+    ]
+    result = [2 * len(units) * r for r in rank]
+    taken: dict[int, int] = {}
+    for u in fixed:
+        number = taken[rank[u]] = taken.get(rank[u], -1) + 1
+        if number:
+            for mate, bond in enumerate(bonds):
+                if bond == bonds[u]:
+                    result[mate] += number
+    levels = {value: place for place, value in enumerate(sorted(set(result)))}
+    return [levels[value] for value in result]
 
 
 def _draw_in(

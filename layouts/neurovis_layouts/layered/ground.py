@@ -1,0 +1,97 @@
+"""Ground: what stands where, so that nothing is put on a disc or into a frame.
+
+In: bodies (neurons, and frames with what is in them) and where they stand. Out: whether another may stand somewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from neurovis_layouts.layered.drawing import Rect
+from neurovis_layouts.pins import Cells
+from neurovis_spec.layout.model import RADIUS, LayoutRefusalError, Point
+
+#: How far what gives way keeps off other discs.
+_CLEAR = 0.75
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """Neurons that move together, by their offsets; the frame around them, if they have one; where they would like to
+    stand; ``level`` are those that keep their place along the direction."""
+
+    members: tuple[int, ...]
+    offsets: tuple[Point, ...]
+    frame: Rect | None
+    wish: Point
+    pinned: bool = False
+    level: bool = False
+
+
+def _at(rect: Rect, place: Point) -> Rect:
+    return rect[0] + place[0], rect[1] + place[1], rect[2] + place[0], rect[3] + place[1]
+
+
+def _holds(rect: Rect, point: Point, by: float) -> bool:
+    return rect[0] - by < point[0] < rect[2] + by and rect[1] - by < point[1] < rect[3] + by
+
+
+class Ground:
+    """What has been put somewhere."""
+
+    def __init__(self) -> None:
+        self._cells = Cells()
+        self._points: list[Point] = []
+        self._frames: list[tuple[Rect, Rect, Body]] = []
+        self._bodies: list[tuple[Body, Point]] = []
+
+    def put(self, body: Body, place: Point) -> None:
+        """A body stands here from now on."""
+        points = [(place[0] + dx, place[1] + dy) for dx, dy in body.offsets]
+        for point in points:
+            self._cells.add(point)
+            self._points.append(point)
+        self._bodies.append((body, place))
+        if body.frame is not None:
+            self._frames.append((_at(body.frame, place), _tight(points), body))
+
+    def takes(self, body: Body, place: Point, clear: float = _CLEAR) -> bool:
+        """Whether a body may stand here."""
+        if body.frame is None:
+            point = (place[0] + body.offsets[0][0], place[1] + body.offsets[0][1])
+            return self._cells.free(point, clear) and not any(_holds(f, point, RADIUS) for f, _, _ in self._frames)
+        own = _at(body.frame, place)
+        if any(own[0] < f[2] and f[0] < own[2] and own[1] < f[3] and f[1] < own[3] for f, _, _ in self._frames):
+            return False
+        return not any(_holds(own, point, RADIUS) for point in self._points)
+
+    def refuse(self, names: Sequence[str], body: Body) -> None:
+        """Raise LayoutRefusalError where a pinned body would stand in the frame of another, or that in its own."""
+        points = [(body.wish[0] + dx, body.wish[1] + dy) for dx, dy in body.offsets]
+        own = _tight(points) if body.frame is not None else None
+        for _, tight, other in self._frames:
+            for member, point in zip(body.members, points, strict=True):
+                if _holds(tight, point, RADIUS):
+                    raise _within(names[member], names[other.members[0]])
+            if own is not None and own[0] < tight[2] and tight[0] < own[2] and own[1] < tight[3] and tight[1] < own[3]:
+                raise _within(names[body.members[0]], names[other.members[0]])
+        if own is None:
+            return
+        for other, place in self._bodies:
+            for member, (dx, dy) in zip(other.members, other.offsets, strict=True):
+                if _holds(own, (place[0] + dx, place[1] + dy), RADIUS):
+                    raise _within(names[member], names[body.members[0]])
+
+
+def _tight(points: Sequence[Point]) -> Rect:
+    xs, ys = [x for x, _ in points], [y for _, y in points]
+    return min(xs), min(ys), max(xs), max(ys)
+
+
+def _within(name: str, mate: str) -> LayoutRefusalError:
+    return LayoutRefusalError(
+        "pin-in-frame",
+        f"pins put '{name}' into the frame that '{mate}' is in; nothing foreign may stand there",
+        "move one of the pins",
+    )
