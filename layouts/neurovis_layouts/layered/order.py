@@ -28,6 +28,8 @@ _SIFTED, _SHAKEN, _MOST_TIMES = 1_500_000, 4_000_000, 60
 _SWEEPS, _PLAIN_SWEEPS = 4, 14
 #: How far nodes are shaken, as a share of the rank, in 1/1024; and how many sweeps follow.
 _SHAKES = ((100, 0), (200, 2), (400, 0), (100, 2), (200, 0), (400, 2))
+#: In a short rank nodes are shaken at least so many 1024ths of a place.
+_LEAST_SHAKE = 2048
 _PATIENCE = 24
 
 
@@ -38,7 +40,10 @@ def ordered(levels: Levels) -> Order:
     segments = Segments(levels)
     natural = [_grouped_start(levels, rank) for rank in levels.ranks]
     held = _Search(levels, segments, True)
-    strict = held.best([natural, _by_descent(levels, natural)])
+    starts = [natural, _by_descent(levels, natural)]
+    if segments.ports > 1:  # blocks are not turned round with the order around them
+        starts.append([rank[::-1] for rank in natural])
+    strict = held.best(starts)
     if strict[0] == 0 or not any(held.kin):
         return strict[1]
     free = _Search(levels, segments, False).best([strict[1], natural])
@@ -172,7 +177,8 @@ class _State:
         it."""
         for r, rank in enumerate(self.order):
             count = len(rank)
-            moved = np.array([i * 1024 + next(dice) * count * far // 1024 for i in range(count)], dtype=np.float64)
+            reach = max(far * count, _LEAST_SHAKE) if far else 0
+            moved = np.array([i * 1024 + next(dice) * reach // 1024 for i in range(count)], dtype=np.float64)
             self.set(r, self._settled(r, self.search.segments.local[rank], moved))
 
     def _sifted(self, r: int, order: Ints, both: bool, down: bool) -> tuple[Ints, int]:
