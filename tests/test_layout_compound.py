@@ -109,7 +109,8 @@ def check_mirror(layout: Layout, problem: LayoutProblem) -> None:
         number = times[edge.source, edge.target] = times.get((edge.source, edge.target), 0) + 1
         keys[edge.source, edge.target, number] = edge.name
     for (a, b, number), name in keys.items():
-        other = keys.get((image.get(a, a), image.get(b, b), number))
+        ends = [image.get(n, n if 2 * at[n][axis] == twice else -1) for n in (a, b)]
+        other = keys.get((ends[0], ends[1], number))
         if other is None or other == name:
             continue
         expected = tuple((twice - x, y) if axis == 0 else (x, twice - y) for x, y in layout.routes[name])

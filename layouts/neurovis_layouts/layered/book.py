@@ -61,6 +61,7 @@ class Book:
                 self._mirror(mirror.scope, a, b)
         for line in problem.align:
             self._align(-1, line)
+        self._join_inner()
         self._inner: list[list[int]] = [[] for _ in modules]
         self._driven: list[set[int]] = [set() for _ in modules]
         self._driving: list[set[int]] = [set() for _ in modules]
@@ -83,6 +84,16 @@ class Book:
     def _join(self, one: int, other: int) -> None:
         low, high = sorted((self._find(one), self._find(other)))
         self._root[high] = low
+
+    def _join_inner(self) -> None:
+        """Instances at one place of instances of one kind are of one kind; outer ones come first."""
+        first: dict[tuple[int, str], int] = {}
+        modules = self._problem.modules
+        for number in sorted(range(len(modules)), key=lambda n: (modules[n].path.count("."), n)):
+            module = modules[number]
+            if module.parent >= 0:
+                place = self._find(module.parent), module.path.rpartition(".")[2]
+                self._join(first.setdefault(place, number), number)
 
     def _inside(self, scope: int, neuron: int) -> int:
         """The instance right below ``scope`` that a neuron is in, −1 without one."""

@@ -70,7 +70,7 @@ def _reflected(routes: dict[Key, Route], rests: Settled, pair: Mapping[int, int]
     result: dict[Key, Route] = {}
     for key, route in sorted(routes.items()):
         source, target, number = key
-        image = pair.get(source, source), pair.get(target, target), number
+        image = _image(source, rests, pair), _image(target, rests, pair), number
         if pair.get(source) == target and (target, source, 0) in routes:
             ends = rests.places[source], rests.places[target]
             route = _swerving(routes[(*min(key, image)[:2], 0)], ends, rests.axis, number)
@@ -81,6 +81,11 @@ def _reflected(routes: dict[Key, Route], rests: Settled, pair: Mapping[int, int]
         result[key] = route
         result[image] = (ends[0], *((twice - x, y) for x, y in route[1:-1]), ends[1])
     return result
+
+
+def _image(neuron: int, rests: Settled, pair: Mapping[int, int]) -> int:
+    """The mirror image of a neuron: itself on the axis, −1 where it has none."""
+    return pair.get(neuron, neuron if rests.places[neuron][0] == rests.axis else -1)
 
 
 def _swerving(route: Route, ends: tuple[Point, Point], axis: float, number: int) -> Route:
