@@ -1,8 +1,8 @@
 """Ranks: how far along the direction each unit stands.
 
 In: units and the connections between them. Out: a rank for each, from 0; connections that go back against the ranks
-are as few as a greedy choice makes them, then the ranks are tightened (short connections, as in Gansner et al. 1993,
-by local moves).
+are as few as a greedy choice makes them, then the ranks are those with the shortest connections in all (``simplex``);
+what could stand earlier without making them longer does.
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 
 import networkx as nx
+
+from neurovis_layouts.layered.simplex import shortened
 
 #: A connection within a step outweighs any number of delayed ones: what runs within a step runs forward.
 INSTANT = 1000.0
@@ -35,16 +37,21 @@ def ranks_of(count: int, arcs: Arcs, first: AbstractSet[int], last: AbstractSet[
         turned = component[a] == component[b] and place[a] > place[b]
         key = (b, a) if turned else (a, b)
         forward[key] = forward.get(key, 0.0) + weight
-    before: list[list[tuple[int, float]]] = [[] for _ in range(count)]
-    after: list[list[tuple[int, float]]] = [[] for _ in range(count)]
-    for (a, b), weight in sorted(forward.items()):
-        after[a].append((b, weight))
-        before[b].append((a, weight))
+    before: list[list[int]] = [[] for _ in range(count)]
+    after: list[list[int]] = [[] for _ in range(count)]
+    for a, b in sorted(forward):
+        after[a].append(b)
+        before[b].append(a)
     order = sorted(range(count), key=lambda unit: (component[unit], place[unit]))
     rank = [0] * count
     for unit in order:
-        rank[unit] = max((rank[other] + 1 for other, _ in before[unit]), default=0)
-    _tighten(order, rank, before, after)
+        rank[unit] = max((rank[other] + 1 for other in before[unit]), default=0)
+    for part in nx.connected_components(graph.to_undirected(as_view=True)):
+        number = {unit: i for i, unit in enumerate(sorted(part))}
+        arcs_within = [(number[a], number[b], int(weight)) for (a, b), weight in forward.items() if a in part]
+        for unit, level in zip(number, shortened([rank[unit] for unit in number], arcs_within), strict=True):
+            rank[unit] = level
+    _early(order, rank, forward, before)
     return rank
 
 
@@ -102,23 +109,12 @@ def _cut(
     return head + tail[::-1]
 
 
-def _tighten(
-    order: Sequence[int],
-    rank: list[int],
-    before: Sequence[Sequence[tuple[int, float]]],
-    after: Sequence[Sequence[tuple[int, float]]],
-) -> None:
-    """Move units within the room their neighbours leave, to where their connections are shortest, until none moves."""
-    for _ in range(24):
-        moved = False
-        for unit in (*reversed(order), *order):
-            low = max((rank[other] + 1 for other, _ in before[unit]), default=None)
-            high = min((rank[other] - 1 for other, _ in after[unit]), default=None)
-            pull = sum(weight for _, weight in after[unit]) - sum(weight for _, weight in before[unit])
-            # all on one side: the length is linear in the rank, so an end of the room is best; a tie stays early
-            wish = high if pull > 0 and high is not None else low if pull < 0 and low is not None else rank[unit]
-            if wish != rank[unit]:
-                rank[unit] = wish
-                moved = True
-        if not moved:
-            return
+def _early(order: Sequence[int], rank: list[int], forward: Arcs, before: Sequence[Sequence[int]]) -> None:
+    """What is pulled forward as much as back stands as early as it may."""
+    pull = [0.0] * len(rank)
+    for (a, b), weight in forward.items():
+        pull[a] += weight
+        pull[b] -= weight
+    for unit in order:
+        if before[unit] and pull[unit] == 0:
+            rank[unit] = max(rank[other] + 1 for other in before[unit])

@@ -1,0 +1,66 @@
+"""Ranks: as short as can be by trying all, forward outside loops, the same whatever the order of the input."""
+
+from __future__ import annotations
+
+from itertools import product
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from neurovis_layouts.layered.ranks import ranks_of
+from neurovis_layouts.layered.simplex import shortened
+
+Arcs = dict[tuple[int, int], float]
+
+
+@st.composite
+def connected_arcs(draw: st.DrawFn, most: int = 6) -> tuple[int, list[tuple[int, int, int]]]:
+    """A connected graph whose arcs lead from lower to higher numbers, with weights."""
+    count = draw(st.integers(2, most))
+    weight = st.integers(1, 4)
+    arcs = {(draw(st.integers(0, i - 1)), i): draw(weight) for i in range(1, count)}
+    for a, b in draw(st.lists(st.tuples(st.integers(0, count - 1), st.integers(0, count - 1)), max_size=6)):
+        if a != b:
+            arcs[min(a, b), max(a, b)] = draw(weight)
+    return count, [(a, b, w) for (a, b), w in arcs.items()]
+
+
+def length(rank: list[int] | tuple[int, ...], arcs: list[tuple[int, int, int]]) -> int:
+    return sum(w * (rank[b] - rank[a]) for a, b, w in arcs)
+
+
+@given(connected_arcs())
+@settings(deadline=None)
+def test_connections_are_as_short_as_can_be(graph: tuple[int, list[tuple[int, int, int]]]) -> None:
+    count, arcs = graph
+    found = shortened(list(range(count)), arcs)
+    assert min(found) == 0
+    assert all(found[b] > found[a] for a, b, _ in arcs)
+    every = (rank for rank in product(range(count), repeat=count) if all(rank[b] > rank[a] for a, b, _ in arcs))
+    assert length(found, arcs) == min(length(rank, arcs) for rank in every)
+
+
+@given(connected_arcs(most=12))
+@settings(deadline=None)
+def test_the_order_of_arcs_does_not_show(graph: tuple[int, list[tuple[int, int, int]]]) -> None:
+    count, arcs = graph
+    given_arcs: Arcs = {(a, b): float(w) for a, b, w in arcs}
+    turned: Arcs = dict(reversed(given_arcs.items()))
+    found = ranks_of(count, given_arcs, set(), set())
+    assert found == ranks_of(count, turned, set(), set())
+    assert all(found[b] > found[a] for a, b, _ in arcs)
+    assert length(found, arcs) == length(shortened(list(range(count)), arcs), arcs)
+
+
+def test_parts_that_nothing_joins_begin_at_the_first_rank() -> None:
+    arcs: Arcs = {(0, 1): 1.0, (1, 2): 1.0, (4, 3): 1.0}
+    assert ranks_of(6, arcs, set(), set()) == [0, 1, 2, 1, 0, 0]
+
+
+def test_a_tie_stands_early() -> None:
+    arcs: Arcs = {(0, 1): 1.0, (1, 2): 1.0, (2, 3): 1.0, (0, 4): 1.0, (4, 3): 1.0}
+    assert ranks_of(5, arcs, set(), set()) == [0, 1, 2, 3, 1]
+
+
+def test_what_runs_within_a_step_is_never_turned() -> None:
+    arcs: Arcs = {(0, 1): 1000.0, (1, 2): 1000.0, (2, 0): 1.0}
+    assert ranks_of(3, arcs, set(), set()) == [0, 1, 2]
