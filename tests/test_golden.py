@@ -1,7 +1,7 @@
 """Golden files pin what the compiler, the layout and the encoding make of every example.
 
-``tests/golden/<spec>/network.json``, ``layout.<engine>.json`` and ``scene.json`` are compared value by value;
-``scene.svg`` lies beside them to be looked at, and must show the same items. After a wanted change: ``pytest
+``tests/golden/<spec>/network.json``, ``layout.<engine>.json`` and ``scene.json`` (of small specs) are compared value by
+value; ``scene.svg`` lies beside them to be looked at, and must show the same items. After a wanted change: ``pytest
 tests/test_golden.py
 --update-golden``, then read the diff.
 """
@@ -26,8 +26,10 @@ from neurovis_spec.scene import Scene
 
 HERE = Path(__file__).parent
 SPECS = sorted([*(HERE.parent / "specs").glob("*.yaml"), *(HERE.parent / "specs").glob("*/*.yaml")])
+#: specs whose scene is pinned: of the others a change of the layout would change thousands of lines and say no more
+SMALL = [path for path in SPECS if path.stem != "hexapod"]
 #: the step that the scene shows
-STEPS = {"cpg_rbf": 160, "mlp": 3, "hebbian": 250, "reward": 630, "hexapod": 1189}
+STEPS = {"cpg_rbf": 160, "mlp": 3, "hebbian": 250, "reward": 630}
 Plain: TypeAlias = "bool | int | float | str | list[Plain] | dict[str, Plain] | None"
 
 
@@ -124,6 +126,7 @@ def test_layout(compiled: CompiledNetwork, update_golden: bool) -> None:
     compare(HERE / "golden" / compiled.name / f"layout.{layout.engine}.json", value, update_golden)
 
 
+@pytest.mark.parametrize("compiled", SMALL, indirect=True, ids=lambda path: path.stem)
 def test_scene(compiled: CompiledNetwork, update_golden: bool) -> None:
     scene = scene_of(compiled)
     folder = HERE / "golden" / compiled.name
