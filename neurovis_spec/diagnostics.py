@@ -15,8 +15,8 @@ from difflib import SequenceMatcher
 from typing import Literal
 
 Severity = Literal["error", "warning"]
-#: A number in a message, with what belongs to it.
-_NUMBER = re.compile(r"-?\d[\d.,]*(e[+-]?\d+)?")
+#: A number in a message, with what belongs to it; that of a name (K3) is none.
+_NUMBER = re.compile(r"(?<![\w.])-?\d[\d.,]*(e[+-]?\d+)?")
 
 
 @dataclass(frozen=True, slots=True, order=True)

@@ -392,7 +392,7 @@ class _Builder:
             return np.full(n, found.start, dtype=np.int64)
         if found.size == n:
             return np.arange(found.start, found.start + n, dtype=np.int64)
-        message = f"the input '{found.name}' has {found.size} components, the group has {plural(n, 'neuron')}"
+        message = f"the input '{name}' has {found.size} components, the group has {plural(n, 'neuron')}"
         findings.error("wrong-size", model.input.span, message, "an input has one component, or one for each neuron")
         return None
 

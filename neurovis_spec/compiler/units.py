@@ -90,8 +90,9 @@ class _Place:
 
 @dataclass(frozen=True)
 class _Binding:
-    """Where an instance says what an input of its module is, and what it is; None where that is at fault."""
+    """What an instance says an input of its module is, where, and what it is; None where that is at fault."""
 
+    name: str
     span: Span
     input: Input | None
 
@@ -267,7 +268,7 @@ class Expander:
         if outer.size == place.count * made.size:
             return Input(outer.name, outer.start + place.position * made.size, made.size)
         wanted = f"{made.size}" if place.count == 1 else f"{made.size} or {place.count * made.size}"
-        message = f"the input '{outer.name}' has {plural(outer.size, 'component')}; {wanted} are wanted here"
+        message = f"the input '{bound.name}' has {plural(outer.size, 'component')}; {wanted} are wanted here"
         hint = None if place.count == 1 else "one of count × size is shared out, one of the module's size goes to each"
         self.findings.error("wrong-size", bound.span, message, hint)
         return None
@@ -344,9 +345,9 @@ class Expander:
             found = unit.inputs.get(outer.value)
             if found is None and not unit.gaps.cover("inputs", outer.value):
                 self._unknown_input(outer, unit)
-            result[name] = _Binding(outer.span, found)
+            result[name] = _Binding(outer.value, outer.span, found)
         for name in lost_names(model.source, "inputs", dict(model.inputs)):
-            result[name] = _Binding(model.source.span, None)
+            result[name] = _Binding("", model.source.span, None)
         return result
 
     def _unknown_input(self, outer: Located[str], unit: Unit) -> None:
