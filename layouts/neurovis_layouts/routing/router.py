@@ -32,19 +32,20 @@ def route_all(
     waypoints: Mapping[int, Sequence[Waypoint]] | None = None,
     bowed: AbstractSet[int] = frozenset(),
     lateral: Mapping[int, Sequence[Waypoint]] | None = None,
+    careful: int = _MOST_CAREFULLY,
 ) -> list[Route]:
     """Routes by edge index.
 
     Without ``waypoints`` every edge runs from anywhere to anywhere; with them, edges not in ``bowed`` run along the
     direction (through their waypoints, if they have any). Those in ``lateral`` run across it, through waypoints with x
-    and y exchanged.
+    and y exchanged. With more than ``careful`` edges, discs in the way are not gone round.
     """
     near = Obstacles(centres)
-    obstacles = near if len(edges) <= _MOST_CAREFULLY else Obstacles(())
+    obstacles = near if len(edges) <= careful else Obstacles(())
     routes: dict[int, Route] = {}
     if lateral:
         exchanged = [(y, x) for x, y in centres]
-        beside = Obstacles(exchanged if len(edges) <= _MOST_CAREFULLY else ())
+        beside = Obstacles(exchanged if len(edges) <= careful else ())
         across = _curves(edges, exchanged, sorted(lateral), lateral, beside)
         routes.update({i: tuple((x, y) for y, x in route) for i, route in across.items()})
     if waypoints is not None:
@@ -73,13 +74,20 @@ def _curves(
     shared = _shared(edges)
     heights: dict[tuple[int, int], float] = {}
     routes: dict[int, Route] = {}
-    for i in chosen:
-        start, end = centres[edges[i].source], centres[edges[i].target]
-        own = (edges[i].source, edges[i].target)
+    owns = [(edges[i].source, edges[i].target) for i in chosen]
+    plain = [
+        curve(centres[own[0]], centres[own[1]], waypoints.get(i, ()), (lean[i, True], lean[i, False]))
+        for i, own in zip(chosen, owns, strict=True)
+    ]
+    tight = obstacles.crowded(plain, owns, REACH - 0.1)
+    for i, own, best, crowded in zip(chosen, owns, plain, tight, strict=True):
+        routes[i] = best
+        if not crowded:
+            continue
+        start, end = centres[own[0]], centres[own[1]]
         ends = (lean[i, True], lean[i, False])
-        best, clearance = curve(start, end, waypoints.get(i, ()), ends), -1.0
         clearance = obstacles.clearance(best, own)
-        for grip, share in ((0.75, 1.0), (0.95, 1.0), (0.75, 0.4), (0.95, 0.4)) if clearance < REACH - 0.1 else ():
+        for grip, share in ((0.75, 1.0), (0.95, 1.0), (0.75, 0.4), (0.95, 0.4)):
             other = curve(start, end, waypoints.get(i, ()), (ends[0] * share, ends[1] * share), grip)
             found = obstacles.clearance(other, own)
             if found > clearance + 0.02:
