@@ -70,7 +70,7 @@ class Segments:
         wide = (int(place.max(initial=0)) + 1) * self.ports
         start = (self.gap * wide + place[self.upper]) * self.ports + self.upper_port
         end = self.gap * wide + place[self.lower] * self.ports + self.lower_port
-        return inversions(end[np.lexsort((end, start))])
+        return inversions(end[np.argsort(start * (int(end.max(initial=0)) + 1) + end)])
 
     def differences(self, size: int, sides: Sequence[Side], place: Ints) -> Ints:
         """For the nodes of a rank, by their places in ``ranks[r]``: (i, j) is how many more crossings they have with
@@ -96,6 +96,8 @@ class Segments:
 
 def _ports(nodes: Ints, offsets: Sequence[float]) -> Ints:
     """For each end its place among the different offsets of its node on this side."""
+    if not any(offsets):
+        return np.zeros(len(nodes), dtype=np.int64)
     different: dict[int, set[float]] = {}
     for node, offset in zip(nodes.tolist(), offsets, strict=True):
         different.setdefault(node, set()).add(offset)

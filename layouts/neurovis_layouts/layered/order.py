@@ -46,7 +46,7 @@ def ordered(levels: Levels) -> Order:
     strict = held.best(starts)
     if strict[0] == 0 or not any(held.kin):
         return strict[1]
-    free = _Search(levels, segments, False).best([strict[1], natural])
+    free = _Search(levels, segments, False).best([natural, strict[1]])
     return free[1] if free[0] < _CLEARLY * strict[0] else strict[1]
 
 
@@ -76,7 +76,7 @@ class _Search:
     def best(self, starts: Sequence[Order]) -> tuple[int, Order]:
         sift = self.work <= _SIFTED
         best: tuple[int, list[Ints]] | None = None
-        for start in starts:
+        for start in starts if sift else starts[1:2]:
             state = _State(self, [np.array(rank, dtype=np.int64) for rank in start])
             state.shake(repeat(0), 0)
             for sweep in range((_SWEEPS if sift else _PLAIN_SWEEPS) + 1):

@@ -10,11 +10,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
 
 from neurovis_layouts.isotonic import spread
-from neurovis_layouts.layered.levels import Levels
+from neurovis_layouts.layered.levels import Levels, Segment
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import Point
+
+Ints = npt.NDArray[np.int64]
+Floats = npt.NDArray[np.float64]
+_Gap: TypeAlias = tuple[Ints, Ints, Floats, Floats]
 
 _BESIDE_DISC = 0.6
 _BESIDE_PASSAGE = 0.25
@@ -81,47 +89,66 @@ def _gap(levels: Levels, a: int, b: int, spacing: float) -> float:
 
 
 def _across(levels: Levels, order: Sequence[Sequence[int]], gaps: Sequence[Sequence[float]]) -> list[float]:
-    count = len(levels.nodes)
-    above: list[list[tuple[int, float, float]]] = [[] for _ in range(count)]
-    below: list[list[tuple[int, float, float]]] = [[] for _ in range(count)]
-    for segment in (segment for gap in levels.segments for segment in gap):
-        shift = segment.a - segment.b
-        below[segment.upper].append((segment.lower, -shift, segment.weight))
-        above[segment.lower].append((segment.upper, shift, segment.weight))
-    x = [0.0] * count
+    count, height = len(levels.nodes), len(order)
+    x: Floats = np.zeros(count)
     for rank, distances in zip(order, gaps, strict=True):
-        for node, place in zip(rank, spread([0.0] * len(rank), [1.0] * len(rank), distances), strict=True):
-            x[node] = place
-    height = len(order)
+        x[rank] = spread([0.0] * len(rank), [1.0] * len(rank), distances)
+    segments = [_arrays(gap) for gap in levels.segments]
+    ways = ((True, False), (False, True), (True, True))
+    above, below, both = (_Pulls(count, order, segments, sides) for sides in ways)
     rounds = 10 if count < 5000 else 4
     for turn in range(rounds):
-        both = turn >= rounds // 2
+        late = turn >= rounds // 2
         for r in range(height):
-            _pull(x, order[r], gaps[r], (above, below) if both else (above,))
+            (both if late else above).pull(x, r, gaps[r])
         for r in range(height - 1, -1, -1):
-            _pull(x, order[r], gaps[r], (above, below) if both else (below,))
-    return x
+            (both if late else below).pull(x, r, gaps[r])
+    return [float(place) for place in x]
 
 
-def _pull(
-    x: list[float],
-    rank: Sequence[int],
-    gaps: Sequence[float],
-    sides: Sequence[Sequence[Sequence[tuple[int, float, float]]]],
-) -> None:
-    """Move one rank to where its connections to these sides want it."""
-    wishes: list[float] = []
-    weights: list[float] = []
-    for node in rank:
-        total, mass = 0.0, 0.0
-        for side in sides:
-            for other, shift, weight in side[node]:
-                total += weight * (x[other] + shift)
-                mass += weight
-        wishes.append(total / mass if mass else x[node])
-        weights.append(mass or _HARDLY)
-    for node, place in zip(rank, spread(wishes, weights, gaps), strict=True):
-        x[node] = place
+class _Pulls:
+    """Where its connections above, below or on both sides want each rank: sums in one order, so that they come out the
+    same on every machine. By rank and connection: the place of its node in the rank, the other node, offset, weight."""
+
+    def __init__(
+        self, nodes: int, order: Sequence[Sequence[int]], segments: Sequence[_Gap], sides: tuple[bool, bool]
+    ) -> None:
+        self.order = [np.array(rank, dtype=np.int64) for rank in order]
+        place = np.zeros(nodes, dtype=np.int64)
+        for rank in self.order:
+            place[rank] = np.arange(len(rank), dtype=np.int64)
+        none = _arrays(())
+        self.own: list[Ints] = []
+        self.other: list[Ints] = []
+        self.shift: list[Floats] = []
+        self.weight: list[Floats] = []
+        for r in range(len(order)):
+            above, up, a, heavy = segments[r - 1] if sides[0] and r > 0 else none
+            own, below, b, weight = segments[r] if sides[1] and r < len(segments) else none
+            self.own.append(place[np.concatenate((up, own))])
+            self.other.append(np.concatenate((above, below)))
+            self.shift.append(np.concatenate((a, -b)))
+            self.weight.append(np.concatenate((heavy, weight)))
+        self.mass = [
+            np.bincount(own, weight, len(rank)) for own, weight, rank in zip(self.own, self.weight, order, strict=True)
+        ]
+
+    def pull(self, x: Floats, r: int, gaps: Sequence[float]) -> None:
+        """Move one rank there."""
+        rank, mass = self.order[r], self.mass[r]
+        total = np.bincount(self.own[r], self.weight[r] * (x[self.other[r]] + self.shift[r]), len(rank))
+        wishes = np.where(mass > 0, total / np.maximum(mass, _HARDLY), x[rank])
+        x[rank] = spread(wishes.tolist(), np.where(mass > 0, mass, _HARDLY).tolist(), gaps)
+
+
+def _arrays(gap: Sequence[Segment]) -> _Gap:
+    """Upper and lower nodes, how much farther across the upper ends are attached, weights."""
+    return (
+        np.array([s.upper for s in gap], dtype=np.int64),
+        np.array([s.lower for s in gap], dtype=np.int64),
+        np.array([s.a - s.b for s in gap], dtype=np.float64),
+        np.array([s.weight for s in gap], dtype=np.float64),
+    )
 
 
 def _along(levels: Levels, order: Sequence[Sequence[int]], x: Sequence[float], spacing: float) -> list[float]:

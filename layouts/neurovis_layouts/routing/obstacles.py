@@ -66,10 +66,14 @@ class Obstacles:
         points, owner = _points(np.array([piece for _, piece in pieces], dtype=np.float64), owner)
         cell = np.floor(points / _CELL).astype(np.int64)
         key = cell[:, 0] * _ROW + cell[:, 1]
-        first, last = np.searchsorted(keys, key), np.searchsorted(keys, key, side="right")
-        for step in range(int((last - first).max())):
-            at = np.flatnonzero(first + step < last)
-            entry, route = first[at] + step, owner[at]
+        cells, starts, counts = np.unique(keys, return_index=True, return_counts=True)
+        place = np.minimum(np.searchsorted(cells, key), len(cells) - 1)
+        near = np.flatnonzero(cells[place] == key)  # few: most of a drawing is not near a disc
+        first, count = starts[place[near]], counts[place[near]]
+        for step in range(int(counts.max())):
+            some = step < count
+            at, entry = near[some], first[some] + step
+            route = owner[at]
             x, y = (points[at] - centres[entry]).T
             foreign = (index[entry] != ends[route, 0]) & (index[entry] != ends[route, 1])
             result[route[foreign & (np.sqrt(x * x + y * y) < enough)]] = True
