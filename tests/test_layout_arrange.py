@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import gc
 from dataclasses import dataclass, field, replace
 
 import layout_conformance as suite
@@ -142,3 +143,15 @@ def test_results_are_put_on_the_grid_and_at_the_origin(monkeypatch: pytest.Monke
     assert layout.positions["B"] == ((1331 + 7475) / 1024, 0.0)
     assert layout.routes["A -> B"][0] == layout.positions["A"]
     assert layout.routes["A -> B"][-1] == layout.positions["B"]
+
+
+def test_the_search_for_garbage_goes_on_after_a_layout() -> None:
+    assert gc.isenabled()
+    lay_out_problem(PAIR, "layered")
+    assert gc.isenabled()
+    gc.disable()
+    try:
+        lay_out_problem(PAIR, "layered")
+        assert not gc.isenabled()
+    finally:
+        gc.enable()

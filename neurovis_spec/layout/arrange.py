@@ -6,8 +6,10 @@ before it starts; what it gives back is checked, put on the grid of 1/1024 and m
 
 from __future__ import annotations
 
+import gc
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 
 from neurovis_spec import plugins
 from neurovis_spec.compiler.network import Network
@@ -48,9 +50,23 @@ def lay_out_problem(problem: LayoutProblem, engine: str = "auto") -> Layout:
     chosen = _engine(name)
     refuse_what_it_cannot(problem, name, chosen.capabilities)
     _refuse_close_pins(problem)
-    result = chosen.lay_out(problem)
-    _check(problem, name, result)
-    return _tidy(problem, name, result)
+    with _undisturbed():
+        result = chosen.lay_out(problem)
+        _check(problem, name, result)
+        return _tidy(problem, name, result)
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """No search for garbage meanwhile: it would walk over all points of all routes time and again, a quarter of the
+    whole, and they hold no cycles."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 def choose_engine(problem: LayoutProblem) -> tuple[str, str]:
