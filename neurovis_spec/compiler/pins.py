@@ -84,6 +84,7 @@ def pins_of(units: tuple[Unit, ...], population: Population, findings: Findings)
             if neuron not in taken:
                 groups.setdefault(base, {})[neuron] = pin.moved(shift)
             taken.add(neuron)
+    _check_placing(said, population, taken, findings)
     origins = said[0].origins
     for base, pins in sorted(groups.items()):
         if base in origins:
@@ -100,6 +101,16 @@ def pins_of(units: tuple[Unit, ...], population: Population, findings: Findings)
         {units[index].path: (pin.x, pin.y) for index, pin in origins.items()},
         {neuron: pin.span for pins in (own, *groups.values()) for neuron, pin in pins.items()},
     )
+
+
+def _check_placing(said: list[_Said], population: Population, taken: set[int], findings: Findings) -> None:
+    """A module that pins an instance within it needs pins in that one: they are what is placed."""
+    for unit in said[1:]:
+        for index, pin in unit.origins.items():
+            if taken.isdisjoint(population.directories[index].members):
+                message = f"'{pin.key.value}' has no pins of its own that this could place"
+                hint = "give its module 'layout: {positions: …}', or leave this pin out"
+                findings.error("bad-pin", pin.key.span, message, hint)
 
 
 def _frame(
