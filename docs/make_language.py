@@ -10,10 +10,8 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
-from neurovis_spec import plugins
-from neurovis_spec.language.drawing import ENGINES
 from neurovis_spec.manual.builtins import Builtin, builtins
-from neurovis_spec.manual.keys import Key, keys, keys_of
+from neurovis_spec.manual.keys import keys_of
 from neurovis_spec.manual.words import ALL_PATTERNS, functions, names
 
 PAGE = Path(__file__).parent / "language.md"
@@ -38,7 +36,6 @@ def key_table(section: str) -> str:
     rows = [
         (code(key.name), key.kind, "required" if key.required else code(key.default), key.about)
         for key in keys_of(section if section != "top" else "")
-        if not key.later
     ]
     return table(("key", "value", "default", "meaning"), rows)
 
@@ -74,7 +71,7 @@ def _value(builtin: Builtin) -> str:
 
 def pattern_table(_: str) -> str:
     """The patterns that this version reads."""
-    rows = [(code(one.use), one.about) for one in ALL_PATTERNS if not one.later]
+    rows = [(code(one.use), one.about) for one in ALL_PATTERNS]
     return table(("pattern", "connects"), rows)
 
 
@@ -88,26 +85,6 @@ def name_table(_: str) -> str:
     return table(("name", "is"), [(code(one.usage), one.about) for one in names()])
 
 
-def later_list(_: str) -> str:
-    """What belongs to the language and is not read yet."""
-    lines = [
-        f"- the key {_placed(key)}: {key.about[:1].lower()}{key.about[1:].rstrip('.')}" for key in keys() if key.later
-    ]
-    lines += [
-        f"- the pattern `{one.name}`: {one.about[:1].lower()}{one.about[1:].rstrip('.')}"
-        for one in ALL_PATTERNS
-        if one.later
-    ]
-    installed = ("auto", *plugins.names(plugins.LAYOUTS))
-    lines += [f"- the layout engine `{name}`" for name in ENGINES if name not in installed]
-    return "\n".join(lines) if lines else "Nothing: this version reads all of it."
-
-
-def _placed(key: Key) -> str:
-    section = key.path.rpartition(".")[0]
-    return f"`{key.name}` of `{section}`" if section else f"`{key.name}`"
-
-
 PARTS: Mapping[str, Callable[[str], str]] = {
     "keys": key_table,
     "activations": activation_table,
@@ -115,7 +92,6 @@ PARTS: Mapping[str, Callable[[str], str]] = {
     "patterns": pattern_table,
     "functions": function_table,
     "names": name_table,
-    "later": later_list,
 }
 
 

@@ -17,7 +17,7 @@ from neurovis_spec.layout.problem import canonical
 
 Edge = tuple[str, str, str, int]
 
-ENGINES = ("layered", "circular", "grid", "manual")
+ENGINES = ("layered", "organic", "large", "circular", "grid", "spatial", "manual")
 
 
 def named(pairs: Iterable[tuple[str, str]], delay: int = 1) -> list[Edge]:
@@ -100,6 +100,7 @@ def check_refusal(engine: str, refusal: LayoutRefusalError) -> None:
         "layout-arrange-unsupported",
         "layout-boxes-unsupported",
         "layout-direction-unsupported",
+        "layout-too-large",
     }
 
 
@@ -107,9 +108,7 @@ def check_positions(problem: LayoutProblem, layout: Layout) -> None:
     assert tuple(layout.positions) == problem.neurons
     points = list(layout.positions.values())
     assert all(math.isfinite(x) and math.isfinite(y) for x, y in points)
-    for i, one in enumerate(points):
-        for other in points[:i]:
-            assert distance(one, other) >= 2 * RADIUS - 1e-9
+    assert nearest(points) >= 2 * RADIUS - 1e-9
     for i, point in enumerate(points):
         if i in problem.pins:
             assert point == problem.pins[i]
@@ -118,6 +117,18 @@ def check_positions(problem: LayoutProblem, layout: Layout) -> None:
     if points and not problem.pins:
         assert min(x for x, _ in points) == 0
         assert min(y for _, y in points) == 0
+
+
+def nearest(points: list[Point]) -> float:
+    """How far the two nearest points are from each other, at most 1, through cells of that width."""
+    cells: dict[tuple[int, int], list[Point]] = {}
+    least = 1.0
+    for point in points:
+        column, row = math.floor(point[0]), math.floor(point[1])
+        for near in ((column + i, row + j) for i in (-1, 0, 1) for j in (-1, 0, 1)):
+            least = min([least, *(distance(point, other) for other in cells.get(near, ()))])
+        cells.setdefault((column, row), []).append(point)
+    return least
 
 
 def check_routes(problem: LayoutProblem, layout: Layout) -> None:

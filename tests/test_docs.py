@@ -64,7 +64,7 @@ def test_an_example_of_a_key_compiles(path: str, tmp_path: Path) -> None:
     network.run(3)
 
 
-@pytest.mark.parametrize("key", [key for key in keys() if not key.later], ids=lambda key: key.path)
+@pytest.mark.parametrize("key", keys(), ids=lambda key: key.path)
 def test_every_key_is_described_and_most_are_shown(key: Key) -> None:
     assert key.about[:1].isupper() or key.about.startswith(("[", "{", "w[", "γ"))
     assert key.about.endswith((".", "…."))
@@ -74,21 +74,6 @@ def test_every_key_is_described_and_most_are_shown(key: Key) -> None:
     shown = example(key.path)
     assert shown is not None
     assert f"{key.name}:" in shown
-
-
-@pytest.mark.parametrize("key", [key for key in keys() if key.later], ids=lambda key: key.path)
-def test_a_key_that_comes_later_is_refused_as_such(key: Key) -> None:
-    section, _, name = key.path.rpartition(".")
-    entry = f"{name}: {{}}"
-    part = {
-        "": entry,
-        "neurons": f"neurons: {{A: {{{entry}}}}}",
-        "connections": f"connections: {{A -> B: {{{entry}}}}}",
-    }.get(section, f"{section}: {{{entry}}}")
-    with pytest.raises(nv.SpecError) as caught:
-        nv.compile_text(completed(part))
-    assert "unsupported" in {finding.code for finding in caught.value.diagnostics}
-    assert "not read by this version yet" in text_of((key,))
 
 
 def test_defaults_stand_apart_from_the_meaning() -> None:
@@ -146,12 +131,7 @@ def test_a_pattern_is_written_as_shown(pattern: object) -> None:
         "neurons: {K: {count: 6}, L: {count: 6}}\n"
         f"connections: {{K -> L: {{weight: 0.1, pattern: {pattern.use}}}}}\nseed: 1"
     )
-    if pattern.later:
-        with pytest.raises(nv.SpecError) as caught:
-            nv.compile_text(spec)
-        assert [finding.code for finding in caught.value.diagnostics] == ["unsupported"]
-    else:
-        assert len(nv.compile_text(spec).network.connections) > 0
+    assert len(nv.compile_text(spec).network.connections) > 0
 
 
 @pytest.mark.parametrize("word", functions(), ids=lambda word: word.name)

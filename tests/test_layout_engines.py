@@ -41,7 +41,7 @@ def test_every_engine_lays_out_nothing_and_one(engine: str) -> None:
     assert layout.positions == {"A": (0.0, 0.0)}
 
 
-@pytest.mark.parametrize("engine", ["layered", "circular", "grid"])
+@pytest.mark.parametrize("engine", ["layered", "organic", "large", "circular", "grid"])
 @pytest.mark.parametrize("direction", ["down", "up", "right", "left"])
 def test_use_case_one_in_every_direction(engine: str, direction: Direction) -> None:
     problem = suite.use_case_one(direction)

@@ -41,7 +41,7 @@ def explained(topic: Topic) -> str:
             return _key(topic)
         case Pattern():
             use = indented(f"connections: {{K -> L: {{weight: 0.1, pattern: {topic.use}}}}}")
-            return f"{topic.name}, a pattern of connections{_later(topic.later)}\n\n{filled(topic.about)}\n\n{use}"
+            return f"{topic.name}, a pattern of connections\n\n{filled(topic.about)}\n\n{use}"
         case Word():
             kind = "a function of expressions" if "(" in topic.usage else "a name in expressions"
             return f"{topic.usage}, {kind}\n\n{filled(topic.about)}"
@@ -58,7 +58,7 @@ def _builtin(builtin: Builtin) -> str:
 
 
 def _key(key: Key) -> str:
-    head = [key.path, f"a key{_later(key.later)}"]
+    head = [key.path, "a key"]
     if key.kind:
         head.append(key.kind)
     if key.default or key.required:
@@ -66,17 +66,14 @@ def _key(key: Key) -> str:
     parts = [", ".join(head), filled(key.about)]
     choices = [one.name for one in builtins() if one.kind == _NAMING.get(key.path)]
     if key.path == "connections.pattern":
-        choices = [pattern.name for pattern in ALL_PATTERNS if not pattern.later]
+        choices = [pattern.name for pattern in ALL_PATTERNS]
     if choices:
         parts.append(filled(f"built in: {', '.join(choices)}"))
     below = keys_of(key.path)
     if below:
-        rows = [
-            (one.name, one.kind, "required" if one.required else one.default, one.about + _later(one.later))
-            for one in below
-        ]
+        rows = [(one.name, one.kind, "required" if one.required else one.default, one.about) for one in below]
         parts.append(table(rows, ("key", "value", "default", "")))
-    shown = None if key.later else example(key.path)
+    shown = example(key.path)
     if shown is not None:
         parts.append(indented(shown))
     return "\n\n".join(parts)
@@ -99,10 +96,6 @@ def contents() -> str:
 
 def _listed(title: str, found: Iterable[str]) -> str:
     return f"{title}\n{filled(', '.join(found))}"
-
-
-def _later(later: bool) -> str:
-    return " (not read by this version yet)" if later else ""
 
 
 def filled(text: str) -> str:

@@ -54,7 +54,7 @@ class Gaps:
 
 def _names_neurons(key: str) -> bool:
     """Whether a key of a group that was left out may have said which neurons there are."""
-    if key in GroupModel.model_fields or key in GroupModel.LATER:
+    if key in GroupModel.model_fields:
         return key in _NAMING
     close = nearest(key, GroupModel.model_fields)
     return not close or not _NAMING.isdisjoint(close)

@@ -23,8 +23,6 @@ from neurovis_spec.language.located import Located, shown
 from neurovis_spec.language.source import Mapping as SourceMapping
 from neurovis_spec.language.spec import RosModel, Spec
 
-#: Engines that the language names and that come later.
-_LATER_ENGINES = ("organic", "large", "spatial")
 _NOTHING = LayoutModel.model_validate(SourceMapping((), Span("", 1, 1, 1, 1)), context=Findings())
 
 
@@ -119,11 +117,8 @@ def _check_engine(engine: Located[str], findings: Findings) -> None:
     installed = plugins.names(plugins.LAYOUTS)
     if name == "auto" or name in installed:
         return
-    if name in _LATER_ENGINES:
-        findings.error("unsupported", engine.span, f"the engine '{name}' is not part of this version yet")
-    else:
-        hint = suggest(name, ("auto", *installed), "known engines")
-        findings.error("unknown-engine", engine.span, f"there is no layout engine '{shown(name)}' here", hint)
+    hint = suggest(name, ("auto", *installed), "known engines")
+    findings.error("unknown-engine", engine.span, f"there is no layout engine '{shown(name)}' here", hint)
 
 
 def check_ros(model: RosModel | None, findings: Findings) -> None:

@@ -73,7 +73,9 @@ class LayoutModel(Model):
     PLACE: ClassVar[str] = "'layout'"
 
     engine: TextField | None = Field(
-        None, description="What lays it out: auto, layered, circular, grid, manual, or a plug-in (default auto)."
+        None,
+        description="What lays it out: auto, layered, organic, large, circular, grid, spatial, manual, or a plug-in "
+        "(default auto).",
     )
     direction: Annotated[Located[str], words("down", "up", "right", "left")] | None = Field(
         None, description="Where the signals go: down, up, right, left (default down)."

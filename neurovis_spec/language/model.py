@@ -46,8 +46,6 @@ class Model(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="ignore", arbitrary_types_allowed=True, populate_by_name=False)
 
-    #: keys that belong to the language but not yet to this version, with what they are
-    LATER: ClassVar[dict[str, str]] = {}
     #: what a mapping of this kind is called in a finding, for keys that are written elsewhere
     PLACE: ClassVar[str] = ""
     #: what required keys are taken for where they are missing or at fault, to go on looking
@@ -120,10 +118,6 @@ class Model(BaseModel):
     def _unknown(cls, entry: Entry, fields: dict[str, FieldInfo], findings: Findings) -> tuple[str, ...]:
         """Note a key that is not known here; the known ones that it may be meant for."""
         name, span = entry.name, entry.key.span
-        if name in cls.LATER:
-            message = f"'{name}' ({cls.LATER[name]}) is not read by this version yet"
-            findings.error("unsupported", span, message)
-            return ()
         if findings.errors >= _MOST_HINTS:
             findings.error("unknown-key", span, f"unknown key '{shown(name)}'")
             return ()

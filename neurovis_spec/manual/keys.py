@@ -34,7 +34,6 @@ class Key:
     about: str
     default: str = ""
     required: bool = False
-    later: bool = False
     model: type[Model] | None = None
 
     @property
@@ -90,8 +89,6 @@ def _walk(model: type[Model], prefix: str) -> Iterator[Key]:
             yield from _walk(below, f"{prefix}{shown}.")
         elif shown == "parameters" and not prefix:
             yield from _PARAMETER
-    for name, about in model.LATER.items():
-        yield Key(path=prefix + name, kind="", about=f"{about[:1].upper()}{about[1:]}.", later=True)
 
 
 def _model_in(annotation: object) -> type[Model] | None:

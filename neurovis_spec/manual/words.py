@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from neurovis_spec.compiler.patterns import PATTERNS
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 
 FUNCTION_TEXTS: Mapping[str, str] = MappingProxyType(
@@ -88,11 +87,6 @@ class Pattern:
     name: str
     use: str
     about: str
-
-    @property
-    def later(self) -> bool:
-        """Whether this version does not read it yet."""
-        return self.name not in PATTERNS
 
 
 ALL_PATTERNS = (

@@ -1,0 +1,114 @@
+"""Apart: discs that overlap are pushed off each other, in small steps, all at once.
+
+In: centres. Out: centres no two of which are closer than a disc, where each has moved as little as it takes; arcs that
+ran along the direction still do. Where there is no room the whole grows.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from neurovis_layouts.wiring import FloatArray, IntArray
+from neurovis_spec.layout.model import RADIUS
+
+#: Centres are kept this far apart at least: rounding to the grid of coordinates takes some of it.
+LEAST = 2 * RADIUS + 0.005
+#: How far beyond half of what is missing a step goes, and after how many steps the whole grows by how much.
+_EAGER, _PATIENCE, _GROWTH = 1.5, 10, 1.03
+_ROUNDS = 1000
+#: How far below its source the target of an arc stays, at least.
+_BELOW = 0.05
+
+
+def jitter(count: int) -> FloatArray:
+    """(count, 2) numbers from −0.5 to 0.5, spread evenly and the same every time (Roberts' sequence)."""
+    steps = np.arange(1, count + 1, dtype=np.float64)[:, None] * np.array([0.7548776662466927, 0.5698402909980532])
+    spread: FloatArray = steps % 1.0 - 0.5
+    return spread
+
+
+def near_pairs(places: FloatArray, reach: float) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    """All pairs of places (n, 2) closer than ``reach``: both numbers, from the first to the second (k, 2), how far."""
+    cells = np.floor(places / reach).astype(np.int64)
+    cells -= cells.min(axis=0, initial=0)
+    width = np.int64(cells[:, 1].max(initial=0)) + 3
+    keys = cells[:, 0] * width + cells[:, 1]
+    order = np.argsort(keys, kind="stable")
+    keys = keys[order]
+    ones: list[IntArray] = []
+    others: list[IntArray] = []
+    at = np.arange(len(keys), dtype=np.int64)
+    for step in (0, 1, width - 1, width, width + 1):
+        begin = np.searchsorted(keys, keys + step) if step else at + 1
+        counts = np.maximum(np.searchsorted(keys, keys + step, side="right") - begin, 0)
+        first = np.repeat(at, counts)
+        place = np.arange(len(first), dtype=np.int64) - np.repeat(np.cumsum(counts) - counts, counts)
+        ones.append(order[first])
+        others.append(order[begin[first] + place])
+    one, other = np.concatenate(ones), np.concatenate(others)
+    way = places[other] - places[one]
+    squared = (way**2).sum(axis=1)
+    near = squared < reach * reach
+    return one[near], other[near], way[near], np.sqrt(squared[near])
+
+
+def apart(
+    places: FloatArray,
+    want: float,
+    fixed: IntArray | None = None,
+    arcs: tuple[IntArray, IntArray] | None = None,
+    part: IntArray | None = None,
+) -> FloatArray:
+    """Places (n, 2), ``want`` apart where that is to be had, at least a disc. ``fixed`` ones stay. Of ``arcs``
+    (sources, targets) those that run to higher y keep doing so. ``part`` (n,) says what grows together, by itself."""
+    count = len(places)
+    part = np.zeros(count, dtype=np.int64) if part is None else part
+    want = max(want, LEAST + 0.02)
+    hold = np.ones((count, 1))
+    if fixed is not None:
+        hold[fixed] = 0.0
+    places = places + hold * jitter(count) / 1024
+    if arcs is not None:
+        kept = places[arcs[1], 1] > places[arcs[0], 1]
+        arcs = arcs[0][kept], arcs[1][kept]
+    for step in range(1, _ROUNDS):
+        one, other, way, far = near_pairs(places, want)
+        if not len(far) or far.min() >= LEAST:
+            break
+        push = way * ((want - far) / (2 * np.maximum(far, 1e-6)))[:, None]
+        moves = _collected(count, one, other, push)
+        if arcs is not None:
+            moves[:, 1] += _below(places[:, 1], *arcs)
+        places = places + hold * moves
+        if step % _PATIENCE == 0:
+            growing = np.bincount(part[one[far < LEAST]], minlength=int(part.max()) + 1)[part] > 0
+            centre = _centres(places, part)
+            places = np.where((hold > 0) & growing[:, None], centre + (places - centre) * _GROWTH, places)
+    return places
+
+
+def _centres(places: FloatArray, part: IntArray) -> FloatArray:
+    """(n, 2) the middle of the part that each place belongs to."""
+    sums = np.stack([np.bincount(part, places[:, k]) for k in (0, 1)], axis=1)
+    centres: FloatArray = (sums / np.maximum(np.bincount(part), 1)[:, None])[part]
+    return centres
+
+
+def _collected(count: int, one: IntArray, other: IntArray, push: FloatArray) -> FloatArray:
+    """The mean of the pushes on each place, away from each other."""
+    times = np.bincount(one, minlength=count) + np.bincount(other, minlength=count)
+    total = np.stack(
+        [np.bincount(other, push[:, k], count) - np.bincount(one, push[:, k], count) for k in (0, 1)], axis=1
+    )
+    moves: FloatArray = total * (_EAGER / np.maximum(times, 1))[:, None]
+    return moves
+
+
+def _below(y: FloatArray, above: IntArray, below: IntArray) -> FloatArray:
+    missing = _BELOW - (y[below] - y[above])
+    wrong = missing > 0
+    half, high, low = missing[wrong] / 2, above[wrong], below[wrong]
+    times = np.bincount(high, minlength=len(y)) + np.bincount(low, minlength=len(y))
+    total = np.bincount(low, half, len(y)) - np.bincount(high, half, len(y))
+    moves: FloatArray = total / np.maximum(times, 1)
+    return moves

@@ -1,0 +1,56 @@
+"""Finish: from places to a layout, for engines that place neurons anywhere.
+
+In: a problem and places in the engine's frame (x across, y along). Out: a Layout: pins exact, edges routed, turned to
+the direction, what is remembered kept.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from neurovis_layouts.apart import near_pairs
+from neurovis_layouts.frame import from_picture, to_picture
+from neurovis_layouts.kept import kept
+from neurovis_layouts.pins import fit
+from neurovis_layouts.routing import route_all
+from neurovis_layouts.wiring import FloatArray, IntArray
+from neurovis_spec.layout.geometry import snap
+from neurovis_spec.layout.model import Layout, LayoutProblem, Point
+
+#: With more connections than this, going round discs only moves the crowd.
+_CAREFUL = 1000
+
+
+def drawn(problem: LayoutProblem, engine: str, places: FloatArray) -> Layout:
+    """The layout with the neurons at the first of ``places`` (n, 2), where no pin says otherwise."""
+    flat: list[Point] = [(snap(x), snap(y)) for x, y in places[: len(problem.neurons)].tolist()]
+    pins = {i: from_picture(point, problem.direction) for i, point in problem.pins.items()}
+    centres, _, _ = fit(flat, pins)
+    routes = route_all(problem.edges, centres, careful=_CAREFUL)
+    turned = problem.direction
+    fresh = Layout(
+        problem.network,
+        engine,
+        {name: to_picture(point, turned) for name, point in zip(problem.neurons, centres, strict=True)},
+        {
+            edge.name: route if turned == "down" else tuple(to_picture(point, turned) for point in route)
+            for edge, route in zip(problem.edges, routes, strict=True)
+        },
+    )
+    return kept(problem, fresh)
+
+
+def pinned_places(problem: LayoutProblem) -> tuple[IntArray, FloatArray]:
+    """Who is pinned (p,), in order, and where in the engine's frame (p, 2)."""
+    fixed = np.array(sorted(problem.pins), dtype=np.int64)
+    there = [from_picture(problem.pins[i], problem.direction) for i in fixed.tolist()]
+    return fixed, np.array(there, dtype=np.float64).reshape(-1, 2)
+
+
+def nearest(places: FloatArray, reach: float) -> FloatArray:
+    """(n,) how far each place is from the next one, at most ``reach``."""
+    one, other, _, far = near_pairs(places, reach)
+    least = np.full(len(places), reach)
+    np.minimum.at(least, one, far)
+    np.minimum.at(least, other, far)
+    return least

@@ -1,0 +1,165 @@
+"""The large engine: from a problem to a layout.
+
+In: a problem of any size. Out: a layout in which modules and whatever else hangs together show as clusters, and most
+connections run along the direction. The parts of the network are laid out (``spread``), scaled so that neighbours are a
+spacing apart, their discs pushed off each other, packed; then pins are put where they belong and pull the rest along.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from neurovis_layouts.apart import apart
+from neurovis_layouts.finish import drawn, nearest, pinned_places
+from neurovis_layouts.large.field import GridField
+from neurovis_layouts.large.settle import Cooling, settle
+from neurovis_layouts.large.spread import SMALL, spread, spread_small
+from neurovis_layouts.packing import packed
+from neurovis_layouts.wiring import FloatArray, IntArray, Wiring, parts_of, wiring_of
+from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem
+
+#: In spacings: how far three quarters are from their next at most, how long links are in the mean at least, how far
+#: discs are kept apart, and parts.
+_NEXT, _LINK, _APART, _GAP = 1.0, 0.9, 0.75, 1.5
+_MOST = 0.75
+#: A neuron's share of the picture, in square spacings, at most: discs have to stay in sight.
+_ROOM = 7.0
+#: A part wider than this by its height is stretched, but not farther than this.
+_FLATTEST, _STRETCH = 1.3, 3.0
+_PINNED_STEPS = 60
+
+
+class LargeEngine:
+    """Forces over levels of detail."""
+
+    name = "large"
+    capabilities = Capabilities(pins=True, boxes=True, direction=True, memory=True, neurons=200_000, edges=2_000_000)
+
+    def lay_out(self, problem: LayoutProblem) -> Layout:
+        """Place the neurons by forces, route the edges straight."""
+        wiring = wiring_of(problem)
+        places = _free(wiring, problem.neuron_spacing)
+        if problem.pins:
+            places = _around_pins(problem, wiring, places)
+        return drawn(problem, self.name, places)
+
+
+def _free(wiring: Wiring, spacing: float) -> FloatArray:
+    """Places (count, 2) without pins: every part laid out, then all packed."""
+    part = parts_of(wiring.count, wiring.a, wiring.b)
+    sizes = np.bincount(part)
+    places = np.zeros((wiring.count, 2))
+    small = np.flatnonzero(sizes[part] <= SMALL)
+    if len(small):
+        within = np.unique(part[small], return_inverse=True)[1]
+        places[small] = spread_small(_only(wiring, small), within)
+    for number in np.flatnonzero(sizes > SMALL).tolist():
+        chosen = np.flatnonzero(part == number)
+        places[chosen] = spread(_only(wiring, chosen))
+    return _packed(wiring, places, part, spacing)
+
+
+def _only(wiring: Wiring, chosen: IntArray) -> Wiring:
+    """The wiring of these points alone, which nothing connects to others."""
+    number = np.full(wiring.count, -1, dtype=np.int64)
+    number[chosen] = np.arange(len(chosen))
+    links, arcs = number[wiring.a] >= 0, number[wiring.above] >= 0
+    return Wiring(
+        int(np.searchsorted(chosen, wiring.neurons)),
+        wiring.mass[chosen],
+        number[wiring.a[links]],
+        number[wiring.b[links]],
+        wiring.weight[links],
+        number[wiring.above[arcs]],
+        number[wiring.below[arcs]],
+        wiring.pull[arcs],
+    )
+
+
+def _packed(wiring: Wiring, places: FloatArray, part: IntArray, spacing: float) -> FloatArray:
+    """Every part scaled, its discs kept apart, and all packed; what holds no neuron goes nowhere."""
+    count = int(part.max(initial=-1)) + 1
+    real = slice(0, wiring.neurons)
+    if not wiring.neurons:
+        return places
+    # far from each other, so that all parts can be worked on at once
+    places = _stretched(places, part)
+    reach = float(np.abs(places).max()) + 1.0
+    shift = np.stack([8 * reach * part, np.zeros(len(part))], axis=1)
+    places = places * _scales(wiring, places + shift, part, spacing)[:, None]
+    reach = float(np.abs(places).max()) + 10.0
+    shift = np.stack([8 * reach * part, np.zeros(len(part))], axis=1)
+    moved = apart(places[real] + shift[real], _APART * spacing, None, (wiring.above, wiring.below), part[real])
+    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+    np.minimum.at(low, part[real], moved)
+    np.maximum.at(high, part[real], moved)
+    filled = np.flatnonzero(np.isfinite(low[:, 0]))
+    sizes = [(float(w), float(h)) for w, h in (high - low)[filled].tolist()]
+    corners = np.zeros((count, 2))
+    corners[filled] = packed(sizes, _GAP * spacing)
+    low[~np.isfinite(low)] = 0.0
+    places[real] = moved + (corners - low)[part[real]]
+    return places
+
+
+def _stretched(places: FloatArray, part: IntArray) -> FloatArray:
+    """Places with y stretched where a part is flat, as arcs pull towards each other what they press apart: that takes
+    nothing from the flow and adds no crossing."""
+    width, height = _extent(places, part).T
+    stretch = np.clip(width / (_FLATTEST * np.maximum(height, 1e-3)), 1.0, _STRETCH)
+    stretched: FloatArray = places * np.stack([np.ones(len(part)), stretch[part]], axis=1)
+    return stretched
+
+
+def _scales(wiring: Wiring, places: FloatArray, part: IntArray, spacing: float) -> FloatArray:
+    """(count,) what to multiply each part by, so that those next to each other have room."""
+    count = int(part.max()) + 1
+    next_one = nearest(places[: wiring.neurons], 1.0)
+    links = (wiring.a < wiring.neurons) & (wiring.b < wiring.neurons)
+    way = places[wiring.b[links]] - places[wiring.a[links]]
+    length = np.sqrt((way**2).sum(axis=1))
+    by_room = _NEXT * spacing / np.maximum(_quantile(part[: wiring.neurons], next_one, count), 1e-3)
+    by_link = _LINK * spacing / np.maximum(_mean(part[wiring.a[links]], length, count, 1.0), 1e-3)
+    width, height = (_extent(places, part) + 0.1).T
+    by_area = spacing * np.sqrt(_ROOM * np.bincount(part) / (width * height))
+    scales: FloatArray = np.maximum(np.minimum(by_room, by_area), by_link)[part]
+    return scales
+
+
+def _extent(places: FloatArray, part: IntArray) -> FloatArray:
+    """(count, 2) how wide and how high each part is."""
+    count = int(part.max()) + 1
+    low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+    np.minimum.at(low, part, places)
+    np.maximum.at(high, part, places)
+    extent: FloatArray = high - low
+    return extent
+
+
+def _quantile(part: IntArray, values: FloatArray, count: int) -> FloatArray:
+    """(count,) what most of the values of each part do not exceed; 1 for none."""
+    times = np.bincount(part, minlength=count)
+    order = np.lexsort((values, part))
+    place = np.cumsum(times) - times + (_MOST * np.maximum(times - 1, 0)).astype(np.int64)
+    return np.where(times > 0, values[order][np.minimum(place, max(len(values) - 1, 0))], 1.0)
+
+
+def _mean(part: IntArray, values: FloatArray, count: int, otherwise: float) -> FloatArray:
+    """(count,) the mean of the values of each part."""
+    times = np.bincount(part, minlength=count)
+    total = np.bincount(part, values, count)
+    return np.where(times > 0, total / np.maximum(times, 1), otherwise)
+
+
+def _around_pins(problem: LayoutProblem, wiring: Wiring, places: FloatArray) -> FloatArray:
+    """The whole moved to the pins, these put where they belong, and the rest pulled along."""
+    fixed, there = pinned_places(problem)
+    places = places + (there - places[fixed]).mean(axis=0)
+    places[fixed] = there
+    scale = 2.0 * problem.neuron_spacing
+    field = GridField(wiring.mass)
+    pulled = settle(wiring, places / scale, field, Cooling(_PINNED_STEPS, 0.5, 0.02), fixed) * scale
+    pulled[fixed] = there
+    real = slice(0, wiring.neurons)
+    pulled[real] = apart(pulled[real], _APART * problem.neuron_spacing, fixed, (wiring.above, wiring.below))
+    return pulled

@@ -1,0 +1,91 @@
+"""The field: how all points push each other off, by the inverse of their distance.
+
+In: places and masses. Out: the push on each. Few points are taken pair by pair; many give their mass to a grid, whose
+field is one convolution, by Fourier transform (Hockney and Eastwood 1988: particle-mesh); closer than a cell the push
+fades, which is as well, as discs are kept apart afterwards.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from neurovis_layouts.wiring import FloatArray, IntArray
+
+_FEWEST_CELLS, _MOST_CELLS = 16, 1024
+
+
+class Field(Protocol):
+    """Whatever gives the push (n, 2) on places (n, 2)."""
+
+    def __call__(self, places: FloatArray, /) -> FloatArray: ...  # noqa: D102
+
+
+class PairField:
+    """Pair by pair: ``one`` and ``other`` (k,) are the pairs."""
+
+    def __init__(self, mass: FloatArray, one: IntArray, other: IntArray) -> None:
+        self._count, self._one, self._other = len(mass), one, other
+        self._mass = mass[one] * mass[other]
+
+    def __call__(self, places: FloatArray, /) -> FloatArray:
+        """The push on each place."""
+        way = places[self._other] - places[self._one]
+        push = way * (self._mass / ((way**2).sum(axis=1) + 0.01))[:, None]
+        sums = [
+            np.bincount(self._other, push[:, k], self._count) - np.bincount(self._one, push[:, k], self._count)
+            for k in (0, 1)
+        ]
+        return np.stack(sums, axis=1)
+
+
+class GridField:
+    """On a square grid with about four cells for each point."""
+
+    def __init__(self, mass: FloatArray) -> None:
+        self._mass = mass
+        self._cells = _smooth(int(np.clip(2 * np.sqrt(len(mass)), _FEWEST_CELLS, _MOST_CELLS)))
+        self._size = 2 * self._cells  # twice, so that what leaves on one side does not come back on the other
+        steps = np.arange(self._size, dtype=np.float64)
+        steps = np.where(steps < self._cells, steps, steps - self._size)
+        right, down = steps[:, None], steps[None, :]
+        squared = right**2 + down**2
+        squared[0, 0] = 1.0
+        # the field of a round cloud one cell wide: 1/r beyond it, none at its middle
+        strength = (1 - np.exp(-squared)) / squared
+        kernel = np.fft.fft2(right * strength + 1j * down * strength)
+        self._kernel = kernel.astype(np.complex64)
+
+    def __call__(self, places: FloatArray, /) -> FloatArray:
+        """The push on each place."""
+        low = places.min(axis=0)
+        cell = (float((places.max(axis=0) - low).max()) + 1e-9) / (self._cells - 2)
+        at = (places - low) / cell + 0.5
+        corner = np.floor(at).astype(np.int64)
+        (fx, fy), size = (at - corner).T, self._size
+        shares = ((1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy)
+        first = corner[:, 0] * size + corner[:, 1]
+        where = (first, first + size, first + 1, first + size + 1)
+        masses = np.concatenate([share * self._mass for share in shares])
+        used = self._cells
+        density = np.bincount(np.concatenate(where), masses, used * size).reshape(used, size)
+        # the rest of the rows is empty, and nobody asks for their field
+        rows = np.fft.fft(density.astype(np.float32), axis=1)
+        waves = np.fft.fft(rows, n=size, axis=0) * self._kernel
+        field = np.fft.ifft(np.fft.ifft(waves, axis=0)[:used], axis=1).ravel()
+        felt = sum((share * field[place] for share, place in zip(shares, where, strict=True)), start=np.zeros(1))
+        push: FloatArray = np.stack([felt.real, felt.imag], axis=1) * (self._mass / cell)[:, None]
+        return push
+
+
+def _smooth(least: int) -> int:
+    """The least number from ``least`` on without a prime factor above 5: Fourier transforms of such sizes are quick."""
+    while True:
+        rest = least
+        for factor in (2, 3, 5):
+            while rest % factor == 0:
+                rest //= factor
+        if rest == 1:
+            return least
+        least += 1

@@ -1,0 +1,68 @@
+"""Settle: forces at one level, step by step, each shorter than the one before.
+
+In: a wiring and where its points are. Out: where they come to rest. All points push each other off (``field``); links
+pull with a force that grows slower than their length, so that clusters stand apart (Noack 2007: forces between linear
+and logarithmic); arcs press their target below their source.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from neurovis_layouts.large.field import Field
+from neurovis_layouts.wiring import FloatArray, IntArray, Wiring
+
+#: How strongly points push each other off, and the power of length with which links pull.
+_PUSH, _POWER = 0.2, 0.7
+#: How strongly an arc presses as long as its target is less than this below its source.
+_PRESS, _BELOW = 10.0, 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Cooling:
+    """How many steps, and the longest move in the first and in the last; ``unit`` is the length that an arc is
+    measured by: points of a coarse level stand for many."""
+
+    steps: int
+    first: float
+    last: float
+    unit: float = 1.0
+
+
+def settle(
+    wiring: Wiring,
+    places: FloatArray,
+    field: Field,
+    cooling: Cooling,
+    fixed: IntArray | None = None,
+    tick: Callable[[], None] | None = None,
+) -> FloatArray:
+    """Places (count, 2) at rest; ``fixed`` ones stay; ``tick`` is called after every step."""
+    count = wiring.count
+    for step in range(cooling.steps):
+        force = _PUSH * field(places)
+        way = places[wiring.b] - places[wiring.a]
+        length = np.sqrt((way**2).sum(axis=1)) + 1e-9
+        stiffness = wiring.weight * length ** (_POWER - 1)
+        pull = way * stiffness[:, None]
+        for k in (0, 1):
+            force[:, k] += np.bincount(wiring.a, pull[:, k], count) - np.bincount(wiring.b, pull[:, k], count)
+        held = np.bincount(wiring.a, stiffness, count) + np.bincount(wiring.b, stiffness, count)
+        missing = _BELOW * cooling.unit - (places[wiring.below, 1] - places[wiring.above, 1])
+        press = _PRESS * wiring.pull * np.maximum(missing, 0)
+        force[:, 1] += np.bincount(wiring.below, press, count) - np.bincount(wiring.above, press, count)
+        active = _PRESS * wiring.pull * (missing > 0)
+        held += np.bincount(wiring.below, active, count) + np.bincount(wiring.above, active, count)
+        move = force / (held + 1e-9)[:, None]
+        far = np.sqrt((move**2).sum(axis=1)) + 1e-12
+        longest = cooling.first * (cooling.last / cooling.first) ** (step / max(1, cooling.steps - 1))
+        move *= (np.minimum(far, longest) / far)[:, None]
+        if fixed is not None:
+            move[fixed] = 0.0
+        places = places + move
+        if tick is not None:
+            tick()
+    return places

@@ -1,0 +1,79 @@
+"""Spread: the points of a network find their places, from the coarsest level to the finest.
+
+In: a Wiring. Out: a place for each of its points. What hangs together is laid out on its own, small parts all in one
+go; a level's points begin where the point was that they are part of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from neurovis_layouts.apart import jitter
+from neurovis_layouts.large.field import Field, GridField, PairField
+from neurovis_layouts.large.levels import levels_of
+from neurovis_layouts.large.settle import Cooling, settle
+from neurovis_layouts.wiring import FloatArray, IntArray, Wiring
+
+#: Parts of at most so many points are laid out together, pair by pair.
+SMALL = 64
+#: Up to so many points, forces are taken pair by pair.
+_BY_PAIRS = 250
+#: Steps at the finest level, where points are few and where they are many.
+_STEPS, _FEWER_STEPS, _MANY = 200, 100, 3000
+#: How far crowded stretches are evened out, and how many stretches there are by the root of the points.
+_EVEN, _BINS = 0.6, 0.2
+
+Tick = Callable[[], None]
+
+
+def spread(wiring: Wiring, tick: Tick | None = None) -> FloatArray:
+    """Places (count, 2) for a wiring that hangs together; neighbours are about 1 apart."""
+    levels, coarsest = levels_of(wiring)
+    whole = float(wiring.count)
+    unit = np.sqrt(whole / coarsest.count)
+    places = jitter(coarsest.count) * np.sqrt(whole)
+    places = settle(coarsest, places, _field(coarsest), Cooling(2 * _STEPS, np.sqrt(whole) / 4, 0.02 * unit, unit))
+    for level in reversed(levels):
+        count = level.wiring.count
+        unit = np.sqrt(whole / count)
+        places = places[level.part_of] + 0.3 * unit * jitter(count)
+        steps = _STEPS if count <= _MANY else _FEWER_STEPS
+        places = settle(level.wiring, places, _field(level.wiring), Cooling(steps, unit, 0.02 * unit, unit), None, tick)
+    return np.stack([_evened(places[:, 0]), _evened(places[:, 1])], axis=1)
+
+
+def _evened(line: FloatArray) -> FloatArray:
+    """Coordinates (count,) in the same order, crowded stretches widened and empty ones narrowed: the order decides
+    about flow, and about crossings nearly so."""
+    bins = max(8, int(_BINS * np.sqrt(len(line))))
+    low, high = float(line.min()), float(line.max())
+    crowd = np.histogram(line, bins, (low, high))[0] / len(line)
+    edges = np.concatenate([[0.0], np.cumsum(_EVEN * crowd + (1 - _EVEN) / bins)])
+    evened: FloatArray = low + (high - low) * np.interp(line, np.linspace(low, high, bins + 1), edges)
+    return evened
+
+
+def spread_small(wiring: Wiring, part: IntArray, tick: Tick | None = None) -> FloatArray:
+    """Places (count, 2) for a wiring of many small parts, each around its own origin: those of different parts do not
+    feel each other. ``part`` (count,) says which one a point belongs to."""
+    order = np.argsort(part, kind="stable")
+    begin = np.searchsorted(part[order], part[order], side="right")
+    at = np.arange(len(order), dtype=np.int64)
+    counts = begin - at - 1
+    one = np.repeat(at, counts)
+    other = one + 1 + np.arange(len(one), dtype=np.int64) - np.repeat(np.cumsum(counts) - counts, counts)
+    field = PairField(wiring.mass, order[one], order[other])
+    size = np.sqrt(np.bincount(part)[part])[:, None]
+    rank = np.zeros(wiring.count, dtype=np.int64)
+    rank[order] = at - np.searchsorted(part[order], part[order])
+    places = jitter(int(rank.max(initial=0)) + 1)[rank] * size
+    return settle(wiring, places, field, Cooling(2 * _STEPS, 1.0, 0.01), None, tick)
+
+
+def _field(wiring: Wiring) -> Field:
+    if wiring.count > _BY_PAIRS:
+        return GridField(wiring.mass)
+    one, other = np.triu_indices(wiring.count, 1)
+    return PairField(wiring.mass, one.astype(np.int64), other.astype(np.int64))

@@ -1,0 +1,120 @@
+"""The organic engine: from a problem to a layout.
+
+In: a problem of a few hundred neurons whose ranks say little. Out: a layout whose distances are those in the network,
+as far as a plane allows: what is wired closely stands close. What runs from one loop to another runs down; modules and
+boxes are drawn together; pins are part of the whole from the start.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from neurovis_layouts.apart import apart, jitter
+from neurovis_layouts.finish import drawn, nearest, pinned_places
+from neurovis_layouts.organic.paths import distances
+from neurovis_layouts.organic.stress import Arcs, least_stress
+from neurovis_layouts.packing import packed
+from neurovis_layouts.wiring import FloatArray, IntArray, Wiring, parts_of, wiring_of
+from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem
+
+#: In spacings: how far linked neurons are apart, discs of any two, three quarters of the discs from their next at
+#: least, and parts.
+_LINK, _APART, _NEXT, _GAP = 1.6, 0.8, 1.05, 1.5
+_MOST = 0.75
+#: What is in one module, or box, is as close as if it were so many links, or so much of what it is.
+_MATES, _CLOSER = 1.0, 0.5
+#: How strongly an arc presses its target below its source, and how far, in links.
+_PRESS, _BELOW = 12.0, 0.8
+
+
+class OrganicEngine:
+    """Stress majorisation with a direction."""
+
+    name = "organic"
+    capabilities = Capabilities(pins=True, boxes=True, direction=True, memory=True, neurons=2000, edges=50_000)
+
+    def lay_out(self, problem: LayoutProblem) -> Layout:
+        """Place the neurons by their distances in the network, route the edges round what is in the way."""
+        wiring = wiring_of(problem, hubs=False)
+        fixed, there = pinned_places(problem)
+        part = _parts(problem, wiring)
+        places = np.zeros((wiring.count, 2))
+        # what has pins is one part: it has its place, and the others stand beside it
+        part[np.isin(part, part[fixed])] = -1
+        numbers = np.unique(part).tolist()
+        sizes: list[tuple[float, float]] = []
+        for number in numbers:
+            chosen = np.flatnonzero(part == number)
+            places[chosen] = _placed(problem, wiring, chosen, fixed, there)
+            sizes.append(tuple((places[chosen].max(axis=0) - places[chosen].min(axis=0)).tolist()))
+        _pack(places, part, numbers, sizes, _GAP * problem.neuron_spacing)
+        return drawn(problem, self.name, places)
+
+
+def _parts(problem: LayoutProblem, wiring: Wiring) -> IntArray:
+    """(count,) parts that hang together, be it by a module or a box."""
+    together = [(members[0], mate) for members in _together(problem) for mate in members[1:]]
+    pairs = np.array(together, dtype=np.int64).reshape(-1, 2)
+    return parts_of(wiring.count, np.concatenate([wiring.a, pairs[:, 0]]), np.concatenate([wiring.b, pairs[:, 1]]))
+
+
+def _together(problem: LayoutProblem) -> list[tuple[int, ...]]:
+    """Modules and boxes, those within others after these."""
+    return [module.members for module in problem.modules] + [members for _, members in problem.boxes]
+
+
+def _placed(problem: LayoutProblem, wiring: Wiring, chosen: IntArray, fixed: IntArray, there: FloatArray) -> FloatArray:
+    """Places (k, 2) of the ``chosen`` neurons: of least stress, then scaled and kept apart."""
+    number = np.full(wiring.count, -1, dtype=np.int64)
+    number[chosen] = np.arange(len(chosen))
+    links, arcs = number[wiring.a] >= 0, number[wiring.above] >= 0
+    link = _LINK * problem.neuron_spacing
+    ways = distances(len(chosen), number[wiring.a[links]], number[wiring.b[links]])
+    for members in _together(problem):
+        mates = number[list(members)]
+        mates = mates[mates >= 0]
+        block = np.ix_(mates, mates)
+        ways[block] = np.minimum(ways[block], np.maximum(_MATES, _CLOSER * ways[block]))
+    np.fill_diagonal(ways, 0.0)
+    above, below = number[wiring.above[arcs]], number[wiring.below[arcs]]
+    press = Arcs(above, below, _BELOW * link, _PRESS / link**2)
+    first = jitter(len(chosen)) * link * np.sqrt(len(chosen))
+    nobody = np.zeros(0, dtype=np.int64)
+    # the direction comes in once the rest has found its shape: springs would lock what begins the wrong way round
+    loose = least_stress(link * ways, first, Arcs(nobody, nobody, 0.0, 0.0), nobody, 60)
+    places = least_stress(link * ways, _upright(loose, above, below), press, nobody)
+    places *= max(1.0, _NEXT * problem.neuron_spacing / max(_most(nearest(places, link)), 1e-3))
+    here = np.isin(fixed, chosen)
+    held = number[fixed[here]]
+    if len(held):
+        places += (there[here] - places[held]).mean(axis=0)
+        places[held] = there[here]
+        places = least_stress(link * ways, places, press, held)
+    return apart(places, _APART * problem.neuron_spacing, held, (above, below))
+
+
+def _most(values: FloatArray) -> float:
+    return float(np.quantile(values, _MOST)) if len(values) else 1.0
+
+
+def _upright(places: FloatArray, above: IntArray, below: IntArray) -> FloatArray:
+    """Places turned about their middle so that arcs run down on the whole."""
+    if not len(above):
+        return places
+    x, y = (places[below] - places[above]).mean(axis=0).tolist()
+    length = float(np.sqrt(x * x + y * y))
+    if length == 0:
+        return places
+    sine, cosine = x / length, y / length
+    return np.stack([cosine * places[:, 0] - sine * places[:, 1], sine * places[:, 0] + cosine * places[:, 1]], axis=1)
+
+
+def _pack(places: FloatArray, part: IntArray, numbers: list[int], sizes: list[tuple[float, float]], gap: float) -> None:
+    """Move the parts side by side; the one with pins (−1) stays, and the others go below it."""
+    free = [i for i, number in enumerate(numbers) if number >= 0]
+    corners = packed([sizes[i] for i in free], gap)
+    pinned = places[part < 0]
+    left, top = (0.0, 0.0) if not len(pinned) else (float(pinned[:, 0].min()), float(pinned[:, 1].max()) + gap)
+    for i, corner in zip(free, corners, strict=True):
+        chosen = part == numbers[i]
+        places[chosen] += np.array((corner[0] + left, corner[1] + top)) - places[chosen].min(axis=0)

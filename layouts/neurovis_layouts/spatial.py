@@ -1,0 +1,96 @@
+"""The spatial engine: neurons where the data says that they are, as in a body or a connectome.
+
+In: a problem whose neurons have a ``position``. Out: a layout with x to the right and y downwards, both as given and
+scaled by one factor that gives most discs room; those that are still too close move aside. Pins win. Neurons without a
+position are refused by name.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from neurovis_layouts.apart import apart, jitter
+from neurovis_layouts.finish import drawn, nearest, pinned_places
+from neurovis_layouts.frame import from_picture
+from neurovis_layouts.wiring import FloatArray
+from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem, LayoutRefusalError
+
+#: In spacings: how far half of the discs are from their next, how far nine tenths of them (the picture may grow by this
+#: factor for it), and how far any two are kept apart.
+_HALF, _NINE_TENTHS, _GROWTH, _APART = 1.0, 0.7, 2.0, 0.7
+#: Room for each of those that stand in one place.
+_CROWD = 0.9
+
+
+class SpatialEngine:
+    """Positions from data."""
+
+    name = "spatial"
+    capabilities = Capabilities(pins=True, boxes=True, direction=True, memory=True, neurons=200_000, edges=2_000_000)
+
+    def lay_out(self, problem: LayoutProblem) -> Layout:
+        """Scale the positions, keep discs apart, route the edges. Raises LayoutRefusalError (``position-missing``)."""
+        data = _data(problem)
+        fixed, there = pinned_places(problem)
+        known = np.isfinite(data.sum(axis=1))
+        places = data * _factor(data[known]) * problem.neuron_spacing
+        pinned = known[fixed]
+        if pinned.any():
+            places += (there[pinned] - places[fixed[pinned]]).mean(axis=0)
+        places[fixed] = there
+        places = _fanned(places, _CROWD * problem.neuron_spacing)
+        places[fixed] = there
+        return drawn(problem, self.name, apart(places, _APART * problem.neuron_spacing, fixed))
+
+
+def _data(problem: LayoutProblem) -> FloatArray:
+    """(n, 2) the positions as given, in the engine's frame: the direction does not turn a body. NaN where a pin stands
+    for one."""
+    nowhere = (math.nan, math.nan)
+    given = problem.places or (nowhere,) * len(problem.neurons)
+    free = [i for i in range(len(given)) if i not in problem.pins]
+    lost = [problem.neurons[i] for i in free if not math.isfinite(sum(given[i]))]
+    if lost:
+        shown = ", ".join(f"'{name}'" for name in lost[:5])
+        more = f" and {len(lost) - 5} more" if len(lost) > 5 else ""
+        raise LayoutRefusalError(
+            "position-missing",
+            f"the engine 'spatial' draws neurons where their 'position' says; {shown}{more} "
+            f"{'has' if len(lost) == 1 else 'have'} none",
+            "give them a position, or pin them under layout.positions",
+        )
+    return np.array([from_picture(point, problem.direction) for point in given], dtype=np.float64).reshape(-1, 2)
+
+
+def _factor(data: FloatArray) -> float:
+    """What to multiply positions by, so that neighbours are about 1 apart."""
+    spots = np.unique(data, axis=0)
+    if len(spots) < 2:
+        return 1.0
+    low = spots.min(axis=0)
+    extent = float((spots.max(axis=0) - low).max())
+    spots = (spots - low) / extent
+    reach = 0.01 / len(spots)
+    while True:
+        next_one = nearest(spots, reach)
+        if (next_one < reach).mean() > 0.5 or reach > 2:
+            break
+        reach *= 2
+    half, tenth = np.quantile(next_one, [0.5, 0.1]).tolist()
+    factor = _HALF / half
+    return float(np.clip(_NINE_TENTHS / max(tenth, 1e-300), factor, _GROWTH * factor)) / extent
+
+
+def _fanned(places: FloatArray, spacing: float) -> FloatArray:
+    """Places, those in exactly one spot fanned out around it."""
+    _, spot, times = np.unique(places, axis=0, return_inverse=True, return_counts=True)
+    spot = spot.reshape(-1)
+    order = np.argsort(spot, kind="stable")
+    rank = np.zeros(len(places), dtype=np.int64)
+    rank[order] = np.arange(len(places)) - (np.cumsum(times) - times)[spot[order]]
+    crowd = times[spot]
+    fan = jitter(int(rank.max(initial=0)) + 1)[rank] * (spacing * np.sqrt(crowd))[:, None]
+    fanned: FloatArray = places + np.where(crowd > 1, 1.0, 0.0)[:, None] * fan
+    return fanned

@@ -1,0 +1,120 @@
+"""Wiring: a network as arrays, for engines that move many neurons at once.
+
+In: a problem. Out: links without direction (parallel and reciprocal edges are one link of their number, self-loops are
+none), arcs (what tells above from below: edges between different loops), hubs (a weightless point for every module and
+box, linked with what belongs to it, which keeps that together) and the parts that hang together.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.layout.model import LayoutProblem
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+#: How heavy a hub is, and its links.
+_HUB, _SPOKE = 0.2, 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Wiring:
+    """``count`` points, of which the first ``neurons`` are neurons and the rest hubs; ``mass`` (count,); links from
+    ``a`` to ``b`` of weight ``weight`` (k,), ``a < b``; arcs from ``above`` to ``below`` of weight ``pull`` (m,)."""
+
+    neurons: int
+    mass: FloatArray
+    a: IntArray
+    b: IntArray
+    weight: FloatArray
+    above: IntArray
+    below: IntArray
+    pull: FloatArray
+
+    @property
+    def count(self) -> int:
+        """How many points there are, hubs included."""
+        return len(self.mass)
+
+
+def wiring_of(problem: LayoutProblem, hubs: bool = True) -> Wiring:
+    """The wiring of a problem."""
+    neurons = len(problem.neurons)
+    ends = np.array([(edge.source, edge.target) for edge in problem.edges], dtype=np.int64).reshape(-1, 2)
+    spokes = _spokes(problem) if hubs else np.zeros((0, 2), dtype=np.int64)
+    count = max(neurons, int(spokes.max(initial=-1)) + 1)
+    mass = np.ones(count)
+    mass[neurons:] = _HUB
+    a, b, weight = linked(
+        count,
+        np.concatenate([ends[:, 0], spokes[:, 0]]),
+        np.concatenate([ends[:, 1], spokes[:, 1]]),
+        np.concatenate([np.ones(len(ends)), np.full(len(spokes), _SPOKE)]),
+    )
+    loops = _loops(neurons, ends)
+    between = ends[loops[ends[:, 0]] != loops[ends[:, 1]]]
+    above, below, pull = summed(count, between[:, 0], between[:, 1], np.ones(len(between)))
+    return Wiring(neurons, mass, a, b, weight, above, below, pull)
+
+
+def linked(count: int, a: IntArray, b: IntArray, weight: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
+    """Links without direction: equal ones summed up, the lower end first, none from a point to itself."""
+    return summed(count, np.minimum(a, b), np.maximum(a, b), weight)
+
+
+def summed(count: int, a: IntArray, b: IntArray, weight: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
+    """Arcs in order, equal ones summed up, none from a point to itself."""
+    apart = a != b
+    keys, place = np.unique(a[apart] * np.int64(count) + b[apart], return_inverse=True)
+    total: FloatArray = np.bincount(place, weight[apart], len(keys)).astype(np.float64)
+    one, other = np.divmod(keys, np.int64(max(count, 1)))
+    return one, other, total
+
+
+def parts_of(count: int, a: IntArray, b: IntArray) -> IntArray:
+    """(count,) the number of the part that each point belongs to: points linked in any way are of one part. Parts
+    are numbered by their first point."""
+    lowest = np.arange(count, dtype=np.int64)
+    while True:
+        low = np.minimum(lowest[a], lowest[b])
+        before = lowest.copy()
+        np.minimum.at(lowest, lowest[a], low)
+        np.minimum.at(lowest, lowest[b], low)
+        lowest = lowest[lowest]
+        if np.array_equal(before, lowest):
+            return np.unique(lowest, return_inverse=True)[1].astype(np.int64)
+
+
+def _spokes(problem: LayoutProblem) -> IntArray:
+    """(k, 2): who is linked with which hub: an instance's with what is in no instance within it, and with theirs."""
+    hub = len(problem.neurons)
+    spokes: list[tuple[int, int]] = []
+    inner: dict[int, int] = {}
+    for number, module in enumerate(problem.modules):
+        for member in module.members:
+            inner[member] = hub + number
+        if module.parent >= 0:
+            spokes.append((hub + module.parent, hub + number))
+    spokes += inner.items()
+    hub += len(problem.modules)
+    for _, members in problem.boxes:
+        spokes += [(member, hub) for member in members]
+        hub += 1
+    return np.array(spokes, dtype=np.int64).reshape(-1, 2)
+
+
+def _loops(neurons: int, ends: IntArray) -> IntArray:
+    """(neurons,) which loop (strongly connected component) each neuron is part of."""
+    import networkx as nx  # only here
+
+    graph: nx.DiGraph[int] = nx.DiGraph()
+    graph.add_nodes_from(range(neurons))
+    graph.add_edges_from(ends.tolist())
+    loops = np.zeros(neurons, dtype=np.int64)
+    for number, part in enumerate(nx.strongly_connected_components(graph)):
+        loops[list(part)] = number
+    return loops
