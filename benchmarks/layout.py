@@ -1,7 +1,7 @@
 """What layouts are worth, ours beside dot, sfdp and networkx on the same graphs in one run.
 
 In: nothing; ``--graphs FOLDER`` (see ``networks.py``), ``--all`` for the large ones, ``--only WORD`` for rows whose
-name holds it, ``--peers dot,sfdp``, ``--engines layered,large``, ``--limit SECONDS`` for a peer. Out: a table, in
+name holds it, ``--peers "dot;sfdp"``, ``--engines layered,large``, ``--limit SECONDS`` for a peer. Out: a table, in
 Markdown, on standard output: crossings of the routes as drawn, discs that overlap, routes over foreign discs, the share
 of connections along the direction (of those in no loop), area, CPU seconds, and our crossings by the best peer's that
 draws a direction (dot, multipartite) or, where we draw none, by the best peer's. Sets of graphs are summed up, flow is
@@ -30,13 +30,16 @@ from neurovis_spec.layout.problem import problem_of
 
 HEXAPOD = Path(__file__).resolve().parent.parent / "specs" / "hexapod"
 #: These draw a direction.
-_DIRECTED = ("dot", "multipartite", "layered", "auto")
+_DIRECTED = ("dot", "dot, hurried", "dot, clusters", "multipartite", "layered", "auto")
 _HEAD = ("graph", "by", "crossings", "overlaps", "over discs", "flow", "area", "CPU", "ratio")
+
+
+_HURRIED = ("dot, hurried", "sfdp", "spring", "multipartite")
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A row: one graph or a set of them; ``slow`` ones are for ``--all``; ``directed`` where a direction is drawn."""
+    """A row: one graph or a set of them, the engines of ours and the peers that lay it out."""
 
     name: str
     problems: Sequence[LayoutProblem]
@@ -63,12 +66,14 @@ def cases(folder: Path | None, slow: bool) -> Iterator[Case]:
     north, name = sample(folder, "north")
     yield Case(name, north)
     for path in sorted(HEXAPOD.glob("*.yaml")) if HEXAPOD.is_dir() else ():
-        yield Case(f"specs/hexapod/{path.name}", [problem_of(nv.compile(path).network)], peers=("dot", "sfdp"))
-    yield Case("small worlds 300/2,500", [small_worlds(300, 2500)], ("layered", "large"))
+        yield Case(
+            f"specs/hexapod/{path.name}", [problem_of(nv.compile(path).network)], peers=("dot", "dot, clusters", "sfdp")
+        )
+    yield Case("small worlds 300/2,500", [small_worlds(300, 2500)], ("layered", "large"), _HURRIED)
     if slow:
         worm, name = connectome(folder)
-        yield Case(f"{name} 302/2,194", [worm], ("layered", "large"))
-        yield Case("reservoir 300/1,700", [reservoir(300)], ("layered", "auto"))
+        yield Case(f"{name} 302/2,194", [worm], ("layered", "auto"), _HURRIED)
+        yield Case("reservoir 300/1,700", [reservoir(300)], ("layered", "auto"), _HURRIED)
         peers = ("sfdp",)
         yield Case("small worlds 2,000/10,000", [small_worlds(2000, 10_000)], ("large", "layered"), peers)
         yield Case("small worlds 10,000/50,000", [small_worlds(10_000, 50_000)], ("large",), peers)
@@ -113,7 +118,7 @@ def _sum(found: Sequence[Worth]) -> Worth:
 
 def row(name: str, by: str, worth: Worth | None, ratio: float | None, limit: float) -> None:
     if worth is None:
-        print(f"| {name} | {by} | – | – | – | – | – | over {limit:.0f} s | |", flush=True)
+        print(f"| {name} | {by} | – | – | – | – | – | none in {limit:.0f} s | |", flush=True)
         return
     cells = [f"{worth.crossings:,}", f"{worth.overlaps:,}", f"{worth.over:,}", f"{worth.flow:.3f}"]
     cells += [f"{worth.area:,.0f}", f"{worth.seconds:.2f} s", "" if ratio is None else f"{ratio:.2f}"]
@@ -125,7 +130,7 @@ def main() -> None:
     parser.add_argument("--graphs", type=Path)
     parser.add_argument("--all", action="store_true")
     parser.add_argument("--only", default="")
-    parser.add_argument("--peers", default=",".join(PEERS))
+    parser.add_argument("--peers", default=";".join(PEERS))
     parser.add_argument("--engines", default="")
     parser.add_argument("--limit", type=float, default=150.0)
     asked = parser.parse_args()
@@ -134,7 +139,7 @@ def main() -> None:
         if asked.only not in case.name:
             continue
         best: dict[str, Worth] = {}
-        for peer in (peer for peer in case.peers if peer in asked.peers.split(",")):
+        for peer in (peer for peer in case.peers if peer in asked.peers.split(";")):
             worth = by_peer(case, peer, asked.limit)
             row(case.name, peer, worth, None, asked.limit)
             if worth:

@@ -22,18 +22,42 @@ from neurovis_spec.layout.geometry import straight
 Timed = tuple[Layout, float]
 #: Points of graphviz in a unit of ours.
 _UNIT = 72.0
+_DISCS = 'node [shape=circle, width=0.6, fixedsize=true, label=""]'
+_DOT = f"{_DISCS}; nodesep=0.4; ranksep=1.4"
 
 
 def dot(problem: LayoutProblem, limit: float) -> Timed | None:
-    """dot with its own ranks and splines; None where it takes longer than ``limit`` seconds."""
-    style = 'node [shape=circle, width=0.6, fixedsize=true, label=""]; nodesep=0.4; ranksep=1.4'
-    return _graphviz(problem, "dot", style, limit)
+    """dot with its own ranks and splines; None where it fails or takes longer than ``limit`` seconds."""
+    return _graphviz(problem, "dot", _DOT, limit)
+
+
+def hurried(problem: LayoutProblem, limit: float) -> Timed | None:
+    """dot for what it does not finish untouched: fewer steps of its simplex and of its sweeps, straight lines."""
+    return _graphviz(problem, "dot", f"{_DOT}; nslimit=0.5; mclimit=0.2; splines=line", limit)
+
+
+def clusters(problem: LayoutProblem, limit: float) -> Timed | None:
+    """dot with a cluster for each instance of a module and each box, nested as they are."""
+    found = [(module.parent, frozenset(module.members)) for module in problem.modules]
+    within: list[str] = []
+    for number, (_, members) in enumerate(found):
+        inner = {m for above, other in found if above == number for m in other}
+        nested = "".join(f"CLUSTER{k} " for k, (above, _) in enumerate(found) if above == number)
+        within.append(f"subgraph cluster_{number} {{ {nested} {'; '.join(map(str, sorted(members - inner)))} }}")
+    for number in reversed(range(len(found))):  # an instance comes before those within it
+        within = [text.replace(f"CLUSTER{number} ", within[number] + " ") for text in within]
+    outer = [within[number] for number, (parent, _) in enumerate(found) if parent < 0]
+    taken = {m for _, members in found for m in members}
+    for number, (_, box) in enumerate(problem.boxes):
+        if not taken & set(box):
+            taken |= set(box)
+            outer.append(f"subgraph cluster_box{number} {{ {'; '.join(map(str, box))} }}")
+    return _graphviz(problem, "dot", f"{_DOT}; {'; '.join(outer)}", limit)
 
 
 def sfdp(problem: LayoutProblem, limit: float) -> Timed | None:
     """sfdp, overlaps removed, straight lines."""
-    style = 'node [shape=circle, width=0.6, fixedsize=true, label=""]; overlap=prism; K=1; splines=line'
-    return _graphviz(problem, "sfdp", style, limit)
+    return _graphviz(problem, "sfdp", f"{_DISCS}; overlap=prism; K=1; splines=line", limit)
 
 
 def spring(problem: LayoutProblem, limit: float) -> Timed | None:
@@ -60,6 +84,8 @@ def multipartite(problem: LayoutProblem, limit: float) -> Timed | None:
 
 PEERS: dict[str, Callable[[LayoutProblem, float], Timed | None]] = {
     "dot": dot,
+    "dot, hurried": hurried,
+    "dot, clusters": clusters,
     "sfdp": sfdp,
     "spring": spring,
     "multipartite": multipartite,
@@ -80,14 +106,14 @@ def _graphviz(problem: LayoutProblem, engine: str, style: str, limit: float) -> 
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     try:
         done = subprocess.run([engine, "-Tjson"], input=text, capture_output=True, text=True, check=True, timeout=limit)
-    except subprocess.TimeoutExpired:
+    except (subprocess.TimeoutExpired, subprocess.CalledProcessError):
         return None
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     seconds = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
     drawing = json.loads(done.stdout)
     centres: list[Point] = [(0.0, 0.0)] * len(problem.neurons)
     for item in drawing["objects"]:
-        if "pos" in item:
+        if "pos" in item and item["name"].isdigit():
             centres[int(item["name"])] = _point(item["pos"])
     routes: dict[str, Route] = {}
     for item in drawing["edges"]:
