@@ -24,6 +24,8 @@ _MOST_CAREFULLY = 4000
 #: With more than this they do not go far out of their way, which would only move the crowd.
 _MOST_AT_LENGTH = 1000
 _STEEP_ENOUGH = 0.75
+#: Handles, leanings and slopes for a curve that comes too close to a disc.
+_OTHERWISE = ((0.75, 1.0, 1.0), (0.95, 1.0, 1.0), (0.75, 0.4, 1.0), (0.95, 0.4, 1.0), (0.0, 1.0, 0.3), (0.5, 1.0, 0.0))
 
 
 def route_all(
@@ -87,8 +89,8 @@ def _curves(
         start, end = centres[own[0]], centres[own[1]]
         ends = (lean[i, True], lean[i, False])
         clearance = obstacles.clearance(best, own)
-        for grip, share in ((0.75, 1.0), (0.95, 1.0), (0.75, 0.4), (0.95, 0.4)):
-            other = curve(start, end, waypoints.get(i, ()), (ends[0] * share, ends[1] * share), grip)
+        for grip, share, slope in _OTHERWISE:
+            other = curve(start, end, waypoints.get(i, ()), (ends[0] * share, ends[1] * share), grip, slope)
             found = obstacles.clearance(other, own)
             if found > clearance + 0.02:
                 best, clearance = other, found
