@@ -14,6 +14,9 @@ import networkx as nx
 from neurovis_layouts.layered.units import Unit
 from neurovis_spec.layout.model import LayoutProblem, LayoutRefusalError
 
+#: Stairs rise by this share of the height of a frame from one to the next at most.
+_STEEPEST = 0.6
+
 
 class _Lines:
     """Units joined with a fixed difference along the direction between them."""
@@ -69,9 +72,9 @@ def bonded(
     flow = _flow(problem, units, owner)
     for family in families:
         mates = [owner[m] for m in family]
-        if not _has_flow(flow, mates):
-            for mate in mates[1:]:
-                lines.join(mates[0], mate, 0.0)
+        stairs = _stairs(problem, units, owner, depth, pair, mates, flow)
+        for mate, step in zip(mates, stairs, strict=False):
+            lines.join(mates[0], mate, step - stairs[0])
     found = [lines.find(u) for u in range(len(units))]
     lifted = [replace(unit, lift=shift) if shift else unit for unit, (_, shift) in zip(units, found, strict=True)]
     return lifted, [root for root, _ in found]
@@ -86,7 +89,39 @@ def _flow(problem: LayoutProblem, units: Sequence[Unit], owner: Mapping[int, int
     return graph
 
 
-def _has_flow(graph: nx.DiGraph[int], mates: Sequence[int]) -> bool:
-    """Whether one drives another and is not driven by it, be it through others."""
-    after = {mate: nx.descendants(graph, mate) for mate in mates}
-    return any(b in after[a] and a not in after[b] for a in mates for b in mates if a != b)
+def _stairs(
+    problem: LayoutProblem,
+    units: Sequence[Unit],
+    owner: Mapping[int, int],
+    depth: Mapping[int, float],
+    pair: Mapping[int, int],
+    mates: Sequence[int],
+    flow: nx.DiGraph[int],
+) -> list[float]:
+    """How far behind the first of its rank each of a family stands: side by side where none drives another, in stairs
+    where one drives the next, so that what runs between them runs along; none where that would make them too steep."""
+    after = {mate: nx.descendants(flow, mate) for mate in mates}
+    ahead = {(a, b) for a in mates for b in mates if a != b and b in after[a] and a not in after[b]}
+    if not ahead:
+        return [0.0] * len(mates)
+    steps: dict[tuple[int, int], float] = {}
+    own = set(mates)
+    for edge in problem.edges:
+        ends = (edge.source, edge.target)
+        if pair and (owner[ends[0]] not in own or owner[ends[1]] not in own):
+            ends = pair.get(ends[0], -1), pair.get(ends[1], -1)
+        a, b = owner.get(ends[0], -1), owner.get(ends[1], -1)
+        if (a, b) in ahead:
+            steps[a, b] = max(steps.get((a, b), 0.0), depth[ends[0]] - depth[ends[1]] + problem.rank_spacing / 2)
+    graph: nx.DiGraph[int] = nx.DiGraph()
+    graph.add_nodes_from(mates)
+    graph.add_edges_from(steps)
+    found = dict.fromkeys(mates, 0.0)
+    for mate in nx.lexicographical_topological_sort(graph):
+        for before in graph.predecessors(mate):
+            found[mate] = max(found[mate], found[before] + steps[before, mate])
+    high = max((units[mate].reach or (0.0, 0.0))[1] for mate in mates)
+    through_others = any(not nx.has_path(graph, a, b) for a, b in ahead)
+    if through_others or max(found.values()) > _STEEPEST * 2 * high * (len(mates) - 1):
+        return []
+    return [found[mate] for mate in mates]

@@ -7,7 +7,7 @@ becomes such a frame where neurons that are not its own would stand in it otherw
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from neurovis_layouts.layered.bonds import bonded
@@ -191,16 +191,29 @@ def _joined(
         frames += [(tuple(part.members[m] for m in own), move.rect(rect)) for own, rect in drawing.frames]
         if part.module >= 0 or part.box >= 0:
             frames.append((part.members, move.rect(piece.rect)))
+    boxes = [(own, move.rect(rect)) for own, move, rect in _boxes_within(rests)]
+    done = {frozenset(own) for own, _ in (*frames, *boxes)}
+    boxes += [(own, _box(places, own)) for _, own in problem.boxes if frozenset(own) not in done]
     links = [i for i, key in enumerate(keys) if key not in routes]
     routes.update(linked(problem, links, keys, plan, rests, units, frames, pair))
-    return Drawing(tuple(places), routes, tuple(frames), rests.axis if pair else None, bool(problem.pins))
+    return Drawing(tuple(places), routes, tuple(frames), tuple(boxes), rests.axis if pair else None, bool(problem.pins))
+
+
+def _boxes_within(rests: Settled) -> Iterator[tuple[tuple[int, ...], Move, Rect]]:
+    for piece, move in rests.pieces:
+        for own, rect in piece.drawing.boxes:
+            yield tuple(piece.part.members[m] for m in own), move, rect
+
+
+def _box(places: Sequence[Point], members: Sequence[int]) -> Rect:
+    xs, ys = [places[m][0] for m in members], [places[m][1] for m in members]
+    return snap(min(xs) - _LINE), snap(min(ys) - _LINE), snap(max(xs) + _LINE), snap(max(ys) + _LINE)
 
 
 def _entered(drawing: Drawing, members: Sequence[int]) -> bool:
     """Whether a neuron stands, or a frame reaches, where the line round these neurons is drawn."""
     own = set(members)
-    xs, ys = [drawing.places[m][0] for m in members], [drawing.places[m][1] for m in members]
-    x0, y0, x1, y1 = min(xs) - _LINE, min(ys) - _LINE, max(xs) + _LINE, max(ys) + _LINE
+    x0, y0, x1, y1 = _box(drawing.places, members)
     if any(x0 < x < x1 and y0 < y < y1 for i, (x, y) in enumerate(drawing.places) if i not in own):
         return True
     return any(

@@ -30,13 +30,15 @@ class Drawing:
     places: tuple[Point, ...]
     routes: Mapping[Key, Route]
     frames: tuple[tuple[tuple[int, ...], Rect], ...] = ()
+    #: boxes that are drawn, though nothing had to make room for them
+    boxes: tuple[tuple[tuple[int, ...], Rect], ...] = ()
     axis: float | None = None
     #: its coordinates are given by pins, so that its origin means something
     fixed: bool = False
 
     def rect(self) -> Rect:
         """The frame around all of it."""
-        return around(self.places, self.routes.values(), [rect for _, rect in self.frames])
+        return around(self.places, self.routes.values(), [rect for _, rect in (*self.frames, *self.boxes)])
 
 
 @dataclass(frozen=True, slots=True)

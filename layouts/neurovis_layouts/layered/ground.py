@@ -12,8 +12,11 @@ from neurovis_layouts.layered.drawing import Rect
 from neurovis_layouts.pins import Cells
 from neurovis_spec.layout.model import RADIUS, LayoutRefusalError, Point
 
-#: How far what gives way keeps off other discs.
-_CLEAR = 0.75
+#: How far what gives way keeps off other discs, and frames off frames, so that lines find a way between them.
+_CLEAR, _BETWEEN = 0.75, 0.4
+
+#: Centres are this far apart at least, but for rounding in the last bit.
+_DISCS = 2 * RADIUS - 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +65,8 @@ class Ground:
             point = (place[0] + body.offsets[0][0], place[1] + body.offsets[0][1])
             return self._cells.free(point, clear) and not any(_holds(f, point, RADIUS) for f, _, _ in self._frames)
         own = _at(body.frame, place)
-        if any(own[0] < f[2] and f[0] < own[2] and own[1] < f[3] and f[1] < own[3] for f, _, _ in self._frames):
+        wide = own[0] - _BETWEEN, own[1] - _BETWEEN, own[2] + _BETWEEN, own[3] + _BETWEEN
+        if any(wide[0] < f[2] and f[0] < wide[2] and wide[1] < f[3] and f[1] < wide[3] for f, _, _ in self._frames):
             return False
         return not any(_holds(own, point, RADIUS) for point in self._points)
 
@@ -72,16 +76,21 @@ class Ground:
         own = _tight(points) if body.frame is not None else None
         for _, tight, other in self._frames:
             for member, point in zip(body.members, points, strict=True):
-                if _holds(tight, point, RADIUS):
+                if _holds(tight, point, _DISCS):
                     raise _within(names[member], names[other.members[0]])
-            if own is not None and own[0] < tight[2] and tight[0] < own[2] and own[1] < tight[3] and tight[1] < own[3]:
+            if own is not None and _meet(own, tight):
                 raise _within(names[body.members[0]], names[other.members[0]])
         if own is None:
             return
         for other, place in self._bodies:
             for member, (dx, dy) in zip(other.members, other.offsets, strict=True):
-                if _holds(own, (place[0] + dx, place[1] + dy), RADIUS):
+                if _holds(own, (place[0] + dx, place[1] + dy), _DISCS):
                     raise _within(names[member], names[body.members[0]])
+
+
+def _meet(one: Rect, other: Rect) -> bool:
+    low, high = (one[0] - _DISCS, one[1] - _DISCS), (one[2] + _DISCS, one[3] + _DISCS)
+    return low[0] < other[2] and other[0] < high[0] and low[1] < other[3] and other[1] < high[1]
 
 
 def _tight(points: Sequence[Point]) -> Rect:

@@ -83,7 +83,7 @@ def _gap(levels: Levels, a: int, b: int, spacing: float) -> float:
         return _BESIDE_PASSAGE
     if not first.members or not second.members:
         return between + _BESIDE_DISC
-    if first.reach[0] or second.reach[0]:
+    if (first.reach[0] or second.reach[0]) and not (first.framed and second.framed):
         between += 0.5 * spacing
     return between + spacing + (_BETWEEN_BOXES if first.box != second.box else 0.0)
 

@@ -19,7 +19,7 @@ from neurovis_spec.layout.model import RADIUS, LayoutProblem, LayoutRefusalError
 
 _SLACK = 1e-9
 _STEP = 0.25
-_TRIES = 400
+_TRIES = 161
 
 #: A part drawn anew, around pins of its neurons.
 Redraw = Callable[[Piece, Mapping[int, Point]], Piece]
@@ -51,14 +51,18 @@ def settled(
     if not (pieces or pair or problem.align):
         places, shift, moved = fit(free, problem.pins)
         return Settled(places, [], shift, moved)
-    axis, pins = _with_images(problem, free, pair)
-    shift = _shift(free, pins)
-    if pair:
-        shift = axis, shift[1]
-    held, moves = _held(problem, pieces, pins, shift, axis, redraw)
-    bodies = [*_frames(held, moves, shift), *_neurons(problem, held, free, pins, shift)]
-    bodies = _on_lines(problem, bodies, pins)
-    placed = _arranged(problem, bodies, pair, axis)
+    for last, axis in _axes(problem, free, pair):
+        try:
+            pins = _imaged(problem.pins, pair, axis)
+            shift = (axis if pair else _shift(free, pins)[0], _shift(free, pins)[1])
+            held, moves = _held(problem, pieces, pins, shift, axis, redraw)
+            bodies = [*_frames(held, moves), *_neurons(problem, held, free, pins, shift)]
+            bodies = _on_lines(problem, bodies, pins)
+            placed = _arranged(problem, bodies, pair, axis)
+            break
+        except LayoutRefusalError:
+            if last:
+                raise
     places = list(free)
     for body, (x, y) in zip(bodies, placed, strict=True):
         for member, (dx, dy) in zip(body.members, body.offsets, strict=True):
@@ -78,41 +82,36 @@ def _shift(free: Sequence[Point], pins: Mapping[int, Point]) -> Point:
     )
 
 
-def _with_images(
-    problem: LayoutProblem, free: Sequence[Point], pair: Mapping[int, int]
-) -> tuple[float, dict[int, Point]]:
-    """The axis, and the pins with the mirror images of pins."""
-    pins = dict(problem.pins)
+def _axes(problem: LayoutProblem, free: Sequence[Point], pair: Mapping[int, int]) -> Iterator[tuple[bool, float]]:
+    """Where the axis may be, the best place first, and whether it is the last: one place where both of a pair are
+    pinned. Raises LayoutRefusalError where such pairs disagree."""
+    pins = problem.pins
     both = sorted((a, b) for a, b in pair.items() if a < b and a in pins and b in pins)
-    if not pair:
-        return 0.0, pins
-    if both:
-        a, b = both[0]
-        axis = (pins[a][0] + pins[b][0]) / 2
-        for a, b in both:
-            if abs(pins[a][0] + pins[b][0] - 2 * axis) > _SLACK or abs(pins[a][1] - pins[b][1]) > _SLACK:
-                raise LayoutRefusalError(
-                    "mirror-pins",
-                    f"the pins of '{problem.neurons[a]}' and '{problem.neurons[b]}' are not mirror images",
-                )
-        return axis, _imaged(pins, pair, axis)
+    for a, b in both:
+        first = both[0]
+        apart = pins[a][0] + pins[b][0] - pins[first[0]][0] - pins[first[1]][0]
+        if abs(apart) > _SLACK or abs(pins[a][1] - pins[b][1]) > _SLACK:
+            names = problem.neurons[a], problem.neurons[b]
+            raise LayoutRefusalError("mirror-pins", f"the pins of '{names[0]}' and '{names[1]}' are not mirror images")
+    if both or not pair:
+        yield True, (pins[both[0][0]][0] + pins[both[0][1]][0]) / 2 if both else 0.0
+        return
     start = _shift(free, pins)[0]
     for number in range(_TRIES):
-        axis = start + (number + 1) // 2 * (_STEP if number % 2 else -_STEP)
-        found = _imaged(pins, pair, axis)
-        if len(found) == len(pins) or _apart(found, pins):
-            return axis, found
-    raise LayoutRefusalError("mirror-pins", "no axis keeps the mirror images of pins off other pins")
+        yield number == _TRIES - 1, start + (number + 1) // 2 * (_STEP if number % 2 else -_STEP)
 
 
 def _imaged(pins: Mapping[int, Point], pair: Mapping[int, int], axis: float) -> dict[int, Point]:
     images = {pair[i]: (2 * axis - x, y) for i, (x, y) in pins.items() if i in pair}
-    return dict(sorted({**images, **pins}.items()))
+    found = dict(sorted({**images, **pins}.items()))
+    _refuse_close(found, [i for i in found if i not in pins])
+    return found
 
 
-def _apart(found: Mapping[int, Point], pins: Mapping[int, Point]) -> bool:
-    images = [point for i, point in found.items() if i not in pins]
-    return all(distance(a, b) >= 2 * RADIUS for a in images for b in found.values() if a is not b)
+def _refuse_close(pins: Mapping[int, Point], images: Sequence[int]) -> None:
+    for i in images:
+        if any(j != i and distance(pins[i], other) < 2 * RADIUS - _SLACK for j, other in pins.items()):
+            raise LayoutRefusalError("mirror-pins", "no axis keeps the mirror images of pins off other pins")
 
 
 def _held(
@@ -158,7 +157,7 @@ def _fitted(drawing: Drawing, pins: Mapping[int, Point], flip: bool) -> Move | N
     return Move((snap(x), snap(y)), flip)
 
 
-def _frames(pieces: Sequence[Piece], moves: Sequence[Move], shift: Point) -> Iterator[Body]:
+def _frames(pieces: Sequence[Piece], moves: Sequence[Move]) -> Iterator[Body]:
     for piece, move in zip(pieces, moves, strict=True):
         turned = Move((0.0, 0.0), move.flip)
         offsets = tuple(turned.point(place) for place in piece.drawing.places)

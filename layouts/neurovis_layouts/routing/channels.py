@@ -1,8 +1,8 @@
 """Channels: ways between neurons of different frames, row by row through the gaps that discs and frames leave.
 
 In: edges, centres, frames that nothing foreign may run through. Out: waypoints of the edges that run along the
-direction, and of those that run across it. A way is the shortest through the free places of every row of discs between its ends
-(dynamic programming over rows); ways that share a gap keep apart.
+direction, and of those that run across it. A way is the shortest through the free places of every row of discs between
+its ends (dynamic programming over rows); ways that share a gap keep apart.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ _APART = 0.22
 #: What it costs to share a gap, to squeeze between two discs, and to run across rather than along.
 _SHARED, _SQUEEZED, _ACROSS = 1.5, 0.4, 1.25
 _LEAST = 0.75
+_WALL = 60.0
 #: With more edges than this nobody can follow one: they take the straight way.
 _MOST = 1500
 
@@ -92,15 +93,24 @@ class _Rows:
         layers = [best]
         rows = [y for y in self._rows if start[1] + _ROW < y < end[1] - _ROW]
         before = start[1]
+        foreign = [rect for own, rect in self._frames if source not in own and target not in own]
         for y in rows:
             row: list[tuple[float, float, int]] = []
+            walls = [(r[0], r[2]) for r in foreign if r[1] <= y and before <= r[3]]
             for x, extra in self._places(y, source, target, start, end):
-                ways = [(cost + _step(x - px, y - before), k) for k, (cost, px, _) in enumerate(best)]
+                ways = [
+                    (cost + _step(x - px, y - before) + _through(px, x, walls), k)
+                    for k, (cost, px, _) in enumerate(best)
+                ]
                 cost, k = min(ways)
                 row.append((cost + extra, x, k))
             layers.append(row)
             best, before = row, y
-        cost, k = min((cost + _step(end[0] - x, end[1] - before), k) for k, (cost, x, _) in enumerate(best))
+        walls = [(r[0], r[2]) for r in foreign if r[1] <= end[1] and before <= r[3]]
+        cost, k = min(
+            (cost + _step(end[0] - x, end[1] - before) + _through(x, end[0], walls), k)
+            for k, (cost, x, _) in enumerate(best)
+        )
         path = [end]
         for row, y in zip(layers[:0:-1], rows[::-1], strict=True):
             path.append((row[k][1], y))
@@ -171,6 +181,12 @@ class _Rows:
             if any(abs(x - other) < 0.12 for other in self._used.get(y, ()) if other != path[n][0]):
                 return False
         return True
+
+
+def _through(a: float, b: float, walls: Sequence[_Span]) -> float:
+    """What it costs to run from one side of frames to the other between two rows."""
+    low, high = min(a, b), max(a, b)
+    return _WALL * sum(low <= x0 and x1 <= high for x0, x1 in walls) if walls else 0.0
 
 
 def _step(dx: float, dy: float) -> float:
