@@ -64,3 +64,19 @@ def test_a_tie_stands_early() -> None:
 def test_what_runs_within_a_step_is_never_turned() -> None:
     arcs: Arcs = {(0, 1): 1000.0, (1, 2): 1000.0, (2, 0): 1.0}
     assert ranks_of(3, arcs, set(), set()) == [0, 1, 2]
+
+
+@given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=1, max_size=14))
+@settings(deadline=None)
+def test_no_unit_of_a_loop_could_move_so_that_fewer_arcs_run_back(pairs: list[tuple[int, int]]) -> None:
+    arcs: Arcs = {(a, b): 1.0 for a, b in pairs if a != b}
+    rank = ranks_of(6, arcs, set(), set())
+
+    def back(place: list[float]) -> int:
+        return sum(place[a] >= place[b] for a, b in arcs)
+
+    for unit in range(6):
+        for there in range(-1, 7):
+            moved = [float(level) for level in rank]
+            moved[unit] = there + 0.5
+            assert back(moved) >= back([float(level) for level in rank])

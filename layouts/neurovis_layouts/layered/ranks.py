@@ -1,8 +1,8 @@
 """Ranks: how far along the direction each unit stands.
 
-In: units and the connections between them. Out: a rank for each, from 0; connections that go back against the ranks
-are as few as a greedy choice makes them, then the ranks are those with the shortest connections in all (``simplex``);
-what could stand earlier without making them longer does.
+In: units and the connections between them. Out: a rank for each, from 0. Connections that go back against the ranks
+are as few as a greedy choice and moves of single units make them; the ranks are those with the shortest connections in
+all (``simplex``); what could stand earlier without making them longer does.
 """
 
 from __future__ import annotations
@@ -11,11 +11,15 @@ from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 
 import networkx as nx
+import numpy as np
 
+from neurovis_layouts.layered.sifting import sifted
 from neurovis_layouts.layered.simplex import shortened
 
 #: A connection within a step outweighs any number of delayed ones: what runs within a step runs forward.
 INSTANT = 1000.0
+#: Loops of more units are cut greedily only.
+_SIFTED = 1500
 Arcs = Mapping[tuple[int, int], float]
 
 
@@ -28,7 +32,7 @@ def ranks_of(count: int, arcs: Arcs, first: AbstractSet[int], last: AbstractSet[
     place = [0] * count
     for loop in nx.strongly_connected_components(graph):
         if len(loop) > 1:
-            for position, unit in enumerate(_cut(sorted(loop), arcs, graph, first, last)):
+            for position, unit in enumerate(_sifted(_cut(sorted(loop), arcs, graph, first, last), arcs)):
                 place[unit] = position
     component = _component_order(graph)
     forward: dict[tuple[int, int], float] = {}
@@ -107,6 +111,19 @@ def _cut(
                 surplus[other] -= arcs[other, chosen]
                 went[other] -= 1
     return head + tail[::-1]
+
+
+def _sifted(order: list[int], arcs: Arcs) -> list[int]:
+    """The order after moving units to where fewer arcs run against it, until no such move is left."""
+    if len(order) > _SIFTED:
+        return order
+    number = {unit: i for i, unit in enumerate(order)}
+    costs = np.zeros((len(order), len(order)), dtype=np.int64)
+    for (a, b), weight in arcs.items():
+        if a in number and b in number:
+            costs[number[a], number[b]] -= int(weight)
+            costs[number[b], number[a]] += int(weight)
+    return [order[i] for i in sifted(costs, np.arange(len(order), dtype=np.int64))[0].tolist()]
 
 
 def _early(order: Sequence[int], rank: list[int], forward: Arcs, before: Sequence[Sequence[int]]) -> None:
