@@ -26,7 +26,7 @@ from neurovis_spec.diagnostics import Diagnostic, Findings, Span, SpecError
 from neurovis_spec.language.source import SourceDocument
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.layout import Layout, Point, Route
-from neurovis_spec.layout.arrange import choose_engine
+from neurovis_spec.layout.choose import choose_engine
 from neurovis_spec.layout.file import dump
 from neurovis_spec.layout.problem import problem_of
 from neurovis_spec.progress import Progress
@@ -192,7 +192,7 @@ class CompiledNetwork:
         network = self.network
         return (
             f"<network {network.name}: {len(network.neurons)} neurons, {len(network.connections)} connections, "
-            f"{len(network.changing)} plastic>"
+            f"{int((network.connections.rules >= 0).sum())} plastic>"
         )
 
     def simulator(self, backend: str | None = None, *, start: Recording | None = None) -> Simulation:
@@ -218,10 +218,12 @@ class CompiledNetwork:
         """
         return pipeline.simulate(self.network, steps, inputs, backend, every, start, progress)
 
-    def layout(self, engine: str | None = None, *, earlier: Layout | None = None) -> NetworkLayout:
+    def layout(
+        self, engine: str | None = None, *, earlier: Layout | None = None, progress: Progress | None = None
+    ) -> NetworkLayout:
         """Where everything is. What an ``earlier`` layout knew (default: that of ``layout.file``) stays where it was.
         Raises LayoutRefusalError where an engine cannot do what is asked."""
-        return NetworkLayout(self, pipeline.arrange(self.network, engine, earlier or self.memory))
+        return NetworkLayout(self, pipeline.arrange(self.network, engine, earlier or self.memory, progress))
 
     @cached_property
     def _layout(self) -> Layout:

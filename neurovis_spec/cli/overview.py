@@ -54,7 +54,7 @@ def _parts(compiled: CompiledNetwork, network: Network) -> Iterator[str]:
 
 def _head(network: Network) -> str:
     """The name, the sizes and the clock."""
-    plastic = len(network.changing)
+    plastic = int((network.connections.rules >= 0).sum())
     lines = [
         f"{network.name}: {network.title}" if network.title != network.name else network.name,
         f"{count(len(network.neurons), 'neuron')}, {count(len(network.connections), 'connection')}"
