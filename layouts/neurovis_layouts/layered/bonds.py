@@ -16,6 +16,8 @@ from neurovis_spec.layout.model import LayoutProblem, LayoutRefusalError
 
 #: Stairs rise by this share of the height of a frame from one to the next at most.
 _STEEPEST = 0.6
+#: Nobody looks along stairs of more steps.
+_MOST_IN_STAIRS = 64
 
 
 class _Lines:
@@ -69,7 +71,7 @@ def bonded(
                 )
     for a, b in sorted(pair.items()):
         lines.join(owner[a], owner[b], 0.0)
-    flow = _flow(problem, units, owner)
+    flow = _flow(problem, units, owner) if families else nx.DiGraph()
     for family in families:
         mates = [owner[m] for m in family]
         stairs = _stairs(problem, units, owner, depth, pair, mates, flow)
@@ -100,6 +102,8 @@ def _stairs(
 ) -> list[float]:
     """How far behind the first of its rank each of a family stands: side by side where none drives another, in stairs
     where one drives the next, so that what runs between them runs along; none where that would make them too steep."""
+    if len(mates) > _MOST_IN_STAIRS:
+        return [] if any(flow.has_edge(a, b) for a in mates for b in mates) else [0.0] * len(mates)
     after = {mate: nx.descendants(flow, mate) for mate in mates}
     ahead = {(a, b) for a in mates for b in mates if a != b and b in after[a] and a not in after[b]}
     if not ahead:

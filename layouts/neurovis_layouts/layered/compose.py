@@ -85,7 +85,10 @@ class Composer:
         pieces: list[Piece] = []
         for part in parts:
             pieces.append(self._piece(problem, part, pieces, pair))
-        frames = [_unit(problem, piece, i, pieces, pair) for i, piece in enumerate(pieces)]
+        kin: dict[str, int] = {}
+        for number, piece in enumerate(pieces):
+            kin.setdefault(piece.part.family, len(problem.groups) + number)
+        frames = [_unit(piece, kin[piece.part.family] if piece.part.family else -1, pair) for piece in pieces]
         units = symmetric_units(problem, frames, pair)
         families: dict[tuple[str, int], list[int]] = {}
         for piece in pieces:
@@ -133,14 +136,13 @@ def _around_pins(drawing: Drawing, pins: Mapping[int, Point], inner: LayoutProbl
     return dict(sorted(found.items()))
 
 
-def _unit(problem: LayoutProblem, piece: Piece, number: int, pieces: Sequence[Piece], pair: Mapping[int, int]) -> Unit:
+def _unit(piece: Piece, kin: int, pair: Mapping[int, int]) -> Unit:
     part, (x, y), rect = piece.part, piece.middle, piece.rect
     flip = part.image_of >= 0
     places = tuple((-(px - x) + 0.0 if flip else px - x, py - y) for px, py in piece.drawing.places)
     reach = max(rect[2] - x, x - rect[0]), rect[3] - y
-    mates = [i for i, other in enumerate(pieces) if other.part.family and other.part.family == part.family]
     alone = not images_of(part, pair) and piece.drawing.axis is None
-    return Unit(part.members, places, reach, len(problem.groups) + mates[0] if mates else -1, alone)
+    return Unit(part.members, places, reach, kin, alone)
 
 
 def _resting(plan: Plan, piece: Piece) -> tuple[Piece, Move]:

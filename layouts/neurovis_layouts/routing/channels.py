@@ -8,14 +8,19 @@ its ends (dynamic programming over rows); ways that share a gap keep apart.
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
+from bisect import bisect_left, insort
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import TypeAlias
 
+import numpy as np
+import numpy.typing as npt
+
 from neurovis_layouts.routing.curves import Waypoint
 from neurovis_spec.layout.model import LayoutEdge, Point
 
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+IntArray: TypeAlias = npt.NDArray[np.int64]
 Rect: TypeAlias = tuple[float, float, float, float]
 Frame: TypeAlias = tuple[frozenset[int], Rect]
 _Span: TypeAlias = tuple[float, float]
@@ -31,6 +36,10 @@ _APART = 0.22
 _SHARED, _SQUEEZED, _ACROSS = 1.5, 0.4, 1.25
 _LEAST = 0.75
 _WALL = 60.0
+#: Places tried in a row, about; ways closer than this to the straight line are kept apart from.
+_CHOICES, _NEAR = 24, 2.0
+#: Where a way is pulled straight, over how many rows, and how close to another.
+_FARTHEST, _BESIDE_WAY = 40, 0.12
 #: With more edges than this nobody can follow one: they take the straight way.
 _MOST = 1500
 
@@ -85,45 +94,38 @@ class _Rows:
         """The cost of the best way, infinite where the ends are level, and its points: both ends, one in each row."""
         start, end = self._centres[source], self._centres[target]
         if start[1] > end[1]:
-            cost, path = self.way(target, source)
-            return cost, path[::-1]
+            back, line = self.way(target, source)
+            return back, line[::-1]
         if end[1] - start[1] < _LEAST:
             return math.inf, []
-        best: list[tuple[float, float, int]] = [(0.0, start[0], -1)]
-        layers = [best]
         rows = [y for y in self._rows if start[1] + _ROW < y < end[1] - _ROW]
-        before = start[1]
-        foreign = [rect for own, rect in self._frames if source not in own and target not in own]
-        for y in rows:
-            row: list[tuple[float, float, int]] = []
+        foreign = self._foreign(source, target)
+        layers: list[tuple[FloatArray, IntArray]] = []
+        cost, across, before = np.zeros(1), np.array([start[0]]), start[1]
+        for y in [*rows, end[1]]:
+            places, extra = np.array([end[0]]), np.zeros(1)
+            if y != end[1]:
+                places, extra = self._places(self._spans(y, source, target, foreign), y, start, end)
             walls = [(r[0], r[2]) for r in foreign if r[1] <= y and before <= r[3]]
-            for x, extra in self._places(y, source, target, start, end):
-                ways = [
-                    (cost + _step(x - px, y - before) + _through(px, x, walls), k)
-                    for k, (cost, px, _) in enumerate(best)
-                ]
-                cost, k = min(ways)
-                row.append((cost + extra, x, k))
-            layers.append(row)
-            best, before = row, y
-        walls = [(r[0], r[2]) for r in foreign if r[1] <= end[1] and before <= r[3]]
-        cost, k = min(
-            (cost + _step(end[0] - x, end[1] - before) + _through(x, end[0], walls), k)
-            for k, (cost, x, _) in enumerate(best)
-        )
-        path = [end]
-        for row, y in zip(layers[:0:-1], rows[::-1], strict=True):
-            path.append((row[k][1], y))
-            k = row[k][2]
-        return cost, [*path, start][::-1]
+            ways = cost[None, :] + _step(across, places, y - before) + _through(across, places, walls)
+            chosen = np.argmin(ways, axis=1)
+            layers.append((places, chosen))
+            cost, across, before = ways[np.arange(len(places)), chosen] + extra, places, y
+        path: list[Point] = []
+        k = 0
+        for (places, chosen), y in zip(layers[::-1], [end[1], *rows[::-1]], strict=True):
+            path.append((float(places[k]), y))
+            k = int(chosen[k])
+        return float(cost[0]), [start, *path[::-1]]
 
-    def spans(self, y: float, source: int, target: int) -> list[_Span]:
+    def _foreign(self, source: int, target: int) -> list[Rect]:
+        return [rect for own, rect in self._frames if source not in own and target not in own]
+
+    def _spans(self, y: float, source: int, target: int, foreign: Sequence[Rect]) -> list[_Span]:
         """What is free in a row."""
         low, high = bisect_left(self._heights, y - _ROW), bisect_left(self._heights, y + _ROW)
         blocked = [(x - _DISC, x + _DISC) for _, x, i in self._sorted[low:high] if i not in (source, target)]
-        for own, (x0, y0, x1, y1) in self._frames:
-            if y0 <= y <= y1 and source not in own and target not in own:
-                blocked.append((x0 - _BESIDE_FRAME, x1 + _BESIDE_FRAME))
+        blocked += [(x0 - _BESIDE_FRAME, x1 + _BESIDE_FRAME) for x0, y0, x1, y1 in foreign if y0 <= y <= y1]
         blocked.sort()
         free: list[_Span] = []
         edge = -math.inf
@@ -133,37 +135,43 @@ class _Rows:
             edge = max(edge, high_x)
         return [*free, (edge, math.inf)]
 
-    def _places(self, y: float, source: int, target: int, start: Point, end: Point) -> list[tuple[float, float]]:
-        """Where a way may run through a row, and what that costs."""
+    def _places(self, free: Sequence[_Span], y: float, start: Point, end: Point) -> tuple[FloatArray, FloatArray]:
+        """Where a way may run through a row, in order, and what that costs: the places nearest to the straight line."""
         line = start[0] + (end[0] - start[0]) * (y - start[1]) / (end[1] - start[1])
-        used = self._used.get(y, ())
+        used = self._used.get(y, [])
+        near = used[bisect_left(used, line - _NEAR) : bisect_left(used, line + _NEAR)]
+        wishes = [line, start[0], end[0], *(x - _APART for x in near), *(x + _APART for x in near)]
         found: dict[float, float] = {}
-        for low, high in self.spans(y, source, target):
-            if high < min(start[0], end[0]) - 20 or low > max(start[0], end[0]) + 20:
-                continue
+        for low, high in sorted(free, key=lambda span: (max(span[0] - line, line - span[1], 0.0), span)):
             inset = min(_INSET, (high - low) / 2)
-            wishes = [line, start[0], end[0], low + inset, high - inset]
-            for other in used:
-                wishes += [other - _APART, other + _APART]
-            for wish in wishes:
+            for wish in [*wishes, low + inset, high - inset]:
                 x = min(max(wish, low + inset), high - inset)
-                if math.isfinite(x):
-                    crowd = sum(1 - abs(x - other) / _APART for other in used if abs(x - other) < _APART)
+                if math.isfinite(x) and x not in found:
+                    beside = used[bisect_left(used, x - _APART) : bisect_left(used, x + _APART)]
+                    crowd = sum(1 - abs(x - other) / _APART for other in beside)
                     found[x] = _SHARED * crowd + (_SQUEEZED if high - low < _NARROW else 0.0)
-        return sorted(found.items())
+            if len(found) > _CHOICES:
+                break
+        places = sorted(found)
+        return np.array(places), np.array([found[x] for x in places])
 
     def use(self, path: Sequence[Point]) -> None:
         """Note where a way runs."""
         for x, y in path[1:-1]:
-            self._used.setdefault(y, []).append(x)
+            insort(self._used.setdefault(y, []), x)
 
     def knots(self, path: Sequence[Point], source: int, target: int) -> list[Waypoint]:
         """The points of a way at which it bends; what lies on a line that is free is left out."""
-        free = [self.spans(y, source, target) for _, y in path]
+        foreign = self._foreign(source, target)
+        free = [self._spans(y, source, target, foreign) for _, y in path]
         knots: list[Waypoint] = []
         at = 0
         while at < len(path) - 1:
-            reach = next(n for n in range(len(path) - 1, at, -1) if n == at + 1 or self._clear(path, free, at, n))
+            reach = next(
+                n
+                for n in range(min(len(path) - 1, at + _FARTHEST), at, -1)
+                if n == at + 1 or self._clear(path, free, at, n)
+            )
             if reach < len(path) - 1:
                 x, y = path[reach]
                 narrow = any(low <= x <= high and high - low < 1.2 for low, high in free[reach])
@@ -178,19 +186,27 @@ class _Rows:
             x = ax + (bx - ax) * (y - ay) / (by - ay)
             if abs(x - path[n][0]) > 0.6 or not any(low <= x <= high for low, high in free[n]):
                 return False
-            if any(abs(x - other) < 0.12 for other in self._used.get(y, ()) if other != path[n][0]):
+            used = self._used.get(y, [])
+            beside = used[bisect_left(used, x - _BESIDE_WAY) : bisect_left(used, x + _BESIDE_WAY)]
+            if any(other != path[n][0] for other in beside):
                 return False
         return True
 
 
-def _through(a: float, b: float, walls: Sequence[_Span]) -> float:
-    """What it costs to run from one side of frames to the other between two rows."""
-    low, high = min(a, b), max(a, b)
-    return _WALL * sum(low <= x0 and x1 <= high for x0, x1 in walls) if walls else 0.0
+def _through(a: FloatArray, b: FloatArray, walls: Sequence[_Span]) -> FloatArray:
+    """What it costs to run from one side of frames to the other between two rows: (to b, from a)."""
+    low, high = np.minimum(a[None, :], b[:, None]), np.maximum(a[None, :], b[:, None])
+    total = np.zeros(low.shape)
+    for x0, x1 in walls:
+        total += _WALL * ((low <= x0) & (x1 <= high))
+    return total
 
 
-def _step(dx: float, dy: float) -> float:
-    return math.sqrt(dx * dx + dy * dy) + 0.12 * dx * dx / max(dy, 0.1)
+def _step(a: FloatArray, b: FloatArray, dy: float) -> FloatArray:
+    """What it costs to get from one row to the next: its length, and more where it is flat: (to b, from a)."""
+    squared = (b[:, None] - a[None, :]) ** 2
+    result: FloatArray = np.sqrt(squared + dy * dy) + 0.12 * squared / max(dy, 0.1)
+    return result
 
 
 def _spaced(knots: list[Waypoint]) -> list[Waypoint]:
