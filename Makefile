@@ -5,6 +5,7 @@
 #   make gallery    draws the examples into docs/pictures and writes docs/gallery.md
 #   make test-all   the tests that need Chromium, graphviz' dot or a C compiler; fails without them
 #   make fuzz       20,000 broken specs and 5,000 expressions (FUZZ_ARGS=... for more), two or three minutes
+#   make layouts    layouts beside dot's, sfdp's and networkx' (LAYOUTS_ARGS="--all --graphs FOLDER" for more)
 #   make docs       writes the generated parts of docs/ anew
 #
 # PYTHON=... names another interpreter to make .venv with, PYTEST_ARGS=... adds to pytest's arguments.
@@ -18,7 +19,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ELSEWHERE := browser or dot or compiler
 
-.PHONY: help install demo gallery test test-all needs fuzz docs format clean
+.PHONY: help install demo gallery test test-all needs fuzz layouts docs format clean
 .DELETE_ON_ERROR:
 
 help:
@@ -71,6 +72,9 @@ needs:
 
 fuzz: $(VENV)/tested
 	$(BIN)/python benchmarks/fuzzing.py $(FUZZ_ARGS)
+
+layouts: $(VENV)/tested
+	$(BIN)/python benchmarks/layout.py $(LAYOUTS_ARGS)
 
 docs: $(VENV)/installed
 	$(BIN)/python docs/make_language.py
