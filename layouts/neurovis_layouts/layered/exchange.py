@@ -14,6 +14,8 @@ import numpy as np
 from neurovis_layouts.layered.crossings import Ints, Segments
 
 _MOST_ROUNDS = 60
+#: More pairs of segments than this are not compared one by one.
+_MANY = 400_000
 #: A round that saves less than this share of all crossings is the last.
 _HARDLY = 1 / 4000
 
@@ -82,8 +84,27 @@ class _Ends:
         key = place[self.other] * ports + self.port
         across = self.degree[right]
         pairs = self.degree[left] * across
-        number = np.repeat(np.arange(len(pairs), dtype=np.int64), pairs)
-        step = np.arange(len(number), dtype=np.int64) - np.repeat(np.cumsum(pairs) - pairs, pairs)
+        if int(pairs.sum()) > _MANY:
+            return self._by_search(left, right, key)
+        number, step = _within(pairs)
         first, second = np.divmod(step, across[number])
         signs = np.sign(key[self.start[left][number] + first] - key[self.start[right][number] + second])
         return np.bincount(number, signs, len(pairs)).astype(np.int64)
+
+    def _by_search(self, left: Ints, right: Ints, key: Ints) -> Ints:
+        """The same by looking up each end of the left one among those of the right one."""
+        wide = int(key.max()) + 1
+        owner = np.repeat(np.arange(len(self.degree), dtype=np.int64), self.degree) * wide
+        every = np.sort(owner + key)
+        number, step = _within(self.degree[left])
+        wanted = right[number] * wide + key[self.start[left][number] + step]
+        start, degree = self.start[right][number], self.degree[right][number]
+        smaller = np.searchsorted(every, wanted) - start
+        greater = degree - (np.searchsorted(every, wanted, side="right") - start)
+        return np.bincount(number, smaller - greater, len(left)).astype(np.int64)
+
+
+def _within(sizes: Ints) -> tuple[Ints, Ints]:
+    """For groups of these sizes: the group of each element, and its place in the group."""
+    number = np.repeat(np.arange(len(sizes), dtype=np.int64), sizes)
+    return number, np.arange(len(number), dtype=np.int64) - np.repeat(np.cumsum(sizes) - sizes, sizes)

@@ -74,7 +74,7 @@ class _Search:
         self.work = sum(len(side.other) ** 2 + _A_RANK for side in (*segments.above, *segments.below)) // 2
 
     def best(self, starts: Sequence[Order]) -> tuple[int, Order]:
-        sift = self.work <= _SIFTED
+        sift = self.work <= _SIFTED and max(len(rank) for rank in self.ids) ** 2 <= _SIFTED
         best: tuple[int, list[Ints]] | None = None
         for start in starts if sift else starts[1:2]:
             state = _State(self, [np.array(rank, dtype=np.int64) for rank in start])
