@@ -93,12 +93,14 @@ def remember(spec: Spec, request: Request, network: Network, findings: Findings)
     return None if file is None else read_memory(file, request.base, request.root, network, findings)
 
 
-def arrange(network: Network, engine: str | None = None, memory: Layout | None = None) -> Layout:
+def arrange(
+    network: Network, engine: str | None = None, memory: Layout | None = None, progress: Progress | None = None
+) -> Layout:
     """A position for every neuron, a route for every connection."""
 
     from neurovis_spec.layout.arrange import lay_out
 
-    return lay_out(network, engine, memory)
+    return lay_out(network, engine, memory, progress)
 
 
 def measure(network: Network, progress: Progress | None = None) -> Gains:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from itertools import pairwise
 
 from hypothesis import strategies as st
 
@@ -67,6 +68,9 @@ def problems(draw: st.DrawFn, pinned: bool = True) -> LayoutProblem:
     spots = draw(st.lists(lattice, unique=True, max_size=3)) if pinned else []
     pins = {name: (0.7 * x, 0.9 * y) for name, (x, y) in zip(names[::2], spots, strict=False)}
     boxes = [("frame", groups[0][1])] if draw(st.booleans()) and groups else []
+    floats = st.floats(-1e6, 1e6)
+    anywhere = st.lists(st.tuples(floats, floats), min_size=len(names), max_size=len(names))
+    places = draw(anywhere) if draw(st.booleans()) else []
     return canonical(
         "drawn",
         names,
@@ -75,7 +79,24 @@ def problems(draw: st.DrawFn, pinned: bool = True) -> LayoutProblem:
         pins,
         draw(st.sampled_from(["down", "up", "right", "left"])),
         boxes=boxes,
+        places=dict(zip(names, places, strict=False)),
     )
+
+
+def extremes() -> list[LayoutProblem]:
+    """Networks at the edge of what there is: very long, very deep, very loose, very centred, all in one place."""
+    many = members("N", 10_000)
+    places = {name: (float(i), 0.0) for i, name in enumerate(many)}
+    chain = canonical("chain", many, [("N", many)], named(pairwise(many)), places=places)
+    paths = [".".join(f"a{i}" for i in range(depth + 1)) for depth in range(64)]
+    deepest = [f"{path}.X" for path in paths]
+    modules = [(path, "m") for path in paths]
+    deep = canonical("deep", deepest, [(n, [n]) for n in deepest], named(pairwise(deepest)), modules=modules)
+    few = members("N", 150)
+    loose = canonical("loose", few, places=dict.fromkeys(few, (1.0, 1.0)))
+    pairs = canonical("pairs", few, edges=named(zip(few[::2], few[1::2], strict=True)))
+    star = canonical("star", few, edges=named((few[0], name) for name in few))
+    return [chain, deep, loose, pairs, star]
 
 
 def check(problem: LayoutProblem, engine: str) -> Layout | None:

@@ -8,8 +8,10 @@ import pytest
 
 from neurovis_spec import plugins
 from neurovis_spec.layout import Capabilities, Layout, LayoutProblem, LayoutRefusalError, Point
-from neurovis_spec.layout.arrange import choose_engine, lay_out_problem, refuse_what_it_cannot
+from neurovis_spec.layout.arrange import lay_out_problem, refuse_what_it_cannot
+from neurovis_spec.layout.choose import choose_engine
 from neurovis_spec.layout.geometry import straight
+from neurovis_spec.layout.model import LayoutModule
 from neurovis_spec.layout.problem import canonical
 
 PAIR = canonical("pair", ["A", "B"], [("A", ["A"]), ("B", ["B"])], suite.named([("A", "B")]))
@@ -30,19 +32,36 @@ def tangle(count: int, steps: tuple[int, ...] = (1, 7, 11)) -> LayoutProblem:
     return canonical("tangle", names, [("N", names)], suite.named(pairs))
 
 
-def test_auto_puts_tangles_on_a_ring_and_large_ones_on_a_grid() -> None:
-    assert choose_engine(tangle(60))[0] == "circular"
-    assert choose_engine(tangle(300))[0] == "grid"
+def test_auto_lays_tangles_out_by_distance_and_complete_ones_on_a_ring() -> None:
+    assert choose_engine(tangle(60))[0] == "organic"
     assert "densely" in choose_engine(tangle(300))[1]
+    assert choose_engine(tangle(60, tuple(range(1, 60))))[0] == "circular"
+    assert choose_engine(tangle(600))[0] == "large"
     for ordinary in (tangle(20), tangle(60, (1,)), replace(tangle(60), boxes=(("b", (0, 1)),)), PAIR):
         assert choose_engine(ordinary)[0] == "layered"
     forward = tangle(60)
     acyclic = replace(forward, edges=tuple(e for e in forward.edges if e.target > e.source))
     assert choose_engine(acyclic)[0] == "layered"
     layers = [(f"{a}{i}", f"{b}{j}") for a, b in ("AB", "BC", "CA") for i in range(20) for j in range(0, 20, 4)]
-    groups = [(name, [f"{name}{i}" for i in range(20)]) for name in "ABC"]
-    names = [neuron for _, members in groups for neuron in members]
-    assert choose_engine(canonical("layers", names, groups, suite.named(layers)))[0] == "layered"
+    assert choose_engine(grouped("ABC", 20, layers))[0] == "layered"
+
+
+def grouped(groups: str, size: int, pairs: list[tuple[str, str]]) -> LayoutProblem:
+    members = [(name, [f"{name}{i}" for i in range(size)]) for name in groups]
+    return canonical("grouped", [neuron for _, of in members for neuron in of], members, suite.named(pairs))
+
+
+def test_auto_takes_large_where_connections_are_many_and_groups_no_layers() -> None:
+    forward = [(f"{a}{i}", f"{b}{j}") for a, b in ("AB", "BC") for i in range(30) for j in range(30)]
+    assert choose_engine(grouped("ABC", 30, forward))[0] == "layered"
+    back = grouped("ABC", 30, [*forward, ("C1", "A1")])
+    assert choose_engine(back)[0] == "large"
+    assert "1801 connections" in choose_engine(back)[1]
+    assert choose_engine(replace(back, pins={0: (0.0, 0.0)}))[0] == "large"
+    for asked in ({"arrange": (((0, 1), "row"),)}, {"align": ((0, 1),)}):
+        assert choose_engine(replace(back, **asked))[0] == "layered"
+    within = replace(back, modules=(LayoutModule("m", "m", -1, (0, 1), "t"),))
+    assert choose_engine(within)[0] == "layered"
 
 
 def test_an_unknown_engine_is_answered_with_the_nearest() -> None:
@@ -58,7 +77,7 @@ def test_manual_names_a_neuron_without_a_position() -> None:
     assert caught.value.code == "position-missing"
 
 
-@pytest.mark.parametrize("engine", ["layered", "manual", "grid", "circular"])
+@pytest.mark.parametrize("engine", suite.ENGINES)
 def test_pins_closer_than_a_disc_are_refused_by_name(engine: str) -> None:
     pins = {"A": (0.0, 0.0), "B": (0.4, 0.4)}
     with pytest.raises(LayoutRefusalError, match=r"'A' and 'B' are closer than 0\.6") as caught:

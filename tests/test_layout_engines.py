@@ -41,6 +41,30 @@ def test_every_engine_lays_out_nothing_and_one(engine: str) -> None:
     assert layout.positions == {"A": (0.0, 0.0)}
 
 
+@pytest.mark.parametrize("engine", suite.ENGINES)
+@pytest.mark.parametrize("problem", suite.extremes(), ids=lambda problem: problem.network)
+def test_every_engine_bears_extremes_or_refuses_by_what_it_declares(engine: str, problem: LayoutProblem) -> None:
+    try:
+        layout = lay_out_problem(problem, engine)
+    except LayoutRefusalError as refusal:
+        suite.check_refusal(engine, refusal)
+    else:
+        suite.check_positions(problem, layout)
+        assert len(layout.routes) == len(problem.edges)
+
+
+@pytest.mark.parametrize("engine", [name for name in suite.ENGINES if name != "manual"])
+def test_every_engine_keeps_what_it_remembers(engine: str) -> None:
+    names = suite.members("N", 12)
+    pairs = suite.named([(a, b) for i, a in enumerate(names) for b in names[i + 1 : i + 3]])
+    places = {name: (float(i % 4), float(i // 4)) for i, name in enumerate([*names, "Z"])}
+    before = lay_out_problem(canonical("x", names, edges=pairs, places=places), engine)
+    later = canonical("x", [*names, "Z"], edges=[*pairs, ("N1 -> Z", "N1", "Z", 1)], places=places, memory=before)
+    now = lay_out_problem(later, engine)
+    assert all(now.positions[name] == before.positions[name] for name in names)
+    assert suite.nearest(list(now.positions.values())) >= 0.6
+
+
 @pytest.mark.parametrize("engine", ["layered", "organic", "large", "circular", "grid"])
 @pytest.mark.parametrize("direction", ["down", "up", "right", "left"])
 def test_use_case_one_in_every_direction(engine: str, direction: Direction) -> None:
@@ -225,11 +249,15 @@ def test_the_order_of_the_spec_does_not_show(problem: LayoutProblem, random: obj
     edges = [(e.name, problem.neurons[e.source], problem.neurons[e.target], e.delay) for e in problem.edges]
     pins = [(problem.neurons[i], point) for i, point in problem.pins.items()]
     boxes = [(name, [problem.neurons[m] for m in of]) for name, of in problem.boxes]
-    for parts in (names, groups, edges, pins, boxes):
+    places = list(zip(problem.neurons, problem.places, strict=False))
+    for parts in (names, groups, edges, pins, boxes, places):
         random.shuffle(parts)
-    shuffled = canonical(problem.network, names, groups, edges, dict(pins), problem.direction, boxes=boxes)
+    shuffled = canonical(
+        problem.network, names, groups, edges, dict(pins), problem.direction, boxes=boxes, places=dict(places)
+    )
     assert shuffled == problem
-    assert dump(lay_out_problem(shuffled, "layered")) == dump(lay_out_problem(problem, "layered"))
+    for engine in ("layered", "organic", "large"):
+        assert dump(lay_out_problem(shuffled, engine)) == dump(lay_out_problem(problem, engine))
 
 
 def test_the_same_network_under_other_names_in_the_same_order_lies_the_same() -> None:

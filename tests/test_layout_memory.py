@@ -22,7 +22,7 @@ from neurovis_spec.layout.geometry import distance
 from neurovis_spec.layout.model import Layout, LayoutProblem, Point
 from neurovis_spec.layout.problem import canonical
 
-ENGINES = ("layered", "circular", "grid")
+ENGINES = ("layered", "organic", "large", "circular", "grid")
 LEG = """
 neurovis: 1
 name: legs

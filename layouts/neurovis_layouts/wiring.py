@@ -23,8 +23,9 @@ _HUB, _SPOKE = 0.2, 1.0
 
 @dataclass(frozen=True, slots=True)
 class Wiring:
-    """``count`` points, of which the first ``neurons`` are neurons and the rest hubs; ``mass`` (count,); links from
-    ``a`` to ``b`` of weight ``weight`` (k,), ``a < b``; arcs from ``above`` to ``below`` of weight ``pull`` (m,)."""
+    """``count`` points, of which the first ``neurons`` are neurons and the rest hubs; ``mass`` (count,), 1 in the mean;
+    links from ``a`` to ``b`` of weight ``weight`` (k,), ``a < b``; arcs from ``above`` to ``below`` of weight ``pull``
+    (m,)."""
 
     neurons: int
     mass: FloatArray
@@ -47,14 +48,16 @@ def wiring_of(problem: LayoutProblem, hubs: bool = True) -> Wiring:
     ends = np.array([(edge.source, edge.target) for edge in problem.edges], dtype=np.int64).reshape(-1, 2)
     spokes = _spokes(problem) if hubs else np.zeros((0, 2), dtype=np.int64)
     count = max(neurons, int(spokes.max(initial=-1)) + 1)
-    mass = np.ones(count)
-    mass[neurons:] = _HUB
     a, b, weight = linked(
         count,
         np.concatenate([ends[:, 0], spokes[:, 0]]),
         np.concatenate([ends[:, 1], spokes[:, 1]]),
         np.concatenate([np.ones(len(ends)), np.full(len(spokes), _SPOKE)]),
     )
+    # what has many links needs room around it, what has one is to stay near (Jacomy et al. 2014: ForceAtlas2)
+    mass = np.ones(count) + np.bincount(a, weight, count) + np.bincount(b, weight, count)
+    mass[:neurons] /= mass[:neurons].mean() if neurons else 1.0
+    mass[neurons:] = _HUB
     loops = _loops(neurons, ends)
     between = ends[loops[ends[:, 0]] != loops[ends[:, 1]]]
     above, below, pull = summed(count, between[:, 0], between[:, 1], np.ones(len(between)))

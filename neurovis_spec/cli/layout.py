@@ -55,8 +55,8 @@ def command(
     network = network_of(spec, settings)
     earlier = None if update is None else earlier_layout(update)
     begun = perf_counter()
-    with progress("laying out"):
-        layout = network.layout(engine, earlier=earlier)
+    with progress("laying out") as bar:
+        layout = network.layout(engine, earlier=earlier, progress=bar)
     seconds = perf_counter() - begun
     if output is not None:
         with writing(output):

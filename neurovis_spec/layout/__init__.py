@@ -13,8 +13,10 @@ from neurovis_spec.layout.model import (
     LayoutProblem,
     LayoutRefusalError,
     Point,
+    ReportingEngine,
     Route,
 )
+from neurovis_spec.progress import Progress
 
 __all__ = [
     "GRID",
@@ -29,5 +31,7 @@ __all__ = [
     "LayoutProblem",
     "LayoutRefusalError",
     "Point",
+    "Progress",
+    "ReportingEngine",
     "Route",
 ]

@@ -1,4 +1,4 @@
-"""From a network to its layout: choose an engine, hold it to what it declares, check and tidy what it gives back.
+"""From a network to its layout: call an engine, hold it to what it declares, check and tidy what it gives back.
 
 In: a Network or a LayoutProblem, and perhaps an engine's name. Out: a Layout. What an engine cannot do is refused
 before it starts; what it gives back is checked, put on the grid of 1/1024 and moved to the origin.
@@ -10,10 +10,12 @@ import gc
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from typing import cast
 
 from neurovis_spec import plugins
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import suggest
+from neurovis_spec.layout.choose import choose_engine
 from neurovis_spec.layout.geometry import distance, snap
 from neurovis_spec.layout.model import (
     RADIUS,
@@ -23,25 +25,25 @@ from neurovis_spec.layout.model import (
     LayoutProblem,
     LayoutRefusalError,
     Point,
+    ReportingEngine,
     Route,
 )
 from neurovis_spec.layout.problem import problem_of
+from neurovis_spec.progress import Progress
 
 #: Rounding in the last bit does not make two pins overlap.
 _SLACK = 1e-9
-#: A component of so many neurons, with so many connections each within their group, is a tangle.
-_LARGE, _DENSE = 40, 2.5
-#: On a larger ring discs get too small.
-_MOST_IN_RING = 120
 
 
-def lay_out(network: Network, engine: str | None = None, memory: Layout | None = None) -> Layout:
+def lay_out(
+    network: Network, engine: str | None = None, memory: Layout | None = None, progress: Progress | None = None
+) -> Layout:
     """The layout of a network, by the engine named here, else by the spec's; what an earlier one (``memory``) knew
     stays where it was. Raises LayoutRefusalError."""
-    return lay_out_problem(problem_of(network, memory), engine or network.layout.engine)
+    return lay_out_problem(problem_of(network, memory), engine or network.layout.engine, progress)
 
 
-def lay_out_problem(problem: LayoutProblem, engine: str = "auto") -> Layout:
+def lay_out_problem(problem: LayoutProblem, engine: str = "auto", progress: Progress | None = None) -> Layout:
     """The layout of a problem: positions on the grid (pins exact), one route for every edge.
 
     Raises LayoutRefusalError where the engine is unknown, or cannot do what the problem asks for.
@@ -51,7 +53,10 @@ def lay_out_problem(problem: LayoutProblem, engine: str = "auto") -> Layout:
     refuse_what_it_cannot(problem, name, chosen.capabilities)
     _refuse_close_pins(problem)
     with _undisturbed():
-        result = chosen.lay_out(problem)
+        if progress is not None and chosen.capabilities.progress:
+            result = cast(ReportingEngine, chosen).lay_out(problem, progress)
+        else:
+            result = chosen.lay_out(problem)
         _check(problem, name, result)
         return _tidy(problem, name, result)
 
@@ -67,33 +72,6 @@ def _undisturbed() -> Iterator[None]:
     finally:
         if enabled:
             gc.enable()
-
-
-def choose_engine(problem: LayoutProblem) -> tuple[str, str]:
-    """The engine that ``auto`` stands for, and why, in words for ``inspect``."""
-    if problem.neurons and len(problem.pins) == len(problem.neurons):
-        return "manual", "every neuron has a position"
-    if not (problem.pins or problem.arrange or problem.boxes) and _tangled(problem):
-        if len(problem.neurons) <= _MOST_IN_RING:
-            return "circular", "its neurons drive one another in loops so densely that ranks would say nothing"
-        return "grid", "its neurons are many and drive one another in loops so densely that ranks would say nothing"
-    return "layered", "the default for networks whose positions are not all given"
-
-
-def _tangled(problem: LayoutProblem) -> bool:
-    """Whether a large strongly connected component is dense with connections within groups: there is no direction in
-    such a network that ranks could show. Connections between groups, even back and forth, do give one."""
-    group = {m: number for number, members in enumerate(problem.groups) for m in members.members}
-    loops = [e for e in problem.edges if e.source != e.target and group.get(e.source) == group.get(e.target)]
-    if len(loops) < _DENSE * _LARGE:
-        return False
-    import networkx as nx  # only here, for few networks
-
-    graph: nx.DiGraph[int] = nx.DiGraph()
-    graph.add_edges_from((edge.source, edge.target) for edge in problem.edges)
-    largest: set[int] = max(nx.strongly_connected_components(graph), key=len)
-    inside = sum(edge.source in largest and edge.target in largest for edge in loops)
-    return len(largest) >= _LARGE and inside >= _DENSE * len(largest)
 
 
 def _engine(name: str) -> LayoutEngine:
@@ -182,7 +160,8 @@ def _check(problem: LayoutProblem, name: str, result: Layout) -> None:
 def _tidy(problem: LayoutProblem, name: str, result: Layout) -> Layout:
     """On the grid, at the origin where nothing is pinned, neurons in natural order, ends exactly at centres."""
     shift = (0.0, 0.0)
-    if not problem.pins and problem.memory is None and problem.neurons:
+    free = not problem.pins and all(module.origin is None for module in problem.modules)
+    if free and problem.memory is None and problem.neurons:
         shift = (
             min(snap(x) for x, _ in result.positions.values()),
             min(snap(y) for _, y in result.positions.values()),
@@ -191,9 +170,13 @@ def _tidy(problem: LayoutProblem, name: str, result: Layout) -> Layout:
     def moved(point: Point) -> Point:
         return snap(point[0]) - shift[0] + 0.0, snap(point[1]) - shift[1] + 0.0
 
+    given: dict[int, Point] = {}
+    for a, b in (pair for mirror in problem.mirrors for pair in mirror.pairs):
+        # where a pin is not on the grid its mirror image is not, either
+        given.update({i: result.positions[problem.neurons[i]] for i, j in ((a, b), (b, a)) if j in problem.pins})
+    given.update(problem.pins)
     positions = {
-        neuron: problem.pins[i] if i in problem.pins else moved(result.positions[neuron])
-        for i, neuron in enumerate(problem.neurons)
+        neuron: given[i] if i in given else moved(result.positions[neuron]) for i, neuron in enumerate(problem.neurons)
     }
     routes: dict[str, Route] = {}
     for edge in problem.edges:

@@ -12,6 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, Protocol, TypeAlias, runtime_checkable
 
+from neurovis_spec.progress import Progress
+
 Point: TypeAlias = tuple[float, float]
 #: A cubic Bézier spline: 1 + 3k points from the centre of the source to the centre of the target.
 Route: TypeAlias = tuple[Point, ...]
@@ -130,6 +132,8 @@ class Capabilities:
     align: bool = False
     #: keeps what it can of an earlier layout
     memory: bool = False
+    #: says how far it is: ``lay_out`` takes a Progress as its second argument (ReportingEngine)
+    progress: bool = False
     #: most neurons and most connections
     neurons: int = 1_000_000
     edges: int = 10_000_000
@@ -146,6 +150,14 @@ class LayoutEngine(Protocol):
     def lay_out(self, problem: LayoutProblem) -> Layout:
         """Place every neuron once and route every edge. Deterministic. Raises ``LayoutRefusalError`` for a problem
         that cannot be solved as asked."""
+        ...
+
+
+class ReportingEngine(LayoutEngine, Protocol):
+    """An engine that takes its time, and says how far it is; it declares ``progress``."""
+
+    def lay_out(self, problem: LayoutProblem, progress: Progress | None = None) -> Layout:
+        """As LayoutEngine's; ``progress`` is called now and then."""
         ...
 
 

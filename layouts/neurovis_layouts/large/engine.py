@@ -7,6 +7,8 @@ spacing apart, their discs pushed off each other, packed; then pins are put wher
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from neurovis_layouts.apart import apart
@@ -16,7 +18,7 @@ from neurovis_layouts.large.settle import Cooling, settle
 from neurovis_layouts.large.spread import SMALL, spread, spread_small
 from neurovis_layouts.packing import packed
 from neurovis_layouts.wiring import FloatArray, IntArray, Wiring, parts_of, wiring_of
-from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem
+from neurovis_spec.layout import Capabilities, Layout, LayoutProblem, Progress
 
 #: In spacings: how far three quarters are from their next at most, how long links are in the mean at least, how far
 #: discs are kept apart, and parts.
@@ -33,18 +35,20 @@ class LargeEngine:
     """Forces over levels of detail."""
 
     name = "large"
-    capabilities = Capabilities(pins=True, boxes=True, direction=True, memory=True, neurons=200_000, edges=2_000_000)
+    capabilities = Capabilities(
+        pins=True, boxes=True, direction=True, memory=True, progress=True, neurons=200_000, edges=2_000_000
+    )
 
-    def lay_out(self, problem: LayoutProblem) -> Layout:
+    def lay_out(self, problem: LayoutProblem, progress: Progress | None = None) -> Layout:
         """Place the neurons by forces, route the edges straight."""
         wiring = wiring_of(problem)
-        places = _free(wiring, problem.neuron_spacing)
+        places = _free(wiring, problem.neuron_spacing, progress)
         if problem.pins:
             places = _around_pins(problem, wiring, places)
         return drawn(problem, self.name, places)
 
 
-def _free(wiring: Wiring, spacing: float) -> FloatArray:
+def _free(wiring: Wiring, spacing: float, progress: Progress | None = None) -> FloatArray:
     """Places (count, 2) without pins: every part laid out, then all packed."""
     part = parts_of(wiring.count, wiring.a, wiring.b)
     sizes = np.bincount(part)
@@ -53,10 +57,19 @@ def _free(wiring: Wiring, spacing: float) -> FloatArray:
     if len(small):
         within = np.unique(part[small], return_inverse=True)[1]
         places[small] = spread_small(_only(wiring, small), within)
+    done = len(small)
     for number in np.flatnonzero(sizes > SMALL).tolist():
         chosen = np.flatnonzero(part == number)
-        places[chosen] = spread(_only(wiring, chosen))
+        reported = partial(_report, progress, done, len(chosen), wiring.count)
+        places[chosen] = spread(_only(wiring, chosen), reported)
+        done += len(chosen)
     return _packed(wiring, places, part, spacing)
+
+
+def _report(progress: Progress | None, before: int, size: int, count: int, share: float) -> None:
+    """Say how many of ``count`` points are done: those ``before`` and a ``share`` of the ``size`` at work."""
+    if progress is not None:
+        progress(before + int(share * size), count)
 
 
 def _only(wiring: Wiring, chosen: IntArray) -> Wiring:

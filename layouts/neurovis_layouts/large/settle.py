@@ -38,9 +38,9 @@ def settle(
     field: Field,
     cooling: Cooling,
     fixed: IntArray | None = None,
-    tick: Callable[[], None] | None = None,
+    tick: Callable[[int], None] | None = None,
 ) -> FloatArray:
-    """Places (count, 2) at rest; ``fixed`` ones stay; ``tick`` is called after every step."""
+    """Places (count, 2) at rest; ``fixed`` ones stay; ``tick`` is called after every step with their number."""
     count = wiring.count
     for step in range(cooling.steps):
         force = _PUSH * field(places)
@@ -64,5 +64,5 @@ def settle(
             move[fixed] = 0.0
         places = places + move
         if tick is not None:
-            tick()
+            tick(count)
     return places

@@ -25,23 +25,38 @@ _STEPS, _FEWER_STEPS, _MANY = 200, 100, 3000
 #: How far crowded stretches are evened out, and how many stretches there are by the root of the points.
 _EVEN, _BINS = 0.6, 0.2
 
-Tick = Callable[[], None]
+#: Called with the share of the work that is done.
+Report = Callable[[float], None]
 
 
-def spread(wiring: Wiring, tick: Tick | None = None) -> FloatArray:
-    """Places (count, 2) for a wiring that hangs together; neighbours are about 1 apart."""
+def spread(wiring: Wiring, report: Report | None = None) -> FloatArray:
+    """Places (count, 2) for a wiring that hangs together, links about 1 long; ``report`` is called after each step."""
     levels, coarsest = levels_of(wiring)
     whole = float(wiring.count)
+    steps = [_STEPS if level.wiring.count <= _MANY else _FEWER_STEPS for level in levels]
+    tick = _tick(sum(n * level.wiring.count for n, level in zip(steps, levels, strict=True)), report)
     unit = np.sqrt(whole / coarsest.count)
     places = jitter(coarsest.count) * np.sqrt(whole)
     places = settle(coarsest, places, _field(coarsest), Cooling(2 * _STEPS, np.sqrt(whole) / 4, 0.02 * unit, unit))
-    for level in reversed(levels):
-        count = level.wiring.count
-        unit = np.sqrt(whole / count)
-        places = places[level.part_of] + 0.3 * unit * jitter(count)
-        steps = _STEPS if count <= _MANY else _FEWER_STEPS
-        places = settle(level.wiring, places, _field(level.wiring), Cooling(steps, unit, 0.02 * unit, unit), None, tick)
+    for level, n in zip(reversed(levels), reversed(steps), strict=True):
+        unit = np.sqrt(whole / level.wiring.count)
+        places = places[level.part_of] + 0.3 * unit * jitter(level.wiring.count)
+        cooling = Cooling(n, unit, 0.02 * unit, unit)
+        places = settle(level.wiring, places, _field(level.wiring), cooling, None, tick)
     return np.stack([_evened(places[:, 0]), _evened(places[:, 1])], axis=1)
+
+
+def _tick(total: int, report: Report | None) -> Callable[[int], None]:
+    """What counts the points that have been moved, and reports their share of ``total`` moves."""
+    done = 0
+
+    def tick(moved: int) -> None:
+        nonlocal done
+        done += moved
+        if report is not None:
+            report(done / total)
+
+    return tick
 
 
 def _evened(line: FloatArray) -> FloatArray:
@@ -55,7 +70,7 @@ def _evened(line: FloatArray) -> FloatArray:
     return evened
 
 
-def spread_small(wiring: Wiring, part: IntArray, tick: Tick | None = None) -> FloatArray:
+def spread_small(wiring: Wiring, part: IntArray) -> FloatArray:
     """Places (count, 2) for a wiring of many small parts, each around its own origin: those of different parts do not
     feel each other. ``part`` (count,) says which one a point belongs to."""
     order = np.argsort(part, kind="stable")
@@ -69,7 +84,7 @@ def spread_small(wiring: Wiring, part: IntArray, tick: Tick | None = None) -> Fl
     rank = np.zeros(wiring.count, dtype=np.int64)
     rank[order] = at - np.searchsorted(part[order], part[order])
     places = jitter(int(rank.max(initial=0)) + 1)[rank] * size
-    return settle(wiring, places, field, Cooling(2 * _STEPS, 1.0, 0.01), None, tick)
+    return settle(wiring, places, field, Cooling(2 * _STEPS, 1.0, 0.01))
 
 
 def _field(wiring: Wiring) -> Field:

@@ -22,7 +22,7 @@ from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem
 _LINK, _APART, _NEXT, _GAP = 1.6, 0.8, 1.05, 1.5
 _MOST = 0.75
 #: What is in one module, or box, is as close as if it were so many links, or so much of what it is.
-_MATES, _CLOSER = 1.0, 0.5
+_MATES, _CLOSER = 0.6, 0.3
 #: How strongly an arc presses its target below its source, and how far, in links.
 _PRESS, _BELOW = 12.0, 0.8
 
@@ -31,7 +31,7 @@ class OrganicEngine:
     """Stress majorisation with a direction."""
 
     name = "organic"
-    capabilities = Capabilities(pins=True, boxes=True, direction=True, memory=True, neurons=2000, edges=50_000)
+    capabilities = Capabilities(pins=True, boxes=True, direction=True, memory=True, neurons=1000, edges=20_000)
 
     def lay_out(self, problem: LayoutProblem) -> Layout:
         """Place the neurons by their distances in the network, route the edges round what is in the way."""

@@ -1,0 +1,69 @@
+"""Which engine ``auto`` stands for.
+
+In: a LayoutProblem. Out: an engine's name, and why, in words for ``inspect``.
+"""
+
+from __future__ import annotations
+
+from neurovis_spec.layout.model import LayoutProblem
+
+#: A component of so many neurons, with so many connections each within their group, is a tangle.
+_LARGE, _DENSE = 40, 2.5
+#: A tangle goes on a ring if it has this share of all connections that there can be, and no more neurons than these: on
+#: a larger ring discs get too small.
+_COMPLETE, _MOST_IN_RING = 0.25, 120
+#: So many neurons are laid out by their distances in the network.
+_MOST_BY_DISTANCE = 500
+#: With more connections nobody can follow one.
+_MOST_IN_RANKS = 1000
+#: Layers of neurons, and frames of instances, show something nevertheless, up to so many.
+_MOST_IN_LAYERS = 20_000
+
+
+def choose_engine(problem: LayoutProblem) -> tuple[str, str]:
+    """The engine that ``auto`` stands for, and why, in words for ``inspect``."""
+    edges = len(problem.edges)
+    if problem.neurons and len(problem.pins) == len(problem.neurons):
+        return "manual", "every neuron has a position"
+    if problem.arrange or problem.mirrors or problem.align:
+        return "layered", "it can arrange, mirror and align as the spec says"
+    if problem.modules and edges <= _MOST_IN_LAYERS:
+        return "layered", "it draws instances as frames"
+    if not (problem.pins or problem.boxes or problem.modules) and _tangled(problem):
+        why = "its neurons drive one another in loops so densely that ranks would say nothing"
+        if len(problem.neurons) <= _MOST_IN_RING and edges > _COMPLETE * len(problem.neurons) ** 2:
+            return "circular", why
+        if len(problem.neurons) <= _MOST_BY_DISTANCE:
+            return "organic", why
+        return "large", why
+    if edges > _MOST_IN_RANKS and not _in_layers(problem):
+        return "large", f"its {edges} connections are too many to follow each: clusters say more"
+    return "layered", "the default for networks whose positions are not all given"
+
+
+def _in_layers(problem: LayoutProblem) -> bool:
+    """Whether groups are layers, as in a perceptron: nothing runs within a group, and signals never come back to
+    one."""
+    if len(problem.edges) > _MOST_IN_LAYERS or 2 * len(problem.groups) > len(problem.neurons):
+        return False
+    group = {m: number for number, members in enumerate(problem.groups) for m in members.members}
+    between = {(group.get(edge.source, -1), group.get(edge.target, -1)) for edge in problem.edges}
+    import networkx as nx  # only here, for few networks
+
+    return bool(nx.is_directed_acyclic_graph(nx.DiGraph(sorted(between))))
+
+
+def _tangled(problem: LayoutProblem) -> bool:
+    """Whether a large strongly connected component is dense with connections within groups: there is no direction in
+    such a network that ranks could show. Connections between groups, even back and forth, do give one."""
+    group = {m: number for number, members in enumerate(problem.groups) for m in members.members}
+    loops = [e for e in problem.edges if e.source != e.target and group.get(e.source) == group.get(e.target)]
+    if len(loops) < _DENSE * _LARGE:
+        return False
+    import networkx as nx  # only here, for few networks
+
+    graph: nx.DiGraph[int] = nx.DiGraph()
+    graph.add_edges_from((edge.source, edge.target) for edge in problem.edges)
+    largest: set[int] = max(nx.strongly_connected_components(graph), key=len)
+    inside = sum(edge.source in largest and edge.target in largest for edge in loops)
+    return len(largest) >= _LARGE and inside >= _DENSE * len(largest)

@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+import layout_conformance as suite
+import networkx as nx
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from neurovis_layouts.organic.paths import distances
+
+from neurovis_spec.layout import LayoutProblem
+from neurovis_spec.layout.arrange import lay_out_problem
+from neurovis_spec.layout.geometry import distance
+from neurovis_spec.layout.metrics import metrics
+from neurovis_spec.layout.problem import canonical
+
+
+@given(st.integers(1, 12), st.lists(st.tuples(st.integers(0, 11), st.integers(0, 11)), max_size=20))
+def test_ways_are_the_shortest(count: int, pairs: list[tuple[int, int]]) -> None:
+    links = [(a % count, b % count) for a, b in pairs]
+    ends = np.array(links, dtype=np.int64).reshape(-1, 2)
+    graph: nx.Graph[int] = nx.Graph(links)
+    graph.add_nodes_from(range(count))
+    known = dict(nx.all_pairs_shortest_path_length(graph))
+    most = max(far for row in known.values() for far in row.values())
+    wanted = [[known[i].get(j, most + 1) for j in range(count)] for i in range(count)]
+    assert distances(count, ends[:, 0], ends[:, 1]).tolist() == wanted
+
+
+def test_a_ring_becomes_a_ring() -> None:
+    names = suite.members("N", 24)
+    ring = canonical("ring", names, edges=suite.named((names[i], names[(i + 1) % 24]) for i in range(24)))
+    layout = lay_out_problem(ring, "organic")
+    points = [layout.positions[name] for name in names]
+    middle = (sum(x for x, _ in points) / 24, sum(y for _, y in points) / 24)
+    radii = [distance(point, middle) for point in points]
+    assert max(radii) < 1.1 * min(radii)
+    assert metrics(layout, ring)["crossings"] == 0
+
+
+def reservoir() -> LayoutProblem:
+    units = suite.members("R", 60)
+    pairs = [(units[i], units[(i * step + 7 * step) % 60]) for i in range(60) for step in (1, 3, 11)]
+    pairs += [("I", unit) for unit in units[::6]] + [(unit, "O") for unit in units[3::6]]
+    return canonical("reservoir", [*units, "I", "O"], edges=suite.named(sorted(set(pairs))))
+
+
+def test_what_drives_a_loop_stands_above_and_what_reads_it_below() -> None:
+    for direction in ("down", "right"):
+        problem = reservoir()
+        turned = LayoutProblem("x", problem.neurons, problem.groups, problem.edges, direction=direction)
+        assert metrics(lay_out_problem(turned, "organic"), turned)["flow"] == 1
+
+
+def test_boxes_are_compact_and_pins_stay() -> None:
+    problem = reservoir()
+    boxed = tuple(problem.neurons.index(f"R{i}") for i in (1, 20, 40))
+
+    def spread(positions: list[tuple[float, float]]) -> float:
+        return max(distance(a, b) for a in positions for b in positions)
+
+    layouts = [
+        lay_out_problem(
+            LayoutProblem("x", problem.neurons, problem.groups, problem.edges, {5: (3.3, 4.4)}, boxes=boxes), "organic"
+        )
+        for boxes in ((), (("b", boxed),))
+    ]
+    loose, close = (spread([layout.positions[problem.neurons[i]] for i in boxed]) for layout in layouts)
+    assert close < 0.7 * loose
+    assert all(layout.positions[problem.neurons[5]] == (3.3, 4.4) for layout in layouts)

@@ -1,0 +1,57 @@
+from __future__ import annotations
+
+import pytest
+
+import neurovis_spec as nv
+from neurovis_spec.layout import LayoutProblem, LayoutRefusalError
+from neurovis_spec.layout.arrange import lay_out_problem
+from neurovis_spec.layout.problem import canonical
+
+BODY = {"A": (0.0, 0.0), "B": (1e-6, 0.0), "C": (0.0, 2e-6), "D": (3e-6, 2e-6)}
+
+
+def body(**changes: object) -> LayoutProblem:
+    return canonical("body", list(BODY), places=BODY, **changes)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("direction", ["down", "right"])
+def test_one_factor_scales_both_axes_whatever_the_direction(direction: str) -> None:
+    places = lay_out_problem(body(direction=direction), "spatial").positions
+    assert places["A"] == (0.0, 0.0)
+    factor = places["B"][0]
+    assert factor >= 0.6
+    for name, (x, y) in BODY.items():
+        assert places[name] == pytest.approx((x / 1e-6 * factor, y / 1e-6 * factor), abs=0.01)
+
+
+def test_what_coincides_stands_side_by_side() -> None:
+    names = [f"N{i}" for i in range(40)]
+    places = {name: (float(i // 4), 5.0) for i, name in enumerate(names)}
+    layout = lay_out_problem(canonical("x", names, places=places), "spatial")
+    xs = [layout.positions[name][0] for name in names]
+    groups = [sum(xs[i : i + 4]) / 4 for i in range(0, 40, 4)]
+    assert groups == sorted(groups)
+    assert len(set(layout.positions.values())) == 40
+
+
+def test_pins_win_and_the_rest_goes_with_them() -> None:
+    layout = lay_out_problem(body(pins={"A": (10.0, 10.0)}), "spatial")
+    free = lay_out_problem(body(), "spatial")
+    assert layout.positions["A"] == (10.0, 10.0)
+    assert layout.positions["D"] == pytest.approx([c + 10 for c in free.positions["D"]], abs=0.01)
+
+
+def test_neurons_without_a_position_are_named_and_a_pin_will_do() -> None:
+    with pytest.raises(LayoutRefusalError, match=r"'E', 'F' have none") as caught:
+        lay_out_problem(canonical("x", [*BODY, "E", "F"], places=BODY), "spatial")
+    assert caught.value.code == "position-missing"
+    pinned = canonical("x", [*BODY, "E"], places=BODY, pins={"E": (9.0, 9.0)})
+    assert lay_out_problem(pinned, "spatial").positions["E"] == (9.0, 9.0)
+
+
+def test_a_spec_draws_by_position() -> None:
+    group = "{count: 3, position: [[0, 0], [10, 0], [0, 30]]}"
+    network = nv.compile_text(f"neurovis: 1\nname: x\nneurons: {{L: {group}}}\nlayout: {{engine: spatial}}\n")
+    places = network.layout().positions
+    assert places["L1"] == (0.0, 0.0)
+    assert places["L3"][1] == pytest.approx(3 * places["L2"][0], abs=0.01)
