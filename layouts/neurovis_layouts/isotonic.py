@@ -7,6 +7,7 @@ Brunk 1972) after the distances are taken out: exact, unique and therefore symme
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import accumulate
 
 
 def spread(wishes: Sequence[float], weights: Sequence[float], gaps: Sequence[float]) -> list[float]:
@@ -15,9 +16,7 @@ def spread(wishes: Sequence[float], weights: Sequence[float], gaps: Sequence[flo
     >>> spread([0, 0, 0], [1, 1, 1], [1, 1])
     [-1.0, 0.0, 1.0]
     """
-    offsets = [0.0]
-    for gap in gaps[: max(0, len(wishes) - 1)]:
-        offsets.append(offsets[-1] + gap)
+    offsets = list(accumulate(gaps[: max(0, len(wishes) - 1)], initial=0.0))
     pools: list[tuple[float, float, int]] = []  # sum of w·value, sum of w, how many
     for wish, weight, offset in zip(wishes, weights, offsets, strict=False):
         total, mass, count = weight * (wish - offset), weight, 1
@@ -27,6 +26,6 @@ def spread(wishes: Sequence[float], weights: Sequence[float], gaps: Sequence[flo
         pools.append((total, mass, count))
     result: list[float] = []
     for total, mass, count in pools:
-        start = len(result)
-        result.extend(total / mass + offsets[start + i] for i in range(count))
+        start, middle = len(result), total / mass
+        result += [middle + offset for offset in offsets[start : start + count]]
     return result

@@ -1,0 +1,42 @@
+"""Routes that come too close to a disc: all at once the same as one by one."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from neurovis_layouts.routing.obstacles import REACH, Obstacles
+
+from neurovis_spec.layout.geometry import straight
+from neurovis_spec.layout.model import Point, Route
+
+#: Centres stand on a lattice, so that no two discs overlap.
+places = st.tuples(st.integers(-6, 6), st.integers(-6, 6)).map(lambda at: (0.75 * at[0], 1.25 * at[1]))
+points = st.tuples(st.floats(-6, 6, allow_nan=False), st.floats(-8, 8, allow_nan=False))
+
+
+@given(st.lists(places, min_size=2, max_size=25, unique=True), st.data())
+@settings(deadline=None)
+def test_crowded_routes_are_those_whose_clearance_is_too_small(centres: list[Point], data: st.DataObject) -> None:
+    obstacles = Obstacles(centres)
+    ends = st.tuples(st.integers(0, len(centres) - 1), st.integers(0, len(centres) - 1))
+    own = data.draw(st.lists(ends, min_size=1, max_size=12))
+    routes: list[Route] = []
+    for source, target in own:
+        between = data.draw(st.lists(points, min_size=2, max_size=2) | st.lists(points, min_size=5, max_size=5))
+        routes.append((centres[source], *between, centres[target]))
+    found = obstacles.crowded(routes, own, REACH - 0.1)
+    assert found == [obstacles.clearance(route, ends) < REACH - 0.1 for route, ends in zip(routes, own, strict=True)]
+
+
+@pytest.mark.parametrize(("middle", "crowded"), [((5.0, 0.34), True), ((5.0, 0.36), False), ((5.0, -0.34), True)])
+def test_a_line_is_crowded_by_a_disc_beside_it_but_not_by_its_own_ends(middle: Point, crowded: bool) -> None:
+    obstacles = Obstacles([(0.0, 0.0), (10.0, 0.0), middle])
+    line = straight((0.0, 0.0), (10.0, 0.0))
+    assert obstacles.crowded([line], [(0, 1)], REACH - 0.1) == [crowded]
+    assert obstacles.crowded([line], [(0, 2)], REACH - 0.1) == [True]
+
+
+def test_nothing_crowds_where_there_is_nothing() -> None:
+    assert Obstacles(()).crowded([straight((0.0, 0.0), (1.0, 0.0))], [(0, 1)], 0.3) == [False]
+    assert Obstacles([(0.0, 0.0)]).crowded([], [], 0.3) == []
