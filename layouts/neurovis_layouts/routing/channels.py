@@ -37,7 +37,7 @@ _SHARED, _SQUEEZED, _ACROSS = 1.5, 0.4, 1.25
 _LEAST = 0.75
 _WALL = 60.0
 #: Places tried in a row, about; ways closer than this to the straight line are kept apart from.
-_CHOICES, _NEAR = 24, 2.0
+_CHOICES, _NEAR, _KEPT = 24, 2.0, 2
 #: Where a way is pulled straight, over how many rows, and how close to another.
 _FARTHEST, _BESIDE_WAY = 40, 0.12
 #: With more edges than this nobody can follow one: they take the straight way.
@@ -105,7 +105,8 @@ class _Rows:
         for y in [*rows, end[1]]:
             places, extra = np.array([end[0]]), np.zeros(1)
             if y != end[1]:
-                places, extra = self._places(self._spans(y, source, target, foreign), y, start, end)
+                kept = across[np.argsort(cost, kind="stable")[:_KEPT]].tolist()
+                places, extra = self._places(self._spans(y, source, target, foreign), y, start, end, kept)
             walls = [(r[0], r[2]) for r in foreign if r[1] <= y and before <= r[3]]
             ways = cost[None, :] + _step(across, places, y - before) + _through(across, places, walls)
             chosen = np.argmin(ways, axis=1)
@@ -135,23 +136,27 @@ class _Rows:
             edge = max(edge, high_x)
         return [*free, (edge, math.inf)]
 
-    def _places(self, free: Sequence[_Span], y: float, start: Point, end: Point) -> tuple[FloatArray, FloatArray]:
-        """Where a way may run through a row, in order, and what that costs: the places nearest to the straight line."""
+    def _places(
+        self, free: Sequence[_Span], y: float, start: Point, end: Point, kept: Sequence[float]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Where a way may run through a row, in order, and what that costs: the places nearest to the straight line,
+        and straight on from the best ones before (``kept``)."""
         line = start[0] + (end[0] - start[0]) * (y - start[1]) / (end[1] - start[1])
         used = self._used.get(y, [])
         near = used[bisect_left(used, line - _NEAR) : bisect_left(used, line + _NEAR)]
         wishes = [line, start[0], end[0], *(x - _APART for x in near), *(x + _APART for x in near)]
+        straight = {x for x in kept if any(low <= x <= high for low, high in free)}
         found: dict[float, float] = {}
         for low, high in sorted(free, key=lambda span: (max(span[0] - line, line - span[1], 0.0), span)):
             inset = min(_INSET, (high - low) / 2)
-            for wish in [*wishes, low + inset, high - inset]:
+            if len(found) > _CHOICES and not any(low <= x <= high for x in straight):
+                continue
+            for wish in [*wishes, low + inset, high - inset, *(x for x in kept if low <= x <= high)]:
                 x = min(max(wish, low + inset), high - inset)
                 if math.isfinite(x) and x not in found:
                     beside = used[bisect_left(used, x - _APART) : bisect_left(used, x + _APART)]
                     crowd = sum(1 - abs(x - other) / _APART for other in beside)
                     found[x] = _SHARED * crowd + (_SQUEEZED if high - low < _NARROW else 0.0)
-            if len(found) > _CHOICES:
-                break
         places = sorted(found)
         return np.array(places), np.array([found[x] for x in places])
 
