@@ -51,6 +51,13 @@ def test_what_drives_a_loop_stands_above_and_what_reads_it_below() -> None:
         assert metrics(lay_out_problem(turned, "organic"), turned)["flow"] == 1
 
 
+def test_who_drives_a_loop_stands_above_the_whole_of_it() -> None:
+    layout = lay_out_problem(reservoir(), "organic")
+    units = [y for name, (_, y) in layout.positions.items() if name.startswith("R")]
+    assert layout.positions["I"][1] < min(units)
+    assert layout.positions["O"][1] > max(units)
+
+
 def test_boxes_are_compact_and_pins_stay() -> None:
     problem = reservoir()
     boxed = tuple(problem.neurons.index(f"R{i}") for i in (1, 20, 40))

@@ -58,7 +58,7 @@ def wiring_of(problem: LayoutProblem, hubs: bool = True) -> Wiring:
     mass = np.ones(count) + np.bincount(a, weight, count) + np.bincount(b, weight, count)
     mass[:neurons] /= mass[:neurons].mean() if neurons else 1.0
     mass[neurons:] = _HUB
-    loops = _loops(neurons, ends)
+    loops = loops_of(problem)
     between = ends[loops[ends[:, 0]] != loops[ends[:, 1]]]
     above, below, pull = summed(count, between[:, 0], between[:, 1], np.ones(len(between)))
     return Wiring(neurons, mass, a, b, weight, above, below, pull)
@@ -110,13 +110,14 @@ def _spokes(problem: LayoutProblem) -> IntArray:
     return np.array(spokes, dtype=np.int64).reshape(-1, 2)
 
 
-def _loops(neurons: int, ends: IntArray) -> IntArray:
+def loops_of(problem: LayoutProblem) -> IntArray:
     """(neurons,) which loop (strongly connected component) each neuron is part of."""
+    neurons = len(problem.neurons)
     import networkx as nx  # only here
 
     graph: nx.DiGraph[int] = nx.DiGraph()
     graph.add_nodes_from(range(neurons))
-    graph.add_edges_from(ends.tolist())
+    graph.add_edges_from((edge.source, edge.target) for edge in problem.edges)
     loops = np.zeros(neurons, dtype=np.int64)
     for number, part in enumerate(nx.strongly_connected_components(graph)):
         loops[list(part)] = number

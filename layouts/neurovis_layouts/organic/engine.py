@@ -7,6 +7,8 @@ boxes are drawn together; pins are part of the whole from the start.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from neurovis_layouts.apart import apart, jitter
@@ -14,7 +16,7 @@ from neurovis_layouts.finish import drawn, nearest, pinned_places
 from neurovis_layouts.organic.paths import distances
 from neurovis_layouts.organic.stress import Arcs, least_stress
 from neurovis_layouts.packing import packed
-from neurovis_layouts.wiring import FloatArray, IntArray, Wiring, parts_of, wiring_of
+from neurovis_layouts.wiring import FloatArray, IntArray, Wiring, loops_of, parts_of, wiring_of
 from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem
 
 #: In spacings: how far linked neurons are apart, discs of any two, three quarters of the discs from their next at
@@ -24,7 +26,9 @@ _MOST = 0.75
 #: What is in one module, or box, is as close as if it were so many links, or so much of what it is.
 _MATES, _CLOSER = 0.6, 0.3
 #: How strongly an arc presses its target below its source, and how far, in links.
-_PRESS, _BELOW = 12.0, 0.8
+_PRESS, _BELOW = 4.0, 0.8
+#: The most arcs between loops.
+_MOST_ARCS = 50_000
 
 
 class OrganicEngine:
@@ -35,7 +39,7 @@ class OrganicEngine:
 
     def lay_out(self, problem: LayoutProblem) -> Layout:
         """Place the neurons by their distances in the network, route the edges round what is in the way."""
-        wiring = wiring_of(problem, hubs=False)
+        wiring = _stacked(wiring_of(problem, hubs=False), loops_of(problem))
         fixed, there = pinned_places(problem)
         part = _parts(problem, wiring)
         places = np.zeros((wiring.count, 2))
@@ -49,6 +53,27 @@ class OrganicEngine:
             sizes.append(tuple((places[chosen].max(axis=0) - places[chosen].min(axis=0)).tolist()))
         _pack(places, part, numbers, sizes, _GAP * problem.neuron_spacing)
         return drawn(problem, self.name, places)
+
+
+def _stacked(wiring: Wiring, loops: IntArray) -> Wiring:
+    """The wiring with an arc from all of a loop to all of the next: what drives a loop stands above the whole of it.
+    Arcs stay as they are where that would be too many."""
+    order = np.argsort(loops, kind="stable")
+    sizes = np.bincount(loops)
+    begin = np.cumsum(sizes) - sizes
+    pairs = np.unique(np.stack([loops[wiring.above], loops[wiring.below]], axis=1), axis=0).tolist()
+    if sum(int(sizes[a] * sizes[b]) for a, b in pairs) > _MOST_ARCS:
+        return wiring
+    of = [order[start : start + size] for start, size in zip(begin.tolist(), sizes.tolist(), strict=True)]
+    above = [np.repeat(of[a], len(of[b])) for a, b in pairs]
+    below = [np.tile(of[b], len(of[a])) for a, b in pairs]
+    none = np.zeros(0, dtype=np.int64)
+    return replace(
+        wiring,
+        above=np.concatenate([none, *above]),
+        below=np.concatenate([none, *below]),
+        pull=np.ones(sum(map(len, above))),
+    )
 
 
 def _parts(problem: LayoutProblem, wiring: Wiring) -> IntArray:
