@@ -70,12 +70,14 @@ def by_pairs(levels: Levels, order: Order) -> int:
 
 
 @given(st.lists(st.integers(0, 9), max_size=40))
+@settings(deadline=None)
 def test_inversions_are_pairs_out_of_order(values: list[int]) -> None:
     expected = sum(a > b for i, a in enumerate(values) for b in values[i + 1 :])
     assert inversions(np.array(values, dtype=np.int64)) == expected
 
 
 @given(some_levels(), st.randoms(use_true_random=False))
+@settings(deadline=None)
 def test_the_fast_count_is_the_plain_one(levels: Levels, random: Random) -> None:
     order = [random.sample(rank, len(rank)) for rank in levels.ranks]
     assert crossings(levels, order) == by_pairs(levels, order)
@@ -128,6 +130,7 @@ def test_the_order_of_segments_does_not_show(levels: Levels) -> None:
 
 
 @given(some_levels(boxes=True))
+@settings(deadline=None)
 def test_differences_are_what_sifting_saves(levels: Levels) -> None:
     segments = Segments(levels)
     place = np.zeros(len(levels.nodes), dtype=np.int64)
@@ -153,6 +156,7 @@ def test_what_is_held_is_never_passed() -> None:
 
 
 @given(some_levels(boxes=True, kin=True))
+@settings(deadline=None)
 def test_exchanges_save_what_they_say(levels: Levels) -> None:
     classes = np.array([n.box for n in levels.nodes]), np.array([n.kin for n in levels.nodes])
     ranks: list[Ints] = [np.array(rank, dtype=np.int64) for rank in levels.ranks]
