@@ -34,6 +34,12 @@ def test_what_coincides_stands_side_by_side() -> None:
     assert len(set(layout.positions.values())) == 40
 
 
+def test_almost_one_place_does_not_make_the_picture_endless() -> None:
+    places = {"A": (0.0, 0.0), "B": (0.0, 1.0), "C": (0.0, 1e-169)}
+    layout = lay_out_problem(canonical("x", list(places), places=places), "spatial")
+    assert max(y for _, y in layout.positions.values()) < 200
+
+
 def test_pins_win_and_the_rest_goes_with_them() -> None:
     layout = lay_out_problem(body(pins={"A": (10.0, 10.0)}), "spatial")
     free = lay_out_problem(body(), "spatial")

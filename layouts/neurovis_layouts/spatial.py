@@ -20,6 +20,8 @@ from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem, Layo
 #: In spacings: how far half of the discs are from their next, how far nine tenths of them (the picture may grow by this
 #: factor for it), and how far any two are kept apart.
 _HALF, _NINE_TENTHS, _GROWTH, _APART = 1.0, 0.7, 2.0, 0.7
+#: Closer than this share of what they had in a row is as good as in one place.
+_CLOSEST = 0.05
 #: Room for each of those that stand in one place.
 _CROWD = 0.9
 
@@ -78,9 +80,10 @@ def _factor(data: FloatArray) -> float:
         if (next_one < reach).mean() > 0.5 or reach > 2:
             break
         reach *= 2
-    half, tenth = np.quantile(next_one, [0.5, 0.1]).tolist()
+    # one far away must not make all others a crowd, nor two in almost one place the picture endless
+    half, tenth = np.maximum(np.quantile(next_one, [0.5, 0.1]), _CLOSEST / len(spots)).tolist()
     factor = _HALF / half
-    return float(np.clip(_NINE_TENTHS / max(tenth, 1e-300), factor, _GROWTH * factor)) / extent
+    return float(np.clip(_NINE_TENTHS / tenth, factor, _GROWTH * factor)) / extent
 
 
 def _fanned(places: FloatArray, spacing: float) -> FloatArray:
