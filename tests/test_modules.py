@@ -398,6 +398,12 @@ def test_paths_are_relative_to_the_file_that_names_them(tmp_path: Path) -> None:
     assert network_of(text, tmp_path).connections.weights.tolist() == [1, 2, 3, 4]
 
 
+def test_a_mistake_within_an_included_file_hides_none_elsewhere(tmp_path: Path) -> None:
+    included(tmp_path, library="modules: {m: {neurons: {Ü: {bias: 1}}}}\n")
+    text = "include: library.yaml\nneurons: {A: {activation: tahn, model: leeky}}\ninstances: {q: {module: m}}"
+    assert sorted(codes(text, tmp_path)) == ["bad-name", "unknown-activation", "unknown-model"]
+
+
 def test_nothing_outside_the_root_is_read(tmp_path: Path) -> None:
     included(tmp_path, library="modules: {leg: {neurons: {K: {bias: 1}}}}\n", specs__near="include: ../library.yaml\n")
     text = "include: near.yaml\ninstances: {left: {module: leg}}"

@@ -48,7 +48,9 @@ def network_of(spec: str, parameters: Mapping[str, float] | None = None) -> Comp
     """The same, its warnings shown on standard error."""
     from neurovis_spec.findings import show_text
 
-    network = compiled(spec, parameters)
+    context = click.get_current_context(silent=True)
+    given = {} if context is None else context.meta
+    network = compiled(spec, parameters, root=given.get("neurovis.root"), limit=given.get("neurovis.limit"))
     if network.warnings:
         click.echo(show_text(network.warnings, network.sources), err=True)
     return network

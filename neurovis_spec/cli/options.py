@@ -66,7 +66,38 @@ def _themes() -> Iterable[str]:
     return THEMES
 
 
-spec_argument = click.argument("spec", metavar="SPEC")
+def _noted(ctx: click.Context, param: click.Parameter, value: object) -> object:
+    """Keep how the spec is to be compiled with the command, for who compiles it."""
+    ctx.meta[f"neurovis.{param.name}"] = value
+    return value
+
+
+def compile_options(command: F) -> F:
+    """Where the files of a spec may lie, and how large it may become."""
+    root = click.option(
+        "--root",
+        type=click.Path(path_type=Path),
+        metavar="DIR",
+        expose_value=False,
+        callback=_noted,
+        help="Data files and included files may lie anywhere below; default: the folder of the spec.",
+    )
+    limit = click.option(
+        "--limit",
+        type=click.IntRange(min=1),
+        metavar="N",
+        expose_value=False,
+        callback=_noted,
+        help="The most connections, ten million by default, and the most neurons where N is above their million.",
+    )
+    return root(limit(command))
+
+
+def spec_argument(command: F) -> F:
+    """``SPEC``, with these options."""
+    return click.argument("spec", metavar="SPEC")(compile_options(command))
+
+
 set_option = click.option(
     "--set",
     "settings",

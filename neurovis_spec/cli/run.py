@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from neurovis_spec.cli.files import check_target, count, network_of, recording_of, tables, writing
-from neurovis_spec.cli.options import backend_option, examples, input_option, output_option, set_option
+from neurovis_spec.cli.options import backend_option, compile_options, examples, input_option, output_option, set_option
 from neurovis_spec.cli.progress import progress
 
 if TYPE_CHECKING:
@@ -40,9 +40,13 @@ _MOST_SHOWN = 20
     "--every", type=click.IntRange(1, 2**53), default=1, metavar="K", help="Record every K-th step only; default 1."
 )
 @click.option(
-    "--from", "start", metavar="RECORDING", help="Begin with the last weights and activities of this recording."
+    "--from",
+    "start",
+    metavar="RECORDING",
+    help="Begin with the last weights and activities of this recording; states of models begin anew.",
 )
 @output_option("Write the recording here (.npz or .csv); without it a summary is printed.")
+@compile_options
 def command(
     spec: str | None,
     steps: int | None,

@@ -35,7 +35,7 @@ from neurovis_spec.compiler.references import Directory, key_span
 from neurovis_spec.compiler.settings import check_initials, choose, parameters, spread
 from neurovis_spec.compiler.units import Unit
 from neurovis_spec.diagnostics import suggest
-from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, shown
+from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, shown, too_long
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.source import Scalar
 from neurovis_spec.language.values import Choice, FormulaList
@@ -317,7 +317,7 @@ class _Builder:
             return None, None
         names = tuple(f"{name}{number}" for number in range(first, first + count))
         if len(names[-1]) > 64:
-            findings.error("bad-name", key_span(self.unit.section, "neurons", name), bad_name(names[-1]), NAME_RULE)
+            findings.error("bad-name", key_span(self.unit.section, "neurons", name), too_long(names[-1]), NAME_RULE)
             return None, None
         return names, first
 

@@ -25,7 +25,7 @@ from neurovis_spec.compiler.signals import make_input
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.diagnostics import Findings, Span, suggest
 from neurovis_spec.language.expressions.tree import Number, names, substitute
-from neurovis_spec.language.located import NAME_RULE, Formula, Located, bad_name, shown
+from neurovis_spec.language.located import NAME_RULE, Formula, Located, shown, too_long
 from neurovis_spec.language.model import lost_names
 from neurovis_spec.language.modules import InstanceModel
 
@@ -292,7 +292,7 @@ class Expander:
             self._stop("too-deep", span, f"modules are nested at most {DEEPEST} deep")
         called = [name] if count is None else [f"{name}{number}" for number in range(1, count + 1)]
         if len(called[-1]) > 64:
-            self.findings.error("bad-name", key_span(unit.section, "instances", name), bad_name(called[-1]), NAME_RULE)
+            self.findings.error("bad-name", key_span(unit.section, "instances", name), too_long(called[-1]), NAME_RULE)
             return None
         self.used.add(module.name)
         self._check_keys(model, module)

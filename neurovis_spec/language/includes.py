@@ -69,43 +69,42 @@ class _Reader:
     def follow(self, paths: tuple[Located[str], ...], file: str, folder: Path, way: tuple[Path, ...]) -> None:
         """Read these paths, named in ``file``; ``way`` are the files that led here."""
         for path in paths:
-            before = self.findings.errors
-            self._one(path, file, folder, way)
-            self.complete &= self.findings.errors == before
+            # what is wrong within a file that could be read is that file's gaps; nothing more is unknown because of it
+            done = self._one(path, file, folder, way)  # which follows paths of its own
+            self.complete &= done
 
-    def _one(self, path: Located[str], file: str, folder: Path, way: tuple[Path, ...]) -> None:
+    def _one(self, path: Located[str], file: str, folder: Path, way: tuple[Path, ...]) -> bool:
+        """Read one file; whether it could be read."""
         place = locate(path.value, self.root, folder, path.span, self.findings)
         if place is None:
-            return
+            return False
         if place in way:
             names = [step.name for step in (*way[way.index(place) :], place)]
             message = f"these files include each other: {' -> '.join(_few(names))}"
             self.findings.error("include-cycle", path.span, message, "move what both need into a file of its own")
-            return
+            return False
         if place in self.read:
-            return
+            return True
         self.read.add(place)
         if len(self.read) > MOST:
             if len(self.read) == MOST + 1:
                 self.findings.error("too-many", path.span, f"a spec includes at most {MOST:,} files")
-            return
+            return False
         if len(way) > DEEPEST:
             self.findings.error("too-deep", path.span, f"files include one another at most {DEEPEST} deep")
-            return
+            return False
         data = self.bytes_of(place, LARGEST)
         if isinstance(data, FileFault):
             self.findings.error(data.code, path.span, f"the file '{shown(path.value)}' {data.reason}")
-            return
+            return False
         name = os.path.normpath(Path(file).parent / path.value)
         document = read_content(data, name, self.findings)
         model = None if document is None else read_included(document, self.findings)
         if model is None:
-            self.complete = False
-            return
+            return False
         self.follow(model.include, name, place.parent, (*way, place))
         self.found.append(Included(model, place.parent))
-        if model.lost:
-            self.complete = False
+        return True
 
 
 def _few(names: list[str]) -> Iterator[str]:

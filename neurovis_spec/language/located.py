@@ -115,6 +115,11 @@ def shown(text: str) -> str:
     return text if len(text) <= 40 else text[:37] + "…"
 
 
+def too_long(name: str) -> str:
+    """The sentence for a name that a count makes too long."""
+    return f"the count makes '{shown(name)}' of {len(name)} characters"
+
+
 def bad_name(name: str) -> str:
     """The sentence for a name that is none."""
     return f"'{shown(name)}' is not a name"
