@@ -56,7 +56,7 @@ test: $(VENV)/tested
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python -m pytest -m "not ($(ELSEWHERE))" $(PYTEST_ARGS)
+	$(BIN)/python -m pytest -n auto -m "not ($(ELSEWHERE))" $(PYTEST_ARGS)
 
 test-all: needs $(VENV)/tested
 	$(BIN)/python -m pytest -m "$(ELSEWHERE)" $(PYTEST_ARGS)
