@@ -30,12 +30,13 @@ _LARGEST: Final = (64 << 20) + 1
 _INPUTS: Final = (".csv", ".npy")
 
 
-def compiled(
-    spec: str, parameters: Mapping[str, float] | None = None, *, root: Path | None = None, limit: int | None = None
-) -> CompiledNetwork:
-    """The network of a SPEC, ``-`` being standard input. Raises SpecError."""
+def compiled(spec: str, parameters: Mapping[str, float] | None = None) -> CompiledNetwork:
+    """The network of a SPEC, ``-`` being standard input, with the command's --root and --limit. Raises SpecError."""
     from neurovis_spec import api
 
+    context = click.get_current_context(silent=True)
+    given = {} if context is None else context.meta
+    root, limit = given.get("neurovis.root"), given.get("neurovis.limit")
     with progress("compiling"):
         if spec == "-":
             folder = Path.cwd()
@@ -48,9 +49,7 @@ def network_of(spec: str, parameters: Mapping[str, float] | None = None) -> Comp
     """The same, its warnings shown on standard error."""
     from neurovis_spec.findings import show_text
 
-    context = click.get_current_context(silent=True)
-    given = {} if context is None else context.meta
-    network = compiled(spec, parameters, root=given.get("neurovis.root"), limit=given.get("neurovis.limit"))
+    network = compiled(spec, parameters)
     if network.warnings:
         click.echo(show_text(network.warnings, network.sources), err=True)
     return network

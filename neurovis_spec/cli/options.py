@@ -67,7 +67,7 @@ def _themes() -> Iterable[str]:
 
 
 def _noted(ctx: click.Context, param: click.Parameter, value: object) -> object:
-    """Keep how the spec is to be compiled with the command, for who compiles it."""
+    """Keep how the spec is to be compiled with the command: ``files.compiled`` asks for it."""
     ctx.meta[f"neurovis.{param.name}"] = value
     return value
 

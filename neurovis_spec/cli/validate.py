@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from pathlib import Path
 
 import click
 
 from neurovis_spec.cli.files import STDIN, compiled, count
-from neurovis_spec.cli.options import examples
+from neurovis_spec.cli.options import compile_options, examples
 from neurovis_spec.diagnostics import Diagnostic, SpecError
 from neurovis_spec.findings import printable, show_text, to_json
 
@@ -29,19 +28,8 @@ FORMATS = ("text", "json", "sarif", "github")
     "--format", "form", type=click.Choice(FORMATS), default="text", help="How findings are shown: text is the default."
 )
 @click.option("--strict", is_flag=True, help="Take warnings for errors.")
-@click.option(
-    "--limit",
-    type=click.IntRange(min=1),
-    metavar="N",
-    help="The most connections, ten million by default, and the most neurons where N is above their million.",
-)
-@click.option(
-    "--root",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Data files may lie anywhere below; default: the folder of the spec.",
-)
-def command(specs: tuple[str, ...], form: str, strict: bool, limit: int | None, root: Path | None) -> None:
+@compile_options
+def command(specs: tuple[str, ...], form: str, strict: bool) -> None:
     """Show all errors and warnings of specs at once.
 
     Findings go to standard error, and a line for each spec without errors to standard output. The other formats go to
@@ -54,7 +42,7 @@ def command(specs: tuple[str, ...], form: str, strict: bool, limit: int | None, 
     sources: dict[str, str] = {}
     for spec in specs:
         try:
-            network = compiled(spec, limit=limit, root=root)
+            network = compiled(spec)
         except SpecError as error:
             found += error.diagnostics
             sources |= error.sources

@@ -6,7 +6,7 @@ sections that are at fault as a whole, or that a misspelled key may have been me
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 from neurovis_spec.diagnostics import nearest
@@ -45,6 +45,11 @@ class Gaps:
         if not self.sections.isdisjoint(("neurons", "instances")):
             return True
         return any(name.startswith(lost) for section in ("neurons", "instances") for lost in self.names[section])
+
+    def only(self, sections: Collection[str]) -> Gaps:
+        """The gaps of these sections."""
+        names = {section: self.names[section] if section in sections else frozenset[str]() for section in self.names}
+        return Gaps(names, self.sections.intersection(sections))
 
     def joined(self, other: Gaps) -> Gaps:
         """The gaps of both."""

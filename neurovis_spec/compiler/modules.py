@@ -58,14 +58,14 @@ def library_of(spec: Spec, includes: Includes, folder: Path, dt: float, findings
     modules: dict[str, Module] = {}
     for included in includes.files:
         definitions = _joined(definitions, define(included.model, findings, builtin, dt))
-        gaps = gaps.joined(_of_library(gaps_of(included.model)))
+        gaps = gaps.joined(gaps_of(included.model).only(INCLUDED))
         for name, model in included.model.modules.items():
             modules.setdefault(name, Module(name, model, included.folder, own=False))
     definitions = _joined(definitions, define(spec, findings, builtin, dt))
     modules.update({name: Module(name, model, folder, own=True) for name, model in spec.modules.items()})
     if not includes.complete:
         gaps = replace(gaps, sections=gaps.sections.union(INCLUDED))
-    gaps = gaps.joined(_of_library(definitions.gaps))
+    gaps = gaps.joined(definitions.gaps.only(INCLUDED))
     cyclic = set(_cyclic(modules, findings))
     gaps = gaps.with_names("modules", gaps.names["modules"] | cyclic)
     kept = {name: module for name, module in modules.items() if name not in cyclic}
@@ -80,12 +80,6 @@ def _check_filled(module: Module, findings: Findings) -> None:
     if not model.neurons and not model.instances and not model.lost:
         message = f"the module '{module.name}' has no neurons"
         findings.error("no-neurons", opening(model.source), message, "add a group under its 'neurons'")
-
-
-def _of_library(gaps: Gaps) -> Gaps:
-    """The gaps of what an included file may hold."""
-    names = {section: gaps.names[section] if section in INCLUDED else frozenset() for section in gaps.names}
-    return Gaps(names, gaps.sections.intersection(INCLUDED))
 
 
 def _joined(one: Definitions, other: Definitions) -> Definitions:

@@ -27,7 +27,7 @@ from neurovis_spec.diagnostics import Findings, Span, suggest
 from neurovis_spec.language.expressions.tree import Number, names, substitute
 from neurovis_spec.language.located import NAME_RULE, Formula, Located, shown, too_long
 from neurovis_spec.language.model import lost_names
-from neurovis_spec.language.modules import InstanceModel
+from neurovis_spec.language.modules import INCLUDED, InstanceModel
 
 
 @dataclass(frozen=True)
@@ -158,7 +158,8 @@ class Expander:
         gaps = self.library.definitions.gaps if module is None else self.library.modules[module].gaps
         gaps = gaps.with_names("inputs", gaps.names["inputs"] | lost)
         if module is not None:
-            gaps = replace(gaps, sections=gaps.sections - {"modules"}).joined(_definitions_only(self.library))
+            everywhere = self.library.definitions.gaps.only(INCLUDED)
+            gaps = replace(gaps, sections=gaps.sections - {"modules"}).joined(everywhere)
         unit = Unit(
             path=place.path,
             section=section,
@@ -393,11 +394,3 @@ def _used(formula: Formula, constants: Constants) -> frozenset[str]:
     """The parameters that a formula uses."""
     tree = constants.tree(formula, ("i", "n")) if isinstance(formula.value, str) else None
     return frozenset() if tree is None else frozenset(names(tree))
-
-
-def _definitions_only(library: Library) -> Gaps:
-    """The gaps of the definitions and modules, which every unit sees."""
-    gaps = library.definitions.gaps
-    seen = ("modules", "activations", "models", "rules")
-    names = {section: gaps.names[section] if section in seen else frozenset() for section in gaps.names}
-    return Gaps(names, gaps.sections.intersection(seen))
