@@ -2,7 +2,7 @@
 #
 #   make demo       makes .venv, installs, and runs the main job into demo/
 #   make test       every check that needs Python alone
-#   make gallery    draws the examples into docs/pictures and writes docs/gallery.md
+#   make gallery    draws the examples into docs/pictures and writes docs/gallery.md; needs graphviz' dot
 #   make test-all   the tests that need Chromium, graphviz' dot or a C compiler; fails without them
 #   make fuzz       20,000 broken specs and 5,000 expressions (FUZZ_ARGS=... for more), two or three minutes
 #   make layouts    layouts beside dot's, sfdp's and networkx' (LAYOUTS_ARGS="--all --graphs FOLDER" for more)

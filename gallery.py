@@ -1,20 +1,43 @@
-"""The gallery: every example as a picture at a telling step, and a page that says what to look at.
+"""The gallery: every example as a picture at a telling step, the same as graphviz' dot arranges it, and a page.
 
-In: ``specs/``. Out: ``docs/pictures/`` and ``docs/gallery.md``, the same bytes each time. Run by ``make gallery``;
-``python gallery.py NAME… --to FOLDER`` draws some of the pictures elsewhere.
+In: ``specs/``. Out: ``docs/pictures/`` and ``docs/gallery.md``, the same bytes each time with the same dot (which must
+be installed). Run by ``make gallery``; ``python gallery.py NAME… --to FOLDER`` draws some of the pictures elsewhere.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
+import re
+import shutil
+import sys
 import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-import neurovis_spec as nv
-
 HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE / "benchmarks"))
+
+from layout_peers import Timed, directed, nested  # noqa: E402
+
+import neurovis_spec as nv  # noqa: E402
+from neurovis_spec import pipeline  # noqa: E402
+from neurovis_spec.layout import LayoutProblem  # noqa: E402
+from neurovis_spec.layout.metrics import metrics  # noqa: E402
+from neurovis_spec.layout.problem import problem_of  # noqa: E402
+
+#: A number in a picture; and how far two may be apart that differ by the last digits of a machine's functions.
+_NUMBER = re.compile(r"(?<![#\w])[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?")
+_NEXT = 1e-6
+#: Measures of a layout, as the page heads them.
+_MEASURES = {
+    "crossings": "crossings",
+    "edges_over_neurons": "lines over neurons",
+    "overlaps": "discs that overlap",
+    "flow": "along the direction",
+    "area": "area",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +158,24 @@ PICTURES = (
 )
 
 
+#: What dot's drawing of a network shows beside ours, by the name of our picture.
+BESIDE = {
+    "cpg_rbf": "dot puts C2 a rank below C1, though neither comes first, and has to lead what C1 sends around it; the"
+    " kernels are out of order. Told of no boxes it crosses fewer lines, and the rhythm is in two places.",
+    "cpg_printed": "Much the same.",
+    "short_term_memory": "Much the same.",
+    "ring": "dot knows no rings and makes ranks of what has neither a first nor a last neuron: fewer crossings, and"
+    " nobody sees a ring. Here the author asks for one (`arrange: {R: ring}`), and opposite lines run side by side.",
+    "mlp": "Much the same, but for the order of the neurons.",
+    "hebbian": "Much the same.",
+    "reward": "As above, C2 stands below C1, and the kernels are out of order. G stands near what it drives; ours near"
+    " what drives it.",
+    "hexapod": "What dot makes of six equal legs is six drawings: each has other ranks and another place for its parts,"
+    " and frames lie over each other. Here all legs are one drawing, the right ones mirror images of the left ones, so"
+    " that only colours differ; the lines from the upper row to the legs are longer for that.",
+}
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Draw the pictures, and write the page unless only some of them are wanted."""
     parser = argparse.ArgumentParser(description="Draw the examples.")
@@ -142,23 +183,76 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--to", type=Path, default=HERE / "docs" / "pictures", metavar="FOLDER")
     options = parser.parse_args(arguments)
     options.to.mkdir(parents=True, exist_ok=True)
+    wanted = options.names or [picture.name for picture in PICTURES] + [f"{name}_dot" for name in BESIDE]
+    if shutil.which("dot") is None and any(name.endswith("_dot") for name in wanted):
+        sys.exit("the gallery shows dot's drawings beside ours and needs dot (on Debian: apt-get install graphviz)")
     for picture in PICTURES:
-        if not options.names or picture.name in options.names:
+        if picture.name in wanted:
             draw(picture, options.to / f"{picture.name}.svg")
+        if f"{picture.name}_dot" in wanted:
+            draw_as_dot(picture, options.to / f"{picture.name}_dot.svg")
     if not options.names:
         (HERE / "docs" / "gallery.md").write_text(page(), encoding="utf-8")
 
 
+def compiled(picture: Picture) -> nv.CompiledNetwork:
+    """The network that a picture shows."""
+    return nv.compile(HERE / "specs" / f"{picture.spec}.yaml")
+
+
 def draw(picture: Picture, path: Path) -> None:
     """Draw one."""
-    network = nv.compile(HERE / "specs" / f"{picture.spec}.yaml")
+    network, before = compiled(picture), path.read_bytes() if path.exists() else b""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         if picture.frames:
             network.animate(path, steps=picture.frames, start=picture.step, theme=picture.theme)
         else:
             network.render(path, step=picture.step, theme=picture.theme)
-    print(f"{picture.name:<20}{path.stat().st_size / 1024:6.0f} KiB   {path}")
+    if alike(before.decode(), path.read_text(encoding="utf-8")):
+        path.write_bytes(before)
+    _say(path)
+
+
+def draw_as_dot(picture: Picture, path: Path) -> None:
+    """Draw the same step of the same network with dot's positions and splines, by our renderer, without tooltips."""
+    network = compiled(picture)
+    layout, _ = _by_dot(nested, problem_of(network.network))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        snapshot = network.run(picture.step + 1).snapshot(picture.step)
+    title = f"{network.network.title or network.name}: by dot"
+    settings = replace(network.network.render, title=title, size=None)
+    scene = pipeline.picture(network.network, layout, snapshot, network.gains, settings)
+    groups = tuple(replace(group, data={}, title="") for group in scene.groups)
+    drawn = pipeline.draw(replace(scene, groups=groups), ".svg")
+    if not path.exists() or not alike(path.read_text(encoding="utf-8"), drawn.decode()):
+        path.write_bytes(drawn)
+    _say(path)
+
+
+def _by_dot(way: Callable[[LayoutProblem, float], Timed | None], problem: LayoutProblem) -> Timed:
+    found = way(problem, 60)
+    if found is None:
+        raise RuntimeError(f"dot did not lay out {problem.network}")
+    return found
+
+
+def _say(path: Path) -> None:
+    print(f"{path.stem:<22}{path.stat().st_size / 1024:6.0f} KiB   {path}")
+
+
+def alike(one: str, other: str) -> bool:
+    """Whether two pictures differ by no more than the last digits of their numbers, as those of two machines do after
+    thousands of steps; then the one that is there may stay.
+
+    >>> alike('<path d="M1.5 2"/>', '<path d="M1.50000001 2"/>'), alike("M1 2", "M1 3"), alike("#0072b2", "#0072b3")
+    (True, False, False)
+    """
+    if _NUMBER.sub("0", one) != _NUMBER.sub("0", other):
+        return False
+    numbers = zip(_NUMBER.findall(one), _NUMBER.findall(other), strict=True)
+    return all(a == b or math.isclose(float(a), float(b), rel_tol=_NEXT) for a, b in numbers)
 
 
 def page() -> str:
@@ -166,7 +260,8 @@ def page() -> str:
     parts = [
         "# Gallery",
         "Every example in `specs/`, drawn at a telling step. Colour is activity and signal, thickness is weight, glow"
-        " is change; the legend of each picture says on which scale. Made by `make gallery`.",
+        " is change; the legend of each picture says on which scale. At the end they stand "
+        "[beside dot's](#beside-dot). Made by `make gallery`, which needs graphviz' dot.",
     ]
     for picture in PICTURES:
         what = f"--steps {picture.frames} --from {picture.step}" if picture.frames else f"--step {picture.step}"
@@ -178,7 +273,44 @@ def page() -> str:
             picture.words,
             f"`neurovis {verb} specs/{picture.spec}.yaml {what}{theme} -o {picture.name}.svg`",
         ]
+    parts += [
+        "## Beside dot",
+        "The same steps of the same networks; on the right the positions and splines are those of graphviz' dot, drawn"
+        " by the same renderer with the same colours and thickness. dot's nodes are as wide as our discs and its ranks"
+        " as far apart, and it is told the direction and, as nested clusters, the boxes and the instances of modules."
+        " The tables count on the routes as drawn (`neurovis layout --metrics`): an area is in squares of the distance"
+        " of neighbours, and the last row is dot told of no boxes.",
+    ]
+    for picture in PICTURES:
+        if picture.name in BESIDE:
+            parts += beside(picture)
     return "\n\n".join(parts) + "\n"
+
+
+def beside(picture: Picture) -> list[str]:
+    """Ours and dot's side by side, and what they measure."""
+    network = compiled(picture)
+    problem, name = problem_of(network.network), picture.name
+    rows = {
+        "NeuroVis": network.layout().metrics(),
+        "dot": metrics(_by_dot(nested, problem)[0], problem),
+        "dot, no boxes": metrics(_by_dot(directed, problem)[0], problem),
+    }
+    if not problem.boxes and not problem.modules:
+        del rows["dot, no boxes"]
+    table = ["|  | " + " | ".join(_MEASURES.values()) + " |", "| --- |" + " ---: |" * len(_MEASURES)]
+    table += [f"| {who} | " + " | ".join(_told(found[key]) for key in _MEASURES) + " |" for who, found in rows.items()]
+    return [
+        f"### {network.network.title or network.name}",
+        f"| NeuroVis | dot |\n| :---: | :---: |\n"
+        f"| ![by NeuroVis](pictures/{name}.svg) | ![by dot](pictures/{name}_dot.svg) |",
+        BESIDE[name],
+        "\n".join(table),
+    ]
+
+
+def _told(value: float | int) -> str:
+    return f"{value:,}" if isinstance(value, int) else f"{value:.2f}" if value <= 1 else f"{value:,.1f}"
 
 
 if __name__ == "__main__":

@@ -37,22 +37,46 @@ def hurried(problem: LayoutProblem, limit: float) -> Timed | None:
 
 
 def clusters(problem: LayoutProblem, limit: float) -> Timed | None:
-    """dot with a cluster for each instance of a module and each box, nested as they are."""
-    found = [(module.parent, frozenset(module.members)) for module in problem.modules]
-    within: list[str] = []
-    for number, (_, members) in enumerate(found):
-        inner = {m for above, other in found if above == number for m in other}
-        nested = "".join(f"CLUSTER{k} " for k, (above, _) in enumerate(found) if above == number)
-        within.append(f"subgraph cluster_{number} {{ {nested} {'; '.join(map(str, sorted(members - inner)))} }}")
-    for number in reversed(range(len(found))):  # an instance comes before those within it
-        within = [text.replace(f"CLUSTER{number} ", within[number] + " ") for text in within]
-    outer = [within[number] for number, (parent, _) in enumerate(found) if parent < 0]
-    taken = {m for _, members in found for m in members}
-    for number, (_, box) in enumerate(problem.boxes):
-        if not taken & set(box):
-            taken |= set(box)
-            outer.append(f"subgraph cluster_box{number} {{ {'; '.join(map(str, box))} }}")
-    return _graphviz(problem, "dot", f"{_DOT}; {'; '.join(outer)}", limit)
+    """dot with a cluster for each instance of a module and each box that holds none of an instance's neurons, nested as
+    they are."""
+    instances = [frozenset(module.members) for module in problem.modules]
+    taken = frozenset(member for members in instances for member in members)
+    sets = [*instances, *(frozenset(box) for _, box in problem.boxes if not taken & set(box))]
+    return _graphviz(problem, "dot", "; ".join([_DOT, *_nested(sets)]), limit)
+
+
+def nested(problem: LayoutProblem, limit: float) -> Timed | None:
+    """dot as told of what a picture frames: a cluster for each instance and each box, also those within another, and
+    the direction."""
+    sets = [frozenset(module.members) for module in problem.modules] + [frozenset(box) for _, box in problem.boxes]
+    return _graphviz(problem, "dot", "; ".join([_DOT, _rankdir(problem), *_nested(sets)]), limit)
+
+
+def directed(problem: LayoutProblem, limit: float) -> Timed | None:
+    """dot as told of nothing but the direction."""
+    return _graphviz(problem, "dot", f"{_DOT}; {_rankdir(problem)}", limit)
+
+
+def _rankdir(problem: LayoutProblem) -> str:
+    return "rankdir=" + {"down": "TB", "up": "BT", "right": "LR", "left": "RL"}[problem.direction]
+
+
+def _nested(sets: Sequence[frozenset[int]]) -> list[str]:
+    """Clusters, each within the smallest that holds it; what crosses one already there is none."""
+    kept: list[frozenset[int]] = []
+    for found in sorted(dict.fromkeys(sets), key=len, reverse=True):
+        if found and all(found <= other or not found & other for other in kept):
+            kept.append(found)
+    within: dict[frozenset[int] | None, list[frozenset[int]]] = {}
+    for number, found in enumerate(kept):
+        within.setdefault(next((o for o in reversed(kept[:number]) if found <= o), None), []).append(found)
+
+    def written(found: frozenset[int]) -> str:
+        inner = within.get(found, [])
+        parts = [*map(written, inner), *map(str, sorted(found.difference(*inner)))]
+        return f"subgraph cluster_{kept.index(found)} {{ {'; '.join(parts)} }}"
+
+    return [written(found) for found in within.get(None, [])]
 
 
 def sfdp(problem: LayoutProblem, limit: float) -> Timed | None:
