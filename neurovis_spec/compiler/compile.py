@@ -72,8 +72,8 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
     population = populate(units, request.limits, seed)
     if with_events:
         _look_at_unused(expander, request.limits, seed)
-    render = render_settings(spec.render, findings)
-    check_ros(spec.ros, findings)
+    render = render_settings(spec.render, constants)
+    check_ros(spec.ros, constants)
     if not len(population.neurons):
         _report_no_neurons(spec, population, findings)
         return None
@@ -111,8 +111,8 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
     )
     network = Network(
         name=spec.name.value,
-        title=spec.name.value if spec.title is None else spec.title.value,
-        description="" if spec.description is None else spec.description.value,
+        title=", ".join(text.value for text in spec.title or ()) or spec.name.value,
+        description="\n".join(text.value for text in spec.description or ()),
         dt=constants.dt,
         dt_given=spec.time is not None and spec.time.dt is not None,
         steps=steps,

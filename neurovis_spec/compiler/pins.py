@@ -137,10 +137,13 @@ def _said(unit: Unit, directory: Directory, by_identity: Mapping[int, int], find
     if model is None:
         return result
     for key, point in _points(model):
-        if max(abs(point.x), abs(point.y)) > FARTHEST:
+        x, y = unit.constants.scalar(point.x), unit.constants.scalar(point.y)
+        if x is None or y is None:
+            continue
+        if max(abs(x), abs(y)) > FARTHEST:
             findings.error("out-of-range", point.span, f"a pin lies within {FARTHEST:g} of the origin")
             continue
-        pin = _Pin(point.x, point.y, key, point.span)
+        pin = _Pin(x, y, key, point.span)
         instances = directory.instance(key.value)
         if len(instances) > 1:
             message = f"'{shown(key.value)}' is {len(instances)} instances; a pin names one"

@@ -11,6 +11,7 @@ from typing import Literal, cast
 import numpy as np
 
 from neurovis_spec import plugins
+from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.mirrors import check_pins, lines_of, mirrors_of
 from neurovis_spec.compiler.network import LayoutSettings, Output, RenderSettings, frozen
 from neurovis_spec.compiler.pins import DIAMETER, FARTHEST, pins_of
@@ -19,7 +20,7 @@ from neurovis_spec.compiler.references import Directory, key_of, resolve, resolv
 from neurovis_spec.compiler.units import Unit
 from neurovis_spec.diagnostics import Findings, Span, suggest
 from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel, RenderModel
-from neurovis_spec.language.located import Located, shown
+from neurovis_spec.language.located import Formula, Located, shown
 from neurovis_spec.language.source import Mapping as SourceMapping
 from neurovis_spec.language.spec import RosModel, Spec
 
@@ -64,15 +65,8 @@ def layout_settings(
     )
     check_pins(mirrors, lines, pins, direction, population.neurons.names, findings)
     spacing = model.spacing
-    neuron = 1.0 if spacing is None or spacing.neuron is None else spacing.neuron.value
-    rank = 2.0 if spacing is None or spacing.rank is None else spacing.rank.value
-    for value, field in ((neuron, "neuron"), (rank, "rank")):
-        if not DIAMETER <= value <= FARTHEST and spacing is not None:
-            node = spacing.source.get(field)
-            message = (
-                f"a spacing lies between {DIAMETER}, the diameter of a neuron, and {FARTHEST:g}; this is {value:g}"
-            )
-            findings.error("out-of-range", spacing.source.span if node is None else node.span, message)
+    neuron = _spacing(None if spacing is None else spacing.neuron, 1.0, units[0].constants)
+    rank = _spacing(None if spacing is None else spacing.rank, 2.0, units[0].constants)
     return LayoutSettings(
         engine=engine,
         direction=direction,
@@ -87,6 +81,16 @@ def layout_settings(
         align=lines,
         file=None if model.file is None else model.file.value,
     )
+
+
+def _spacing(formula: Formula | None, default: float, constants: Constants) -> float:
+    value = None if formula is None else constants.scalar(formula)
+    if formula is None or value is None:
+        return default
+    if not DIAMETER <= value <= FARTHEST:
+        message = f"a spacing lies between {DIAMETER}, the diameter of a neuron, and {FARTHEST:g}; this is {value:g}"
+        constants.findings.error("out-of-range", formula.span, message)
+    return value
 
 
 def _arranged(
@@ -121,32 +125,32 @@ def _check_engine(engine: Located[str], findings: Findings) -> None:
     findings.error("unknown-engine", engine.span, f"there is no layout engine '{shown(name)}' here", hint)
 
 
-def check_ros(model: RosModel | None, findings: Findings) -> None:
+def check_ros(model: RosModel | None, constants: Constants) -> None:
     """The ``ros`` section: only what needs no ROS to be seen."""
-    if model is not None and model.rate is not None and not model.rate.value > 0:
-        message = f"'rate' is steps a second and above 0, this is {model.rate.value:g}"
-        findings.error("out-of-range", model.rate.span, message)
+    if model is None or model.rate is None:
+        return
+    rate = constants.scalar(model.rate)
+    if rate is not None and not rate > 0:
+        message = f"'rate' is steps a second and above 0, this is {rate:g}"
+        constants.findings.error("out-of-range", model.rate.span, message)
 
 
-def render_settings(model: RenderModel | None, findings: Findings) -> RenderSettings:
+def render_settings(model: RenderModel | None, constants: Constants) -> RenderSettings:
     """The ``render`` section."""
     if model is None:
         return RenderSettings()
     gain = model.gain
 
-    def factor(value: Located[float] | None) -> float | None:
-        if value is not None and value.value < 0:
-            findings.error("out-of-range", value.span, f"a gain is not negative, this is {value.value:g}")
-        return None if value is None else value.value
+    def factor(formula: Formula | None) -> float | None:
+        value = None if formula is None else constants.scalar(formula)
+        if formula is not None and value is not None and value < 0:
+            constants.findings.error("out-of-range", formula.span, f"a gain is not negative, this is {value:g}")
+        return value
 
     size = None
     if model.size is not None:
-        width, height = model.size
-        for side in model.size:
-            if not 64 <= side.value <= 16384:
-                message = f"a side of a picture has 64 to 16384 pixels, this is {side.value:.15g}"
-                findings.error("out-of-range", side.span, message)
-        size = (width.value, height.value)
+        width, height = (_side(side, constants) for side in model.size)
+        size = None if width is None or height is None else (width, height)
     return RenderSettings(
         activity=None if gain is None else factor(gain.activity),
         signal=None if gain is None else factor(gain.signal),
@@ -158,3 +162,19 @@ def render_settings(model: RenderModel | None, findings: Findings) -> RenderSett
         legend=model.legend is None or model.legend.value,
         title=True if model.title is None else model.title.value,
     )
+
+
+def _side(formula: Formula, constants: Constants) -> int | None:
+    """The width or the height of a picture, in pixels."""
+    value = constants.scalar(formula)
+    if value is None:
+        return None
+    if not value.is_integer():
+        message = f"a side of a picture must be an integer, this is {value:g}"
+        constants.findings.error("not-an-integer", formula.span, message)
+        return None
+    if not 64 <= value <= 16384:
+        message = f"a side of a picture has 64 to 16384 pixels, this is {value:.15g}"
+        constants.findings.error("out-of-range", formula.span, message)
+        return None
+    return int(value)

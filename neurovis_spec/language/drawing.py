@@ -10,11 +10,11 @@ from typing import Annotated, ClassVar
 from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
 
 from neurovis_spec.language.located import (
+    FORMULA,
     BoolField,
-    IntegerField,
+    FormulaField,
     Leaf,
     Located,
-    NumberField,
     TextField,
     findings_of,
     give_up,
@@ -60,8 +60,8 @@ class Spacing(Model):
 
     PLACE: ClassVar[str] = "'layout: spacing'"
 
-    neuron: NumberField | None = Field(None, description="Between neighbours of a rank (default 1).")
-    rank: NumberField | None = Field(None, description="Between ranks (default 2).")
+    neuron: FormulaField | None = Field(None, description="Between neighbours of a rank (default 1).")
+    rank: FormulaField | None = Field(None, description="Between ranks (default 2).")
 
 
 ENGINES = ("auto", "layered", "organic", "large", "circular", "grid", "spatial", "manual")
@@ -120,10 +120,10 @@ class Gain(Model):
 
     PLACE: ClassVar[str] = "'render: gain'"
 
-    activity: NumberField | None = Field(None, description="γ_NC, Eq. 2: colour of neurons.")
-    signal: NumberField | None = Field(None, description="γ_CC, Eq. 3: colour of connections.")
-    thickness: NumberField | None = Field(None, description="γ_CT, Eq. 4: thickness of connections, pixels a unit.")
-    change: NumberField | None = Field(None, description="γ_LI, Eq. 5: glow of connections whose weight changes.")
+    activity: FormulaField | None = Field(None, description="γ_NC, Eq. 2: colour of neurons.")
+    signal: FormulaField | None = Field(None, description="γ_CC, Eq. 3: colour of connections.")
+    thickness: FormulaField | None = Field(None, description="γ_CT, Eq. 4: thickness of connections, pixels a unit.")
+    change: FormulaField | None = Field(None, description="γ_LI, Eq. 5: glow of connections whose weight changes.")
 
 
 class RenderModel(Model):
@@ -136,9 +136,9 @@ class RenderModel(Model):
         None, description="The colours: default, dark, print or paper (default default)."
     )
     size: Annotated[
-        tuple[IntegerField, IntegerField] | None,
+        tuple[FormulaField, FormulaField] | None,
         BeforeValidator(lambda node, info: _size(node, info)),
-        WithJsonSchema({"type": "array", "items": {"type": "integer", "minimum": 1}, "minItems": 2, "maxItems": 2}),
+        WithJsonSchema({"type": "array", "items": FORMULA, "minItems": 2, "maxItems": 2}),
     ] = Field(None, description="[width, height] in pixels.")
     labels: BoolField | None = Field(None, description="Whether neurons show their labels (default true).")
     legend: BoolField | None = Field(None, description="Whether there is a legend (default true).")

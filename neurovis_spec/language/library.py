@@ -89,8 +89,8 @@ class Library(Model):
     neurovis: Annotated[Located[int], Leaf(version_field, {"const": 1})] = Field(
         description="The version of the language: 1."
     )
-    title: TextField | None = Field(None, description="A title.")
-    description: TextField | None = Field(None, description="What this is.")
+    title: TextsField | None = Field(None, description="A title.")
+    description: TextsField | None = Field(None, description="What this is.")
     activations: Named[ActivationModel] = Field(default_factory=dict, description="Activation functions of one's own.")
     models: Named[ModelModel] = Field(default_factory=dict, description="Neuron models of one's own.")
     rules: Named[RuleModel] = Field(default_factory=dict, description="Plasticity rules of one's own.")

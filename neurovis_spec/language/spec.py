@@ -13,10 +13,10 @@ from pydantic import Field, ValidationInfo
 from neurovis_spec.language.drawing import LayoutModel, RenderModel
 from neurovis_spec.language.library import LANGUAGE_VERSION, Library
 from neurovis_spec.language.located import (
+    FormulaField,
     IdentifierField,
     IntegerField,
     Leaf,
-    NumberField,
     TextField,
     TextsField,
     refuse,
@@ -41,7 +41,7 @@ class RosModel(Model):
     """How the network meets ROS. Its topics are checked by the ROS adapter."""
 
     namespace: TextField | None = Field(None, description="Prefix of the topics (default /neurovis).")
-    rate: NumberField | None = Field(None, description="Steps a second (default 1/dt).")
+    rate: FormulaField | None = Field(None, description="Steps a second (default 1/dt).")
     qos: MappingField | None = Field(None, description="Quality of service of what is published.")
     subscribe: MappingField | None = Field(None, description="{input: {topic, type, field, timeout}}.")
     publish: MappingField | None = Field(None, description="{output: {topic, type}}.")
@@ -55,7 +55,7 @@ class Spec(Library):
 
     name: IdentifierField = Field(description="The name of the network, an identifier.")
     authors: TextsField | None = Field(None, description="Who wrote it.")
-    license: TextField | None = Field(None, description="Under which licence.")
+    license: TextsField | None = Field(None, description="Under which licence.")
     references: TextsField | None = Field(None, description="What it goes back to.")
     time: Time | None = Field(None, description="The clock: dt, steps, episode.")
     seed: IntegerField | None = Field(None, description="The only source of randomness (default 0).")

@@ -10,7 +10,8 @@ from typing import Annotated, TypeAlias
 
 from pydantic import ValidationInfo
 
-from neurovis_spec.diagnostics import Span, nearest, suggest
+from neurovis_spec.diagnostics import Span
+from neurovis_spec.language.keys import read_keys
 from neurovis_spec.language.located import (
     FORMULA,
     Formula,
@@ -18,7 +19,6 @@ from neurovis_spec.language.located import (
     Located,
     as_bool,
     as_formula,
-    as_number,
     as_text,
     as_texts,
     findings_of,
@@ -110,14 +110,11 @@ Matrix: TypeAlias = Rows | FileReference
 
 def as_file(node: Mapping, info: ValidationInfo) -> FileReference:
     """``{file: path, key: name}``."""
-    known = ("file", "key")
-    for entry in node.entries:
-        if entry.name not in known:
-            message = f"unknown key '{shown(entry.name)}'"
-            findings_of(info).error("unknown-key", entry.key.span, message, suggest(entry.name, known))
+    keys = read_keys(node, ("file", "key"), findings_of(info))
+    node = keys.mapping
     path = node.get("file")
     if path is None:
-        if not any(nearest(entry.name, ("file",)) for entry in node.entries):
+        if "file" not in keys.perhaps:
             findings_of(info).error("missing-key", opening(node), "the key 'file' is missing")
         give_up()
     key = node.get("key")
@@ -226,13 +223,10 @@ def as_parameter(node: Node, info: ValidationInfo) -> Parameter:
     if not isinstance(node, Mapping):
         return Parameter(as_formula(node, info), None, None, None)
     known = ("value", "min", "max", "description")
-    for entry in node.entries:
-        if entry.name not in known:
-            message = f"unknown key '{shown(entry.name)}'"
-            findings_of(info).error("unknown-key", entry.key.span, message, suggest(entry.name, known))
-    value, low, high, text = (node.get(name) for name in known)
+    keys = read_keys(node, known, findings_of(info))
+    value, low, high, text = (keys.mapping.get(name) for name in known)
     if value is None:
-        if not any(nearest(entry.name, ("value",)) for entry in node.entries):
+        if "value" not in keys.perhaps:
             findings_of(info).error("missing-key", opening(node), "the key 'value' is missing")
         give_up()
     return Parameter(
@@ -288,24 +282,24 @@ ReferenceField = Annotated[
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """Two numbers, x and y."""
+    """Two numbers or expressions, x and y."""
 
-    x: float
-    y: float
+    x: Formula
+    y: Formula
     span: Span
 
 
 def as_point(node: Node, info: ValidationInfo) -> Point:
-    """``[x, y]``: two finite numbers."""
+    """``[x, y]``: two numbers or expressions."""
     if not isinstance(node, Sequence) or len(node.items) != 2:
         refuse(info, node, "a position [x, y]")
-    x, y = (as_number(item, info).value for item in node.items)
+    x, y = (as_formula(item, info) for item in node.items)
     return Point(x, y, node.span)
 
 
 PointField = Annotated[
     Point,
-    Leaf(as_point, {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}),
+    Leaf(as_point, {"type": "array", "items": FORMULA, "minItems": 2, "maxItems": 2}),
 ]
 
 
