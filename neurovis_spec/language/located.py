@@ -18,7 +18,7 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import PydanticCustomError, core_schema
 
-from neurovis_spec.diagnostics import Findings, Span, nearest, suggest
+from neurovis_spec.diagnostics import Findings, Span, meant, nearest, suggest
 from neurovis_spec.language.source import Node, Packed, Scalar, Sequence, describe
 
 T = TypeVar("T")
@@ -202,7 +202,10 @@ def one_of(*words: str) -> Callable[[Node, ValidationInfo], Located[str]]:
             message = f"'{shown(text.value)}' is not one of {', '.join(words)}"
             hint = suggest(text.value, words) if nearest(text.value, words) else None
             findings_of(info).error("unknown-value", node.span, message, hint)
-            give_up()
+            right = meant(text.value, words)
+            if right is None:
+                give_up()
+            return Located(right, text.node)
         return text
 
     return check

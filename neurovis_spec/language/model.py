@@ -1,17 +1,17 @@
 """The base of all models of the language: a mapping with known keys.
 
-In: a Mapping of the document. Out: the model, its ``source`` the Mapping. Unknown keys are answered with the nearest
-known ones, missing ones with what is missing. A key whose value is at fault is noted and left out, and so is an entry
-of a mapping of the author's names: all others are still read, so that later stages have something to look at. What was
-left out is what stands in ``source`` and not in the model (``lost``).
+In: a Mapping of the document. Out: the model, its ``source`` the Mapping, in which misspelt keys bear the right names
+(``keys``). Missing keys are answered with what is missing. A key whose value is at fault is noted and left out, and so
+is an entry of a mapping of the author's names: all others are still read, so that later stages have something to look
+at. What was left out is what stands in ``source`` and not in the model (``lost``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, ClassVar, Final, TypeVar
+from typing import Annotated, ClassVar, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -27,14 +27,12 @@ from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue, SkipJsonSchema
 from pydantic_core import core_schema
 
-from neurovis_spec.diagnostics import Findings, Span, nearest, suggest
-from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Leaf, bad_name, findings_of, give_up, refuse, shown
-from neurovis_spec.language.source import Entry, Mapping, Node, Scalar, ScalarValue
+from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.language.keys import Words, read_keys
+from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Leaf, bad_name, findings_of, give_up, refuse
+from neurovis_spec.language.source import Mapping, Node, Scalar, ScalarValue
 
 V = TypeVar("V")
-
-#: Errors after which unknown keys are no longer compared with the known ones.
-_MOST_HINTS: Final = 200  # as in the compiler
 
 
 def _as_it_is(value: Node, info: ValidationInfo) -> Node:
@@ -60,7 +58,9 @@ class Model(BaseModel):
             assert not isinstance(data, (str, int, float, dict))
             hint = "write {} where there is nothing to say" if isinstance(data, Scalar) and data.value is None else None
             refuse(info, data, "a mapping", hint)  # type: ignore[arg-type]
-        values = cls._keys(data, findings_of(info))
+        keys = read_keys(data, cls._fields(), findings_of(info), Words(cls._foreign, _home))
+        data = keys.mapping
+        values = cls._keys(data, keys.perhaps, findings_of(info))
         for _ in range(2):
             try:
                 return handler(values)
@@ -79,16 +79,16 @@ class Model(BaseModel):
         return {field.alias or name: field for name, field in cls.model_fields.items() if name != "source"}
 
     @classmethod
-    def _keys(cls, data: Mapping, findings: Findings) -> dict[str, object]:
-        """The values by key, under ``$`` the Mapping itself; what is missing or unknown is noted."""
+    def _keys(cls, data: Mapping, perhaps: Collection[str], findings: Findings) -> dict[str, object]:
+        """The values by key, under ``$`` the Mapping itself; what is missing is noted, unless an unknown key is
+        ``perhaps`` meant for it."""
         fields = cls._fields()
         result: dict[str, object] = {"$": data}
-        perhaps: set[str] = set()
         for entry in data.entries:
             field = fields.get(entry.name)
             if field is None:
-                perhaps.update(cls._unknown(entry, fields, findings))
-            elif isinstance(entry.value, Scalar) and entry.value.value is None and not field.is_required():
+                continue
+            if isinstance(entry.value, Scalar) and entry.value.value is None and not field.is_required():
                 if not findings.at_fault(entry.value.span):  # such as an alias, which is refused and read as nothing
                     message = f"'{entry.name}' has no value"
                     findings.error("no-value", entry.key.span, message, "leave the key out, or give it a value")
@@ -115,19 +115,9 @@ class Model(BaseModel):
         return None
 
     @classmethod
-    def _unknown(cls, entry: Entry, fields: dict[str, FieldInfo], findings: Findings) -> tuple[str, ...]:
-        """Note a key that is not known here; the known ones that it may be meant for."""
-        name, span = entry.name, entry.key.span
-        if findings.errors >= _MOST_HINTS:
-            findings.error("unknown-key", span, f"unknown key '{shown(name)}'")
-            return ()
-        close = nearest(name, fields)
-        homes = () if close else tuple(dict.fromkeys(model.PLACE for model in _models() if name in model._fields()))
-        hint = suggest(name, fields, "known here")
-        if any(homes):
-            hint = f"'{name}' is a key of {' and of '.join(home for home in homes if home)}"
-        findings.error("unknown-key", span, f"unknown key '{shown(name)}'", hint)
-        return close
+    def _foreign(cls, name: str) -> tuple[str, str] | None:
+        """What is said of an unknown key that is no misspelling of a known one: a message and a hint."""
+        return None
 
     @cached_property
     def lost(self) -> frozenset[str]:
@@ -136,6 +126,12 @@ class Model(BaseModel):
             field.alias or name for name, field in type(self).model_fields.items() if name in self.model_fields_set
         }
         return frozenset(entry.name for entry in self.source.entries) - taken
+
+
+def _home(name: str) -> str | None:
+    """A help line for a key that is known elsewhere."""
+    homes = dict.fromkeys(model.PLACE for model in _models() if model.PLACE and name in model._fields())
+    return f"'{name}' is a key of {' and of '.join(homes)}" if homes else None
 
 
 def _models() -> Iterator[type[Model]]:

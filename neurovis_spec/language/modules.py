@@ -9,15 +9,13 @@ from __future__ import annotations
 from typing import Annotated, ClassVar
 
 from pydantic import Field
-from pydantic.fields import FieldInfo
 
-from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.drawing import ModuleLayoutModel
 from neurovis_spec.language.library import Library, version_field
 from neurovis_spec.language.located import FormulaField, IdentifierField, Leaf, Located, TextField, TextsField
 from neurovis_spec.language.model import Model, Named
 from neurovis_spec.language.sections import ConnectionsField, GroupModel, InputModel
-from neurovis_spec.language.source import Entry, ScalarValue
+from neurovis_spec.language.source import ScalarValue
 from neurovis_spec.language.values import ParameterField
 
 #: the sections of an included file
@@ -82,10 +80,8 @@ class IncludedModel(Library):
     modules: Named[ModuleModel] = Field(default_factory=dict, description="Networks to be used several times.")
 
     @classmethod
-    def _unknown(cls, entry: Entry, fields: dict[str, FieldInfo], findings: Findings) -> tuple[str, ...]:
-        if entry.name not in _OF_A_NETWORK:
-            return super()._unknown(entry, fields, findings)
-        message = f"'{entry.name}' is of a network of its own; an included file holds modules and definitions"
-        hint = "leave it to the specs that include this file, or make a module of it"
-        findings.error("unknown-key", entry.key.span, message, hint)
-        return ()
+    def _foreign(cls, name: str) -> tuple[str, str] | None:
+        if name not in _OF_A_NETWORK:
+            return None
+        message = f"'{name}' is of a network of its own; an included file holds modules and definitions"
+        return message, "leave it to the specs that include this file, or make a module of it"

@@ -1,0 +1,73 @@
+"""Keys: those of a mapping of the language, against the known ones.
+
+In: a Mapping as written. Out: the same, in which a misspelt key bears the name that it can only be meant for, with the
+place where it stands; so what it holds is looked at as well, and nothing that it declares is missed elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, replace
+from typing import Final
+
+from neurovis_spec.diagnostics import Findings, did_you_mean, meant, nearest, suggest
+from neurovis_spec.language.located import shown
+from neurovis_spec.language.source import Entry, Mapping
+
+#: Errors after which unknown keys are no longer compared with the known ones.
+_MOST_HINTS: Final = 200  # as in the compiler
+
+
+@dataclass(frozen=True, slots=True)
+class Keys:
+    """A mapping whose unknown keys are noted; ``perhaps`` are the known ones that those still unknown may be meant
+    for."""
+
+    mapping: Mapping
+    perhaps: frozenset[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """What is said of an unknown key. ``foreign``: the message and the hint for one that is no misspelling; ``home``: a
+    hint for one that is like none of the known ones."""
+
+    foreign: Callable[[str], tuple[str, str] | None] = lambda name: None
+    home: Callable[[str], str | None] = lambda name: None
+
+
+def read_keys(data: Mapping, known: Collection[str], findings: Findings, words: Words | None = None) -> Keys:
+    """Note the unknown keys of a mapping."""
+    if all(entry.name in known for entry in data.entries):
+        return Keys(data, frozenset())
+    perhaps: set[str] = set()
+    mapping = Mapping(tuple(_read(data, known, findings, words or Words(), perhaps)), data.span)
+    return Keys(mapping, frozenset(perhaps))
+
+
+def _read(
+    data: Mapping, known: Collection[str], findings: Findings, words: Words, perhaps: set[str]
+) -> Iterator[Entry]:
+    free = {name: None for name in known if data.entry(name) is None}  # what is there already is not meant
+    for entry in data.entries:
+        name, span = entry.name, entry.key.span
+        foreign = None if name in known else words.foreign(name)
+        right = None
+        if foreign is not None:
+            findings.error("unknown-key", span, *foreign)
+        elif name not in known and findings.errors >= _MOST_HINTS:
+            findings.error("unknown-key", span, _unknown(name))
+        elif name not in known:
+            close = nearest(name, known)
+            hint = did_you_mean(sorted(close, key=lambda one: one not in free)) if close else words.home(name)
+            findings.error("unknown-key", span, _unknown(name), hint or suggest(name, known, "known here"))
+            right = meant(name, free)
+            if right is None:
+                perhaps.update(close)
+        if right is not None:
+            del free[right]
+        yield entry if right is None else Entry(replace(entry.key, value=right, inner=None), entry.value)
+
+
+def _unknown(name: str) -> str:
+    return f"unknown key '{shown(name)}'"
