@@ -8,6 +8,7 @@ becomes such a frame where neurons that are not its own would stand in it otherw
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import replace
 
 from neurovis_layouts.layered.bonds import bonded
@@ -15,7 +16,7 @@ from neurovis_layouts.layered.book import Book, Key, keys_of, restricted
 from neurovis_layouts.layered.drawing import Drawing, Move, Piece, Rect
 from neurovis_layouts.layered.halves import symmetric_units
 from neurovis_layouts.layered.links import linked
-from neurovis_layouts.layered.parts import Part, firm, images_of, may_be_frame, parts_of
+from neurovis_layouts.layered.parts import Part, columns_of, firm, images_of, may_be_frame, parts_of
 from neurovis_layouts.layered.settle import Settled, settled
 from neurovis_layouts.layered.sheet import Plan, planned
 from neurovis_layouts.layered.units import Unit
@@ -75,13 +76,25 @@ class Composer:
         frames = firm(problem, pair)
         loose = {i for i in range(len(problem.boxes)) if i not in frames and may_be_frame(problem, i, pair)}
         while True:
-            drawing = self._attempt(problem, parts_of(problem, frames, pair), pair)
+            parts = parts_of(problem, frames, pair)
+            drawing = self._attempt(problem, parts, pair)
             entered = {i for i in loose - frames if _entered(drawing, problem.boxes[i][1])}
             if not entered:
                 return drawing
+            columns = columns_of(problem, parts, loose - frames) if not pair else frozenset()
+            if entered <= columns:
+                drawing = self._attempt(problem, parts, pair, columns)
+                if not any(_entered(drawing, problem.boxes[i][1]) for i in loose - frames):
+                    return drawing
             frames |= entered
 
-    def _attempt(self, problem: LayoutProblem, parts: Sequence[Part], pair: Mapping[int, int]) -> Drawing:
+    def _attempt(
+        self,
+        problem: LayoutProblem,
+        parts: Sequence[Part],
+        pair: Mapping[int, int],
+        columns: AbstractSet[int] = frozenset(),
+    ) -> Drawing:
         pieces: list[Piece] = []
         for part in parts:
             pieces.append(self._piece(problem, part, pieces, pair))
@@ -95,7 +108,7 @@ class Composer:
             if piece.part.family:
                 families.setdefault((piece.part.family, piece.part.kind), []).append(min(piece.part.members))
         units, bonds = bonded(problem, units, pair, list(families.values()))
-        plan = planned(problem, units, bonds, pair)
+        plan = planned(problem, units, bonds, pair, columns)
 
         def redraw(piece: Piece, pins: Mapping[int, Point]) -> Piece:
             inner = (
@@ -104,7 +117,7 @@ class Composer:
             return _as_piece(piece.part, self.compose(replace(inner, pins=_around_pins(piece.drawing, pins, inner))))
 
         rests = settled(problem, plan, [_resting(plan, piece) for piece in pieces], pair, redraw)
-        return _joined(problem, plan, rests, units, pair)
+        return _joined(problem, plan, rests, units, pair, columns)
 
     def _piece(self, problem: LayoutProblem, part: Part, before: Sequence[Piece], pair: Mapping[int, int]) -> Piece:
         if part.image_of >= 0:
@@ -175,7 +188,12 @@ def _boxed(problem: LayoutProblem, part: Part, pair: Mapping[int, int]) -> Layou
 
 
 def _joined(
-    problem: LayoutProblem, plan: Plan, rests: Settled, units: Sequence[Unit], pair: Mapping[int, int]
+    problem: LayoutProblem,
+    plan: Plan,
+    rests: Settled,
+    units: Sequence[Unit],
+    pair: Mapping[int, int],
+    columns: AbstractSet[int],
 ) -> Drawing:
     """Neurons, what is within frames, and the connections between them."""
     places = rests.places
@@ -193,11 +211,12 @@ def _joined(
         frames += [(tuple(part.members[m] for m in own), move.rect(rect)) for own, rect in drawing.frames]
         if part.module >= 0 or part.box >= 0:
             frames.append((part.members, move.rect(piece.rect)))
+    frames += [(problem.boxes[i][1], _box(places, problem.boxes[i][1])) for i in sorted(columns)]
     boxes = [(own, move.rect(rect)) for own, move, rect in _boxes_within(rests)]
     done = {frozenset(own) for own, _ in (*frames, *boxes)}
     boxes += [(own, _box(places, own)) for _, own in problem.boxes if frozenset(own) not in done]
     links = [i for i, key in enumerate(keys) if key not in routes]
-    routes.update(linked(problem, links, keys, plan, rests, units, frames, pair))
+    routes.update(linked(problem, links, keys, plan, rests, units, [*frames, *boxes], pair))
     return Drawing(tuple(places), routes, tuple(frames), tuple(boxes), rests.axis if pair else None, bool(problem.pins))
 
 

@@ -7,6 +7,7 @@ segments between neighbouring ranks.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -52,16 +53,26 @@ class Levels:
     ranks: list[list[int]] = field(default_factory=list)
     segments: list[list[Segment]] = field(default_factory=list)
     passages: dict[int, list[int]] = field(default_factory=dict)
+    #: nodes that only mark where a box passes through a rank
+    spines: set[int] = field(default_factory=set)
 
 
-def levels_of(problem: LayoutProblem, units: Sequence[Unit], rank: Sequence[int], edges: Sequence[int]) -> Levels:
-    """Levels of these units; ``rank`` is by position in ``units``; ``edges`` are the indices of theirs."""
+def levels_of(
+    problem: LayoutProblem,
+    units: Sequence[Unit],
+    rank: Sequence[int],
+    edges: Sequence[int],
+    columns: AbstractSet[int] = frozenset(),
+) -> Levels:
+    """Levels of these units; ``rank`` is by position in ``units``; ``edges`` are the indices of theirs; ``columns`` are
+    the boxes to which their neurons belong before all others."""
     levels = Levels()
     height = max(rank, default=-1) + 1
     levels.ranks = [[] for _ in range(height)]
     levels.segments = [[] for _ in range(max(0, height - 1))]
     where: dict[int, tuple[int, float]] = {}
     boxes = {m: number for number, (_, members) in enumerate(problem.boxes) for m in reversed(members)}
+    boxes.update({m: number for number in sorted(columns) for m in problem.boxes[number][1]})
     groups = {m: number for number, group in enumerate(problem.groups) for m in group.members}
     for unit, level in sorted(zip(units, rank, strict=True), key=lambda pair: min(pair[0].members)):
         for node in _nodes(unit, level, boxes, groups):

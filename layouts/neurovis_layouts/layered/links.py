@@ -30,9 +30,11 @@ def linked(
 ) -> dict[Key, Route]:
     """Routes of these edges by key."""
     edges = [problem.edges[i] for i in links]
-    if rests.pieces:
+    if frames:
         framed = [(frozenset(members), rect) for members, rect in frames]
-        ways, lateral = channels(dict(enumerate(edges)), rests.places, framed)
+        planned = _passing(problem, plan, rests)
+        gates = {k: planned[i] for k, i in enumerate(links) if i in planned}
+        ways, lateral = channels(dict(enumerate(edges)), rests.places, framed, gates)
         routes = route_all(edges, rests.places, ways, _bowed(edges, units), lateral)
     else:
         routes = route_all(edges, rests.places, _passing(problem, plan, rests), _bowed(edges, units))

@@ -101,5 +101,17 @@ def may_be_frame(problem: LayoutProblem, box: int, pair: Mapping[int, int]) -> b
     return not images or images == own - _free(own, pair) or (len(images) == len(own) and not images & own)
 
 
+def columns_of(problem: LayoutProblem, parts: Sequence[Part], boxes: AbstractSet[int]) -> frozenset[int]:
+    """Those of the boxes that can be columns: they share no neuron with each other or with a part."""
+    taken = {m for part in parts for m in part.members}
+    found: set[int] = set()
+    for box in sorted(boxes, key=lambda b: (-len(problem.boxes[b][1]), b)):
+        own = set(problem.boxes[box][1])
+        if not own & taken:
+            found.add(box)
+            taken |= own
+    return frozenset(found)
+
+
 def _free(own: Iterable[int], pair: Mapping[int, int]) -> set[int]:
     return {m for m in own if m not in pair}

@@ -9,6 +9,7 @@ run flat over discs.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from itertools import pairwise
 from typing import TypeAlias
 
@@ -16,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_layouts.isotonic import spread
+from neurovis_layouts.layered.columns import Strips
 from neurovis_layouts.layered.levels import Levels, Segment
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import Point
@@ -39,17 +41,22 @@ def placed(
     neuron_spacing: float,
     rank_spacing: float,
     partner: Sequence[int] | None = None,
+    columns: AbstractSet[int] = frozenset(),
 ) -> list[Point]:
     """x across (the middle of the whole is 0) and y along (the first rank is at 0) of every node.
 
     With ``partner``, for each node the one that is its mirror image (each rank's order turned round is that of the
-    partners), the axis is at 0, and places are mirror images to the last bit.
+    partners), the axis is at 0, and places are mirror images to the last bit. ``columns`` are boxes that get a strip
+    for themselves.
     """
     neuron_spacing = max(neuron_spacing, 0.65)
     gaps = _gaps(levels, order, neuron_spacing)
     if partner is not None:
         gaps = [[max(pair) for pair in zip(row, row[::-1], strict=True)] for row in gaps]
     across = _across(levels, order, gaps)
+    if columns:
+        strips = Strips(levels, order, gaps, columns)
+        across = strips.kept(across, _pulls(levels)) if strips.fit() else across
     if partner is not None:
         across = [(x - across[partner[node]]) / 2 for node, x in enumerate(across)]
     along = _along(levels, order, across, rank_spacing)
@@ -106,6 +113,16 @@ def _across(levels: Levels, order: Sequence[Sequence[int]], gaps: Sequence[Seque
     return [float(place) for place in x]
 
 
+def _pulls(levels: Levels) -> dict[int, list[tuple[int, float, float]]]:
+    """By node: what pulls it, how far off that wants it, how strongly."""
+    found: dict[int, list[tuple[int, float, float]]] = {}
+    for segment in (segment for gap in levels.segments for segment in gap):
+        apart = segment.a - segment.b
+        found.setdefault(segment.lower, []).append((segment.upper, apart, segment.weight))
+        found.setdefault(segment.upper, []).append((segment.lower, -apart, segment.weight))
+    return found
+
+
 class _Pulls:
     """Where its connections above, below or on both sides want each rank: sums in one order, so that they come out the
     same on every machine. By rank and connection: the place of its node in the rank, the other node, offset, weight."""
@@ -151,10 +168,16 @@ def _arrays(gap: Sequence[Segment]) -> _Gap:
     )
 
 
+def reaches(levels: Levels, order: Sequence[Sequence[int]]) -> tuple[list[float], list[float]]:
+    """How far what stands in each rank reaches before its line, and behind it."""
+    both = [[(levels.nodes[node].reach[1], levels.nodes[node].lift) for node in rank] for rank in order]
+    before = [max((reach - lift for reach, lift in rank), default=0.0) for rank in both]
+    behind = [max((reach + lift for reach, lift in rank), default=0.0) for rank in both]
+    return before, behind
+
+
 def _along(levels: Levels, order: Sequence[Sequence[int]], x: Sequence[float], spacing: float) -> list[float]:
-    reaches = [[(levels.nodes[node].reach[1], levels.nodes[node].lift) for node in rank] for rank in order]
-    before = [max((reach - lift for reach, lift in rank), default=0.0) for rank in reaches]
-    behind = [max((reach + lift for reach, lift in rank), default=0.0) for rank in reaches]
+    before, behind = reaches(levels, order)
     result: list[float] = []
     for r in range(len(order)):
         if r == 0:

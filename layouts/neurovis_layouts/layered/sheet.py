@@ -6,15 +6,17 @@ In: a problem, its units, who shares a rank. Out: a Plan: places of neurons and 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 from itertools import pairwise
 
 from neurovis_layouts.formations import columns, grid
+from neurovis_layouts.layered.columns import straightened, tied, with_spines
 from neurovis_layouts.layered.components import components_of, packed
 from neurovis_layouts.layered.levels import Levels, levels_of
 from neurovis_layouts.layered.mirror import mirrored, symmetric
 from neurovis_layouts.layered.order import ordered
-from neurovis_layouts.layered.place import placed
+from neurovis_layouts.layered.place import placed, reaches
 from neurovis_layouts.layered.ranks import INSTANT, ranks_of
 from neurovis_layouts.layered.turned import turned
 from neurovis_layouts.layered.units import Unit
@@ -51,14 +53,20 @@ class Plan:
             self.ways[i] = [Waypoint(way.x + dx, way.y + dy, way.half) for way in ways]
 
 
-def planned(problem: LayoutProblem, units: Sequence[Unit], bonds: Sequence[int], pair: Mapping[int, int]) -> Plan:
+def planned(
+    problem: LayoutProblem,
+    units: Sequence[Unit],
+    bonds: Sequence[int],
+    pair: Mapping[int, int],
+    columns: AbstractSet[int] = frozenset(),
+) -> Plan:
     """All components laid out and packed; units without connections beside the last rank of the largest component.
 
     ``bonds`` are numbers that units of one rank share. With ``pair`` (mirror images, both ways) all is one component,
-    its axis at 0.
+    its axis at 0. ``columns`` are boxes to be drawn as such where that can be.
     """
     if pair:
-        return _component(problem, units, bonds, (), range(len(problem.edges)), pair)
+        return _component(problem, units, bonds, (), range(len(problem.edges)), pair, frozenset())
     connected, alone = components_of(problem, units, bonds)
     largest = max(connected, key=lambda part: sum(len(units[u].members) for u in part), default=None)
     parts: list[Plan] = []
@@ -73,7 +81,7 @@ def planned(problem: LayoutProblem, units: Sequence[Unit], bonds: Sequence[int],
     for k, part in enumerate(connected):
         guests = [units[u] for u in alone if few and hosts.get(u, largest) == part]
         own, tied = [units[u] for u in part], [bonds[u] for u in part]
-        parts.append(_component(problem, own, tied, guests, edges.get(k, []), {}))
+        parts.append(_component(problem, own, tied, guests, edges.get(k, []), {}, columns))
     if alone and not (few and connected):
         parts.append(_unconnected(problem, [units[u] for u in alone]))
     plan = Plan()
@@ -103,20 +111,29 @@ def _component(
     guests: Sequence[Unit],
     edges: Sequence[int],
     pair: Mapping[int, int],
+    columns: AbstractSet[int],
 ) -> Plan:
     everyone = [*units, *guests]
+    here = {m for unit in units for m in unit.members}
+    columns = {box for box in columns if here.issuperset(problem.boxes[box][1])}
     rank = _ranks(problem, units, bonds, edges)
     if pair:
         rank = _one_on_axis(units, bonds, rank, pair)
     rank += [max(rank)] * len(guests)
-    levels = levels_of(problem, everyone, rank, edges)
+    levels = levels_of(problem, everyone, rank, edges, columns)
+    with_spines(problem, levels, columns)
     partner: list[int] | None = None
     if pair:
         order, partner = mirrored(problem, levels, pair)
     else:
         order = ordered(levels)
+        straight = straightened(levels, order, columns) if columns else None
+        if straight is None:
+            columns = frozenset()
+        else:
+            levels, order = tied(levels, straight, columns)
     levels, flipped = turned(levels, order, {min(unit.members) for unit in units if unit.turns})
-    places = placed(levels, order, problem.neuron_spacing, problem.rank_spacing, partner)
+    places = placed(levels, order, problem.neuron_spacing, problem.rank_spacing, partner, columns)
     _draw_in(levels, order, places, {m for unit in guests for m in unit.members}, problem.neuron_spacing)
     plan = Plan(turned=flipped)
     for node, (x, y) in zip(levels.nodes, places, strict=True):
@@ -124,10 +141,15 @@ def _component(
             plan.places[member] = (x + dx, y + dy)
         if node.framed:
             plan.corners += [(x - node.reach[0], y - node.reach[1]), (x + node.reach[0], y + node.reach[1])]
-    half = [max((levels.nodes[n].reach[1] for n in members), default=0.0) for members in order]
+    spans = list(zip(*reaches(levels, order), strict=True))
     for i, passages in levels.passages.items():
-        plan.ways[i] = [Waypoint(*places[n], half[levels.nodes[n].rank]) for n in passages]
+        plan.ways[i] = [_passage(places[n], *spans[levels.nodes[n].rank]) for n in passages]
     return plan
+
+
+def _passage(place: Point, before: float, behind: float) -> Waypoint:
+    """Straight through all of a rank."""
+    return Waypoint(place[0], place[1] + (behind - before) / 2, (before + behind) / 2)
 
 
 def _ranks(problem: LayoutProblem, units: Sequence[Unit], bonds: Sequence[int], edges: Sequence[int]) -> list[int]:

@@ -73,4 +73,4 @@ def _turn(levels: Levels, flipped: AbstractSet[int]) -> Levels:
         ]
         for gap in levels.segments
     ]
-    return Levels(nodes, levels.ranks, segments, levels.passages)
+    return Levels(nodes, levels.ranks, segments, levels.passages, levels.spines)

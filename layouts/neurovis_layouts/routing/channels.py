@@ -45,9 +45,13 @@ _MOST = 1500
 
 
 def channels(
-    edges: Mapping[int, LayoutEdge], centres: Sequence[Point], frames: Sequence[Frame]
+    edges: Mapping[int, LayoutEdge],
+    centres: Sequence[Point],
+    frames: Sequence[Frame],
+    gates: Mapping[int, Sequence[Waypoint]],
 ) -> tuple[dict[int, list[Waypoint]], dict[int, list[Waypoint]]]:
-    """Waypoints of edges by index: of those along the direction, and (x and y exchanged) of those across it."""
+    """Waypoints of edges by index: of those along the direction, and (x and y exchanged) of those across it. Those with
+    ``gates`` run along it, through these, which lie in their order."""
     along: dict[int, list[Waypoint]] = {}
     across: dict[int, list[Waypoint]] = {}
     if len(edges) > _MOST:
@@ -56,6 +60,11 @@ def channels(
     side = _Rows([(y, x) for x, y in centres], [(own, (r[1], r[0], r[3], r[2])) for own, r in frames])
     for i, edge in sorted(edges.items(), key=lambda item: (_length(item[1], centres), item[0])):
         if edge.source == edge.target:
+            continue
+        if gates.get(i):
+            path = down.through(edge.source, edge.target, gates[i])
+            down.use(path)
+            along[i] = down.knots(path, edge.source, edge.target)
             continue
         found = [
             (cost * factor, place, path)
@@ -93,11 +102,30 @@ class _Rows:
     def way(self, source: int, target: int) -> tuple[float, list[Point]]:
         """The cost of the best way, infinite where the ends are level, and its points: both ends, one in each row."""
         start, end = self._centres[source], self._centres[target]
-        if start[1] > end[1]:
-            back, line = self.way(target, source)
-            return back, line[::-1]
-        if end[1] - start[1] < _LEAST:
+        if abs(end[1] - start[1]) < _LEAST:
             return math.inf, []
+        if start[1] > end[1]:
+            cost, path = self._way(end, start, (source, target))
+            return cost, path[::-1]
+        return self._way(start, end, (source, target))
+
+    def through(self, source: int, target: int, gates: Sequence[Waypoint]) -> list[Point]:
+        """The points of the best way through these gates, from above to below or the other way round."""
+        start, end = self._centres[source], self._centres[target]
+        if start[1] > end[1]:
+            return self.through(target, source, gates[::-1])[::-1]
+        path = [start]
+        for gate in gates:
+            top, bottom = (gate.x, gate.y - gate.half), (gate.x, gate.y + gate.half)
+            path += self._way(path[-1], top, (source, target))[1][1:]
+            path += [(gate.x, y) for y in self._rows if top[1] + _FINE < y < bottom[1] - _FINE]
+            if gate.half > 0:
+                path.append(bottom)
+        return [*path, *self._way(path[-1], end, (source, target))[1][1:]]
+
+    def _way(self, start: Point, end: Point, own: tuple[int, int]) -> tuple[float, list[Point]]:
+        """The cost of the best way down from one point to another, and its points: both ends, one in each row."""
+        source, target = own
         rows = [y for y in self._rows if start[1] + _ROW < y < end[1] - _ROW]
         foreign = self._foreign(source, target)
         layers: list[tuple[FloatArray, IntArray]] = []

@@ -1,0 +1,220 @@
+"""Columns: boxes beside each other in the same ranks, each a strip that nothing foreign enters.
+
+In: Levels and the boxes that are to be columns. Out: levels with a spine through every rank of a box, and passages
+within boxes marked as theirs; an order in which whatever hangs together outside a box is on one side of it; places
+across that leave each box its strip. So a box may stand beside what it drives and is driven by, which a block cannot.
+After Sander (1996), Layout of compound directed graphs.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from neurovis_layouts.layered.crossings import Segments
+from neurovis_layouts.layered.exchange import Exchange
+from neurovis_layouts.layered.levels import Levels, Node, Segment
+from neurovis_spec.layout.model import LayoutProblem
+
+#: From the line of a strip to centres and to lines, within and outside; between two strips.
+_INSIDE_DISC, _INSIDE_LINE, _OUTSIDE_DISC, _OUTSIDE_LINE, _BETWEEN = 0.65, 0.2, 0.55, 0.25, 0.4
+_SPINE, _TIED = 8.0, 3.0
+_ROUNDS = 24
+
+
+def with_spines(problem: LayoutProblem, levels: Levels, columns: AbstractSet[int]) -> None:
+    """Give every column a node in each of its ranks, joined to a line, and the passages of its own connections."""
+    box_of = {m: b for b in sorted(columns) for m in problem.boxes[b][1]}
+    for i, passages in levels.passages.items():
+        edge = problem.edges[i]
+        box = box_of.get(edge.source, -1)
+        if box >= 0 and box == box_of.get(edge.target, -1):
+            for n in passages:
+                levels.nodes[n] = replace(levels.nodes[n], box=box)
+    for box in sorted(columns):
+        ranks = [node.rank for node in levels.nodes if node.box == box]
+        before = -1
+        for rank in range(min(ranks), max(ranks) + 1):
+            levels.nodes.append(Node(rank, box=box))
+            spine = len(levels.nodes) - 1
+            levels.ranks[rank].append(spine)
+            levels.spines.add(spine)
+            if before >= 0:
+                levels.segments[rank - 1].append(Segment(before, 0.0, spine, 0.0, _SPINE))
+            before = spine
+
+
+def straightened(levels: Levels, order: Sequence[Sequence[int]], columns: AbstractSet[int]) -> list[list[int]] | None:
+    """The order with everything foreign on one side of each column; None where two columns cannot both have that."""
+    found = [list(rank) for rank in order]
+    for _ in range(len(columns) + 2):
+        before = [list(rank) for rank in found]
+        for box in sorted(columns):
+            _part(levels, found, box)
+        if found == before:
+            segments = Segments(levels)
+            boxes = np.array([node.box for node in levels.nodes], dtype=np.int64)
+            kin = np.array([node.kin for node in levels.nodes], dtype=np.int64)
+            place = np.zeros(len(levels.nodes), dtype=np.int64)
+            for rank in found:
+                place[rank] = np.arange(len(rank), dtype=np.int64)
+            arrays = [np.array(rank, dtype=np.int64) for rank in found]
+            better = Exchange(segments, (boxes, kin)).improved(segments.count(place), arrays)[1]
+            return [rank.tolist() for rank in better]
+    return None
+
+
+def _part(levels: Levels, order: list[list[int]], box: int) -> None:
+    """Everything foreign in the ranks of a column to the side where most of what it is connected to there stands."""
+    spans = [r for r, rank in enumerate(order) if any(levels.nodes[n].box == box for n in rank)]
+    foreign = [n for r in spans for n in order[r] if levels.nodes[n].box != box]
+    root = {n: n for n in foreign}
+
+    def find(n: int) -> int:
+        while root[n] != n:
+            root[n] = root[root[n]]
+            n = root[n]
+        return n
+
+    def join(a: int, b: int) -> None:
+        low, high = sorted((find(a), find(b)))
+        root[high] = low
+
+    for r in spans[:-1]:
+        for segment in levels.segments[r]:
+            if segment.upper in root and segment.lower in root:
+                join(segment.upper, segment.lower)
+    first: dict[int, int] = {}
+    for n in foreign:
+        other = levels.nodes[n].box
+        if other >= 0:
+            join(first.setdefault(other, n), n)
+    lean: dict[int, int] = {}
+    for r in spans:
+        start = next(i for i, n in enumerate(order[r]) if levels.nodes[n].box == box)
+        for i, n in enumerate(order[r]):
+            if n in root:
+                lean[find(n)] = lean.get(find(n), 0) + (1 if i > start else -1)
+    for r in spans:
+        left = [n for n in order[r] if n in root and lean[find(n)] < 0]
+        right = [n for n in order[r] if n in root and lean[find(n)] >= 0]
+        order[r] = left + [n for n in order[r] if n not in root] + right
+
+
+def tied(levels: Levels, order: Sequence[Sequence[int]], columns: AbstractSet[int]) -> tuple[Levels, list[list[int]]]:
+    """Levels and order without the spines where a column has other nodes; what stands in a column is tied to what
+    stands in it in the next rank, so that the column is narrow."""
+    nodes = levels.nodes
+    spines = {n for n in levels.spines if any(nodes[m].box == nodes[n].box for m in order[nodes[n].rank] if m != n)}
+    left = [[n for n in rank if n not in spines] for rank in order]
+    segments = [[s for s in gap if s.upper not in levels.spines] for gap in levels.segments]
+    for box in sorted(columns):
+        own = [[n for n in rank if nodes[n].box == box] for rank in left]
+        for r, (above, below) in enumerate(pairwise(own)):
+            for a in above:
+                segments[r] += [Segment(a, 0.0, b, 0.0, _TIED / max(len(above), len(below))) for b in below]
+    return Levels(nodes, left, segments, levels.passages, levels.spines), left
+
+
+class Strips:
+    """What keeps columns apart from each other and from everything else: least distances between nodes and the lines
+    of columns. The line on the left of the k-th column is the node ``count + 2k``, that on the right the next."""
+
+    def __init__(
+        self,
+        levels: Levels,
+        order: Sequence[Sequence[int]],
+        gaps: Sequence[Sequence[float]],
+        columns: AbstractSet[int],
+    ) -> None:
+        self._count = len(levels.nodes)
+        self._line = {box: self._count + 2 * k for k, box in enumerate(sorted(columns))}
+        self._after: list[dict[int, float]] = [{} for _ in range(self._count + 2 * len(columns))]
+        self._before: list[dict[int, float]] = [{} for _ in self._after]
+        nodes = levels.nodes
+        for rank, distances in zip(order, gaps, strict=True):
+            for (a, b), gap in zip(pairwise(rank), distances, strict=True):
+                self._apart(a, b, gap)
+            line = [-1, *rank, -1]
+            for a, b in pairwise(line):
+                own = self._line.get(nodes[a].box, -1) if a >= 0 else -1
+                other = self._line.get(nodes[b].box, -1) if b >= 0 else -1
+                if own == other:
+                    continue
+                if own >= 0:
+                    self._apart(a, own + 1, _inside(nodes[a]))
+                if other >= 0:
+                    self._apart(other, b, _inside(nodes[b]))
+                if own >= 0 and other >= 0:
+                    self._apart(own + 1, other, _BETWEEN)
+                elif own >= 0 and b >= 0:
+                    self._apart(own + 1, b, _outside(nodes[b]))
+                elif other >= 0 and a >= 0:
+                    self._apart(a, other, _outside(nodes[a]))
+        for line_of in self._line.values():
+            self._apart(line_of, line_of + 1, 0.0)
+        self._sorted = list(self._topological())
+
+    def _apart(self, a: int, b: int, gap: float) -> None:
+        self._after[a][b] = max(self._after[a].get(b, 0.0), gap)
+        self._before[b][a] = max(self._before[b].get(a, 0.0), gap)
+
+    def _topological(self) -> Iterator[int]:
+        waiting = {n: len(before) for n, before in enumerate(self._before)}
+        ready = [n for n, count in waiting.items() if count == 0]
+        heapq.heapify(ready)
+        while ready:
+            n = heapq.heappop(ready)
+            yield n
+            for other in self._after[n]:
+                waiting[other] -= 1
+                if waiting[other] == 0:
+                    heapq.heappush(ready, other)
+
+    def fit(self) -> bool:
+        """Whether all distances can be kept at once."""
+        return len(self._sorted) == len(self._after)
+
+    def kept(self, wishes: Sequence[float], pulls: Mapping[int, Sequence[tuple[int, float, float]]]) -> list[float]:
+        """Places of the nodes that keep all distances, near to where they wish to be; ``pulls`` are by node: the other
+        node, how far from it, weight."""
+        own: dict[int, list[int]] = {}
+        for b in self._line.values():
+            own[b] = sorted(self._after[b].keys() - {b + 1})
+        wish = list(wishes) + [0.0] * (len(self._after) - self._count)
+        for b in self._line.values():
+            wish[b] = min((wish[n] - self._after[b][n] for n in own[b]), default=0.0)
+            wish[b + 1] = max((wish[n] + gap for n, gap in sorted(self._before[b + 1].items()) if n != b), default=0.0)
+        # the mean of two solutions is one: pushed to the right, and pushed to the left
+        right, left = list(wish), list(wish)
+        for n in self._sorted:
+            right[n] = max([right[n], *(right[a] + gap for a, gap in self._before[n].items())])
+        for n in reversed(self._sorted):
+            left[n] = min([left[n], *(left[b] - gap for b, gap in self._after[n].items())])
+        x = [(a + b) / 2 for a, b in zip(right, left, strict=True)]
+        for turn in range(_ROUNDS):
+            for n in self._sorted if turn % 2 == 0 else self._sorted[::-1]:
+                low = max((x[a] + gap for a, gap in self._before[n].items()), default=-np.inf)
+                high = min((x[b] - gap for b, gap in self._after[n].items()), default=np.inf)
+                if n >= self._count:
+                    if np.isfinite(low) and np.isfinite(high):
+                        x[n] = (low + high) / 2
+                    continue
+                mass = sum(weight for _, _, weight in pulls.get(n, ()))
+                if mass > 0:
+                    aim = sum(weight * (x[other] + far) for other, far, weight in pulls[n]) / mass
+                    x[n] = min(max(aim, low), max(low, high))
+        return x[: self._count]
+
+
+def _inside(node: Node) -> float:
+    return node.reach[0] + (_INSIDE_DISC if node.members else _INSIDE_LINE)
+
+
+def _outside(node: Node) -> float:
+    return node.reach[0] + (_OUTSIDE_DISC if node.members else _OUTSIDE_LINE)
