@@ -194,9 +194,10 @@ def _eventful(
 
 def _report_no_neurons(spec: Spec, population: Population, findings: Findings) -> None:
     """Without neurons nothing else can be looked at; if that is because groups are at fault, it is said already."""
-    gaps = population.directory.gaps
-    if gaps.sections & {"neurons", "instances"} or gaps.names["neurons"] or gaps.names["instances"]:
-        return
+    for directory in population.directories:
+        gaps = directory.gaps
+        if gaps.sections & {"neurons", "instances"} or gaps.names["neurons"] or gaps.names["instances"]:
+            return
     node = spec.source.entry("neurons")
     span = opening(spec.source) if node is None else node.key.span
     findings.error("no-neurons", span, "a network needs at least one neuron", "add a group under 'neurons'")

@@ -1,0 +1,107 @@
+"""What is left of YAML (§2): what a finding says and where, all at once; and that reading is linear in the size."""
+
+from __future__ import annotations
+
+import sys
+from types import FrameType
+
+import pytest
+
+import neurovis_spec as nv
+from neurovis_spec.diagnostics import Diagnostic, Findings
+from neurovis_spec.language.reader import read_text
+
+HEAD = "neurovis: 1\nname: x\n"
+
+
+def findings(text: str) -> tuple[Diagnostic, ...]:
+    with pytest.raises(nv.SpecError) as caught:
+        nv.compile_text(HEAD + text)
+    return caught.value.diagnostics
+
+
+REFUSED = [
+    ("neurons:\n  A: {}\n  A: {}\n", "duplicate-key", (5, 3)),
+    ("neurons: {A: !!map {}}\n", "tag", (3, 14)),
+    ("neurons: {A: {<<: {bias: 1}}}\n", "merge-key", (3, 15)),
+    ("neurons: {A: {}}\n---\nb: 1\n", "several-documents", (4, 1)),
+    ("neurons: {A: &a {}}\n", "anchor", (3, 14)),
+    ("neurons: {A: *a}\n", "alias", (3, 14)),
+    ("neurons: {A: {label: 'a\u202eb'}}\n", "control-character", (3, 24)),
+    ("neurons: {A: " + "[" * 65 + "]" * 65 + "}\n", "too-deep", (3, 76)),
+    ("neurons: {A: {bias: .nan}}\n", "not-finite", (3, 21)),
+    ("neurons: {A: {bias: 9223372036854775808}}\n", "integer-range", (3, 21)),
+]
+
+
+@pytest.mark.parametrize(("text", "code", "place"), REFUSED)
+def test_each_refusal_has_its_own_code_and_position(text: str, code: str, place: tuple[int, int]) -> None:
+    """At the very thing that is refused."""
+    found = [(item.code, (item.span.line, item.span.column)) for item in findings(text)]
+    assert (code, place) in found
+    assert len({code for code, _ in found}) == 1
+
+
+def test_all_that_is_refused_is_found_at_once() -> None:
+    """One document with a bit of everything."""
+    text = "title: !!str a\ndescription: &d b\nlicense: *d\nneurons:\n  A: {bias: .inf, <<: {}}\n  A: {bias: 1e999}\n"
+    found = [(item.span.line, item.code) for item in findings(text)]
+    assert found == [(3, "tag"), (4, "anchor"), (5, "alias"), (7, "not-finite"), (7, "merge-key"), (8, "duplicate-key"),
+                     (8, "number-range")]  # fmt: skip
+
+
+def test_nan_is_no_number_but_a_text_may_say_it() -> None:
+    """``.nan`` is refused where a number is wanted; quoted it is a text like others."""
+    network = nv.compile_text(HEAD + "neurons: {A: {label: '.nan', box: '.inf'}}\n")
+    assert network.network.neurons.labels == (".nan",)
+    assert [item.code for item in findings("neurons: {A: {count: .nan}}\n")] == ["not-finite"]
+    assert [item.code for item in findings("layout: {positions: {A: [.inf, 0]}}\nneurons: {A: {}}\n")] == ["not-finite"]
+
+
+def test_a_name_that_yaml_reads_as_something_else_is_refused_with_that_said() -> None:
+    """In the words null, true or false, a number."""
+    for name, word in (("null", "null"), ("~", "null"), ("true", "true or false"), ("12", "number"), ("1e3", "number")):
+        (found,) = findings(f"neurons: {{{name}: {{}}}}\n")
+        assert found.code == "key-not-text"
+        assert f"YAML reads '{name}' as" in found.message
+        assert word in found.message
+    for name, word in (("null", "null"), ("true", "true"), ("3", "number 3")):
+        (found,) = findings(f"neurons: {{A: {{names: [a, {name}]}}}}\n")
+        assert found.code == "wrong-type"
+        assert word in f"{found.message} {found.hint}"
+
+
+def steps(text: str, pure: bool) -> int:
+    """How many calls reading a text takes."""
+    count = 0
+
+    def counting(frame: FrameType, event: str, argument: object) -> None:
+        nonlocal count
+        count += event in ("call", "c_call")
+
+    found = Findings()
+    sys.setprofile(counting)
+    try:
+        read_text(text, "net.yaml", found, pure=pure)
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+LINEAR = {
+    "groups": "  N{0}: {{count: 3, bias: {0}}}\n",
+    "edges": "  - [A{0}, B{0}, {0}.5]\n",
+    "texts": "  t{0}: 'a text, with commas (and parentheses'\n",
+    "flow": "  f{0}: {{a: [1, 2, {{b: {0}}}]}}\n",
+    "refused": "  d{0}: !x &y 1\n  d{0}: 2\n",
+    "comments": "  # {0}\n  c{0}: 1   # here\n",
+    "unclosed": "  u{0}: [1, 2\n",
+}
+
+
+@pytest.mark.parametrize("kind", LINEAR)
+@pytest.mark.parametrize("pure", [False, True])
+def test_loading_is_linear_in_the_size_of_the_file(kind: str, pure: bool) -> None:
+    """Twice the lines take twice the calls, whatever stands on them."""
+    short, long = ("a:\n" + "".join(LINEAR[kind].format(i) for i in range(n)) for n in (300, 600))
+    assert steps(long, pure) <= 2.1 * steps(short, pure) + 2000
