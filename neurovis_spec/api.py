@@ -1,6 +1,7 @@
 """What users hold: a compiled network with ``.run``, ``.layout``, ``.render`` (the top layer, under the command line).
 
-In: a path, a text or a mapping. Out: a CompiledNetwork, or SpecError with every finding.
+In: a path, a text or a mapping. Out: a CompiledNetwork, or SpecError with every finding. What runs, lays out and draws
+is imported by who does so: a spec is compiled, and thereby checked, without it.
 """
 
 from __future__ import annotations
@@ -9,8 +10,7 @@ import json
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import islice
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,23 +21,16 @@ from neurovis_spec import pipeline
 from neurovis_spec.compiler.compile import Request, rebind
 from neurovis_spec.compiler.limits import Limits
 from neurovis_spec.compiler.network import Network, RenderSettings
-from neurovis_spec.describe import describe
 from neurovis_spec.diagnostics import Diagnostic, Findings, Span, SpecError
 from neurovis_spec.language.source import SourceDocument
 from neurovis_spec.language.spec import Spec
-from neurovis_spec.layout import Layout, Point, Route
-from neurovis_spec.layout.choose import choose_engine
-from neurovis_spec.layout.file import dump
-from neurovis_spec.layout.problem import problem_of
 from neurovis_spec.progress import Progress
-from neurovis_spec.runtime import backend as backends_module
-from neurovis_spec.runtime import formats
 from neurovis_spec.runtime.files import replacing
-from neurovis_spec.runtime.inputs import InputError
-from neurovis_spec.runtime.recording import Recording, RecordingError, Snapshot
-from neurovis_spec.runtime.simulation import Simulation
 
-if TYPE_CHECKING:  # what draws is imported by who draws
+if TYPE_CHECKING:
+    from neurovis_spec.layout import Layout, Point, Route
+    from neurovis_spec.runtime.recording import Recording, Snapshot
+    from neurovis_spec.runtime.simulation import Simulation
     from neurovis_spec.scene.gains import Gains
 
 #: Frames a second where the spec writes no dt, and the most there are.
@@ -104,6 +97,8 @@ def compile_text(
 
 def load(path: str | Path) -> Recording:
     """Read a recording. Raises RecordingError for a file that is none, OSError for one that cannot be read."""
+    from neurovis_spec.runtime import formats
+
     return formats.load(path)
 
 
@@ -116,9 +111,11 @@ def schema(*, included: bool = False) -> dict[str, object]:
 
 def backends() -> list[tuple[str, bool, str]]:
     """Name, whether it is available, and a note, for each backend."""
+    from neurovis_spec.runtime import backend
+
     result = []
-    for name in backends_module.names():
-        availability = backends_module.available(name)
+    for name in backend.names():
+        availability = backend.available(name)
         result.append((name, availability.available, availability.note))
     return result
 
@@ -197,6 +194,8 @@ class CompiledNetwork:
 
     def simulator(self, backend: str | None = None, *, start: Recording | None = None) -> Simulation:
         """Step by step, for a control loop; ``start`` is a recording to go on from."""
+        from neurovis_spec.runtime.simulation import Simulation
+
         return Simulation(
             self.network, backend, start, lambda values: rebind(self.spec, self.request, self.network, values)
         )
@@ -236,6 +235,9 @@ class CompiledNetwork:
 
     def choose_engine(self) -> tuple[str, str]:
         """The layout engine, and why."""
+        from neurovis_spec.layout.choose import choose_engine
+        from neurovis_spec.layout.problem import problem_of
+
         engine = self.network.layout.engine
         if engine != "auto":
             return engine, "the spec names it"
@@ -243,10 +245,14 @@ class CompiledNetwork:
 
     def choose_backend(self) -> tuple[str, str]:
         """The backend that runs it by default, and why."""
-        return backends_module.choose_backend(self.network)
+        from neurovis_spec.runtime.backend import choose_backend
+
+        return choose_backend(self.network)
 
     def describe(self) -> dict[str, object]:
         """What ``neurovis inspect --format json`` prints."""
+        from neurovis_spec.describe import describe
+
         return describe(self.network, self.choose_engine())
 
     def render(
@@ -291,6 +297,7 @@ class CompiledNetwork:
         ``fps`` defaults to 1/dt, at most 60, and to 25 where the spec writes no dt.
         """
         from neurovis_spec.scene.renderers import renderer_for
+        from neurovis_spec.snapshots import snapshots_from
 
         suffix = Path(path).suffix
         renderer_for(suffix, moving=True)
@@ -298,7 +305,8 @@ class CompiledNetwork:
             fps = min(1 / self.network.dt, MOST_FPS) if self.network.dt_given else DEFAULT_FPS
         if not (math.isfinite(fps) and fps > 0):
             raise ValueError(f"frames a second are above 0, not {fps}")
-        snapshots = self._snapshots(start, steps, recording, progress)
+        run = partial(self.run, progress=progress)
+        snapshots = snapshots_from(self.network, start, steps, recording, run)
         film = pipeline.moving(self.network, self._layout, snapshots, self.gains, self._settings(theme), fps)
         content = pipeline.animate(film, suffix, progress)
         with replacing(path) as file:
@@ -308,39 +316,9 @@ class CompiledNetwork:
         return self.network.render if theme is None else replace(self.network.render, theme=theme)
 
     def _snapshot(self, step: int | None, recording: Recording | None, progress: Progress | None) -> Snapshot:
-        if step is not None and step < 0:
-            raise InputError(f"step {step}: steps count from 0")
-        if recording is None:
-            steps = self.network.steps if step is None else step + 1
-            recording = self.run(steps, progress=progress)
-        self._check(recording)
-        if not len(recording):
-            raise RecordingError("the recording holds no step")
-        return recording.snapshot(int(recording.step[-1]) if step is None else step)
+        from neurovis_spec.snapshots import snapshot_at
 
-    def _snapshots(
-        self, start: int, steps: int | None, recording: Recording | None, progress: Progress | None
-    ) -> list[Snapshot]:
-        if start < 0 or (steps is not None and steps < 1):
-            raise InputError(f"{steps} frames from step {start}: at least one frame from step 0 on is wanted")
-        if recording is None:
-            count = max(1, self.network.steps - start) if steps is None else steps
-            recording = self.run(start + count, progress=progress)
-        self._check(recording)
-        rows = recording.step[recording.step >= start].tolist()
-        if not rows:
-            raise RecordingError(f"the recording holds no step from {start} on")
-        return [recording.snapshot(step) for step in islice(rows, steps)]
-
-    def _check(self, recording: Recording) -> None:
-        """A recording must be of this network: the same neurons and connections."""
-        network = self.network
-        same = recording.neurons == network.neurons.names and np.array_equal(
-            recording.sources, network.connections.sources
-        )
-        if not same or not np.array_equal(recording.targets, network.connections.targets):
-            whose = f"{recording.network or 'unnamed'}, {len(recording.neurons)} neurons"
-            raise RecordingError(f"the recording is of another network ({whose})")
+        return snapshot_at(self.network, step, recording, partial(self.run, progress=progress))
 
     def _repr_svg_(self) -> str:
         """The network at the last step of its default run, for a notebook."""
@@ -373,12 +351,15 @@ class NetworkLayout:
 
     def metrics(self) -> dict[str, float | int]:
         """What ``neurovis layout --metrics`` prints, but for the seconds."""
-        from neurovis_spec.layout.metrics import metrics  # networkx, which nobody else here needs
+        from neurovis_spec.layout.metrics import metrics
+        from neurovis_spec.layout.problem import problem_of
 
         return metrics(self.value, problem_of(self.compiled.network))
 
     def dump(self) -> str:
         """The layout file as a text."""
+        from neurovis_spec.layout.file import dump
+
         return dump(self.value)
 
     def save(self, path: str | Path) -> None:
@@ -388,6 +369,8 @@ class NetworkLayout:
 
     def _repr_svg_(self) -> str:
         """The network in this layout, before anything happens, for a notebook."""
+        from neurovis_spec.runtime.recording import Snapshot
+
         network = self.compiled.network
         snapshot = Snapshot(0, np.zeros(len(network.neurons)), network.connections.weights, None)
         scene = pipeline.picture(network, self.value, snapshot, self.compiled.gains, network.render)

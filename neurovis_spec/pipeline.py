@@ -29,10 +29,10 @@ from neurovis_spec.language.reader import read_file, read_text
 from neurovis_spec.language.shape import read_spec
 from neurovis_spec.language.source import SourceDocument
 from neurovis_spec.language.spec import Spec
-from neurovis_spec.layout.model import Layout
 from neurovis_spec.progress import Progress
 
 if TYPE_CHECKING:  # what only some stages need is imported there: a spec is validated without all of it
+    from neurovis_spec.layout.model import Layout
     from neurovis_spec.runtime.recording import Recording, Snapshot
     from neurovis_spec.scene import Film, Scene
     from neurovis_spec.scene.gains import Gains
@@ -87,10 +87,11 @@ def simulate(
 def remember(spec: Spec, request: Request, network: Network, findings: Findings) -> Layout | None:
     """The earlier layout that the spec names, if it names one."""
 
+    if spec.layout is None or spec.layout.file is None:
+        return None
     from neurovis_spec.layout.remember import read_memory
 
-    file = None if spec.layout is None else spec.layout.file
-    return None if file is None else read_memory(file, request.base, request.root, network, findings)
+    return read_memory(spec.layout.file, request.base, request.root, network, findings)
 
 
 def arrange(

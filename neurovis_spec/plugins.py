@@ -1,14 +1,18 @@
 """Plug-ins: engines, renderers, backends and formats are found by name, through entry points.
 
 In: a group and a name. Out: what the entry point names, called without arguments. Ours are registered in the same way
-as anybody's. Nothing is listed or imported before somebody asks.
+as anybody's. Nothing is listed or imported before somebody asks; then a group is listed once in a process.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
-from importlib.metadata import EntryPoint, entry_points
+from collections.abc import Iterator, Mapping
+from functools import cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 LAYOUTS = "neurovis.layouts"
 RENDERERS = "neurovis.renderers"
@@ -22,7 +26,10 @@ class PluginError(ValueError):
     """What is installed under a name cannot be loaded: the fault is the plug-in's."""
 
 
-def _points(group: str) -> dict[str, EntryPoint]:
+@cache
+def _points(group: str) -> Mapping[str, EntryPoint]:
+    from importlib.metadata import entry_points  # slow to import, and the help of a command needs none of it
+
     return {point.name: point for point in sorted(entry_points(group=group), key=lambda p: (p.name, p.value))}
 
 

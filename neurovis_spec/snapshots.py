@@ -1,0 +1,54 @@
+"""Snapshots: the steps that are drawn, of a recording that is given or made for them.
+
+In: a Network, the steps wanted, a Recording of it, or a function that runs so many steps. Out: Snapshots.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import islice
+
+import numpy as np
+
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.runtime.inputs import InputError
+from neurovis_spec.runtime.recording import Recording, RecordingError, Snapshot
+
+
+def snapshot_at(
+    network: Network, step: int | None, recording: Recording | None, run: Callable[[int], Recording]
+) -> Snapshot:
+    """The snapshot of a step, by default of the last one. Raises InputError, RecordingError."""
+    if step is not None and step < 0:
+        raise InputError(f"step {step}: steps count from 0")
+    if recording is None:
+        recording = run(network.steps if step is None else step + 1)
+    check_same(recording, network)
+    if not len(recording):
+        raise RecordingError("the recording holds no step")
+    return recording.snapshot(int(recording.step[-1]) if step is None else step)
+
+
+def snapshots_from(
+    network: Network, start: int, steps: int | None, recording: Recording | None, run: Callable[[int], Recording]
+) -> list[Snapshot]:
+    """The snapshots of ``steps`` steps from ``start`` on, by default of all that follow. Raises InputError,
+    RecordingError."""
+    if start < 0 or (steps is not None and steps < 1):
+        raise InputError(f"{steps} frames from step {start}: at least one frame from step 0 on is wanted")
+    if recording is None:
+        count = max(1, network.steps - start) if steps is None else steps
+        recording = run(start + count)
+    check_same(recording, network)
+    rows = recording.step[recording.step >= start].tolist()
+    if not rows:
+        raise RecordingError(f"the recording holds no step from {start} on")
+    return [recording.snapshot(step) for step in islice(rows, steps)]
+
+
+def check_same(recording: Recording, network: Network) -> None:
+    """Refuse a recording of another network: it has the same neurons and connections. Raises RecordingError."""
+    same = recording.neurons == network.neurons.names and np.array_equal(recording.sources, network.connections.sources)
+    if not same or not np.array_equal(recording.targets, network.connections.targets):
+        whose = f"{recording.network or 'unnamed'}, {len(recording.neurons)} neurons"
+        raise RecordingError(f"the recording is of another network ({whose})")
