@@ -154,6 +154,7 @@ render: {theme: drak}
         ("out-of-range", "count"),
         ("unknown-activation", "tahn"),
         ("unknown-parameter", "laek"),
+        ("wrong-size", "'u'"),
         ("wrong-size", "bias"),
         ("unknown-key", "wieght"),
         ("unknown-neuron", "E"),

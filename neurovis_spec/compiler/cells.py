@@ -8,7 +8,7 @@ costs hardly more than one of numbers.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +25,8 @@ from neurovis_spec.language.source import NULL, NUMBER, TEXT, Node, Packed, Scal
 @dataclass(frozen=True)
 class Cells:
     """Row ``r`` holds the cells ``starts[r]`` to ``starts[r + 1]``. A cell is NULL, a NUMBER or a TEXT (then its number
-    is an index into ``texts``); ``node`` and ``row_span`` say where things stand."""
+    is an index into ``texts``); ``node`` and ``row_span`` say where things stand. ``failed``: some were no cells, which
+    is noted; they are left as NULL, so that the others can be looked at."""
 
     starts: IntArray
     kinds: npt.NDArray[np.int8]
@@ -33,6 +34,7 @@ class Cells:
     texts: tuple[str, ...]
     node: Callable[[int], Node]
     row_span: Callable[[int], Span]
+    failed: bool = False
 
     @property
     def widths(self) -> IntArray:
@@ -49,7 +51,8 @@ class Cells:
 
 
 def cells_of(node: Sequence | Packed, findings: Findings, row: str) -> Cells | None:
-    """The cells of a list of rows. None, and findings, where one is no number, text or null, or a row is no list.
+    """The cells of a list of rows; findings where one is no number, text or null, or a row is no list. None where there
+    are many such.
 
     ``row`` is what a row is, for a finding; with "" a bare cell is a row of one.
     """
@@ -60,7 +63,7 @@ def cells_of(node: Sequence | Packed, findings: Findings, row: str) -> Cells | N
     wild = np.flatnonzero((cells.kinds == NUMBER) & ~np.isfinite(cells.numbers))
     for cell in wild[:PATIENCE].tolist():
         formula_of(cells.node(cell), findings)
-    return None if len(wild) else cells
+    return replace(cells, failed=True) if len(wild) else cells
 
 
 def _packed(node: Packed, row: str) -> Cells | None:
@@ -105,8 +108,6 @@ def _written(node: Sequence | Packed, findings: Findings, row: str) -> Cells | N
             kinds[place], numbers[place] = TEXT, texts.setdefault(cell.value, len(texts))
         elif cell.value is not None:
             kinds[place], numbers[place] = NUMBER, cell.value
-    if findings.errors > before:
-        return None
     return Cells(
         np.array(starts, dtype=np.int64),
         kinds,
@@ -114,17 +115,20 @@ def _written(node: Sequence | Packed, findings: Findings, row: str) -> Cells | N
         tuple(texts),
         nodes.__getitem__,
         lambda r: items[r].span,
+        findings.errors > before,
     )
 
 
 @dataclass(frozen=True)
 class Pairs:
-    """What the formulas of cells see: source ``i`` and target ``j``, which also count the numbers drawn, and more."""
+    """What the formulas of cells see: source ``i`` and target ``j``, which also count the numbers drawn, and more.
+    ``vague``: what these are is not known, as an end is at fault; a formula that depends on them has no value then."""
 
     i: IntArray
     j: IntArray
     known: Mapping[str, float]
     stream: Stream
+    vague: bool = False
 
 
 def values_of(cells: Cells, which: IntArray, constants: Constants, pairs: Pairs | None = None) -> FloatArray | None:
@@ -160,6 +164,9 @@ def _evaluated(
         return None
     extra: dict[str, Value] = {}
     randomness = None
+    if pairs is not None and pairs.vague:
+        constants.look(formula, ("i", "j", *pairs.known), random=True)
+        return None
     if pairs is not None:
         i, j = pairs.i[places], pairs.j[places]
         extra = {"i": i.astype(np.float64), "j": j.astype(np.float64), **pairs.known}

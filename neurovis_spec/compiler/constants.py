@@ -199,6 +199,13 @@ class Constants:
         result = self.unchecked(formula, extra, randomness, structural)
         return result if result is not None and check_finite(result, formula, self.findings) else None
 
+    def look(self, formula: Formula, extra: Collection[str] = (), random: bool = False) -> float | None:
+        """The value of a formula where it is not known what ``extra`` are; None where it depends on these, or draws."""
+        tree = self.tree(formula, extra, random)
+        if tree is None or not names(tree).isdisjoint(extra) or draws(tree):
+            return None
+        return self.scalar(formula)
+
     def scalar(self, formula: Formula, structural: bool = False) -> float | None:
         """The value of a formula that is one number."""
         value = self.value(formula, structural=structural)

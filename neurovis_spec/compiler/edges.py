@@ -38,10 +38,11 @@ class EdgeList:
 
 @dataclass(frozen=True)
 class EdgeReader:
-    """Reads the edges of one entry. ``sources`` and ``targets`` map the names that belong to its ends to positions."""
+    """Reads the edges of one entry. ``sources`` and ``targets`` map the names that belong to its ends to positions;
+    None where an end is at fault, whose names are not looked at then."""
 
-    sources: Mapping[str, int]
-    targets: Mapping[str, int]
+    sources: Mapping[str, int] | None
+    targets: Mapping[str, int] | None
     constants: Constants
     files: Files
     stream: Stream
@@ -59,33 +60,36 @@ class EdgeReader:
     def _written(self, cells: Cells) -> EdgeList | None:
         findings = self.constants.findings
         widths = cells.widths
-        wrong = np.flatnonzero((widths < 2) | (widths > 4))
+        right = (widths >= 2) & (widths <= 4)
+        wrong = np.flatnonzero(~right)
         for row in wrong[:PATIENCE].tolist():
-            findings.error("wrong-type", cells.row_span(row), _AN_EDGE)
-        if len(wrong):
-            return None
+            if widths[row] or not cells.failed:  # what failed may have been no row at all
+                findings.error("wrong-type", cells.row_span(row), _AN_EDGE)
         first = cells.starts[:-1]
-        i, j = self._ends(cells, first, self.sources, "source"), self._ends(cells, first + 1, self.targets, "target")
-        if i is None or j is None:
-            return None
-        weighted, delayed = np.flatnonzero(widths >= 3), np.flatnonzero(widths == 4)
-        weights = np.ones(len(widths))
-        given = self._given(cells, first[weighted] + 2, i[weighted], j[weighted])
+        i = self._ends(cells, first[right], self.sources, "source")
+        j = self._ends(cells, first[right] + 1, self.targets, "target")
+        weighted, delayed = np.flatnonzero(right & (widths >= 3)), np.flatnonzero(right & (widths == 4))
+        ends = None if i is None or j is None or len(wrong) else (i[weighted], j[weighted])
+        given = self._given(cells, first[weighted] + 2, ends)
         later = self._delays(cells, first[delayed] + 3)
-        if given is None or later is None:
+        if i is None or j is None or given is None or later is None or len(wrong) or cells.failed:
             return None
+        weights = np.ones(len(widths))
         weights[weighted] = given
         delays = np.full(len(widths), -1, dtype=np.int64)
         delays[delayed] = later
         return EdgeList(i, j, weights, delays)
 
-    def _ends(self, cells: Cells, which: IntArray, known: Mapping[str, int], what: str) -> IntArray | None:
+    def _ends(self, cells: Cells, which: IntArray, known: Mapping[str, int] | None, what: str) -> IntArray | None:
         """The positions of the neurons that these cells name."""
         findings = self.constants.findings
         no_names = which[cells.kinds[which] != TEXT]
         for cell in no_names[:PATIENCE].tolist():
+            if findings.at_fault(cells.node(cell).span):  # it is no cell at all
+                continue
             findings.error("wrong-type", cells.node(cell).span, f"the {what} of an edge is the name of a neuron")
-        if len(no_names):
+        which = which[cells.kinds[which] == TEXT]
+        if known is None:
             return None
         texts = cells.numbers[which].astype(np.int64)
         positions = np.array([known.get(text, -1) for text in cells.texts], dtype=np.int64)[texts]
@@ -93,17 +97,17 @@ class EdgeReader:
         _, once = np.unique(texts[unknown], return_index=True)
         for place in sorted(unknown[once].tolist())[:PATIENCE]:
             self._outside(cells.texts[int(texts[place])], cells.node(int(which[place])).span, known, what)
-        return None if len(unknown) else positions
+        return None if len(unknown) or len(no_names) else positions
 
-    def _given(self, cells: Cells, which: IntArray, i: IntArray, j: IntArray) -> FloatArray | None:
-        """The weights in these cells."""
+    def _given(self, cells: Cells, which: IntArray, ends: tuple[IntArray, IntArray] | None) -> FloatArray | None:
+        """The weights in these cells; they are looked at even if their ends are at fault."""
         missing = which[cells.kinds[which] == NULL]
         for cell in missing[:PATIENCE].tolist():
             formula_of(cells.node(cell), self.constants.findings)
-        if len(missing):
-            return None
-        sizes = {"n_from": float(len(self.sources)), "n_to": float(len(self.targets))}
-        return values_of(cells, which, self.constants, Pairs(i, j, sizes, self.stream))
+        sizes = {"n_from": float(len(self.sources or ())), "n_to": float(len(self.targets or ()))}
+        i, j = ends or (which, which)
+        values = values_of(cells, which, self.constants, Pairs(i, j, sizes, self.stream, vague=ends is None))
+        return None if len(missing) else values
 
     def _delays(self, cells: Cells, which: IntArray) -> IntArray | None:
         """The delays in these cells: few distinct ones, each looked at once."""
@@ -143,8 +147,10 @@ class EdgeReader:
         return EdgeList(i, j, table.weights, table.delays)
 
     def _named(
-        self, names: tuple[str, ...], rows: IntArray, known: Mapping[str, int], what: str, span: Span
+        self, names: tuple[str, ...], rows: IntArray, known: Mapping[str, int] | None, what: str, span: Span
     ) -> IntArray | None:
+        if known is None:
+            return None
         positions = np.array([known.get(name, -1) for name in names], dtype=np.int64)
         unknown = {names[place]: int(rows[place]) for place in reversed(np.flatnonzero(positions < 0).tolist())}
         for name in sorted(unknown, key=unknown.__getitem__)[:PATIENCE]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from neurovis_spec.compiler.network import FloatArray, IntArray, Rule
 from neurovis_spec.compiler.references import Directory, few, resolve_end
-from neurovis_spec.compiler.settings import check_initials, choose, parameters
+from neurovis_spec.compiler.settings import check_initials, choose, look_at_settings, parameters, settle
 from neurovis_spec.compiler.units import Unit
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.located import Located, shown
@@ -33,47 +33,51 @@ class Learning:
 
 def learning_of(
     choice: Choice,
-    targets: IntArray,
-    target_count: int,
+    targets: IntArray | None,
+    target_count: int | None,
     unit: Unit,
     directory: Directory,
     neurons: int,
 ) -> Learning | None:
-    """The rule of an entry whose connection c goes to the ``targets[c]``-th of ``target_count`` targets.
+    """The rule of an entry whose connection c goes to the ``targets[c]``-th of ``target_count`` targets; None where one
+    of these is not known: the entry is at fault, and its rule is looked at only.
 
     ``directory`` says what the names of the unit mean, ``neurons`` is how many the network has.
     """
     constants, definitions = unit.constants, unit.definitions
     found = choose(choice, definitions.rules, "rule", definitions, constants.findings)
     if found is None:
+        look_at_settings(choice, constants, ("i", "n"))
         return None
     rule, defaults = found
-    n = len(targets)
-    values = parameters(choice, defaults, n, constants, rule.signals)
+    known = (*(default.name for default in defaults), *rule.signals)
+    settled = settle(choice, known, constants.findings)
+    values = parameters(choice, defaults, None if targets is None else len(targets), constants, settled)
     signals: dict[str, IntArray] = {}
     failed = values is None
-    entries = {entry.name: entry for entry in choice.settings}
     for signal in rule.signals:
-        if signal not in entries:
-            message = f"the rule '{rule.name}' needs the signal '{signal}'"
-            hint = f"write {{{rule.name}: {{{signal}: NEURON_OR_INPUT}}}}"
-            constants.findings.error("missing-signal", choice.name.span, message, hint)
+        entry = settled.entries.get(signal)
+        if entry is None:
             failed = True
+            if signal not in settled.perhaps:
+                message = f"the rule '{rule.name}' needs the signal '{signal}'"
+                hint = f"write {{{rule.name}: {{{signal}: NEURON_OR_INPUT}}}}"
+                constants.findings.error("missing-signal", choice.name.span, message, hint)
             continue
-        where = _signal(entries[signal], targets, target_count, unit, directory, neurons)
+        where = _signal(entry, targets, target_count, unit, directory, neurons)
         if where is None:
             failed = True
         else:
             signals[signal] = where
     if failed or values is None or not check_initials(rule.state, values, choice, constants):
         return None
-    return Learning(rule, values, signals, _title(rule, values, entries))
+    return Learning(rule, values, signals, _title(rule, values, settled.entries))
 
 
 def _signal(
     entry: Entry,
-    targets: IntArray,
-    target_count: int,
+    targets: IntArray | None,
+    target_count: int | None,
     unit: Unit,
     directory: Directory,
     neurons: int,
@@ -102,10 +106,12 @@ def _signal(
         if found is None:
             return None
         where = np.array(found, dtype=np.int64)
-    if len(where) == 1:
+    if len(where) == 1 and targets is not None:
         return np.repeat(where, len(targets))
-    if len(where) == target_count:
+    if len(where) == target_count and targets is not None:
         return where[targets]
+    if target_count is None or len(where) in (1, target_count):
+        return None
     message = f"the signal '{name}' has {len(where)} components; 1 or {target_count}, one for each target, are wanted"
     findings.error("wrong-size", node.span, message)
     return None

@@ -40,9 +40,10 @@ class Grid:
 
 
 def grid_of(
-    matrix: Matrix, n: int, m: int, by_target: bool, constants: Constants, files: Files, stream: Stream
+    matrix: Matrix, n: int | None, m: int | None, by_target: bool, constants: Constants, files: Files, stream: Stream
 ) -> Grid | None:
-    """The numbers of a matrix from n sources to m targets; None where it is at fault.
+    """The numbers of a matrix from n sources to m targets; None where it is at fault. An end of which nothing is known
+    (None) is taken to be as large as the matrix has it, so that all else can be looked at.
 
     In its cells ``i`` is the source and ``j`` the target, also where ``by_target`` its rows are targets.
     """
@@ -53,36 +54,43 @@ def grid_of(
     return _written(matrix, n, m, by_target, constants, stream)
 
 
-def _written(matrix: Rows, n: int, m: int, by_target: bool, constants: Constants, stream: Stream) -> Grid | None:
+def _written(
+    matrix: Rows, n: int | None, m: int | None, by_target: bool, constants: Constants, stream: Stream
+) -> Grid | None:
     findings = constants.findings
     cells = cells_of(matrix.node, findings, "a row of a matrix is a list")
     if cells is None:
         return None
     widths = cells.widths
-    if not len(widths) or not widths[0]:
+    if cells.failed:
+        uneven = widths[:0]  # a row may be none
+    elif not len(widths) or not widths[0]:
         span = cells.row_span(0) if len(widths) else matrix.span
         findings.error("wrong-size", span, "a matrix needs at least one row, and a row at least one cell")
         return None
-    uneven = np.flatnonzero(widths != widths[0])
+    else:
+        uneven = np.flatnonzero(widths != widths[0])
     for row in uneven[:PATIENCE].tolist():
         message = f"this row has {plural(int(widths[row]), 'cell')}, the first has {widths[0]}"
         findings.error("ragged-matrix", cells.row_span(row), message)
-    if len(uneven):
-        return None
     rows, columns = cells.rows(), cells.columns()
     i, j = (columns, rows) if by_target else (rows, columns)
-    pairs = Pairs(i, j, {"n_from": float(n), "n_to": float(m)}, stream)
+    shape = (len(widths), int(widths.max(initial=0)))
+    own = shape[::-1] if by_target else shape
+    known = {"n_from": float(own[0] if n is None else n), "n_to": float(own[1] if m is None else m)}
+    pairs = Pairs(i, j, known, stream, vague=cells.failed)
     values = values_of(cells, np.arange(len(rows)), constants, pairs)
-    if values is None:
+    if values is None or len(uneven) or cells.failed:
         return None
-    shape = (len(widths), int(widths[0]))
     grid = Grid(values.reshape(shape), (cells.kinds != NULL).reshape(shape), matrix.span)
     return fit(grid, n, m, by_target, findings)
 
 
-def fit(grid: Grid, n: int, m: int, by_target: bool, findings: Findings) -> Grid | None:
-    """The grid with sources as rows, of n × m; a shape that fits only when transposed is an error that says so."""
+def fit(grid: Grid, n: int | None, m: int | None, by_target: bool, findings: Findings) -> Grid | None:
+    """The grid with sources as rows, of n × m; a shape that fits only when transposed is an error that says so. A size
+    that is not known (None) fits."""
     oriented = grid.transposed() if by_target else grid
+    n, m = (own if size is None else size for own, size in zip(oriented.shape, (n, m), strict=True))
     if oriented.shape == (n, m):
         return oriented
     rows, columns = grid.shape

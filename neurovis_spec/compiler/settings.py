@@ -6,51 +6,114 @@ every parameter, one for each of n neurons; the neuron's index ``i`` and the cou
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
 
 from neurovis_spec.compiler.constants import Constants, Randomness, Value
-from neurovis_spec.compiler.definitions import Defaults, Definitions, check_bounds
+from neurovis_spec.compiler.definitions import Default, Defaults, Definitions, check_bounds
 from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.limits import PATIENCE, plural
 from neurovis_spec.compiler.network import FloatArray, Quantity
-from neurovis_spec.diagnostics import Findings, suggest
+from neurovis_spec.diagnostics import Findings, meant, nearest, suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
-from neurovis_spec.language.located import Formula, formula_of, shown
-from neurovis_spec.language.source import Entry, Packed, Sequence
+from neurovis_spec.language.expressions.tree import names
+from neurovis_spec.language.located import IDENTIFIER, Formula, formula_of, shown
+from neurovis_spec.language.source import Entry, Packed, Scalar, Sequence
 from neurovis_spec.language.values import Choice, FormulaList
 
 T = TypeVar("T")
+
+#: Values of a list that are looked at where it is not known how many there should be.
+_MOST_LOOKS = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """Settings by name; ``perhaps`` are names that an unknown one may be meant for. ``failed``: one was unknown."""
+
+    entries: Mapping[str, Entry]
+    perhaps: frozenset[str]
+    failed: bool
 
 
 def choose(
     choice: Choice, known: Mapping[str, tuple[T, Defaults]], what: str, definitions: Definitions, findings: Findings
 ) -> tuple[T, Defaults] | None:
-    """The definition that a choice names; an unknown name is answered with the nearest ones."""
+    """The definition that a choice names; an unknown name is answered with the nearest ones, and taken for the one that
+    it can only be meant for."""
     name = choice.name
     found = known.get(name.value)
     if found is None and not definitions.gaps.cover(f"{what}s", name.value):
         hint = suggest(name.value, known, "known")
         findings.error(f"unknown-{what}", name.span, f"there is no {what} '{shown(name.value)}'", hint)
+        right = meant(name.value, known)
+        found = None if right is None else known[right]
     return found
 
 
+def settle(choice: Choice, known: Collection[str], findings: Findings) -> Settled:
+    """The settings of a choice by the names of its definition. An unknown one is a finding, and is taken for the one
+    that it can only be meant for."""
+    entries = {entry.name: entry for entry in choice.settings if entry.name in known}
+    perhaps: set[str] = set()
+    failed = False
+    for entry in choice.settings:
+        if entry.name in known:
+            continue
+        failed = True
+        hint = suggest(entry.name, known, "known here") or "it has no parameters"
+        message = f"there is no parameter '{shown(entry.name)}'"
+        findings.error("unknown-parameter", entry.key.span, message, hint)
+        free = [name for name in known if name not in entries]
+        right = meant(entry.name, free)
+        if right is None:
+            perhaps.update(nearest(entry.name, free))
+        else:
+            entries[right] = entry
+    return Settled(entries, frozenset(perhaps), failed)
+
+
+def look_at_settings(choice: Choice, constants: Constants, extra: tuple[str, ...] = ()) -> None:
+    """What can be said of the settings of a definition that is not known: those that are formulas, not names."""
+    for entry in choice.settings:
+        nodes = entry.value.items if isinstance(entry.value, (Sequence, Packed)) else (entry.value,)
+        for node in nodes[:_MOST_LOOKS]:
+            name = isinstance(node, Scalar) and isinstance(node.value, str) and IDENTIFIER.fullmatch(node.value.strip())
+            formula = None if name else formula_of(node, Findings())
+            if formula is not None:
+                constants.look(formula, extra)
+
+
 def spread(
-    formulas: Formula | FormulaList, n: int, constants: Constants, what: str, stream: Stream | None = None
+    formulas: Formula | FormulaList, n: int | None, constants: Constants, what: str, stream: Stream | None = None
 ) -> FloatArray | None:
-    """One value for each of n neurons: from one formula of ``i`` and ``n``, or from a list of n.
+    """One value for each of n neurons: from one formula of ``i`` and ``n``, or from a list of n. Where n is not known,
+    one value for all, or None.
 
     With a stream the formulas may draw random numbers; the counter of neuron i is (i, 0, 0, number of the draw).
     """
+    if n is None:
+        return _looked_at(formulas, constants, stream is not None)
     if isinstance(formulas, FormulaList):
         return _listed(formulas, n, constants, what, stream)
     index = np.arange(n, dtype=np.int64)
     randomness = None if stream is None else Randomness(stream, index)
     value = constants.value(formulas, {"i": index.astype(np.float64), "n": float(n)}, randomness)
     return None if value is None else np.broadcast_to(np.asarray(value, dtype=np.float64), (n,)).copy()
+
+
+def _looked_at(formulas: Formula | FormulaList, constants: Constants, random: bool) -> FloatArray | None:
+    """The value of a formula that depends on no neuron; the others are looked at."""
+    if isinstance(formulas, FormulaList):
+        for item in formulas.items[:_MOST_LOOKS]:
+            constants.look(item, ("i", "n"), random)
+        return None
+    value = constants.look(formulas, ("i", "n"), random)
+    return None if value is None else np.array([value], dtype=np.float64)
 
 
 def _listed(formulas: FormulaList, n: int, constants: Constants, what: str, stream: Stream | None) -> FloatArray | None:
@@ -89,57 +152,53 @@ def _formulas(entry: Entry, constants: Constants) -> Formula | FormulaList | Non
 
 
 def parameters(
-    choice: Choice, defaults: Defaults, n: int, constants: Constants, allowed: tuple[str, ...] = ()
+    choice: Choice,
+    defaults: Defaults,
+    n: int | None,
+    constants: Constants,
+    settled: Settled | None = None,
 ) -> dict[str, FloatArray] | None:
-    """The value of every parameter of a definition for n neurons or connections.
+    """The value of every parameter of a definition for n neurons or connections; None where one is at fault, or where n
+    is not known and one depends on it.
 
-    ``allowed`` are further keys (signals) that the caller reads itself.
+    ``settled`` are its settings, where the caller has looked at them for more than the parameters.
     """
-    given = _given(choice.settings, defaults, n, constants, allowed)
-    if given is None:
-        return None
     findings = constants.findings
-    entries = {entry.name: entry for entry in choice.settings}
+    settled = settled or settle(choice, tuple(default.name for default in defaults), findings)
     values: dict[str, Value] = {**CONSTANTS, "dt": constants.dt}
     result: dict[str, FloatArray] = {}
     for default in defaults:
-        name = default.name
-        value = given.get(name)
+        entry = settled.entries.get(default.name)
+        value = _default(default, n, values) if entry is None else _setting(entry, default.name, n, constants)
         if value is None:
-            value = np.broadcast_to(np.asarray(evaluate_array(default.value, values), dtype=np.float64), (n,)).copy()
-            if not np.isfinite(value).all():
-                message = f"with these settings the default of '{name}' is not a finite number"
-                findings.error("not-finite", choice.name.span, message)
-                return None
-        values[name] = result[name] = value
-        span = entries[name].value.span if name in entries else choice.name.span
-        # A default that lies outside by itself is a finding of the definition.
-        if given and not check_bounds(value, default, values, span, findings):
+            continue
+        if entry is None and not np.isfinite(value).all():
+            message = f"with these settings the default of '{default.name}' is not a finite number"
+            findings.error("not-finite", choice.name.span, message)
             return None
-    return result
+        values[default.name] = value
+        span = choice.name.span if entry is None else entry.value.span
+        # A default that lies outside by itself is a finding of the definition.
+        if not settled.entries or (_bounded(default, values) and check_bounds(value, default, values, span, findings)):
+            result[default.name] = value
+    return None if settled.failed or len(result) < len(defaults) else result
 
 
-def _given(
-    entries: tuple[Entry, ...], defaults: Defaults, n: int, constants: Constants, allowed: tuple[str, ...]
-) -> dict[str, FloatArray] | None:
-    """The settings as written; None where one of them is at fault."""
-    names = tuple(default.name for default in defaults)
-    given: dict[str, FloatArray] = {}
-    failed = False
-    for entry in entries:
-        if entry.name in names:
-            formulas = _formulas(entry, constants)
-            value = None if formulas is None else spread(formulas, n, constants, f"'{entry.name}'")
-            failed = failed or value is None
-            if value is not None:
-                given[entry.name] = value
-        elif entry.name not in allowed:
-            failed = True
-            known = (*names, *allowed)
-            hint = suggest(entry.name, known, "known here") or "it has no parameters"
-            message = f"there is no parameter '{shown(entry.name)}'"
-            constants.findings.error("unknown-parameter", entry.key.span, message, hint)
-    return None if failed else given
+def _setting(entry: Entry, name: str, n: int | None, constants: Constants) -> FloatArray | None:
+    formulas = _formulas(entry, constants)
+    return None if formulas is None else spread(formulas, n, constants, f"'{name}'")
+
+
+def _default(default: Default, n: int | None, values: Mapping[str, Value]) -> FloatArray | None:
+    """The value of a parameter that is not set; None where it depends on one that is at fault."""
+    if not names(default.value) <= values.keys():
+        return None
+    return np.broadcast_to(np.asarray(evaluate_array(default.value, values), dtype=np.float64), (n or 1,)).copy()
+
+
+def _bounded(default: Default, values: Mapping[str, Value]) -> bool:
+    """Whether the bounds of a parameter are known."""
+    return all(names(bound) <= values.keys() for bound in (default.low, default.high) if bound is not None)
 
 
 def check_initials(

@@ -83,13 +83,13 @@ def _inline(node: Sequence | Packed, constants: Constants) -> FloatArray | None:
         return None
     missing = np.flatnonzero(cells.kinds == NULL)
     for cell in missing[:PATIENCE].tolist():
-        formula_of(cells.node(cell), findings)
+        formula_of(cells.node(cell), findings)  # once more where it is no cell: a finding counts once
     uneven = np.flatnonzero((widths != widths[0]) if widths[0] else widths == 0)
-    for row in () if len(missing) else uneven[:PATIENCE].tolist():
+    for row in () if len(missing) or cells.failed else uneven[:PATIENCE].tolist():
         wanted = f"{amount(int(widths[0]))}, as in the first row" if widths[0] else "at least one"
         message = f"a row of {plural(int(widths[row]), 'number')}; expected {wanted}"
         findings.error("wrong-size", cells.row_span(row), message)
-    if len(uneven) or len(missing):
-        return None
     values = values_of(cells, np.arange(len(cells.kinds)), constants)
+    if len(uneven) or len(missing) or cells.failed:
+        return None
     return None if values is None else values.reshape(len(widths), int(widths[0]))
