@@ -10,7 +10,7 @@ from data_attempts import npz
 from small_specs import compiled, network_of, wires
 
 from neurovis_spec.diagnostics import Findings, Span
-from neurovis_spec.language.data_files import Table, read_table
+from neurovis_spec.language.data_files import Room, Table, read_table
 from neurovis_spec.language.located import Located
 
 NEURONS = "neurons: {A: {count: 2, bias: 1}, B: {count: 3}, D: {count: 3, combine: distance, activation: gaussian}}\n"
@@ -71,10 +71,18 @@ def test_a_file_is_read_once_for_each_key(folder: Path, monkeypatch: pytest.Monk
     read: list[tuple[str, str | None]] = []
 
     def counting(
-        path: str, root: Path, base: Path, span: Span, findings: Findings, key: Located[str] | None, *, keyed: bool
+        path: str,
+        root: Path,
+        base: Path,
+        span: Span,
+        findings: Findings,
+        key: Located[str] | None,
+        *,
+        keyed: bool,
+        room: Room,
     ) -> Table | None:
         read.append((path, None if key is None else key.value))
-        return read_table(path, root, base, span, findings, key, keyed=keyed)
+        return read_table(path, root, base, span, findings, key, keyed=keyed, room=room)
 
     monkeypatch.setattr("neurovis_spec.compiler.tables.read_table", counting)
     bodies = ["{matrix: {file: w.npz, key: weights}}", "{matrix: {file: w.npz, key: turned}, rows: to}"]

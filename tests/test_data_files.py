@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 
 from neurovis_spec.diagnostics import Diagnostic, Findings
 from neurovis_spec.language.data_files import EdgeTable, read_edges, read_table
-from neurovis_spec.language.data_files_csv import parse_edges, parse_numbers, parse_rows
+from neurovis_spec.language.data_files_csv import parse_numbers
+from neurovis_spec.language.data_files_edges import parse_edges
 from neurovis_spec.language.data_files_npy import parse_npy
 from neurovis_spec.language.data_files_table import CellError
 
@@ -85,7 +86,7 @@ def test_csv_numbers_read_back_exactly(rows: list[list[float]]) -> None:
         ('1,"2\n', "file-format", "no CSV"),
         ("1,2\x00\n", "file-format", "row 1, column 2"),
         ("1," + "9" * 200_000, "file-format", "row 1"),
-        ("x,y\n1,2\n" + "9" * 200_000, "file-format", "row 3 is no CSV"),
+        ("x,y\n1,2\n" + "9" * 200_000, "file-format", "row 3, column 1: no number or name"),
         ("1,\x1b[2J\n", "file-format", "row 1, column 2: '?[2J' is no number"),
     ],
 )
@@ -204,7 +205,7 @@ def test_nothing_but_its_own_error_leaves_a_parser(noise: bytes, at: int, patch:
             continue
         assert np.isfinite(values).all()
     for data in (noise, b"from,to,weight\n" + noise):
-        for parse in (parse_numbers, lambda data: parse_edges(parse_rows(data))):
+        for parse in (parse_numbers, parse_edges):
             with suppress(CellError):
                 parse(data)
 

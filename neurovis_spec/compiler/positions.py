@@ -80,7 +80,7 @@ def positions_of(
 
 
 def _from_file(reference: FileReference, n: int, constants: Constants, files: Files) -> FloatArray | None:
-    table = files.table(reference)
+    table = files.table(reference, (n, 2))
     if table is None:
         return None
     rows, columns = table.values.shape

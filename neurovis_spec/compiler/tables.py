@@ -1,17 +1,53 @@
 """Data files of a spec: where they may lie, and that each is read once.
 
-In: the folder of the spec and the root that no path may leave. Out: tables of numbers and lists of edges.
+In: the folder of the spec and the root that no path may leave. Out: tables of numbers and lists of edges. What is much
+too large for the place that names it is refused before it is made.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Generic, TypeVar
 
+from neurovis_spec.compiler.limits import amount
 from neurovis_spec.diagnostics import Findings
-from neurovis_spec.language.data_files import EdgeTable, Table, read_edges, read_table
+from neurovis_spec.language.data_files import CellError, EdgeTable, Room, Table, read_edges, read_table
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.values import FileReference
+
+T = TypeVar("T")
+#: Cells of a table that is read whatever its place needs: what is said of it then is more exact.
+_FEW = 1 << 16
+
+
+@dataclass
+class _Shelf(Generic[T]):
+    """What was read, each file once; None where it is at fault."""
+
+    read: dict[Hashable, T | None] = field(default_factory=dict)
+    #: what was too large for a place, with what there is room for; another place may have more
+    refused: set[Hashable] = field(default_factory=set)
+
+    def get(self, file: Hashable, place: Hashable, room: Room, read: Callable[[Room], T | None]) -> T | None:
+        """What ``read`` makes of a file in which there is room at a place for so much."""
+        if file in self.read:
+            return self.read[file]
+        if (file, place) in self.refused:
+            return None
+
+        def noting(count: int) -> None:
+            try:
+                room(count)
+            except CellError:
+                self.refused.add((file, place))
+                raise
+
+        found = read(noting)
+        if (file, place) not in self.refused:
+            self.read[file] = found
+        return found
 
 
 @dataclass
@@ -21,29 +57,40 @@ class Files:
     base: Path
     root: Path
     findings: Findings
-    _tables: dict[tuple[str, str | None, bool], Table | None] = field(default_factory=dict)
-    _edges: dict[tuple[str, str | None], EdgeTable | None] = field(default_factory=dict)
+    _tables: _Shelf[Table] = field(default_factory=_Shelf)
+    _edges: _Shelf[EdgeTable] = field(default_factory=_Shelf)
 
-    def table(self, reference: FileReference) -> Table | None:
-        """The numbers of a file, and where it has none; None where it is at fault."""
-        return self._table(reference.path, reference.key, keyed=True)
+    def table(self, reference: FileReference, shape: tuple[int, int] | None = None) -> Table | None:
+        """The numbers of a file, and where it has none; None where it is at fault. A table of many more cells than the
+        ``shape`` that its place needs is refused; whether a smaller one fits, the caller has to say."""
+        return self._table(reference.path, reference.key, shape, keyed=True)
 
     def table_at(self, path: Located[str]) -> Table | None:
-        """The same of a path alone, beside which no ``key`` can stand."""
-        return self._table(path, None, keyed=False)
+        """The same of a path alone, beside which no ``key`` can stand, and of any size."""
+        return self._table(path, None, None, keyed=False)
 
-    def edges(self, reference: FileReference) -> EdgeTable | None:
-        """The edges of a ``.csv`` file; None where it is at fault."""
+    def edges(self, reference: FileReference, most: int | None = None) -> EdgeTable | None:
+        """The edges of a ``.csv`` file, at most so many; None where it is at fault."""
         path, key = reference.path, reference.key
-        known = (path.value, None if key is None else key.value)
-        if known not in self._edges:
-            self._edges[known] = read_edges(path.value, self.root, self.base, path.span, self.findings, key)
-        return self._edges[known]
 
-    def _table(self, path: Located[str], key: Located[str] | None, *, keyed: bool) -> Table | None:
-        known = (path.value, None if key is None else key.value, keyed)
-        if known not in self._tables:
-            self._tables[known] = read_table(
-                path.value, self.root, self.base, path.span, self.findings, key, keyed=keyed
-            )
-        return self._tables[known]
+        def room(edges: int) -> None:
+            if most is not None and edges > most:
+                message = f"it has {amount(edges)} edges; {amount(most)} more connections may be made"
+                raise CellError("too-many", message, "raise the limit with --limit")
+
+        def read(room: Room) -> EdgeTable | None:
+            return read_edges(path.value, self.root, self.base, path.span, self.findings, key, room=room)
+
+        return self._edges.get((path.value, None if key is None else key.value), most, room, read)
+
+    def _table(
+        self, path: Located[str], key: Located[str] | None, shape: tuple[int, int] | None, *, keyed: bool
+    ) -> Table | None:
+        def room(cells: int) -> None:
+            if shape is not None and cells > max(_FEW, 2 * shape[0] * shape[1]):  # a header counts as well
+                raise CellError("wrong-size", f"it has {amount(cells)} cells; {shape[0]} × {shape[1]} are wanted")
+
+        def read(room: Room) -> Table | None:
+            return read_table(path.value, self.root, self.base, path.span, self.findings, key, keyed=keyed, room=room)
+
+        return self._tables.get((path.value, None if key is None else key.value, keyed), shape, room, read)

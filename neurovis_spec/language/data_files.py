@@ -11,17 +11,20 @@ from pathlib import Path, PureWindowsPath
 from typing import Final
 
 from neurovis_spec.diagnostics import Findings, Span, suggest
-from neurovis_spec.language.data_files_csv import EdgeTable, parse_edges, parse_numbers, parse_rows
+from neurovis_spec.language.data_files_csv import parse_numbers
+from neurovis_spec.language.data_files_edges import EdgeTable, parse_edges
 from neurovis_spec.language.data_files_mtx import parse_mtx
 from neurovis_spec.language.data_files_npy import parse_npy
 from neurovis_spec.language.data_files_npz import parse_npz
-from neurovis_spec.language.data_files_table import CellError, Table, full
+from neurovis_spec.language.data_files_table import CellError, Room, Table, full
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.reader_files import FileFault, read_bytes
 
-__all__ = ["KINDS", "EdgeTable", "Table", "locate", "read_data", "read_edges", "read_table"]
+__all__ = ["KINDS", "CellError", "EdgeTable", "Room", "Table", "locate", "read_data", "read_edges", "read_table"]
 
 LARGEST: Final = 256 << 20  # bytes; ten million connections in double precision are 80 MB
+#: characters of a path: what common systems take
+LONGEST_PATH: Final = 4096
 #: files that hold a table of numbers
 KINDS: Final = (".csv", ".npy", ".npz", ".mtx")
 
@@ -34,6 +37,10 @@ def locate(path_text: str, root: Path, base: Path, span: Span, findings: Finding
     shown = _short(path_text)
     if not path_text or "\0" in path_text:
         findings.error("file-missing", span, "this is no path of a file")
+        return None
+    if len(path_text) > LONGEST_PATH:
+        message = f"a path of {len(path_text):,} characters is no path of a file; {LONGEST_PATH:,} are the most"
+        findings.error("file-missing", span, message)
         return None
     if Path(path_text).is_absolute() or PureWindowsPath(path_text).drive or path_text.startswith(("/", "\\")):
         hint = "paths are relative to the file that names them"
@@ -75,13 +82,14 @@ def read_table(
     *,
     keyed: bool = True,
     kinds: Iterable[str] = KINDS,
+    room: Room | None = None,
 ) -> Table | None:
     """A table of numbers from a file of one of these ``kinds``; an array of one dimension is a column.
 
     A ``.csv`` may begin with a row of texts, the header; its empty cells are absent, and so is what an ``.mtx`` and a
     sparse ``.npz`` leave out. ``key`` names an array of an ``.npz``; ``keyed`` says whether the author can give one at
-    this place. Codes: those of ``read_data``, and ``file-format``, ``invalid-utf8``, ``not-finite``, ``missing-key``,
-    ``unknown-array``, ``useless-key``.
+    this place. ``room`` may refuse a table for its size before it is made. Codes: those of ``read_data`` and ``room``,
+    and ``file-format``, ``invalid-utf8``, ``not-finite``, ``missing-key``, ``unknown-array``, ``useless-key``.
     """
     suffix = Path(path_text).suffix.lower()
     if suffix not in kinds:
@@ -96,12 +104,12 @@ def read_table(
         return None
     try:
         if suffix == ".csv":
-            return parse_numbers(data)
+            return parse_numbers(data, room)
         if suffix == ".npy":
-            return full(parse_npy(data))
+            return full(parse_npy(data, room))
         if suffix == ".mtx":
-            return parse_mtx(data)
-        return parse_npz(data, None if key is None else key.value)
+            return parse_mtx(data, room)
+        return parse_npz(data, None if key is None else key.value, room)
     except CellError as error:
         if error.code == "missing-key" and not keyed:
             error = CellError("file-format", str(error), "keep the one that is meant in a file of its own")
@@ -111,12 +119,20 @@ def read_table(
 
 
 def read_edges(
-    path_text: str, root: Path, base: Path, span: Span, findings: Findings, key: Located[str] | None = None
+    path_text: str,
+    root: Path,
+    base: Path,
+    span: Span,
+    findings: Findings,
+    key: Located[str] | None = None,
+    *,
+    room: Room | None = None,
 ) -> EdgeTable | None:
     """A list of edges from a ``.csv`` file whose header names the columns from, to, weight and perhaps delay.
 
-    An empty weight is 1, an empty delay −1; a ``key`` is refused. Codes: those of ``read_data``, and ``file-format``,
-    ``invalid-utf8``, ``not-finite``, ``useless-key``.
+    An empty weight is 1, an empty delay −1; a ``key`` is refused; ``room`` may refuse so many edges before they are
+    made. Codes: those of ``read_data`` and of ``room``, and ``file-format``, ``invalid-utf8``, ``not-finite``,
+    ``useless-key``.
     """
     if Path(path_text).suffix.lower() != ".csv":
         findings.error("file-format", span, f"edges are read from a .csv file, not from '{_short(path_text)}'")
@@ -128,7 +144,7 @@ def read_edges(
     if data is None:
         return None
     try:
-        return parse_edges(parse_rows(data))
+        return parse_edges(data, room)
     except CellError as error:
         _refuse(error, path_text, span, findings)
         return None

@@ -1,190 +1,215 @@
-"""Tables and edge lists from the bytes of a ``.csv`` file.
+"""Tables of numbers from the bytes of a ``.csv`` file, and its rows.
 
-In: bytes. Out: numbers in rows, or edges. A fault is a CellError that names row and column as an editor or a
-spreadsheet counts them (from 1, the header included).
+In: bytes. Out: numbers in rows, or rows of texts. A fault is a CellError that names row and column as an editor or a
+spreadsheet counts them (from 1, the header included). Cells are turned into numbers many at a time; they are looked at
+one by one only among the few where something is wrong.
 """
 
 from __future__ import annotations
 
 import csv
 import io
-import math
-import re
 from array import array
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from itertools import chain
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from neurovis_spec.diagnostics import nearest
-from neurovis_spec.language.data_files_table import CellError, Table, check_cells, full, quoted
+from neurovis_spec.language.data_files_cells import (
+    LONGEST_CELL,
+    check_lengths,
+    check_utf8,
+    counted,
+    is_number,
+    number_of,
+    numbers_in,
+    numbers_of,
+)
+from neurovis_spec.language.data_files_table import CellError, Room, Table, check_cells
 
-_NUMBER: Final = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
-_NOT_FINITE: Final = re.compile(r"[-+]?\.?(?:nan|inf|infinity)", re.IGNORECASE)
-_UNEVEN: Final = re.compile(rb"(?:\A|\n)\s*\n|\r(?!\n)|,\s*,|,\s*\n|\n\s*,")
-_PLAIN: Final = b"0123456789+-.eE,\r\n "
-_LONGEST_NUMBER: Final = 1000
-_EDGE_COLUMNS: Final = ("from", "to", "weight", "delay")
-_LARGEST_DELAY: Final = 2**31 - 1
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class EdgeTable:
-    """A list of edges, one an index. ``rows`` are the rows of the file in which they stand, from 1; a delay is −1
-    where the file gives none."""
-
-    sources: tuple[str, ...]
-    targets: tuple[str, ...]
-    weights: NDArray[np.float64]
-    delays: NDArray[np.int64]
-    rows: NDArray[np.int64]
+#: bytes, and cells, that are made numbers of together; and cells among which one that is at fault is looked for
+_STRETCH: Final = 1 << 18
+_BATCH: Final = 1 << 14
+_FEW: Final = 1 << 10
+_MARK: Final = b"\xef\xbb\xbf"
 
 
-class _Row(NamedTuple):
+class Row(NamedTuple):
+    """The number of a row, and its cells as they are written."""
+
     number: int
     cells: list[str]
 
+    def stripped(self) -> Row:
+        """The same without blanks around the cells."""
+        return Row(self.number, [cell.strip() for cell in self.cells])
 
-def parse_rows(data: bytes) -> Iterator[_Row]:
-    """The cells of a file, row by row, blanks around them removed; empty rows at the end are none. Raises CellError."""
+
+def read_rows(data: bytes) -> Iterator[Row]:
+    """The cells of a file, row by row; empty rows at the end are none. Raises CellError."""
+    check_lengths(data)
+    check_utf8(data)
     reader = csv.reader(io.TextIOWrapper(io.BytesIO(data.rstrip(b"\r\n")), "utf-8-sig", newline=""), strict=True)
     try:
         for cells in reader:
-            yield _Row(reader.line_num, [cell.strip() for cell in cells])
-    except UnicodeDecodeError:
-        raise _not_utf8(data) from None
+            yield Row(reader.line_num, cells)
     except csv.Error as error:
         raise CellError("file-format", f"row {reader.line_num} is no CSV: {error}") from error
     if not reader.line_num:
-        raise CellError("file-format", "the file is empty")
+        raise empty()
 
 
-def _not_utf8(data: bytes) -> CellError:
+def batches(rows: Iterable[Row]) -> Iterator[list[Row]]:
+    """Rows, many together. Those before one that cannot be read come all the same. Raises CellError."""
+    batch: list[Row] = []
+    cells = 0
     try:
-        data.decode("utf-8")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        return CellError("invalid-utf8", f"row {line} is not UTF-8", "save the file as UTF-8")
-    raise AssertionError("what could not be decoded in parts cannot be decoded as a whole")
+        for row in rows:
+            batch.append(row)
+            cells += 1 + len(row.cells)
+            if cells > _BATCH:
+                yield batch
+                batch, cells = [], 0
+    except CellError:
+        yield batch
+        raise
+    yield batch
 
 
-def parse_numbers(data: bytes) -> Table:
+def plain_lines(data: bytes) -> bytes:
+    """The same file with line feeds alone at the ends of its lines and no byte-order mark. Raises CellError."""
+    check_lengths(data)
+    check_utf8(data)
+    data = data.removeprefix(_MARK).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    if not data:
+        raise empty()
+    return data
+
+
+def parse_numbers(data: bytes, room: Room | None = None) -> Table:
     """Numbers in rows of one width, after a header of texts, if there is one. Raises CellError."""
     data = data.rstrip(b"\r\n")
     # the separators bound the cells, before any are made
-    check_cells(1 + data.count(b",") + max(data.count(b"\n"), data.count(b"\r")))
-    plain = _parse_plain(data)
-    if plain is not None:
-        return plain
+    cells = 1 + data.count(b",") + max(data.count(b"\n"), data.count(b"\r"))
+    check_cells(cells)
+    if room is not None:
+        room(cells)
+    if b'"' not in data:
+        return _unquoted(plain_lines(data), cells)
+    rows = read_rows(data)
+    first = next(rows)
+    header, width = _header(first), len(first.cells) or 1
     numbers = array("d")
-    width, header = 0, None
-    for row in parse_rows(data):
-        if not width:
-            width = len(row.cells) or 1
-            header = _header(row)
-            if header is not None:
-                continue
-        cells = row.cells or [""]  # an empty line of a file with one column is an empty cell
-        if len(cells) != width:
-            message = f"row {row.number} has {_count(len(cells))}, the first row {width}"
-            raise CellError("file-format", message, "rows of a table are equally long")
-        numbers.extend([_number(cell, row.number, column) for column, cell in enumerate(cells, 1)])
-    if not numbers:
+    for batch in batches(rows if header is not None else chain((first,), rows)):
+        numbers.frombytes(_numbers(batch, width).tobytes())
+    return _table(np.frombuffer(numbers, dtype=np.float64), width, header)
+
+
+def _table(numbers: NDArray[np.float64], width: int, header: tuple[str, ...] | None) -> Table:
+    if not len(numbers):
         raise CellError("file-format", "there is a header but no row of numbers")
-    values = np.array(numbers, dtype=np.float64).reshape(-1, width)
+    values = numbers.reshape(-1, width)
     return Table(values, ~np.isnan(values), header)
 
 
-def _parse_plain(data: bytes) -> Table | None:
-    """The quick way for a file of nothing but digits, signs, commas and line ends; None leaves it to the slow one."""
-    if not data or data.translate(None, _PLAIN) or _UNEVEN.search(data):
-        return None
-    try:
-        values = np.loadtxt(io.BytesIO(data), delimiter=",", ndmin=2, comments=None, dtype=np.float64)
-    except (ValueError, OverflowError):
-        return None
-    return full(values) if np.isfinite(values).all() else None
-
-
-def _header(row: _Row) -> tuple[str, ...] | None:
+def _header(row: Row) -> tuple[str, ...] | None:
     """The first row if it is one of texts: no cell of it is a number, and one at least is not empty."""
-    if any(_NUMBER.fullmatch(cell) or _NOT_FINITE.fullmatch(cell) for cell in row.cells) or not any(row.cells):
-        return None
-    return tuple(row.cells)
+    filled = False
+    for cell in map(str.strip, filter(None, row.cells)):
+        if is_number(cell):
+            return None
+        filled = filled or bool(cell)
+    return tuple(row.stripped().cells) if filled else None
 
 
-def _number(cell: str, row: int, column: int) -> float:
-    """A cell's number, NaN for an empty cell. Raises CellError."""
-    if not cell:
-        return math.nan
-    plain = len(cell) <= _LONGEST_NUMBER and _NUMBER.fullmatch(cell)
-    if plain and math.isfinite(value := float(cell)):
-        return value
-    place = f"row {row}, column {column}"
-    if plain:
-        raise CellError("not-finite", f"{place}: {quoted(cell)} is beyond double precision")
-    if _NOT_FINITE.fullmatch(cell):
-        raise CellError("not-finite", f"{place}: '{cell}' is not finite", "an empty cell means that there is none")
-    hint = "columns are separated by commas" if ";" in cell or "\t" in cell else None
-    raise CellError("file-format", f"{place}: {quoted(cell)} is no number", hint)
+def _numbers(batch: list[Row], width: int) -> NDArray[np.float64]:
+    """The numbers of some rows, one behind the other, NaN for an empty cell. Raises CellError."""
+    rows = [row.cells or [""] for row in batch]  # an empty line of a file with one column is an empty cell
+    if all(len(cells) == width for cells in rows):
+        quick = numbers_of(list(chain.from_iterable(rows)))
+        if quick is not None:
+            return quick
+    parts: list[NDArray[np.float64]] = []
+    for (number, _), cells in zip(batch, rows, strict=True):
+        if len(cells) != width:
+            raise _ragged(number, len(cells), width)
+        parts.append(_one_by_one(cells, number, 0, width))
+    return np.concatenate(parts)
 
 
-def parse_edges(rows: Iterable[_Row]) -> EdgeTable:
-    """EdgeTable from rows whose first one names the columns, in any order. Raises CellError."""
-    rows = iter(rows)
-    names = [cell.casefold() for cell in next(rows).cells]
-    places = _edge_columns(names)
-    known: dict[str, str] = {}
-    ends: dict[str, list[str]] = {"from": [], "to": []}
-    weights, delays, numbers = array("d"), array("q"), array("q")
-    for row in rows:
-        if len(row.cells) != len(names):
-            raise CellError("file-format", f"row {row.number} has {_count(len(row.cells))}, the header {len(names)}")
-        for end, called in ends.items():
-            cell = row.cells[places[end]]
-            if not cell:
-                message = f"row {row.number}, column {places[end] + 1}: the name of a neuron is wanted"
-                raise CellError("file-format", message)
-            called.append(known.setdefault(cell, cell))  # one text for all edges of a neuron
-        weight = _number(row.cells[places["weight"]], row.number, places["weight"] + 1)
-        weights.append(1.0 if math.isnan(weight) else weight)
-        delays.append(_delay(row, places["delay"]) if "delay" in places else -1)
-        numbers.append(row.number)
-    return EdgeTable(
-        tuple(ends["from"]),
-        tuple(ends["to"]),
-        np.array(weights, dtype=np.float64),
-        np.array(delays, dtype=np.int64),
-        np.array(numbers, dtype=np.int64),
-    )
+def _unquoted(data: bytes, cells: int) -> Table:
+    """The same of a file in which every comma and every line end separates two cells, of which it has at most so many;
+    a stretch of it at a time. Raises CellError."""
+    end = data.find(b"\n") % (len(data) + 1)  # of the first line, which may be the only one
+    width = 1 + data.count(b",", 0, end)
+    header = _header(Row(1, data[:end].decode("utf-8").split(","))) if data[:end].strip(b", \t") else None
+    above, start = (0, 0) if header is None else (1, end + 1)
+    values = np.empty(cells)
+    filled = 0
+    while start <= len(data):
+        stop = _stop(data, start)
+        row, column = divmod(filled, width)
+        made = _stretch(data, start, stop, 1 + above + row, column, width)
+        values[filled : filled + len(made)] = made
+        filled += len(made)
+        start = stop + 1
+    return _table(values[:filled], width, header)
 
 
-def _edge_columns(names: list[str]) -> dict[str, int]:
-    for column, name in enumerate(names, 1):
-        if name not in _EDGE_COLUMNS:
-            close = nearest(name, _EDGE_COLUMNS, 1)
-            hint = f"did you mean '{close[0]}'?" if close else "the columns are from, to, weight and perhaps delay"
-            raise CellError("file-format", f"row 1, column {column}: no column is called {quoted(name)}", hint)
-        if names.index(name) != column - 1:
-            raise CellError("file-format", f"row 1, column {column}: '{name}' is there twice")
-    missing = [name for name in _EDGE_COLUMNS[:3] if name not in names]
-    if missing:
-        message = f"there is no column '{missing[0]}'"
-        raise CellError("file-format", message, "the first row is 'from,to,weight' or 'from,to,weight,delay'")
-    return {name: column for column, name in enumerate(names)}
+def _stop(data: bytes, start: int) -> int:
+    """The place of the separator that ends a stretch; the end of the file counts as one."""
+    at = start + _STRETCH
+    found = (data.find(mark, at, at + LONGEST_CELL + 1) for mark in (b",", b"\n"))
+    return min((place for place in found if place >= 0), default=len(data))
 
 
-def _delay(row: _Row, column: int) -> int:
-    value = _number(row.cells[column], row.number, column + 1)
-    if math.isnan(value):
-        return -1
-    if value < 0 or value != int(value) or value > _LARGEST_DELAY:
-        cell = quoted(row.cells[column])
-        raise CellError("file-format", f"row {row.number}, column {column + 1}: {cell} is no delay (0, 1, 2, … steps)")
-    return int(value)
+def _stretch(data: bytes, start: int, stop: int, row: int, column: int, width: int) -> NDArray[np.float64]:
+    """The numbers of a stretch, whose first cell stands in this row (from 1) and column (from 0). Raises CellError."""
+    text = data[start:stop] + (data[stop : stop + 1] or b"\n")
+    marks = np.frombuffer(text, dtype=np.uint8)
+    ends = np.flatnonzero((marks == ord(",")) | (marks == ord("\n")))
+    last = np.zeros(len(ends), dtype=np.bool_)
+    last[width - 1 - column :: width] = True
+    uneven = np.flatnonzero((marks[ends] == ord("\n")) != last)
+    wrong = int(uneven[0]) if len(uneven) else None
+    good = len(ends) if wrong is None else max(0, wrong - (column + wrong) % width)  # cells of rows that are even
+    numbers = np.zeros(0)
+    if good:
+        text = text[: ends[good - 1]].replace(b"\n", b",")
+        quick = numbers_in(text, np.diff(ends[:good], prepend=-1) == 1)
+        numbers = _one_by_one(text.decode("utf-8").split(","), row, column, width) if quick is None else quick
+    if wrong is not None:
+        place = start + int(ends[wrong])
+        end = data.find(b"\n", place) % (len(data) + 1)
+        found = 1 + data.count(b",", data.rfind(b"\n", 0, place) + 1, end)
+        raise _ragged(row + (column + wrong) // width, found, width)
+    return numbers
 
 
-def _count(cells: int) -> str:
-    return "1 cell" if cells == 1 else f"{cells} cells"
+def _one_by_one(cells: list[str], row: int, column: int, width: int) -> NDArray[np.float64]:
+    """The numbers of cells of which one may be at fault, the first in this row and column. Raises CellError."""
+    parts: list[NDArray[np.float64]] = []
+    for start in range(0, len(cells), _FEW):
+        few = cells[start : start + _FEW]
+        quick = numbers_of(few)
+        if quick is None:
+            places = (divmod(column + start + at, width) for at in range(len(few)))
+            slow = [
+                number_of(cell.strip(), row + down, 1 + across)
+                for cell, (down, across) in zip(few, places, strict=True)
+            ]
+            quick = np.array(slow, dtype=np.float64)
+        parts.append(quick)
+    return np.concatenate(parts)
+
+
+def _ragged(row: int, cells: int, width: int) -> CellError:
+    message = f"row {row} has {counted(cells)}, the first row {width}"
+    return CellError("file-format", message, "rows of a table are equally long")
+
+
+def empty() -> CellError:
+    """What is wrong with a file without a row."""
+    return CellError("file-format", "the file is empty")

@@ -18,7 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from neurovis_spec.diagnostics import nearest
-from neurovis_spec.language.data_files_table import SPARSER, CellError, Table, check_cells, quoted, repeated, scattered
+from neurovis_spec.language.data_files_table import (
+    SPARSER,
+    CellError,
+    Room,
+    Table,
+    check_cells,
+    quoted,
+    repeated,
+    scattered,
+)
 
 _BANNER: Final = "%%matrixmarket"
 _LONGEST_LINE: Final = 1024
@@ -86,7 +95,7 @@ class _Body:
         raise AssertionError("there are as many lines as entries")
 
 
-def parse_mtx(data: bytes) -> Table:
+def parse_mtx(data: bytes, room: Room | None = None) -> Table:
     """The matrix; in a pattern every entry is 1. Raises CellError."""
     if data.startswith(b"\xef\xbb\xbf"):
         data = data[3:]
@@ -96,6 +105,8 @@ def parse_mtx(data: bytes) -> Table:
     line = data.count(b"\n", 0, start) + 1
     sizes, _, rest = data[start:].partition(b"\n")
     head = _sizes(words, sizes[:_LONGEST_LINE], line)
+    if room is not None:
+        room(head.rows * head.columns)
     body = _Body(_COMMENT.sub(b"", rest) if b"%" in rest else rest, line + 1)
     body.check()
     i, j, values = _entries(head, body, _numbers(head, body, line))

@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from neurovis_spec.language.data_files_table import MOST_CELLS, CellError, check_cells, check_finite
+from neurovis_spec.language.data_files_table import MOST_CELLS, CellError, Room, check_cells, check_finite
 
 #: real numbers, as kinds of NumPy's types
 REAL: Final = "iuf"
@@ -43,9 +43,11 @@ class Header:
     offset: int
 
 
-def parse_npy(data: bytes) -> NDArray[np.float64]:
+def parse_npy(data: bytes, room: Room | None = None) -> NDArray[np.float64]:
     """The array, rows × columns; one of one dimension as a column. Raises CellError."""
     array = parse_array(data, REAL, (1, 2))
+    if room is not None:
+        room(array.size)
     if not array.size:
         raise CellError("file-format", "the array is empty")
     with np.errstate(over="ignore", invalid="ignore"):

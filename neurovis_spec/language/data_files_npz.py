@@ -6,6 +6,7 @@ directory before the rest is unpacked, so an archive takes no more memory than t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -16,6 +17,7 @@ from neurovis_spec.language.data_files_npy import LONGEST_HEADER, REAL, parse_ar
 from neurovis_spec.language.data_files_table import (
     SPARSER,
     CellError,
+    Room,
     Table,
     check_cells,
     full,
@@ -45,9 +47,9 @@ class Archive:
         }
         self.names = tuple(self._members)
 
-    def numbers(self, name: str) -> NDArray[np.float64]:
+    def numbers(self, name: str, room: Room | None = None) -> NDArray[np.float64]:
         """An array of one or two dimensions, rows × columns. Raises CellError."""
-        return parse_npy(self._content(name, REAL, (1, 2)))
+        return parse_npy(self._content(name, REAL, (1, 2), room))
 
     def vector(self, name: str, kinds: str, dimensions: int = 1) -> NDArray[np.generic]:
         """An array of one dimension, as it stands. Raises CellError."""
@@ -58,13 +60,15 @@ class Archive:
         except CellError as error:
             raise CellError(error.code, f"{quoted(name)}: {error}", error.hint) from error
 
-    def _content(self, name: str, kinds: str, dimensions: tuple[int, ...]) -> bytes:
+    def _content(self, name: str, kinds: str, dimensions: tuple[int, ...], room: Room | None = None) -> bytes:
         member = self._members[name]
-        read_header(beginning(self._data, member, LONGEST_HEADER), member.size, kinds, dimensions)
+        header = read_header(beginning(self._data, member, LONGEST_HEADER), member.size, kinds, dimensions)
+        if room is not None:
+            room(math.prod(header.shape))
         return unpack(self._data, member)
 
 
-def parse_npz(data: bytes, key: str | None = None) -> Table:
+def parse_npz(data: bytes, key: str | None = None, room: Room | None = None) -> Table:
     """The array that ``key`` names; without it the only one, or a matrix of scipy.sparse. Raises CellError.
 
     The codes ``unknown-array`` and ``missing-key`` are about ``key``, not about the file.
@@ -76,18 +80,18 @@ def parse_npz(data: bytes, key: str | None = None) -> Table:
             known = [printable(name) for name in names[:_COMPARED]]
             hint = suggest(key, known, "its arrays") if known else "it holds none"
             raise CellError("unknown-array", f"there is no array {quoted(key)} in the file", hint)
-        return full(archive.numbers(key))
+        return full(archive.numbers(key, room))
     if _SPARSE.issubset(names):
-        return _sparse(archive)
+        return _sparse(archive, room)
     if not names:
         raise CellError("file-format", "the archive holds no array")
     if len(names) > 1:
         listed = ", ".join(printable(name) for name in names[:_SHOWN]) + (", …" if len(names) > _SHOWN else "")
         raise CellError("missing-key", f"it holds {len(names)} arrays: {listed}", "name one of them with 'key'")
-    return full(archive.numbers(names[0]))
+    return full(archive.numbers(names[0], room))
 
 
-def _sparse(archive: Archive) -> Table:
+def _sparse(archive: Archive, room: Room | None) -> Table:
     """A matrix as scipy.sparse.save_npz writes it; an entry that is stored is there, also if it is 0."""
     kind = _text(archive.vector("format", "SU", 0))
     if kind not in ("csr", "csc", "coo"):
@@ -98,6 +102,8 @@ def _sparse(archive: Archive) -> Table:
         raise CellError("file-format", "'shape': a matrix has two sizes of at least 1")
     rows, columns = (int(size) for size in sizes)
     check_cells(rows * columns, hint=SPARSER)
+    if room is not None:
+        room(rows * columns)
     with np.errstate(over="ignore", invalid="ignore"):
         values = archive.vector("data", REAL).astype(np.float64)
     if kind == "coo":

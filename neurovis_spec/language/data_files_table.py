@@ -6,14 +6,18 @@ In: shapes and entries as a file states them. Out: Table. Memory is taken only a
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 #: a table has at most this many cells: 256 MiB in double precision
 MOST_CELLS: Final = 1 << 25
+#: Is told how many cells a table has (or edges a list) before these are made, and refuses too many by a CellError. The
+#: header of a table may be counted among its cells.
+Room: TypeAlias = Callable[[int], None]
 #: what to do with a sparse matrix that has more
 SPARSER: Final = "list its entries as 'edges', or divide it among several entries of 'connections'"
 
