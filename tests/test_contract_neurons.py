@@ -25,11 +25,12 @@ def titles(text: str, folder: Path) -> dict[str, str]:
 def test_the_defaults_of_a_group() -> None:
     """A single neuron, identity, static, sum, no bias; without anything it stays at 0."""
     network = compiled("neurons: {A: {}}")
-    (neuron,) = network.describe()["neurons"]  # type: ignore[misc]
-    assert neuron == {
-        "name": "A", "group": "A", "module": None,
-        "activation": "identity", "model": "static", "combine": "sum", "bias": 0,
-    }  # fmt: skip
+    assert network.describe()["neurons"] == [
+        {
+            "name": "A", "group": "A", "module": None,
+            "activation": "identity", "model": "static", "combine": "sum", "bias": 0,
+        }
+    ]  # fmt: skip
     assert np.isnan(network.network.neurons.initial).all()
     assert network.run(3)["A"].tolist() == [0, 0, 0]
 
@@ -37,9 +38,8 @@ def test_the_defaults_of_a_group() -> None:
 @pytest.mark.parametrize(("combine", "expected"), [("sum", 2 * 3 - 1 * 5), ("product", -30), ("distance", 5.0)])
 def test_what_arrives_is_combined(combine: str, expected: float) -> None:
     """By the sum or the product of w·a, or by √Σ (w·a − c)²; the bias and the input are added to it."""
-    centre = ", centre: 3 + 3*i" if combine == "distance" else ""  # 6 − 3 = 3, and −5 − (3 + 6)…
-    centres = "[[3], [-1]]"
-    body = f"{{matrix: [[2], [-1]], centre: {centres}}}" if centre else "{matrix: [[2], [-1]]}"
+    centre = ", centre: [[3], [-1]]" if combine == "distance" else ""  # 2·3 − 3 and −1·5 + 1: 3 and −4
+    body = f"{{matrix: [[2], [-1]]{centre}}}"
     text = (
         "inputs: {s: {expression: 100}}\n"
         f"neurons: {{A: {{count: 2, bias: [3, 5]}}, B: {{combine: {combine}, bias: 10, input: s}}}}\n"

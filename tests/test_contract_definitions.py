@@ -1,0 +1,192 @@
+"""Definitions of one's own (§7): those of the contract as printed, the tables of what is built in, what they see."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from small_specs import codes, compiled
+
+from neurovis_spec.cli.commands import neurovis
+from neurovis_spec.compiler.builtin import builtin_definitions, libraries
+from neurovis_spec.language.expressions.evaluate import evaluate
+
+PRINTED = """\
+activations:
+  swish: {parameters: {beta: 1}, value: x * sigmoid(beta * x)}        # x: the combined input
+
+models:
+  leaky_integrator:
+    parameters: {leak: 0.1}
+    state: {v: {initial: 0, each_step: (1 - leak) * v + leak * drive}} # drive: u[t] of section 5
+    activity: f(v)                                                    # f: the neuron's activation
+  izhikevich:                                                         # Izhikevich 2003; h: milliseconds a step
+    parameters: {a: 0.02, b: 0.2, c: -65, d: 8, h: 1}
+    let: {v0: c if v >= 30 else v, u0: u + d if v >= 30 else u}       # intermediate values, in order
+    state:
+      v: {initial: -65, each_step: v0 + h * (0.04 * v0^2 + 5 * v0 + 140 - u0 + drive)}
+      u: {initial: -13, each_step: u0 + h * a * (b * v0 - u0)}
+    activity: f(v)
+
+rules:
+  delta:                                                              # Eq. 10
+    parameters: {rate: 0.01}
+    signals: [target]
+    weight: {each_step: weight + rate * pre * (target - post)}
+  reward_modulated:                                                   # Eq. 15
+    parameters: {rate: 0.01, smoothing: 0.9}
+    signals: [policy, reward]
+    state:
+      eligibility: {initial: 0, each_step: eligibility + policy * pre * (policy - post), each_episode: 0}
+      baseline: {initial: 0, each_episode: smoothing * baseline + (1 - smoothing) * reward}
+    weight: {each_episode: weight + rate * (reward - baseline) * eligibility}
+"""
+USE = """\
+time: {episode: 7}
+inputs: {s: {expression: 9*sin(k/3)}}
+neurons:
+  A: {input: s, model: leaky_integrator, activation: tanh}
+  I: {input: s, model: {izhikevich: {h: 0.5}}}
+  P: {bias: 0.3, noise: "normal(0, 1)"}
+  O: {}
+  Q: {}
+connections:
+  A -> O: {weight: 0.1, plasticity: {delta: {rate: 0.05, target: P}}}
+  A -> Q: {weight: 0.1, plasticity: {reward_modulated: {policy: P, reward: O}}}
+"""
+
+
+def test_the_definitions_of_the_contract_are_the_built_in_ones() -> None:
+    """As printed they replace these, each with a warning, and nothing of a run changes."""
+    own, built_in = compiled(PRINTED + USE), compiled(USE)
+    replaced = [item.message for item in own.warnings if item.code == "replaces-builtin"]
+    assert len(replaced) == 4
+    for name in ("leaky_integrator", "izhikevich", "delta", "reward_modulated"):
+        assert any(f"'{name}'" in message for message in replaced)
+    one, other = own.run(60), built_in.run(60)
+    np.testing.assert_array_equal(one.activity, other.activity)
+    np.testing.assert_array_equal(one.weights, other.weights)
+    assert (one.weights[-1] != one.weights[0]).all()
+
+
+def test_swish_is_what_it_says() -> None:
+    """x · sigmoid(βx), with the default and with another β."""
+    text = PRINTED + "neurons: {A: {bias: 2, activation: swish}, B: {bias: 2, activation: {swish: {beta: 0.5}}}}"
+    assert compiled(text).run(1).activity[0] == pytest.approx([2 / (1 + np.exp(-2)), 2 / (1 + np.exp(-1))], rel=1e-15)
+
+
+DEFAULTS = {
+    "identity": {}, "tanh": {}, "sigmoid": {}, "relu": {}, "leaky_relu": {"slope": 0.01}, "softplus": {},
+    "step": {"threshold": 0}, "sign": {}, "sin": {}, "cos": {}, "gaussian": {"sigma": 1},
+    "clip": {"low": -1, "high": 1}, "piecewise_linear": {"x0": -1, "y0": -1, "x1": 1, "y1": 1},
+    "static": {}, "leaky_integrator": {"leak": 0.1}, "adaptive": {"leak": 0.1, "strength": 1, "rate": 0.01},
+    "hysteresis": {"low": -0.5, "high": 0.5}, "integrate_and_fire": {"leak": 0.1, "threshold": 1, "reset": 0},
+    "izhikevich": {"a": 0.02, "b": 0.2, "c": -65, "d": 8, "h": 1},
+    "delta": {"rate": 0.01}, "hebbian": {"rate": 0.01}, "anti_hebbian": {"rate": 0.01}, "oja": {"rate": 0.01},
+    "bcm": {"rate": 0.01, "threshold_rate": 0.01}, "covariance": {"rate": 0.01, "average_rate": 0.01},
+    "input_correlation": {"rate": 0.01}, "differential_hebbian": {"rate": 0.01},
+    "reward_modulated": {"rate": 0.01, "smoothing": 0.9}, "decay": {"rate": 0.01},
+}  # fmt: skip
+SIGNALS = {"delta": ("target",), "input_correlation": ("reflex",), "reward_modulated": ("policy", "reward")}
+
+
+def test_the_built_in_ones_are_those_of_the_tables_with_their_parameters_and_signals() -> None:
+    """No more and no fewer, with these defaults."""
+    known = builtin_definitions()
+    found: dict[str, dict[str, float]] = {}
+    for section in (known.activations, known.models, known.rules):
+        for name, (_, defaults) in section.items():
+            found[name] = {default.name: evaluate(default.value, {}) for default in defaults}
+    assert found == DEFAULTS
+    assert {name: rule.signals for name, (rule, _) in known.rules.items() if rule.signals} == SIGNALS
+
+
+def described() -> dict[str, str]:
+    """What each built-in definition says of itself."""
+    result = {}
+    for library in libraries():
+        for section in (library.activations, library.models, library.rules):
+            for name, definition in section.items():
+                assert definition.description is not None
+                result[name] = definition.description.value
+    return result
+
+
+@pytest.mark.parametrize("name", DEFAULTS)
+def test_a_description_holds_the_equation_and_the_source_and_docs_shows_it(name: str) -> None:
+    """An equation has an ``=``; a source a year, or the number of one of the paper's equations."""
+    text = described()[name]
+    assert re.search(r"[\w\])] = ", text), text
+    assert re.search(r"\b(1[89]|20)\d\d\b|\bEqs?\. \d", text), text
+    shown = CliRunner().invoke(neurovis, ["docs", name]).stdout
+    assert " ".join(text.split()) in " ".join(shown.split())
+
+
+@pytest.mark.parametrize(
+    ("definition", "use"),
+    [
+        ("activations: {a: {value: p*x}}", "{activation: a}"),
+        ("models: {a: {activity: p*f(drive)}}", "{model: a}"),
+        ("rules: {a: {weight: {each_step: weight + p}}}", ""),
+        ("activations: {a: {let: {u: p}, value: u}}", ""),
+        ("models: {a: {state: {v: {initial: p}}, activity: v}}", ""),
+        ("rules: {a: {parameters: {r: p}, weight: {each_step: weight + r}}}", ""),
+    ],
+)
+def test_a_definition_sees_its_own_parameters_never_the_specs(definition: str, use: str) -> None:
+    """Used or not."""
+    assert codes(f"parameters: {{p: 1}}\n{definition}\nneurons: {{A: {use or '{bias: p}'}}}") == ["unknown-name"]
+
+
+def test_what_a_rule_sees() -> None:
+    """pre is what reaches the synapse, sent what leaves, post the target's activity; k and t the step and the time."""
+    text = """
+time: {dt: 0.5}
+inputs: {s: {expression: 2^k}}
+rules: {all: {parameters: {z: 0}, weight: {each_step: 1e8*pre + 1e4*sent + 100*post + 10*k + t + z*weight}}}
+neurons: {A: {input: s}, B: {bias: 3}}
+connections: {A -> B: {weight: 0, delay: 2, plasticity: all}}
+"""
+    weight = compiled(text).run(5).weights[:, 0]
+    a = [2.0**k for k in range(5)]
+    post = [3.0 + (weight[k - 2] * a[k - 2] if k >= 2 else 0) for k in range(5)]
+    for k in range(4):
+        pre = a[k - 2] if k >= 2 else 0
+        assert weight[k + 1] == pytest.approx(1e8 * pre + 1e4 * a[k] + 100 * post[k] + 10 * k + 0.5 * k, rel=1e-14)
+
+
+def test_the_state_of_a_rule_is_kept_per_connection() -> None:
+    """Each connection counts what it has carried itself."""
+    text = """
+rules: {sum: {state: {m: {each_step: m + pre}}, weight: {each_step: m + pre}}}
+neurons: {A: {count: 2, bias: i + 1}, B: {count: 2}}
+connections: {A -> B: {pattern: all_to_all, weight: 0, delay: 0, plasticity: sum}}
+"""
+    assert compiled(text).run(4).weights[-1].tolist() == [3, 3, 6, 6]
+
+
+def test_several_states_are_updated_together_and_let_is_computed_in_order() -> None:
+    """Right-hand sides read old values; a later ``let`` sees an earlier one."""
+    text = """
+models:
+  swap:
+    let: {p: v + 1, q: 10*p}
+    state: {v: {initial: 1, each_step: w}, w: {initial: 2, each_step: v}, seen: {each_step: q}}
+    activity: 100*v + 10*w + seen
+neurons: {A: {model: swap}}
+"""
+    # (v, w) = (2, 1) and q of v = 1 is 20; then (1, 2) and q of v = 2 is 30
+    assert compiled(text).run(2)["A"].tolist() == [200 + 10 + 20, 100 + 20 + 30]
+
+
+def test_bounds_apply_after_the_change_at_an_episodes_end_too() -> None:
+    """Right after each: what follows begins within them."""
+    text = """
+time: {episode: 2}
+rules: {up: {weight: {each_step: weight + 0.4, each_episode: weight + 5}}}
+neurons: {A: {bias: 1}, B: {}}
+connections: {A -> B: {weight: 0, plasticity: up, bounds: [-1, 1]}}
+"""
+    assert compiled(text).run(4).weights[:, 0].tolist() == [0, 0.4, 1, 1]
