@@ -193,6 +193,18 @@ def _file(name: str, data: bytes, seconds: float = 0.2, mib: float = 60) -> Case
     return Case(text, _write(name, data), seconds, mib)
 
 
+def _input(name: str, data: bytes, seconds: float = 0.2, mib: float = 60) -> Case:
+    """A file in a place that takes a table of any size."""
+    return Case(
+        HEAD + f"inputs: {{s: {{file: {name}}}}}\nneurons: {{A: {{input: s}}}}\n", _write(name, data), seconds, mib
+    )
+
+
+def _edges(data: bytes, seconds: float = 0.2, mib: float = 60) -> Case:
+    text = HEAD + "neurons: {A: {}, B: {}}\nconnections: {A -> B: {edges: {file: e.csv}}}\n"
+    return Case(text, _write("e.csv", data), seconds, mib)
+
+
 def _header(shape: str, descr: str = "'<f8'") -> str:
     return f"{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}"
 
@@ -211,19 +223,28 @@ FILES: dict[str, Case] = {
     ".npy of NaN": _file("a.npy", _saved(np.full((2, 2), np.nan))),
     ".npy cut off": _file("a.npy", _saved(np.zeros((2, 2)))[:-8]),
     ".npz of 64 MiB of zeros in 64 KiB": _file(
-        "a.npz", _zip({"a.npy": _npy(_header("(8192, 1024)")) + bytes(1 << 26)}), 2, 200
+        "a.npz", _zip({"a.npy": _npy(_header("(8192, 1024)")) + bytes(1 << 26)})
+    ),
+    ".npz of 64 MiB, as an input": _input(
+        "a.npz", _zip({"a.npy": _npy(_header("(8192, 1024)")) + bytes(1 << 26)}), 1, 270
     ),
     ".npz of 1 GiB, it says": _file("a.npz", _zip({"a.npy": _npy(_header("(131072, 1024)")) + bytes(1 << 10)})),
     ".npz that is none": _file("a.npz", b"PK\x03\x04" + b"\0" * 100),
-    ".npz of 20,000 arrays": _file("a.npz", _zip({f"a{i}.npy": b"" for i in range(20_000)}), 1),
+    ".npz of 20,000 arrays": _file("a.npz", _zip({f"a{i}.npy": b"" for i in range(20_000)})),
     ".mtx of 1e12 entries, it says": _file(
         "a.mtx", b"%%MatrixMarket matrix coordinate real general\n1000000 1000000 1000000000000\n1 1 1\n"
     ),
     ".csv with a cell of 10 MB": _file("a.csv", b"1," + b"9" * 10_000_000 + b"\n"),
-    ".csv with a row of a million cells": _file("a.csv", b"1," * 1_000_000 + b"x\n", 1),
-    ".csv of 200,000 rows, the last ragged": _file("a.csv", b"1,2\n" * 200_000 + b"3\n", 1),
+    ".csv with a row of a million cells": _file("a.csv", b"1," * 1_000_000 + b"x\n"),
+    "the same, an input of a million": _input("a.csv", b"1," * 1_000_000 + b"x\n", 0.4),
+    ".csv of 200,000 rows, the last ragged": _file("a.csv", b"1,2\n" * 200_000 + b"3\n"),
+    "the same, an input of two": _input("a.csv", b"1,2\n" * 200_000 + b"3\n"),
+    ".csv of 31 million commas": _file("a.csv", (b"," * 5567 + b"\n") * 5568, mib=80),
+    "the same, an input of 5,568": _input("a.csv", (b"," * 5567 + b"\n") * 5568, 2, 400),
     ".csv of NUL bytes": _file("a.csv", b"\0" * 1_000_000),
-    ".csv with a quote never closed": _file("a.csv", b'"' + b"1,2\n" * 250_000, 1),
+    ".csv with a quote never closed": _file("a.csv", b'"' + b"1,2\n" * 250_000),
+    "edges: 200,000 rows, the last ragged": _edges(b"from,to,weight\n" + b"A,B,1\n" * 200_000 + b"A\n", 0.4),
+    "edges: a header of a million cells": _edges(b"from," * 1_000_000),
     ".csv that is a picture": _file("a.csv", b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 400),
 }
 

@@ -15,8 +15,9 @@ import pytest
 from data_attempts import HERE, fault, npy, npz, table
 from hypothesis import given
 from hypothesis import strategies as st
-from small_specs import answer
+from small_specs import HEAD, answer, network_of
 
+import neurovis_spec as nv
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language import data_files_csv, data_files_edges
 from neurovis_spec.language.data_files import CellError, locate, read_edges, read_table
@@ -162,17 +163,48 @@ def test_who_reads_a_table_may_refuse_its_size(tmp_path: Path, name: str, data: 
     assert [(finding.code, finding.span) for finding in findings.sorted()] == [("wrong-size", HERE)]
 
 
-def test_a_place_refuses_a_table_that_is_far_too_large_for_it(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("group", "rest"),
+    [
+        (", position: {file: a.npz}", ""),
+        ("", "connections: {A -> A: {matrix: {file: a.npz}}}"),
+        (", combine: distance", "connections: {A -> A: {centre: {file: a.npz}}}"),
+    ],
+)
+def test_a_place_refuses_a_table_that_is_far_too_large_for_it(tmp_path: Path, group: str, rest: str) -> None:
     """A matrix, centres and positions know their size: what is much larger is never unpacked."""
     (tmp_path / "a.npz").write_bytes(npz(True, a=np.zeros((8192, 1024))))
 
     def refuse() -> None:
-        code, message, _ = answer("neurons: {A: {count: 2, bias: 1, position: {file: a.npz}}}", tmp_path)
+        code, message, _ = answer(f"neurons: {{A: {{count: 2, bias: 1{group}}}}}\n{rest}", tmp_path)
         assert code == "wrong-size"
         assert message == "the file 'a.npz': it has 8,388,608 cells; 2 × 2 are wanted"
 
     refuse()  # what is loaded for the first time does not count
     assert peak(refuse) < 30_000_000
+
+
+def test_what_is_too_large_for_one_place_may_fit_another(tmp_path: Path) -> None:
+    (tmp_path / "a.npy").write_bytes(npy(np.ones((300, 300))))
+    text = "neurons: {A: {count: 2, bias: 1}, B: {count: 300}}\nconnections:\n"
+    network = network_of(text + "  B -> B: {matrix: {file: a.npy}}\n", tmp_path)
+    assert len(network.connections) == 90_000
+    code, message, _ = answer(text + "  A -> A: {matrix: {file: a.npy}}\n  B -> B: {matrix: {file: a.npy}}\n", tmp_path)
+    assert (code, message) == ("wrong-size", "the file 'a.npy': it has 90,000 cells; 2 × 2 are wanted")
+
+
+def test_edges_beyond_the_limit_are_refused_before_they_are_made(tmp_path: Path) -> None:
+    (tmp_path / "e.csv").write_text("from,to,weight\n" + "nobody,A,1\n" * 101)
+    with pytest.raises(nv.SpecError) as caught:
+        nv.compile_text(
+            f"{HEAD}neurons: {{A: {{}}}}\nconnections: {{A -> A: {{edges: {{file: e.csv}}}}}}\n",
+            folder=tmp_path,
+            limit=100,
+        )
+    (item,) = caught.value.diagnostics
+    assert item.code == "too-many"
+    assert "it has 101 edges; 100 more connections may be made" in item.message
+    assert "--limit" in (item.hint or "")
 
 
 def test_a_path_has_a_largest_length(tmp_path: Path) -> None:

@@ -294,7 +294,8 @@ class _EntryBuilder:
         called, own = self.connector.population.neurons.names, len(self.connector.unit.called(""))
         sources = {called[neuron][own:]: place for place, neuron in enumerate(self.sources.tolist())}
         targets = {called[neuron][own:]: place for place, neuron in enumerate(self.targets.tolist())}
-        reader = EdgeReader(sources, targets, self.constants, self.connector.unit.files, self.stream("weight"))
+        files, stream = self.connector.unit.files, self.stream("weight")
+        reader = EdgeReader(sources, targets, self.constants, files, stream, self.room)
         assert self.body.edges is not None
         edges = reader.read(self.body.edges)
         return None if edges is None else _Shape(edges.i, edges.j, edges.weights, edges.delays)

@@ -46,6 +46,8 @@ class EdgeReader:
     constants: Constants
     files: Files
     stream: Stream
+    #: how many connections may be made; None where that is not known
+    most: int | None = None
 
     def read(self, edges: EdgeRows | FileReference) -> EdgeList | None:
         """All edges; None where one is at fault."""
@@ -127,7 +129,7 @@ class EdgeReader:
         self.constants.findings.error("edge-outside", span, message, hint)
 
     def _from_file(self, reference: FileReference) -> EdgeList | None:
-        table = self.files.edges(reference)
+        table = self.files.edges(reference, self.most)
         if table is None:
             return None
         span = reference.path.span

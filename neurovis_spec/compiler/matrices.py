@@ -48,7 +48,7 @@ def grid_of(
     In its cells ``i`` is the source and ``j`` the target, also where ``by_target`` its rows are targets.
     """
     if isinstance(matrix, FileReference):
-        table = files.table(matrix)
+        table = files.table(matrix, None if n is None or m is None else (n, m))
         grid = None if table is None else Grid(table.values, table.present, matrix.path.span)
         return None if grid is None else fit(grid, n, m, by_target, constants.findings)
     return _written(matrix, n, m, by_target, constants, stream)
