@@ -17,6 +17,7 @@ from neurovis_spec.layout.geometry import distance, sampled
 from neurovis_spec.layout.problem import canonical
 
 Edge = tuple[str, str, str, int]
+Rect = tuple[float, float, float, float]
 
 ENGINES = ("layered", "organic", "large", "circular", "grid", "spatial", "manual")
 
@@ -170,3 +171,63 @@ def check_routes(problem: LayoutProblem, layout: Layout) -> None:
         for i, one in enumerate(equal):
             for other in equal[:i]:
                 assert max(min(distance(p, q) for q in other) for p in one) > 0.04, "two edges share a line"
+
+
+def frames_of(layout: Layout, problem: LayoutProblem) -> list[tuple[frozenset[int], Rect]]:
+    """The frames of instances and boxes as they are drawn, but for the room of titles: around centres, the routes
+    between the neurons of an instance, and the frames in it."""
+    at = [layout.positions[name] for name in problem.neurons]
+    result: list[tuple[frozenset[int], Rect]] = [
+        (frozenset(own), _around([at[m] for m in own], 0.6)) for _, own in problem.boxes if own
+    ]
+    found: dict[int, Rect] = {}
+    for number, module in sorted(enumerate(problem.modules), reverse=True):
+        own = frozenset(module.members)
+        if not own:
+            continue
+        inner = [e.name for e in problem.edges if e.source in own and e.target in own]
+        parts = [_around([at[m] for m in own], 0.65)]
+        parts += [_around(sampled(layout.routes[name], 0.1), 0.2) for name in inner]
+        parts += [
+            _around([rect[:2], rect[2:]], 0.35) for k, rect in found.items() if problem.modules[k].parent == number
+        ]
+        found[number] = _around([corner for rect in parts for corner in (rect[:2], rect[2:])], 0.0)
+        result.append((own, found[number]))
+    return result
+
+
+def _around(points: Iterable[Point], by: float) -> Rect:
+    xs, ys = zip(*points, strict=True)
+    return min(xs) - by, min(ys) - by, max(xs) + by, max(ys) + by
+
+
+def through_frames(layout: Layout, problem: LayoutProblem) -> list[str]:
+    """Routes that run through a frame that holds neither of their ends."""
+    frames = frames_of(layout, problem)
+    found: list[str] = []
+    for edge in problem.edges:
+        line = sampled(layout.routes[edge.name], 0.1)
+        foreign = [rect for own, rect in frames if edge.source not in own and edge.target not in own]
+        if any(_within(rect, point) for rect in foreign for point in line):
+            found.append(edge.name)
+    return found
+
+
+def frames_meet(layout: Layout, problem: LayoutProblem) -> bool:
+    """Whether frames that do not hold each other overlap, or a neuron stands in a foreign one."""
+    frames = frames_of(layout, problem)
+    at = [layout.positions[name] for name in problem.neurons]
+    for i, (own, rect) in enumerate(frames):
+        if any(_within(rect, point) for m, point in enumerate(at) if m not in own):
+            return True
+        for other, theirs in frames[:i]:
+            apart = rect[2] <= theirs[0] or theirs[2] <= rect[0] or rect[3] <= theirs[1] or theirs[3] <= rect[1]
+            if not (apart or own <= other or other <= own):
+                return True
+    return False
+
+
+def _within(rect: Rect, point: Point) -> bool:
+    """Farther in than rounding to the grid of coordinates goes."""
+    slack = 1 / 128
+    return rect[0] + slack < point[0] < rect[2] - slack and rect[1] + slack < point[1] < rect[3] - slack

@@ -26,18 +26,20 @@ def linked(
     rests: Settled,
     units: Sequence[Unit],
     frames: Sequence[tuple[tuple[int, ...], Rect]],
+    boxes: Sequence[tuple[tuple[int, ...], Rect]],
     pair: Mapping[int, int],
 ) -> dict[Key, Route]:
-    """Routes of these edges by key."""
+    """Routes of these edges by key; ``boxes`` are drawn, though nothing had to make room for them."""
     edges = [problem.edges[i] for i in links]
+    framed = [(frozenset(members), rect) for members, rect in (*frames, *boxes)]
     if frames:
-        framed = [(frozenset(members), rect) for members, rect in frames]
         planned = _passing(problem, plan, rests)
         gates = {k: planned[i] for k, i in enumerate(links) if i in planned}
         ways, lateral = channels(dict(enumerate(edges)), rests.places, framed, gates)
-        routes = route_all(edges, rests.places, ways, _bowed(edges, units), lateral)
+        routes = route_all(edges, rests.places, ways, _bowed(edges, units), lateral, frames=framed)
     else:
-        routes = route_all(edges, rests.places, _passing(problem, plan, rests), _bowed(edges, units))
+        ways = _passing(problem, plan, rests)
+        routes = route_all(edges, rests.places, ways, _bowed(edges, units), frames=framed)
     found = {keys[i]: tuple(_snapped(route)) for i, route in zip(links, routes, strict=True)}
     return _reflected(found, rests, pair) if pair else found
 

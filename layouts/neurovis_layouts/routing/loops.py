@@ -6,7 +6,7 @@ In: a centre, what is around it. Out: a route that leaves the centre and comes b
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from neurovis_layouts.routing.obstacles import REACH, Obstacles
 from neurovis_spec.layout.geometry import distance
@@ -31,6 +31,8 @@ _WAYS: tuple[tuple[Point, float], ...] = (
     ((-_DIAGONAL, _DIAGONAL), 0.2),
 )
 _CROWDED = 0.35
+#: What it costs to enter a foreign frame.
+_ENTERING = 8.0
 #: An edge within some 50° of a loop's way runs along one of its legs, which stand 30° to either side.
 _LEGS = 0.64
 #: Length of the handles: three quarters of it is how far the loop reaches.
@@ -49,10 +51,17 @@ def loop(centre: Point, way: Point, handle: float, wide: float = 0.59) -> Route:
 
 
 def best_loop(
-    centre: Point, index: int, turn: int, near: Sequence[Point], tangents: Sequence[Point], obstacles: Obstacles
+    centre: Point,
+    index: int,
+    turn: int,
+    near: Sequence[Point],
+    tangents: Sequence[Point],
+    obstacles: Obstacles,
+    enters: Callable[[Route], bool] | None = None,
 ) -> Route:
     """The loop with most room. ``near`` are neighbours' centres, ``tangents`` unit vectors in which other edges leave
-    or arrive; ``turn`` counts the loops that this neuron has already: each further one is drawn around the first."""
+    or arrive; ``turn`` counts the loops that this neuron has already: each further one is drawn around the first.
+    ``enters`` says whether a loop enters a foreign frame, if there are such."""
     ranked: list[tuple[float, int, Route]] = []
     for place, (way, cost) in enumerate(_WAYS):
         crowd = _crowd(centre, way, near) + _traffic(way, tangents) + cost
@@ -60,7 +69,8 @@ def best_loop(
             route = loop(centre, way, handle * (1 + 0.3 * turn), 0.59 + 0.1 * turn)
             clearance = obstacles.clearance(route, (index, index))
             missing = max(0.0, REACH - clearance)
-            ranked.append((crowd + 8 * missing + 0.12 * smaller, place, route))
+            entering = _ENTERING if enters is not None and enters(route) else 0.0
+            ranked.append((crowd + 8 * missing + entering + 0.12 * smaller, place, route))
     return min(ranked, key=lambda item: (item[0], item[1]))[2]
 
 

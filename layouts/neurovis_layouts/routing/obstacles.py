@@ -63,7 +63,7 @@ class Obstacles:
         centres = np.array([centre for _, _, centre in entries], dtype=np.float64)
         owner = np.array([i for i, _ in pieces], dtype=np.int64)
         ends = np.array(own, dtype=np.int64)
-        points, owner = _points(np.array([piece for _, piece in pieces], dtype=np.float64), owner)
+        points, owner = points_on(np.array([piece for _, piece in pieces], dtype=np.float64), owner)
         cell = np.floor(points / _CELL).astype(np.int64)
         key = cell[:, 0] * _ROW + cell[:, 1]
         cells, starts, counts = np.unique(keys, return_index=True, return_counts=True)
@@ -80,14 +80,14 @@ class Obstacles:
         return [bool(value) for value in result]
 
 
-def _points(
-    pieces: npt.NDArray[np.float64], owner: npt.NDArray[np.int64]
+def points_on(
+    pieces: npt.NDArray[np.float64], owner: npt.NDArray[np.int64], apart: float = _STEP
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
-    """Points on cubic pieces (p, 4, 2), without the first of each, and whose they are."""
+    """Points on cubic pieces (p, 4, 2), about ``apart``, without the first of each, and whose they are."""
     steps = np.diff(pieces, axis=1)
     legs = np.sqrt(steps[:, :, 0] * steps[:, :, 0] + steps[:, :, 1] * steps[:, :, 1])
     length = legs[:, 0] + legs[:, 1] + legs[:, 2]
-    parts = np.clip(np.ceil(length / _STEP), _FEWEST, _MOST).astype(np.int64)
+    parts = np.clip(np.ceil(length / apart), _FEWEST, _MOST).astype(np.int64)
     piece = np.repeat(np.arange(len(pieces), dtype=np.int64), parts)
     number = np.arange(len(piece), dtype=np.int64) - np.repeat(np.cumsum(parts) - parts, parts) + 1
     t = (number / parts[piece])[:, None]

@@ -10,9 +10,11 @@ from collections.abc import Set as AbstractSet
 
 from neurovis_layouts.routing.bows import FEW_TRIES, MANY_TRIES, clear_bow
 from neurovis_layouts.routing.curves import Waypoint, curve
+from neurovis_layouts.routing.detours import Detours
 from neurovis_layouts.routing.loops import best_loop
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
 from neurovis_layouts.routing.ports import Port, leanings
+from neurovis_layouts.routing.walls import Frame, Walls
 from neurovis_spec.layout.geometry import distance
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
@@ -35,12 +37,14 @@ def route_all(
     bowed: AbstractSet[int] = frozenset(),
     lateral: Mapping[int, Sequence[Waypoint]] | None = None,
     careful: int = _MOST_CAREFULLY,
+    frames: Sequence[Frame] = (),
 ) -> list[Route]:
     """Routes by edge index.
 
     Without ``waypoints`` every edge runs from anywhere to anywhere; with them, edges not in ``bowed`` run along the
     direction (through their waypoints, if they have any). Those in ``lateral`` run across it, through waypoints with x
-    and y exchanged. With more than ``careful`` edges, discs in the way are not gone round.
+    and y exchanged. With more than ``careful`` edges, discs in the way are not gone round. No route enters one of the
+    ``frames`` that holds neither of its ends, if there is a way round.
     """
     near = Obstacles(centres)
     obstacles = near if len(edges) <= careful else Obstacles(())
@@ -56,8 +60,31 @@ def route_all(
         routes.update(_curves(edges, centres, along, waypoints, obstacles))
     rest = [i for i, edge in enumerate(edges) if i not in routes and edge.source != edge.target]
     routes.update(_bows(edges, centres, rest, obstacles))
-    routes.update(_loops(edges, centres, routes, near))
+    walls = Walls(frames, len(centres)) if frames else None
+    if walls is not None:
+        routes.update(_round_frames(edges, centres, routes, walls))
+    routes.update(_loops(edges, centres, routes, near, walls))
     return [routes[i] for i in range(len(edges))]
+
+
+def _round_frames(
+    edges: Sequence[LayoutEdge], centres: Sequence[Point], routes: Mapping[int, Route], walls: Walls
+) -> dict[int, Route]:
+    """Detours for the routes that enter foreign frames, the shortest edges first."""
+    chosen = sorted(routes)
+    entered = walls.entered([routes[i] for i in chosen], [(edges[i].source, edges[i].target) for i in chosen])
+    through = [i for i, enters in zip(chosen, entered, strict=True) if enters]
+    if not through:
+        return {}
+    shared = _shared(edges)
+    detours = Detours(walls, centres)
+    found: dict[int, Route] = {}
+    for i in sorted(through, key=lambda i: (distance(centres[edges[i].source], centres[edges[i].target]), i)):
+        own = edges[i].source, edges[i].target
+        route = detours.route(*own, own not in shared)
+        if route is not None:
+            found[i] = route
+    return found
 
 
 def _runs_along(edge: LayoutEdge, centres: Sequence[Point]) -> bool:
@@ -168,7 +195,11 @@ def _bows(
 
 
 def _loops(
-    edges: Sequence[LayoutEdge], centres: Sequence[Point], routes: Mapping[int, Route], obstacles: Obstacles
+    edges: Sequence[LayoutEdge],
+    centres: Sequence[Point],
+    routes: Mapping[int, Route],
+    obstacles: Obstacles,
+    walls: Walls | None,
 ) -> dict[int, Route]:
     looping = [i for i, edge in enumerate(edges) if edge.source == edge.target]
     tangents: dict[int, list[Point]] = {edges[i].source: [] for i in looping}
@@ -179,12 +210,21 @@ def _loops(
             tangents[edges[i].target].append(_unit(route[-1], route[-2]))
     near = _neighbours(centres, tangents)
     turns: dict[int, int] = {}
-    result: dict[int, Route] = {}
+    turn: dict[int, int] = {}
     for i in looping:
         neuron = edges[i].source
-        turn = turns.get(neuron, 0)
-        turns[neuron] = turn + 1
-        result[i] = best_loop(centres[neuron], neuron, turn, near[neuron], tangents[neuron], obstacles)
+        turn[i] = turns.get(neuron, 0)
+        turns[neuron] = turn[i] + 1
+
+    def best(i: int, walls: Walls | None) -> Route:
+        own = edges[i].source
+        enters = None if walls is None else lambda route: walls.entered([route], [(own, own)])[0]
+        return best_loop(centres[own], own, turn[i], near[own], tangents[own], obstacles, enters)
+
+    result = {i: best(i, None) for i in looping}
+    if walls is not None:
+        entered = walls.entered([result[i] for i in looping], [(edges[i].source,) * 2 for i in looping])
+        result.update({i: best(i, walls) for i, enters in zip(looping, entered, strict=True) if enters})
     return result
 
 

@@ -1,0 +1,177 @@
+"""Detours: the shortest ways round frames and discs, for routes that would run through a foreign frame.
+
+In: walls, centres, two neurons. Out: a route of straight lines and round corners that touches neither, where there is
+a way. It bends only at the corners of frames, in one of several lanes around them, and beside discs (a visibility
+graph, searched by A*: Hart, Nilsson and Raphael 1968); where a detour runs already, the next one costs more.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+
+from neurovis_layouts.routing.rounded import rounded
+from neurovis_layouts.routing.walls import BoolArray, FloatArray, Walls, meet, touch
+from neurovis_spec.layout.geometry import sampled
+from neurovis_spec.layout.model import Point, Route
+
+#: How far off a frame's lines lanes run, and how far off a disc's centre.
+_LANES = (0.16, 0.3, 0.44, 0.58)
+_BESIDE = 0.52
+#: How close to frames and to centres a line may come: at best, and at all.
+_CLEAR = ((0.1, 0.44), (0.02, 0.34))
+#: How far around both ends ways are looked for.
+_WINDOWS = (2.0, 8.0, 1e9)
+#: What a bend costs, a lane that is taken already, and a corner that an edge between the same neurons has taken.
+_BEND, _TAKEN, _SAME = 0.2, 0.6, 1e6
+#: Directions round a disc.
+_DIAGONAL = 0.7071067811865476
+_QUARTER = np.array([(1, 0), (_DIAGONAL, _DIAGONAL), (0, 1), (-_DIAGONAL, _DIAGONAL)], dtype=np.float64)
+_AROUND = np.concatenate([_QUARTER, -_QUARTER])
+
+
+@dataclass(frozen=True, slots=True)
+class _Ground:
+    """What is in the way: rectangles (f, 4) and centres (c, 2) to keep ``clear`` of."""
+
+    rects: FloatArray
+    discs: FloatArray
+    clear: float
+
+    def free(self, a: FloatArray, b: FloatArray) -> BoolArray:
+        """(k,) whether the segments from ``a`` to ``b`` (k, 2) are clear of all."""
+        found: BoolArray = np.logical_not(meet(a, b, self.rects).any(axis=1))
+        found[found] = ~touch(a[found], b[found], self.discs, self.clear).any(axis=1)
+        return found
+
+    def clears(self, piece: Route) -> bool:
+        """Whether a curve is clear of all."""
+        line = np.array(sampled(piece, 0.1), dtype=np.float64)
+        return bool(self.free(line[:-1], line[1:]).all())
+
+
+@dataclass(frozen=True, slots=True)
+class _Taken:
+    """Where detours run: how much it costs to bend at a corner that they bend at, and what stretches of which lines
+    across (0: at this x) and along (1: at this y) they run on."""
+
+    corners: dict[Point, float] = field(default_factory=dict)
+    lines: dict[tuple[int, float], list[Point]] = field(default_factory=dict)
+
+    def add(self, path: Sequence[Point]) -> None:
+        """Note a detour."""
+        for point in path[1:-1]:
+            self.corners[point] = self.corners.get(point, 0.0) + _TAKEN
+        for a, b in pairwise(path):
+            for axis in (0, 1):
+                if a[axis] == b[axis]:
+                    stretch = min(a[1 - axis], b[1 - axis]), max(a[1 - axis], b[1 - axis])
+                    self.lines.setdefault((axis, a[axis]), []).append(stretch)
+
+    def beside(self, at: Point, points: FloatArray) -> FloatArray:
+        """(k,) what it costs to run from here straight to points (k, 2), for the stretches shared."""
+        cost = np.zeros(len(points))
+        for axis in (0, 1):
+            for low, high in self.lines.get((axis, at[axis]), ()):
+                other, here = points[:, 1 - axis], at[1 - axis]
+                shared = (np.minimum(other, here) < high) & (np.maximum(other, here) > low)
+                cost += np.where(shared & (points[:, axis] == at[axis]), _TAKEN, 0.0)
+        return cost
+
+
+class Detours:
+    """Finds detours, one after the other."""
+
+    def __init__(self, walls: Walls, centres: Sequence[Point]) -> None:
+        self._walls = walls
+        self._centres: FloatArray = np.array(centres, dtype=np.float64).reshape(-1, 2)
+        x0, y0, x1, y1 = walls.rects.T
+        lanes = [
+            np.stack([x + right * off, y + down * off], axis=1)
+            for off in _LANES
+            for x, right in ((x0, -1), (x1, 1))
+            for y, down in ((y0, -1), (y1, 1))
+        ]
+        self._corners: FloatArray = np.concatenate(lanes)
+        self._frame = np.tile(np.arange(len(x0), dtype=np.int64), len(lanes))
+        self._taken = _Taken()
+        self._between: dict[tuple[int, int], list[Point]] = {}
+
+    def route(self, source: int, target: int, alone: bool) -> Route | None:
+        """A way round, None where there is none; one that is not ``alone`` between its ends keeps off the straight
+        line and off those before it."""
+        ends = self._centres[[source, target]]
+        same = self._between.setdefault((min(source, target), max(source, target)), [])
+        bends = {**self._taken.corners, **dict.fromkeys(same, _SAME)}
+        for off, clear in _CLEAR:
+            for window in _WINDOWS:
+                low, high = ends.min(axis=0) - window, ends.max(axis=0) + window
+                ground, nodes = self._ground(source, target, low, high, off, clear)
+                path = _shortest(ends, nodes, ground, bends, self._taken, alone)
+                if path is not None:
+                    self._taken.add(path)
+                    same += path[1:-1]
+                    return rounded(path, ground.clears)
+        return None
+
+    def _ground(
+        self, source: int, target: int, low: FloatArray, high: FloatArray, off: float, clear: float
+    ) -> tuple[_Ground, FloatArray]:
+        """What is in the way within a window, and where a way may bend in it."""
+        foreign = self._walls.foreign(source, target)
+        loose: BoolArray = np.logical_not(self._walls.inside[:, foreign].any(axis=1))
+        loose[[source, target]] = False
+        rects = self._walls.rects
+        near = foreign & (rects[:, :2] < high).all(axis=1) & (rects[:, 2:] > low).all(axis=1)
+        centres = self._centres
+        discs = centres[loose & (centres > low - 1).all(axis=1) & (centres < high + 1).all(axis=1)]
+        ground = _Ground(rects[near] + np.array([-off, -off, off, off]), discs, clear)
+        beside = (discs[:, None, :] + _BESIDE * _AROUND[None, :, :]).reshape(-1, 2)
+        nodes = np.concatenate([self._corners[near[self._frame]], beside])
+        nodes = nodes[(nodes > low).all(axis=1) & (nodes < high).all(axis=1)]
+        return ground, nodes[ground.free(nodes, nodes)]
+
+
+def _shortest(
+    ends: FloatArray, nodes: FloatArray, ground: _Ground, bends: Mapping[Point, float], taken: _Taken, alone: bool
+) -> list[Point] | None:
+    """The shortest line from the first end to the second, over nodes."""
+    points = np.concatenate([ends, nodes])
+    places: list[Point] = [(x, y) for x, y in points.tolist()]
+    extra = np.array([0.0, 0.0, *(_BEND + bends.get(place, 0.0) for place in places[2:])])
+    ahead = _far(points, points[1])
+    best = np.full(len(points), np.inf)
+    best[0] = 0.0
+    before = np.zeros(len(points), dtype=np.int64)
+    done = np.zeros(len(points), dtype=np.bool_)
+    waiting = [(float(ahead[0]), 0)]
+    while waiting:
+        _, at = heapq.heappop(waiting)
+        if at == 1:
+            line = [at]
+            while line[-1]:
+                line.append(int(before[line[-1]]))
+            return [places[n] for n in line[::-1]]
+        if done[at]:
+            continue
+        done[at] = True
+        cost = best[at] + _far(points, points[at]) + extra + taken.beside(places[at], points)
+        better = np.flatnonzero((cost < best) & ~done)
+        if at == 0 and not alone:
+            better = better[better != 1]
+        better = better[ground.free(np.repeat(points[at][None, :], len(better), axis=0), points[better])]
+        best[better] = cost[better]
+        before[better] = at
+        for node in better.tolist():
+            heapq.heappush(waiting, (float(best[node] + ahead[node]), node))
+    return None
+
+
+def _far(points: FloatArray, point: FloatArray) -> FloatArray:
+    x, y = (points - point).T
+    far: FloatArray = np.sqrt(x * x + y * y)
+    return far

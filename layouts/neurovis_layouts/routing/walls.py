@@ -1,0 +1,88 @@
+"""Walls: frames that a route may enter only to reach one of its ends.
+
+In: frames, each with the neurons in it and its rectangle. Out: which of them are foreign to a route, and which routes
+run through such a one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_layouts.routing.obstacles import points_on
+from neurovis_spec.layout.geometry import cubics
+from neurovis_spec.layout.model import Route
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+IntArray: TypeAlias = npt.NDArray[np.int64]
+BoolArray: TypeAlias = npt.NDArray[np.bool_]
+#: x0, y0, x1, y1
+Rect: TypeAlias = tuple[float, float, float, float]
+Frame: TypeAlias = tuple[frozenset[int], Rect]
+
+#: How far apart the points of a route are that must not lie in a foreign frame.
+_STEP = 0.1
+
+
+class Walls:
+    """Frames: ``rects`` (f, 4), and ``inside`` (n, f), whether a neuron is in a frame."""
+
+    def __init__(self, frames: Sequence[Frame], neurons: int) -> None:
+        self.rects: FloatArray = np.array([rect for _, rect in frames], dtype=np.float64).reshape(-1, 4)
+        self.inside: BoolArray = np.zeros((neurons, len(frames)), dtype=np.bool_)
+        for number, (own, _) in enumerate(frames):
+            self.inside[sorted(own), number] = True
+
+    def foreign(self, source: int, target: int) -> BoolArray:
+        """(f,) which frames hold neither end of a route."""
+        found: BoolArray = ~(self.inside[source] | self.inside[target])
+        return found
+
+    def entered(self, routes: Sequence[Route], own: Sequence[tuple[int, int]]) -> list[bool]:
+        """For each route, from the first of its ``own`` neurons to the second, whether it enters a foreign frame."""
+        pieces = [(i, piece) for i, route in enumerate(routes) for piece in cubics(route)]
+        result = np.zeros(len(routes), dtype=np.bool_)
+        if not pieces or not len(self.rects):
+            return [False] * len(routes)
+        ends = np.array(own, dtype=np.int64)
+        points, owner = points_on(
+            np.array([piece for _, piece in pieces], dtype=np.float64),
+            np.array([i for i, _ in pieces], dtype=np.int64),
+            _STEP,
+        )
+        x, y = np.ascontiguousarray(points.T)
+        for number, (x0, y0, x1, y1) in enumerate(self.rects.tolist()):
+            within = owner[np.flatnonzero((x > x0) & (x < x1) & (y > y0) & (y < y1))]
+            foreign = ~(self.inside[ends[within, 0], number] | self.inside[ends[within, 1], number])
+            result[within[foreign]] = True
+        return [bool(value) for value in result]
+
+
+def meet(a: FloatArray, b: FloatArray, rects: FloatArray) -> BoolArray:
+    """(k, f) whether the segments from ``a`` (k, 2) to ``b`` (k, 2) enter rectangles (f, 4), borders apart."""
+    # after Liang and Barsky 1984: the stretch of a segment between both pairs of borders
+    with np.errstate(divide="ignore", invalid="ignore"):
+        first, last = np.zeros((len(a), len(rects))), np.ones((len(a), len(rects)))
+        for axis in (0, 1):
+            start, way = a[:, axis, None], (b - a)[:, axis, None]
+            low, high = (rects[None, :, axis] - start) / way, (rects[None, :, axis + 2] - start) / way
+            level = way == 0
+            beside = level & ((start <= rects[None, :, axis]) | (start >= rects[None, :, axis + 2]))
+            first = np.maximum(first, np.where(level, np.where(beside, np.inf, 0.0), np.minimum(low, high)))
+            last = np.minimum(last, np.where(level, 1.0, np.maximum(low, high)))
+    entered: BoolArray = first < last
+    return entered
+
+
+def touch(a: FloatArray, b: FloatArray, centres: FloatArray, clear: float) -> BoolArray:
+    """(k, c) whether the segments from ``a`` (k, 2) to ``b`` (k, 2) come closer than ``clear`` to centres (c, 2)."""
+    ux, uy = (b - a)[:, 0, None], (b - a)[:, 1, None]
+    squared = np.maximum(ux * ux + uy * uy, 1e-12)
+    x, y = centres[None, :, 0] - a[:, 0, None], centres[None, :, 1] - a[:, 1, None]
+    t = np.clip((x * ux + y * uy) / squared, 0.0, 1.0)
+    dx, dy = x - t * ux, y - t * uy
+    near: BoolArray = dx * dx + dy * dy < clear * clear
+    return near

@@ -1,0 +1,157 @@
+"""Frames are walls: a route enters one only to reach one of its ends."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import layout_conformance as suite
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from neurovis_layouts.routing import route_all
+from neurovis_layouts.routing.detours import Detours
+from neurovis_layouts.routing.rounded import rounded
+from neurovis_layouts.routing.walls import Rect, Walls, meet, touch
+
+import neurovis_spec as nv
+from neurovis_spec.layout import Direction, Layout, LayoutEdge, LayoutProblem, LayoutRefusalError, Point
+from neurovis_spec.layout.arrange import lay_out_problem
+from neurovis_spec.layout.geometry import distance, sampled
+from neurovis_spec.layout.metrics import metrics
+from neurovis_spec.layout.problem import canonical, problem_of
+
+ROOT = Path(__file__).parent.parent
+SPECS = sorted(p for p in (ROOT / "specs").rglob("*.yaml") if "neurons:" in p.read_text() and "modules" not in p.parts)
+
+
+@st.composite
+def bodies(draw: st.DrawFn, pinned: bool = False) -> LayoutProblem:
+    """Legs with knees in them perhaps, boxes, neurons between them, connections anywhere, mirrors."""
+    count, size, knees = draw(st.integers(1, 4)), draw(st.integers(1, 4)), draw(st.booleans())
+    own = suite.members("S", size) + ([f"knee.{name}" for name in suite.members("K", 2)] if knees else [])
+    legs = [f"{side}{i + 1}" for side in ("left", "right") for i in range(count)]
+    middle = suite.members("C", draw(st.integers(0, 6)))
+    names = [f"{leg}.{name}" for leg in legs for name in own] + middle
+    inner = draw(st.lists(st.tuples(st.sampled_from(own), st.sampled_from(own)), max_size=8))
+    pairs = [(f"{leg}.{a}", f"{leg}.{b}") for leg in legs for a, b in inner]
+    pairs += draw(st.lists(st.tuples(st.sampled_from(names), st.sampled_from(names)), max_size=30))
+    modules = [(leg, "leg") for leg in legs] + ([(f"{leg}.knee", "knee") for leg in legs] if knees else [])
+    mirrors = []
+    if draw(st.booleans()):
+        sides = [(f"left{i + 1}", f"right{i + 1}") for i in range(count)]
+        mirrors = [("", [(f"{a}.{name}", f"{b}.{name}") for a, b in sides for name in own], sides)]
+    pins: dict[str, Point] = {}
+    if pinned:
+        spots = draw(st.lists(st.tuples(st.integers(-9, 9), st.integers(-9, 9)), unique=True, min_size=1, max_size=3))
+        chosen = draw(st.lists(st.sampled_from(names), unique=True, max_size=3))
+        pins = {name: (1.5 * x, 1.25 * y) for name, (x, y) in zip(chosen, spots, strict=False)}
+    boxes = [("frame", middle[: len(middle) // 2])] if len(middle) > 3 and draw(st.booleans()) else []
+    groups = [("C", middle)] if middle else []
+    edges = suite.named(pairs, draw(st.integers(0, 1)))
+    directions: tuple[Direction, ...] = ("down", "up", "right", "left")
+    direction = draw(st.sampled_from(directions))
+    return canonical("body", names, groups, edges, pins, direction, boxes=boxes, modules=modules, mirrors=mirrors)
+
+
+def check(layout: Layout, problem: LayoutProblem) -> None:
+    assert suite.through_frames(layout, problem) == []
+    assert metrics(layout, problem)["edges_over_neurons"] == 0
+
+
+@pytest.mark.parametrize("path", SPECS, ids=lambda path: path.stem)
+def test_no_route_of_a_shipped_spec_runs_through_a_foreign_frame(path: Path) -> None:
+    problem = problem_of(nv.compile(path).network)
+    check(lay_out_problem(problem, "layered"), problem)
+
+
+@settings(max_examples=100, deadline=None)
+@given(problem=bodies())
+def test_no_route_runs_through_a_foreign_frame(problem: LayoutProblem) -> None:
+    layout = suite.check(problem, "layered")
+    assert layout is not None
+    check(layout, problem)
+
+
+@settings(max_examples=60, deadline=None)
+@given(problem=bodies(pinned=True))
+def test_with_pins_only_what_pins_put_into_each_other_is_run_through(problem: LayoutProblem) -> None:
+    try:
+        layout = lay_out_problem(problem, "layered")
+    except LayoutRefusalError:
+        return
+    if not suite.frames_meet(layout, problem):
+        assert suite.through_frames(layout, problem) == []
+
+
+def test_frames_in_a_row_are_gone_round_above_or_below() -> None:
+    names = [f"m{i}.N{j}" for i in range(1, 6) for j in (1, 2)]
+    pairs = [(f"m{i}.N1", f"m{i}.N2") for i in range(1, 6)] + [("m1.N1", "m5.N1"), ("m5.N2", "m1.N2")]
+    pins = {f"m{i}.N{j}": (3.0 * i, 1.5 * j) for i in range(1, 6) for j in (1, 2)}
+    problem = canonical(
+        "row", names, edges=suite.named(pairs), pins=pins, modules=[(f"m{i}", "m") for i in range(1, 6)]
+    )
+    layout = lay_out_problem(problem, "layered")
+    check(layout, problem)
+    over = [y for x, y in sampled(layout.routes["m1.N1 -> m5.N1"]) if 5 < x < 13]
+    assert max(over) < 0.9 or min(over) > 3.5
+
+
+def test_edges_between_the_same_neurons_take_detours_of_their_own() -> None:
+    centres = [(0.0, 0.0), (10.0, 0.0), (5.0, 0.0)]
+    edges = [LayoutEdge("a", 0, 1, 1), LayoutEdge("b", 0, 1, 1), LayoutEdge("c", 1, 0, 1)]
+    wall = (frozenset({2}), (3.0, -1.0, 7.0, 1.5))
+    lines = [sampled(route, 0.05) for route in route_all(edges, centres, frames=[wall])]
+    for i, one in enumerate(lines):
+        assert all(not (3 < x < 7 and -1 < y < 1.5) for x, y in one)
+        for other in lines[:i]:
+            assert max(min(distance(p, q) for q in other) for p in one) > 0.1
+
+
+def test_where_there_is_no_way_round_there_is_no_detour() -> None:
+    shut = Walls([(frozenset({1}), (-2.0, y, 12.0, y + 4.0)) for y in (-5.0, -1.0, 3.0)], 3)
+    assert Detours(shut, [(0.0, 0.0), (5.0, 0.0), (10.0, 0.0)]).route(0, 2, True) is None
+
+
+def test_a_loop_keeps_out_of_the_frame_beside_it() -> None:
+    centres = [(0.0, 0.0), (1.5, 0.0), (1.5, 1.0)]
+    wall = (frozenset({1, 2}), (0.5, -1.0, 2.2, 1.65))
+    (route,) = route_all([LayoutEdge("a", 0, 0, 1)], centres, frames=[wall])
+    assert max(x for x, _ in sampled(route, 0.05)) < 0.5
+
+
+rects = st.tuples(*(st.integers(-6, 6) for _ in range(4))).map(
+    lambda r: (min(r[0], r[2]) - 0.5, min(r[1], r[3]) - 0.5, max(r[0], r[2]) + 0.5, max(r[1], r[3]) + 0.5)
+)
+spots = st.tuples(st.integers(-8, 8), st.integers(-8, 8)).map(lambda at: (float(at[0]), float(at[1])))
+
+
+@given(a=spots, b=spots, rect=rects, centre=spots)
+def test_segments_meet_rectangles_and_touch_discs_where_points_on_them_do(
+    a: Point, b: Point, rect: Rect, centre: Point
+) -> None:
+    import numpy as np
+
+    line = [(a[0] + (b[0] - a[0]) * i / 400, a[1] + (b[1] - a[1]) * i / 400) for i in range(401)]
+    one, other = np.array([a]), np.array([b])
+    inside = any(rect[0] + 0.05 < x < rect[2] - 0.05 and rect[1] + 0.05 < y < rect[3] - 0.05 for x, y in line)
+    near = any(rect[0] - 0.05 < x < rect[2] + 0.05 and rect[1] - 0.05 < y < rect[3] + 0.05 for x, y in line)
+    found = bool(meet(one, other, np.array([rect]))[0, 0])
+    assert found or not inside
+    assert near or not found
+    closest = min(distance(point, centre) for point in line)
+    touched = bool(touch(one, other, np.array([centre]), 0.7)[0, 0])
+    assert touched or closest > 0.65
+    assert closest < 0.75 or not touched
+
+
+def test_rounded_lines_run_from_end_to_end_and_stay_within_their_corners() -> None:
+    line = [(0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (9.0, 3.0)]
+    route = rounded(line, lambda piece: True)
+    assert (route[0], route[-1], len(route) % 3) == (line[0], line[-1], 1)
+    sharp = rounded(line, lambda piece: False)
+    for corner in line[1:-1]:
+        assert min(distance(corner, p) for p in sampled(route, 0.02)) > 0.2
+        assert min(distance(corner, p) for p in sampled(sharp, 0.02)) < 0.05
+    steps = [distance(a, b) for a, b in pairwise(sampled(route, 0.05))]
+    assert max(steps) < 0.2
