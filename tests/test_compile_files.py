@@ -12,6 +12,7 @@ from small_specs import compiled, network_of, wires
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.data_files import Room, Table, read_table
 from neurovis_spec.language.located import Located
+from neurovis_spec.language.reader_files import FileFault, read_bytes
 
 NEURONS = "neurons: {A: {count: 2, bias: 1}, B: {count: 3}, D: {count: 3, combine: distance, activation: gaussian}}\n"
 WEIGHTS = np.array([[1.0, 2, 3], [4, 5, 6]])
@@ -91,6 +92,28 @@ def test_a_file_is_read_once_for_each_key(folder: Path, monkeypatch: pytest.Monk
     network = network_of(NEURONS + "connections:\n" + entries, folder)
     assert network.connections.weights[:6].tolist() == [1, 2, 3, 4, 5, 6]
     assert read == [("w.npz", "weights"), ("w.npz", "turned"), ("w.mtx", None)]
+
+
+def test_events_read_no_file_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each parameter that an event sets is a compilation of its own; the files stay as they were read."""
+    opened: list[str] = []
+
+    def reading(path: Path, most: int) -> bytes | FileFault:
+        opened.append(path.name)
+        return read_bytes(path, most)
+
+    monkeypatch.setattr("neurovis_spec.language.data_files.read_bytes", reading)
+    (folder / "s.csv").write_text("1\n2\n", encoding="utf-8")
+    (folder / "e.csv").write_text("from,to,weight\nA1,B1,1\n", encoding="utf-8")
+    text = "parameters: {gain: 1}\ninputs: {s: {file: s.csv}}\nmodules: {leg: {neurons: {M: {}}}}\n" + NEURONS
+    text += "instances: {left: {module: leg, count: 2}}\n"
+    text += "connections: [{A -> B: {matrix: {file: w.mtx}}}, {A -> B: {edges: {file: e.csv}}}, {A1 -> B1: gain}]\n"
+    text += "events: [{at: 1, set: {gain: 2}}, {at: 2, set: {gain: 3}}, {at: 3, set: {gain: 4}}]\n"
+    text = text.replace("bias: 1", "bias: 1, input: s")
+    network = network_of(text, folder)
+    assert [step for step, _ in network.phases] == [1, 2, 3]
+    assert [phase.connections.weights[-1] for _, phase in network.phases] == [2, 3, 4]
+    assert sorted(opened) == ["e.csv", "s.csv", "w.mtx"]
 
 
 def test_how_a_matrix_is_written_does_not_show_in_the_hash(folder: Path) -> None:

@@ -28,6 +28,7 @@ from neurovis_spec.compiler.parameters import make_parameters
 from neurovis_spec.compiler.populate import Population, populate
 from neurovis_spec.compiler.references import Directory, key_span
 from neurovis_spec.compiler.sections import check_ros, layout_settings, make_outputs, render_settings
+from neurovis_spec.compiler.tables import Files
 from neurovis_spec.compiler.units import Expander, Unit, constants_of
 from neurovis_spec.compiler.warnings import Compiled, warn
 from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError, suggest
@@ -45,8 +46,9 @@ class Request:
     parameters: Mapping[str, float] = field(default_factory=dict)
     seed: int | None = None
     limits: Limits = field(default_factory=Limits)
-    #: the included files, where they are read already
+    #: the included files, where they are read already, and the data files by the folder that paths are relative to
     includes: Includes | None = None
+    files: Mapping[Path, Files] = field(default_factory=dict)
 
 
 def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_events: bool = True) -> Network | None:
@@ -66,7 +68,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
     make_parameters(spec, constants, request.parameters)
     _check_given(spec, constants, request.parameters)
     steps, episode = _clock(spec, constants)
-    expander = Expander(library, request.root, findings, constants.dt)
+    expander = Expander(library, request.root, findings, constants.dt, files={**request.files})
     expansion = expander.expand(spec, constants, request.base)
     units, inputs = expansion.units, expansion.inputs
     population = populate(units, request.limits, seed)
@@ -135,7 +137,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
     )
     if not with_events:
         return network
-    made = _eventful(spec, request, network, directory, constants)
+    made = _eventful(spec, replace(request, files=expander.files), network, directory, constants)
     if made is not None and not findings.failed:  # the shape may have been at fault
         warn(Compiled(spec, units, library, expander.used, made, bundles), findings)
     return made
