@@ -34,6 +34,8 @@ COMMANDS: Final[Mapping[str, str]] = {
     "render": "Draw one step as a picture.",
     "animate": "Draw a run as a moving picture.",
 }
+#: What the language names and this version does not have yet.
+LATER: Final = ("live", "ros", "analyze", "import", "export")
 INTERRUPTED: Final = 130
 NO_READER: Final = 141  # as a process that SIGPIPE has ended
 
@@ -74,6 +76,9 @@ class Commands(click.Group):
         if name not in COMMANDS and not name.startswith("-"):
             from neurovis_spec.diagnostics import suggest
 
+            if name in LATER:
+                known = f"the commands are: {', '.join(COMMANDS)}"
+                raise click.UsageError(f"this version has no command '{name}' yet; {known}", ctx)
             raise click.UsageError(f"no command '{name}'; {suggest(name, COMMANDS, 'the commands are')}", ctx)
         return super().resolve_command(ctx, args)
 

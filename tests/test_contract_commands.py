@@ -1,0 +1,391 @@
+"""The command line (§12), command by command: what the table and the paragraphs below it promise."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+import neurovis_spec as nv
+from neurovis_spec.cli.commands import COMMANDS, neurovis
+
+SPEC = """\
+neurovis: 1
+name: small
+time: {dt: 0.5, steps: 10}
+parameters: {gain: {value: 0.5, min: 0}}
+inputs: {push: {expression: 1}, pull: {size: 2}}
+neurons:
+  A: {input: push, bias: 0.25}
+  B: {count: 2, input: pull}
+connections:
+  A -> B: {weight: gain, delay: 2}
+  B -> B: {weight: 0.1, pattern: ring, plasticity: {hebbian: {rate: 0.01}}, bounds: [-1, 1]}
+outputs: {last: B2, both: B}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working folder with ``small.yaml``."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "small.yaml").write_text(SPEC, encoding="utf-8")
+    return tmp_path
+
+
+def call(words: str, stdin: str | None = None) -> Result:
+    """A command line; nothing but an exit may leave it."""
+    result = CliRunner().invoke(neurovis, words.split(), input=stdin)
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    assert "Traceback" not in result.output
+    return result
+
+
+def good(words: str, stdin: str | None = None) -> str:
+    """What a command prints that succeeds without a diagnostic."""
+    result = call(words, stdin)
+    assert (result.exit_code, result.stderr) == (0, "")
+    return result.stdout
+
+
+# Every command
+
+READS = {
+    "validate": "", "inspect": "", "layout": "", "run": "--steps 3", "fmt": "", "render": "--step 2 -o x.svg",
+    "animate": "--steps 3 -o y.svg",
+}  # fmt: skip
+OPTIONS = {
+    "new": "--from", "validate": "--format --strict --limit --root", "fmt": "--check --diff", "inspect": "--format",
+    "layout": "--output --engine --update --metrics", "render": "--output --step --recording --theme",
+    "run": "--steps --set --input --backend --every --from --output",
+    "animate": "--output --steps --from --fps --recording",
+    "explain": "", "docs": "", "lsp": "", "schema": "",
+}  # fmt: skip
+
+
+def test_there_are_these_commands_with_these_options() -> None:
+    """Each option stands in the help of its command."""
+    assert set(COMMANDS) == set(OPTIONS)
+    for name, options in OPTIONS.items():
+        shown = good(f"{name} --help")
+        assert [option for option in options.split() if option not in shown] == []
+
+
+@pytest.mark.parametrize("name", READS)
+def test_a_spec_is_a_path_or_standard_input(folder: Path, name: str) -> None:
+    """A dash is standard input; the results are the same."""
+    by_path = good(f"{name} small.yaml {READS[name]}")
+    written = {path.name: path.read_bytes() for path in folder.iterdir()}
+    piped = good(f"{name} - {READS[name]}", SPEC)
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == written
+    if name != "fmt":  # which rewrites a file, and prints what it reads from standard input
+        assert re.sub(r"in [\d.]+ s", "", by_path) == re.sub(r"in [\d.]+ s", "", piped).replace("<stdin>", "small.yaml")
+
+
+@pytest.mark.parametrize("name", READS)
+def test_results_go_to_standard_output_and_diagnostics_to_standard_error(folder: Path, name: str) -> None:
+    """A warning does not mix with a result, and an error leaves none."""
+    (folder / "odd.yaml").write_text(SPEC.replace("gain: {", "spare: 1, gain: {"), encoding="utf-8")
+    if name != "fmt":  # to which unused things are fine
+        plain, odd = call(f"{name} small.yaml {READS[name]}"), call(f"{name} odd.yaml {READS[name]}")
+        assert odd.exit_code == 0
+        assert "warning[unused-parameter]" in odd.stderr
+        assert bool(odd.stdout) == bool(plain.stdout)
+        assert "warning" not in odd.stdout
+    (folder / "bad.yaml").write_text("neurovis: 1\nname: [\n", encoding="utf-8")
+    bad = call(f"{name} bad.yaml {READS[name]}")
+    assert (bad.exit_code, bad.stdout) == (1, "")
+    assert "bad.yaml:2:7: error[yaml-syntax]" in bad.stderr
+
+
+@pytest.mark.parametrize("name", ["live", "ros", "analyze", "import", "export"])
+def test_a_command_that_is_not_there_yet_is_answered_with_those_that_are(name: str) -> None:
+    """Wrong usage, not a misspelling of another."""
+    result = call(f"{name} x.yaml")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert f"this version has no command '{name}' yet" in result.stderr
+    assert "did you mean" not in result.stderr
+    assert "validate" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "kinds"),
+    [
+        ("run small.yaml -o x.mcap", (".csv", ".npz")),
+        ("render small.yaml -o x.pdf", (".svg", ".png")),
+        ("animate small.yaml -o x.mp4", (".svg", ".gif", ".webp")),
+        ("animate small.yaml -o x.webm", (".webp",)),
+    ],
+)
+def test_a_kind_of_file_that_is_not_made_yet_is_answered_with_those_that_are(
+    folder: Path, words: str, kinds: tuple[str, ...]
+) -> None:
+    """Before anything is run or written."""
+    result = call(words)
+    assert result.exit_code == 1
+    assert [kind for kind in kinds if kind not in result.stderr] == []
+    assert [path.name for path in folder.iterdir()] == ["small.yaml"]
+
+
+# validate
+
+SHOWN = """\
+bad.yaml:3:27: error[unknown-activation]: there is no activation 'tahn'
+ 3 | neurons: {A: {activation: tahn}, B: {bia: 1}}
+   |                           ^^^^
+help: did you mean 'tanh'?
+"""
+
+
+def test_a_finding_is_shown_with_its_line_a_caret_and_a_help(folder: Path) -> None:
+    """As FILE:LINE:COLUMN: error[CODE]: MESSAGE."""
+    text = "neurovis: 1\nname: x\nneurons: {A: {activation: tahn}, B: {bia: 1}}\n"
+    (folder / "bad.yaml").write_text(text, encoding="utf-8")
+    result = call("validate bad.yaml")
+    assert result.stdout == ""
+    assert result.stderr.startswith(SHOWN)
+    assert "bad.yaml:3:38: error[unknown-key]" in result.stderr
+    assert result.stderr.rstrip().endswith("2 errors")
+
+
+def test_json_is_an_array_of_objects_with_lines_and_columns_from_1(folder: Path) -> None:
+    """``hint`` may be null; the end is that of the text at fault."""
+    text = "neurovis: 1\nname: x\nneurons: {A: {activation: tahn}, B: {count: -1}}\n"
+    (folder / "bad.yaml").write_text(text, encoding="utf-8")
+    result = call("validate bad.yaml --format json")
+    assert (result.exit_code, result.stderr) == (1, "")
+    first, second = json.loads(result.stdout)
+    assert first == {
+        "code": "unknown-activation", "severity": "error", "message": "there is no activation 'tahn'",
+        "file": "bad.yaml", "line": 3, "column": 27, "end_line": 3, "end_column": 31, "hint": "did you mean 'tanh'?",
+    }  # fmt: skip
+    assert set(second) == set(first)
+    assert second["hint"] is None or isinstance(second["hint"], str)
+
+
+def test_a_finding_points_at_the_key_the_value_or_the_character_at_fault() -> None:
+    """Each of the three."""
+    groups = ["A: {bia: 1}", "B: {count: -1}", "C: {bias: 2 + * 3}", "D: {bias: 'cos(fi)'}"]
+    text = "neurovis: 1\nname: x\nneurons:\n" + "".join(f"  {group}\n" for group in groups)
+    found = json.loads(call("validate - --format json", text).stdout)
+    assert [(item["line"], item["column"], item["end_column"]) for item in found] == [
+        (4, 7, 10), (5, 14, 16), (6, 17, 18), (7, 18, 20),
+    ]  # fmt: skip
+
+
+def test_a_duplicate_is_answered_with_the_place_of_the_first() -> None:
+    """Of a key, and of a neuron."""
+    head = "neurovis: 1\nname: x\nneurons:\n"
+    for text, place in (("  A: {}\n  A: {}\n", "4:3"), ("  K: {count: 2}\n  K1: {}\n", "4")):
+        (found,) = json.loads(call("validate - --format json", head + text).stdout)
+        assert found["line"] == 5
+        assert re.search(rf"\b{place}\b", found["message"])
+
+
+def test_an_unknown_name_is_answered_with_one_that_fits_there() -> None:
+    """A neuron where a neuron is wanted, an input where an input is: all these names are alike."""
+    text = """\
+neurovis: 1
+name: x
+parameters: {legs1: 1}
+inputs: {legs2: {}}
+activations: {legs3: {value: legs3_x}}
+neurons: {legs4: {input: legs, bias: legs}, O: {activation: legs}}
+connections: {legs -> O: 1}
+outputs: {o: legs}
+"""
+    found = json.loads(call("validate - --format json", text.replace("legs3_x", "x")).stdout)
+    hints = {(item["line"], item["code"]): item["hint"] for item in found}
+    assert hints == {
+        (6, "unknown-input"): "did you mean 'legs2'?",
+        (6, "unknown-name"): "did you mean 'legs1'?",
+        (6, "unknown-activation"): "did you mean 'legs3'?",
+        (7, "unknown-neuron"): "did you mean 'legs4'?",
+        (8, "unknown-neuron"): "did you mean 'legs4'?",
+    }
+
+
+# inspect
+
+
+def test_inspect_prints_an_object_with_these_keys(folder: Path) -> None:
+    """And no others; ``parameters`` are values, neurons and connections stand in order."""
+    seen = json.loads(good("inspect small.yaml --format json"))
+    assert set(seen) == {
+        "name", "dt", "steps", "seed", "parameters", "neurons", "connections", "inputs", "outputs", "engine", "hash",
+    }  # fmt: skip
+    assert (seen["dt"], seen["steps"], seen["seed"], seen["parameters"]) == (0.5, 10, 0, {"gain": 0.5})
+    assert [neuron["name"] for neuron in seen["neurons"]] == ["A", "B1", "B2"]
+    assert all(
+        set(neuron) == {"name", "group", "module", "activation", "model", "combine", "bias"}
+        for neuron in seen["neurons"]
+    )
+    assert seen["connections"] == [
+        {"from": "A", "to": "B1", "weight": 0.5, "delay": 2, "rule": None},
+        {"from": "A", "to": "B2", "weight": 0.5, "delay": 2, "rule": None},
+        {"from": "B1", "to": "B2", "weight": 0.1, "delay": 1, "rule": "hebbian"},
+        {"from": "B2", "to": "B1", "weight": 0.1, "delay": 1, "rule": "hebbian"},
+    ]
+    assert seen["engine"]["name"] == "layered"
+    assert seen["engine"]["reason"]
+    assert re.fullmatch(r"[0-9a-f]{64}", seen["hash"])
+
+
+def test_inspect_shows_groups_sizes_connections_delays_rules_and_the_matrix(folder: Path) -> None:
+    """As text."""
+    shown = good("inspect small.yaml")
+    for words in (r"B +B1 … B2 +2 ", r"A -> B +2 +0\.5 +2", r"B -> B +2 .*hebbian", "connection matrix"):
+        assert re.search(words, shown), words
+
+
+# layout
+
+
+def test_layout_writes_a_file_another_engine_and_metrics(folder: Path) -> None:
+    """Without -o it goes to standard output; --update keeps what was there."""
+    text = good("layout small.yaml --engine circular")
+    assert "engine: circular" in text
+    good("layout small.yaml --engine circular -o x.layout.yaml")
+    assert (folder / "x.layout.yaml").read_text(encoding="utf-8") == text
+    good("layout small.yaml --update x.layout.yaml")
+    kept = (folder / "x.layout.yaml").read_text(encoding="utf-8")
+    positions = re.findall(r"^  (\w+): (\[.*\])$", kept, re.MULTILINE)
+    assert len(positions) == 3
+    assert [f"  {name}: {place}\n" in text for name, place in positions] == [True] * 3
+    measured = json.loads(good("layout small.yaml --metrics"))
+    assert set(measured) == {
+        "neurons", "edges", "crossings", "overlaps", "edges_over_neurons", "flow", "symmetry", "area", "pins_moved",
+        "seconds",
+    }  # fmt: skip
+    assert (measured["neurons"], measured["edges"], measured["symmetry"]) == (3, 4, 1)
+
+
+# run, render, animate
+
+
+def test_a_backend_has_a_line_of_its_own() -> None:
+    """``NAME available [note]`` or ``NAME unavailable: reason``."""
+    for line in good("run --backend list").splitlines():
+        assert re.fullmatch(r"\w+ available( .+)?|\w+ unavailable: .+", line)
+
+
+def test_steps_of_a_run_default_to_those_of_the_spec(folder: Path) -> None:
+    """``--every`` records every K-th, ``--from`` begins with what was learned."""
+    good("run small.yaml -o a.npz")
+    good("run small.yaml --steps 7 --every 3 -o b.npz")
+    good("run small.yaml --from a.npz --steps 2 -o c.npz")
+    a, b, c = (nv.load(f"{name}.npz") for name in "abc")
+    assert (a.step.tolist(), b.step.tolist()) == (list(range(10)), [0, 3, 6])
+    np.testing.assert_array_equal(c.weights[0], a.weights[-1])
+
+
+def test_a_frame_is_a_step_and_frames_a_second_default_to_one_over_dt(folder: Path) -> None:
+    """At most 60, and 25 where no dt is written."""
+
+    def seconds(time: str, options: str = "") -> float:
+        (folder / "x.yaml").write_text(SPEC.replace("time: {dt: 0.5, steps: 10}", f"time: {time}"), encoding="utf-8")
+        good(f"animate x.yaml -o x.svg {options}")
+        found = re.findall(r'dur="([\d.]+)s"', (folder / "x.svg").read_text(encoding="utf-8"))
+        assert len(set(found)) == 1
+        return float(found[0])
+
+    assert seconds("{dt: 0.5, steps: 10}") == pytest.approx(10 / 2)
+    assert seconds("{dt: 0.05, steps: 10}") == pytest.approx(10 / 20)
+    assert seconds("{dt: 0.001, steps: 30}") == pytest.approx(30 / 60)
+    assert seconds("{steps: 10}") == pytest.approx(10 / 25)
+    assert seconds("{dt: 1, steps: 10}") == pytest.approx(10)
+    assert seconds("{dt: 0.5, steps: 10}", "--steps 6") == pytest.approx(3)
+    assert seconds("{dt: 0.5, steps: 10}", "--fps 4") == pytest.approx(2.5)
+    assert seconds("{dt: 0.5, steps: 10}", "--from 4") == pytest.approx(3)
+
+
+def test_render_without_a_recording_runs_as_far_as_the_step(folder: Path) -> None:
+    """And shows the same as a recording would."""
+    good("run small.yaml -o x.npz")
+    good("render small.yaml -o a.svg --step 7 --recording x.npz")
+    good("render small.yaml -o b.svg --step 7")
+    good("render small.yaml -o c.svg --step 6")
+    a, b, c = ((folder / f"{name}.svg").read_bytes() for name in "abc")
+    assert a == b != c
+
+
+def test_an_input_is_a_csv_with_a_row_a_step_or_an_npy(folder: Path) -> None:
+    """A column per component."""
+    rows = np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]])
+    np.save(folder / "p.npy", rows)
+    (folder / "p.csv").write_text("1,2\n3,4\n5,6\n", encoding="utf-8")
+    expected = nv.compile("small.yaml").run(5, {"pull": rows})
+    for suffix in ("csv", "npy"):
+        good(f"run small.yaml --steps 5 --input pull=p.{suffix} -o {suffix}.npz")
+        np.testing.assert_array_equal(nv.load(f"{suffix}.npz").activity, expected.activity)
+
+
+def test_what_cannot_be_read_is_the_inputs_fault(folder: Path) -> None:
+    """A recording, an input, a layout file, a spec."""
+    (folder / "broken").write_bytes(b"\x93NUMPY\x01")
+    for words in (
+        "run small.yaml --from broken", "run small.yaml --from none.npz", "run small.yaml --input pull=broken",
+        "render small.yaml -o x.svg --recording broken", "layout small.yaml --update broken", "validate broken",
+        "animate small.yaml -o x.svg --recording none.npz",
+    ):  # fmt: skip
+        assert call(words).exit_code == 1, words
+
+
+# new, fmt, schema, docs, explain
+
+
+def test_new_writes_a_starter_spec_with_comments_and_from_an_example(folder: Path) -> None:
+    """What is written validates, and what is there is not overwritten."""
+    good("new first")
+    good("new second --from ring")
+    for name in ("first", "second"):
+        text = (folder / f"{name}.yaml").read_text(encoding="utf-8")
+        assert f"name: {name}\n" in text
+        assert "#" in text
+        assert ": ok (" in good(f"validate {name}.yaml --strict")
+    assert call("new first").exit_code == 1
+
+
+def test_fmt_is_idempotent_keeps_comments_and_says_what_it_would_do(folder: Path) -> None:
+    """``--check`` and ``--diff`` write nothing."""
+    rough = SPEC.replace("parameters: {gain:", "parameters: {   gain:").replace(
+        "\nneurons:\n", "   # why\n\n\n\nneurons:  # what\n"
+    )
+    (folder / "small.yaml").write_text(rough, encoding="utf-8")
+    before = nv.compile("small.yaml").hash
+    check, diff = call("fmt small.yaml --check"), call("fmt small.yaml --diff")
+    assert check.exit_code == 1
+    assert "-parameters: {   gain:" in diff.stdout
+    assert (folder / "small.yaml").read_text(encoding="utf-8") == rough
+    assert call("fmt small.yaml").exit_code == 0
+    once = (folder / "small.yaml").read_text(encoding="utf-8")
+    assert "# why" in once
+    assert "# what" in once
+    assert nv.compile("small.yaml").hash == before
+    assert call("fmt small.yaml --check").exit_code == 0
+    good("fmt small.yaml")
+    assert (folder / "small.yaml").read_text(encoding="utf-8") == once
+
+
+def test_docs_and_explain_answer_with_examples() -> None:
+    """A built-in, a key, a function, a pattern; the code of a finding."""
+    assert "exp(-sigma * x^2)" in good("docs gaussian")
+    for name, words in (("delay", "connections"), ("small_world", "rewire"), ("atan2", "atan2("), ("theme", "render")):
+        assert words in good(f"docs {name}")
+    shown = good("explain transposed")
+    assert "Wrong:" in shown
+    assert "rows are sources" in shown
+    assert call("explain transpozed").exit_code in (1, 2)
+    assert "did you mean 'transposed'" in call("explain transpozed").stderr
+
+
+def test_schema_is_json_schema_2020_12_with_descriptions() -> None:
+    """Of every key."""
+    schema = json.loads(good("schema"))
+    assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    assert all(value.get("description") for value in schema["properties"].values())
+    assert set(schema["required"]) == {"neurovis", "name"}
