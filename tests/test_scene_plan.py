@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hand_networks import C, Case, G, loop, network, numbered, straight, straight_layout, use_case_1
 
@@ -99,7 +100,8 @@ def test_each_neuron_and_connection_is_there_once_with_its_attributes() -> None:
     assert set(with_data(scene, "neuron")) == set(CASE.network.neurons.names)
     lines = with_data(scene, "connection")
     assert set(lines) == set(CASE.network.connection_names)
-    assert lines["K1 -> O"].data == {"connection": "K1 -> O", "from": "K1", "to": "O"}
+    assert lines["K1 -> O"].data == {"connection": "K1 -> O", "from": "K1", "to": "O", "delay": "0"}
+    assert lines["C1 -> C2"].data["delay"] == "1"
     assert len([g for g in scene.groups if "connection" in g.data]) == 28
 
 
@@ -171,18 +173,74 @@ def test_a_teacher_has_a_dotted_line_and_a_place_in_the_legend() -> None:
     assert "T is the target of delta" in taught[0].title
 
 
-def test_a_signal_that_takes_several_steps_has_a_bead_and_a_place_in_the_legend() -> None:
-    made = network([numbered("A", 3)], [C("A1", "A2", 1.0, 0), C("A2", "A3", 1.0, 1), C("A1", "A3", 1.0, 20)])
+@pytest.mark.parametrize(
+    ("delays", "marked", "words"),
+    [
+        ((0, 1, 20), (0, 1, 1), "delay 1 … 20, else 0"),
+        ((0, 0, 1), (0, 0, 1), "delay 1, else 0"),
+        ((1, 1, 20), (0, 0, 1), "delay 20, else 1"),
+        ((3, 3, 3), (1, 1, 1), "delay 3"),
+        ((1, 1, 1), (0, 0, 0), ""),
+        ((0, 0, 0), (0, 0, 0), ""),
+    ],
+)
+def test_signals_that_arrive_later_than_others_have_a_bead_and_a_place_in_the_legend(
+    delays: tuple[int, int, int], marked: tuple[int, int, int], words: str
+) -> None:
+    ends = [("A1", "A2"), ("A2", "A3"), ("A1", "A3")]
+    made = network([numbered("A", 3)], [C(a, b, 1.0, delay) for (a, b), delay in zip(ends, delays, strict=True)])
     scene = small(made, straight_layout(made, {"A1": (0, 0), "A2": (1, 2), "A3": (0, 4)}))
     lines = with_data(scene, "connection")
     beads = {name: [s for s in g.shapes if isinstance(s, Rectangle)] for name, g in lines.items()}
-    assert {name: len(found) for name, found in beads.items()} == {"A1 -> A2": 0, "A2 -> A3": 0, "A1 -> A3": 1}
-    (bead,) = beads["A1 -> A3"]
+    assert [len(beads[f"{a} -> {b}"]) for a, b in ends] == list(marked)
+    said = {t.text for t in all_texts(scene)}
+    assert ("Bead" in said) == bool(words)
+    assert not words or words in said
+
+
+def test_a_bead_lies_on_the_middle_of_its_line() -> None:
+    made = network([numbered("A", 3)], [C("A1", "A2", 1.0, 0), C("A2", "A3", 1.0, 0), C("A1", "A3", 1.0, 20)])
+    scene = small(made, straight_layout(made, {"A1": (0, 0), "A2": (1, 2), "A3": (0, 4)}))
+    lines = with_data(scene, "connection")
+    (bead,) = [s for s in lines["A1 -> A3"].shapes if isinstance(s, Rectangle)]
     line = next(s for s in lines["A1 -> A3"].shapes if isinstance(s, Spline))
     middle = sample(line.points, 2)[1]
     assert (bead.corner[0] + bead.radius, bead.corner[1] + bead.radius) == pytest.approx(tuple(middle))
     assert bead.width == bead.height == 2 * bead.radius
-    assert {"Bead", "delay: 20 steps"} <= {t.text for t in all_texts(scene)}
+
+
+def test_beads_that_are_too_small_to_be_seen_are_not_explained() -> None:
+    case = grid(120, 100)
+    made = replace(case.network, connections=replace(case.network.connections, delays=_some_delayed(case.network)))
+    scene = small(made, case.layout)
+    assert not [s for g in scene.groups if "connection" in g.data for s in g.shapes if isinstance(s, Rectangle)]
+    assert "Bead" not in {t.text for t in all_texts(scene)}
+
+
+def _some_delayed(made: Network) -> npt.NDArray[np.int64]:
+    delays = np.ones(len(made.connections), np.int64)
+    delays[:5] = 4
+    return delays
+
+
+def test_a_title_that_lines_have_to_cross_keeps_them_away_from_its_letters() -> None:
+    boxed = replace(numbered("B", 2), box="b")
+    lines = [C(f"A{i}", f"B{j}", 6.0) for i in range(1, 10) for j in (1, 2)]
+    made = network(
+        [numbered("A", 9), numbered("D", 9), boxed],
+        lines + [C(f"B{j}", f"D{i}", 6.0) for i in range(1, 10) for j in (1, 2)],
+    )
+    places: dict[str, Point] = {f"{name}{i}": (0.7 * i, y) for name, y in (("A", 0), ("D", 2)) for i in range(1, 10)}
+    scene = small(made, straight_layout(made, places | {"B1": (3, 1), "B2": (4, 1)}))
+    (title,) = next(g for g in scene.groups if g.id.startswith("title:")).shapes
+    assert isinstance(title, Text)
+    x0, y0, x1, y1 = text_rect(title)
+    dots = np.concatenate([sample(s.points, 60) for s in scene.shapes() if isinstance(s, Spline)])
+    crossed = bool(((dots[:, 0] > x0) & (dots[:, 0] < x1) & (dots[:, 1] > y0) & (dots[:, 1] < y1)).any())
+    assert not crossed or title.halo == scene.theme.box_fill
+    header = next(g for g in scene.groups if g.id == "title").shapes[0]
+    assert isinstance(header, Text)
+    assert not header.halo
 
 
 def test_a_title_that_finds_no_room_is_shortened_rather_than_crossed() -> None:

@@ -6,6 +6,7 @@ Renderers use what stands here; ``encode``, ``film`` and ``choose_gains`` are in
 from neurovis_spec.progress import Progress
 from neurovis_spec.scene.film import still
 from neurovis_spec.scene.model import (
+    HALO,
     HEAD_MORE,
     HEAD_OF_LENGTH,
     HEAD_OF_WIDTH,
@@ -30,6 +31,7 @@ from neurovis_spec.scene.themes import THEMES, blend, channels, colours, readabl
 
 __all__ = [
     "FAMILIES",
+    "HALO",
     "HEAD_MORE",
     "HEAD_OF_LENGTH",
     "HEAD_OF_WIDTH",

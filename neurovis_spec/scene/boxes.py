@@ -19,8 +19,8 @@ from neurovis_spec.scene.obstacles import Obstacles
 
 _PAD_ACROSS, _PAD_DOWN = 0.62, 0.6
 _TIGHT = 0.42
-_SIZE = 11.5
-
+#: of a title; where nothing else helps its name gets as small as the last
+_SIZE, _SMALLER = 11.5, (10.0, 9.0)
 
 #: Around what an instance's frame holds: centres, routes, frames; and room for its title on top.
 _PAD_FRAME, _PAD_ROUTE, _PAD_INNER, _TITLE_ROOM = 0.65, 0.2, 0.35, 0.35
@@ -206,19 +206,17 @@ def box_title(box: Box, rect: Rect, obstacles: Obstacles, theme: Theme, picture:
     finds no room, or as much of the name as finds it. ``rect`` and ``picture``: the box and what may be drawn on, in
     user units."""
     best: tuple[int, int, Text, Rect] | None = None
-    room = picture[2] - picture[0]
-    shorter = [texts.shorten(box.name, _SIZE, share * min(room, rect[2] - rect[0])) for share in (1, 0.7, 0.5, 0.35)]
-    fitting = [text for text in shorter if len(text) > 3]
-    for penalty, text in enumerate([*(texts.shorten(name, _SIZE, room) for name in (box.title, box.name)), *fitting]):
-        width = texts.width(text, _SIZE)
+    for penalty, (text, size) in enumerate(_wordings(box, rect, picture)):
+        width = texts.width(text, size)
         for rank, (x, y) in enumerate(_places(rect, width, picture)):
             x = min(max(x, picture[0]), picture[2] - width)
-            taken = (x - 2, y - _SIZE, x + width + 2, y + 0.3 * _SIZE)
+            taken = (x - 2, y - size, x + width + 2, y + 0.3 * size)
             if taken[1] < picture[1] or taken[3] > picture[3]:
                 continue
             hits = obstacles.hits(taken)
             if best is None or (hits, penalty * 1000 + rank) < best[:2]:
-                best = (hits, penalty * 1000 + rank, Text((x, y), text, _SIZE, theme.muted), taken)
+                halo = theme.box_fill if hits else ""
+                best = (hits, penalty * 1000 + rank, Text((x, y), text, size, theme.muted, halo=halo), taken)
             if hits == 0:
                 break
         if best is not None and best[0] == 0:
@@ -227,6 +225,15 @@ def box_title(box: Box, rect: Rect, obstacles: Obstacles, theme: Theme, picture:
         return None
     obstacles.add_text(best[3])
     return best[2]
+
+
+def _wordings(box: Box, rect: Rect, picture: Rect) -> list[tuple[str, float]]:
+    """What a title may say and how large, best first: all, the name, the name in small, the beginning of the name."""
+    room = picture[2] - picture[0]
+    whole = [(texts.shorten(box.title, _SIZE, room), _SIZE)]
+    whole += [(texts.shorten(box.name, size, room), size) for size in (_SIZE, *_SMALLER)]
+    shares = [texts.shorten(box.name, _SIZE, share * min(room, rect[2] - rect[0])) for share in (1, 0.7, 0.5, 0.35)]
+    return whole + [(text, _SIZE) for text in shares if len(text) > 3]
 
 
 def _places(rect: Rect, width: float, picture: Rect) -> list[tuple[float, float]]:

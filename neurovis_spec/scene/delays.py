@@ -1,7 +1,8 @@
-"""Beads: a small open bead on every connection whose signal is under way for more than one step.
+"""Beads: a small open bead on every connection whose signal arrives later than those of others.
 
-In: delays and lines. Out: a bead in the middle of each such line, and what the legend says of them. Delays of 0 and 1
-look alike: which of the two it is decides nothing that a picture of one step could show.
+In: delays and lines. Out: a bead in the middle of each such line, and what the legend says of them. Where some
+connections have no delay, so that what they send takes part in the very step that a picture shows, those with any
+delay have beads; else those of several steps.
 """
 
 from __future__ import annotations
@@ -15,14 +16,20 @@ from neurovis_spec.scene.model import Rectangle, Theme
 
 #: more beads than this would not be quiet
 _MOST = 300
-#: smaller beads cannot be seen
-_SMALLEST = 1.5
+#: beads are not smaller, so that they can be seen, and none is on lines between discs that are hardly larger
+_SMALLEST, _SMALLEST_DISC = 2.0, 5.0
 
 
 def delayed(network: Network) -> list[int]:
-    """The connections with a delay of several steps; none where there are too many to be marked."""
-    found: list[int] = (network.connections.delays > 1).nonzero()[0].tolist()
+    """The connections with beads; none where there are too many to be marked."""
+    delays = network.connections.delays
+    found: list[int] = (delays > int(delays.min(initial=1))).nonzero()[0].tolist()
     return found if len(found) <= _MOST else []
+
+
+def visible(disc: float) -> bool:
+    """Whether discs of this radius leave room for beads."""
+    return disc >= _SMALLEST_DISC
 
 
 def bead(centre: Point, radius: float, theme: Theme) -> Rectangle:
@@ -33,17 +40,19 @@ def bead(centre: Point, radius: float, theme: Theme) -> Rectangle:
 
 def beads(network: Network, lines: Sequence[Line], disc: float, theme: Theme) -> dict[int, Rectangle]:
     """By connection; ``disc`` is the radius of neurons."""
-    radius = min(3.2, 0.16 * disc)
-    if radius < _SMALLEST:
+    if not visible(disc):
         return {}
+    radius = min(3.2, max(_SMALLEST, 0.16 * disc))
     middles = {index: point_at(lines[index].points, (len(lines[index].points) - 1) / 6) for index in delayed(network)}
     return {index: bead(middle, radius, theme) for index, middle in middles.items()}
 
 
 def label_of(network: Network) -> str:
-    """How long the delays are: ``delay: 3 … 10 steps``; '' where nothing is marked."""
-    found = network.connections.delays[delayed(network)]
-    if not len(found):
+    """Which delays have beads, and which have none: ``delay 3 … 10, else 1``; '' where nothing is marked."""
+    delays = network.connections.delays
+    chosen = delayed(network)
+    if not chosen:
         return ""
-    low, high = int(found.min()), int(found.max())
-    return f"delay: {low} steps" if low == high else f"delay: {low} … {high} steps"
+    low, high = int(delays[chosen].min()), int(delays[chosen].max())
+    marked = f"delay {low} … {high}" if low < high else f"delay {low}"
+    return marked if len(chosen) == len(delays) else f"{marked}, else {int(delays.min())}"

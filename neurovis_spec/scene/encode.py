@@ -6,7 +6,7 @@ In: a network, its layout, a Snapshot, gains and settings. Out: a Scene, or what
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +18,7 @@ from neurovis_spec.scene import encoding, texts
 from neurovis_spec.scene.caption import caption
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.geometry import FloatArray
+from neurovis_spec.scene.lesions import FAINT
 from neurovis_spec.scene.model import Arrowhead, Disc, Group, Scene, Shape, Spline, head_half_width
 from neurovis_spec.scene.plan import Plan, plan
 from neurovis_spec.scene.themes import colours, readable
@@ -43,7 +44,8 @@ def encode(network: Network, layout: Layout, snapshot: Snapshot, gains: Gains, s
     planned = plan(network, layout, gains, settings)
     seen = looks(network, snapshot, gains)
     words = tooltips(network, snapshot.activity[None], snapshot.weights[None])
-    return paint(planned, seen, seen.glows > 0, caption(network, snapshot.step, snapshot.activity), words)
+    said = caption(network, snapshot.step, snapshot.activity)
+    return paint(planned, seen, seen.glows > 0, said, words, snapshot.step)
 
 
 def looks(network: Network, snapshot: Snapshot, gains: Gains) -> Looks:
@@ -66,8 +68,10 @@ def paint(
     glowing: npt.NDArray[np.bool_],
     words: str,
     titles: tuple[list[str], list[str]],
+    step: int,
 ) -> Scene:
-    """A plan with colours and widths; connections that are ``glowing`` (m,) have a glow, if only of width 0."""
+    """A plan with colours and widths; connections that are ``glowing`` (m,) have a glow, if only of width 0. What is
+    lesioned by ``step`` is faint."""
     caption_shape = planned.caption_shape(words)
     said = (Group((caption_shape,), id=CAPTION),) if caption_shape else ()
     return Scene(
@@ -78,12 +82,31 @@ def paint(
         title=f"{planned.title}, {words}",
         groups=(
             *planned.back,
-            *_connections(planned, seen, glowing, titles[1]),
-            *_neurons(planned, seen, titles[0]),
+            *_fainter(_connections(planned, seen, glowing, titles[1]), lesions_by_id(planned), step),
+            *_fainter(_neurons(planned, seen, titles[0]), lesions_by_id(planned), step),
             *planned.front,
             *said,
         ),
     )
+
+
+def lesions_by_id(planned: Plan) -> dict[str, int]:
+    """The step of its lesion, for each group of a scene that has one."""
+    found = {f"n{index}": step for index, step in planned.lesions.neurons.items()}
+    return found | {f"c{index}": step for index, step in planned.lesions.connections.items()}
+
+
+def _fainter(groups: list[Group], lesions: dict[str, int], step: int) -> list[Group]:
+    """Groups, of which those that are lesioned by a step are faint and say so."""
+    if not lesions:
+        return groups
+    result = []
+    for group in groups:
+        since = lesions.get(group.id)
+        if since is not None and since <= step:
+            group = replace(group, opacity=FAINT, title=f"{group.title}\nlesioned at step {since}")
+        result.append(group)
+    return result
 
 
 def _neurons(planned: Plan, seen: Looks, titles: list[str]) -> list[Group]:
@@ -95,7 +118,7 @@ def _neurons(planned: Plan, seen: Looks, titles: list[str]) -> list[Group]:
         label = planned.labels[index]
         shapes: tuple[Shape, ...] = (disc,)
         if label is not None:
-            shapes = (disc, label.shape(readable(theme, fills[index]) if label.on_disc else theme.ink))
+            shapes = (disc, label.shape(readable(theme, fills[index]) if label.on_disc else theme.ink, theme.box_fill))
         groups.append(Group(shapes, f"n{index}", {"neuron": name}, titles[index]))
     return groups
 
@@ -118,16 +141,17 @@ def _connections(planned: Plan, seen: Looks, glowing: npt.NDArray[np.bool_], tit
 
 
 def data_attributes(network: Network) -> list[dict[str, str]]:
-    """``connection``, ``from`` and ``to`` of every connection; ``index`` where several share both ends."""
+    """``connection``, ``from``, ``to`` and ``delay`` of every connection; ``index`` where several share both ends."""
     names, connections = network.neurons.names, network.connections
     ends = list(zip(connections.sources.tolist(), connections.targets.tolist(), strict=True))
     sharing = Counter(ends)
     result = []
-    for full, (source, target) in zip(network.connection_names, ends, strict=True):
+    for full, (source, target), delay in zip(network.connection_names, ends, connections.delays.tolist(), strict=True):
         plain = f"{names[source]} -> {names[target]}"
         data = {"connection": plain, "from": names[source], "to": names[target]}
         if sharing[source, target] > 1:
             data["index"] = full[len(plain) + 2 : -1] or "1"
+        data["delay"] = str(delay)
         result.append(data)
     return result
 

@@ -16,8 +16,9 @@ import numpy.typing as npt
 from neurovis_spec.compiler.network import Network, RenderSettings
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.scene.caption import caption
-from neurovis_spec.scene.encode import CAPTION, looks, paint, tooltips
+from neurovis_spec.scene.encode import CAPTION, lesions_by_id, looks, paint, tooltips
 from neurovis_spec.scene.gains import Gains
+from neurovis_spec.scene.lesions import FAINT
 from neurovis_spec.scene.model import Arrowhead, Disc, Film, Group, Scene, Shape, Spline, Text, head_half_width
 from neurovis_spec.scene.plan import plan
 from neurovis_spec.scene.themes import colours, readable
@@ -36,9 +37,10 @@ def film(
 ) -> Film:
     """One frame a snapshot, ``fps`` frames a second. Raises ValueError without a snapshot."""
     planned = plan(network, layout, gains, settings)
-    seen, captions, low, high = [], [], None, None
+    seen, captions, steps, low, high = [], [], list[int](), None, None
     for snapshot in snapshots:
         seen.append(looks(network, snapshot, gains))
+        steps.append(snapshot.step)
         words = caption(network, snapshot.step, snapshot.activity)
         shape = planned.caption_shape(words)
         captions.append(shape.text if shape else words)
@@ -51,7 +53,7 @@ def film(
     glowing: npt.NDArray[np.bool_] = np.max(glows > 0, axis=0)
     titles = tooltips(network, np.stack([low[0], high[0]]), np.stack([low[1], high[1]]))
     return Film(
-        scene=paint(planned, seen[0], glowing, captions[0], titles),
+        scene=paint(planned, seen[0], glowing, captions[0], titles, steps[0]),
         fps=fps,
         discs=tuple(f"n{index}" for index in range(len(network.neurons))),
         lines=tuple(f"c{index}" for index in range(len(network.connections))),
@@ -61,6 +63,12 @@ def film(
         glow_widths=glows,
         caption=CAPTION,
         captions=tuple(captions),
+        faint={
+            name: next(frame for frame, step in enumerate(steps) if step >= since)
+            for name, since in lesions_by_id(planned).items()
+            if since <= steps[-1]
+        },
+        faintness=FAINT,
     )
 
 
@@ -99,6 +107,7 @@ def still(film: Film, frame: int) -> Scene:
                     shapes.append(replace(shape, fill=lines[group.id][0], half_width=half))
                 case _:
                     shapes.append(shape)
-        return replace(group, shapes=tuple(shapes))
+        faint = group.id in film.faint and frame >= film.faint[group.id]
+        return replace(group, shapes=tuple(shapes), opacity=film.faintness if faint else 1.0)
 
     return replace(film.scene, groups=tuple(repaint(group) for group in film.scene.groups))

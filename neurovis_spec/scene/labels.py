@@ -16,12 +16,18 @@ from neurovis_spec.scene.model import Text
 from neurovis_spec.scene.obstacles import Obstacles
 
 _WEIGHT = 600
-#: on the disc: never smaller, not for the sake of others, never larger; beside it
-_SMALLEST, _READABLE, _LARGEST, _BESIDE = 9.0, 10.5, 14.0, 11.0
+#: on the disc: never smaller, not for the sake of others, never larger
+_SMALLEST, _READABLE, _LARGEST = 9.0, 10.5, 14.0
+#: beside it: these, and so much for each unit of the radius between them
+_BESIDE_SMALLEST, _BESIDE_LARGEST, _BESIDE_SHARE = 8.5, 11.0, 0.8
 #: a numbered name may be smaller: it says where one is among many
-_NUMBERED = 6.5
-#: how wide, in radii, a text beside a disc may be: it must not look like a title of the neurons around
-_WIDEST_BESIDE = 5.0
+_NUMBERED = 6.0
+#: one that is shortened may be
+_LEGIBLE = 8.0
+#: how wide, in radii, a text beside a disc may be, if there is room: it must not look like a title of those around
+_WIDEST_BESIDE = (9.0, 5.0)
+#: of a group with so many labels all stand beside their discs, or none does: some would look as if they meant something
+_MANY = 4
 #: with more labels than this to place beside discs, none is
 _MOST_BESIDE = 150
 #: a disc smaller than this has no label
@@ -38,10 +44,13 @@ class Label:
     point: Point
     anchor: Literal["start", "middle", "end"]
     on_disc: bool
+    #: it lies across the line of a box
+    crosses: bool = False
 
-    def shape(self, fill: str) -> Text:
-        """The text in a colour."""
-        return Text(self.point, self.text, self.size, fill, self.anchor, _WEIGHT, self.subscript, self.on_disc)
+    def shape(self, fill: str, halo: str) -> Text:
+        """The text in a colour; where it lies across a line, with a halo in another."""
+        around = halo if self.crosses else ""
+        return Text(self.point, self.text, self.size, fill, self.anchor, _WEIGHT, self.subscript, self.on_disc, around)
 
 
 def labels_of(
@@ -55,11 +64,34 @@ def labels_of(
     common = _common_size(parts, radius)
     result = [_on_disc(*both, centre, radius, common) for both, centre in zip(parts, centres, strict=True)]
     missing = [index for index, found in enumerate(result) if found is None]
+    if len(missing) <= _MOST_BESIDE:
+        for members in _together(network, missing):
+            placed = [_beside(neurons.labels[index], centres[index], radius, obstacles, picture) for index in members]
+            if len(members) >= _MANY and None in placed:
+                obstacles.drop_texts(len(placed) - placed.count(None))
+                continue
+            for index, label in zip(members, placed, strict=True):
+                result[index] = label
     for index in missing:
-        label, centre = neurons.labels[index], centres[index]
-        # where most would not find room, the few that do would only look as if they meant something
-        found = _beside(label, centre, radius, obstacles, picture) if len(missing) <= _MOST_BESIDE else None
-        result[index] = found if found is not None else _shortened(label, centre, radius)
+        if result[index] is None:
+            result[index] = _shortened(*parts[index], centres[index], radius)
+    return result
+
+
+def outgrown(network: Network, radius: float) -> list[int]:
+    """The neurons whose labels do not fit on discs of this radius, so that they need room beneath."""
+    neurons = network.neurons
+    parts = [_parts(label, name) for label, name in zip(neurons.labels, neurons.names, strict=True)]
+    return [index for index, both in enumerate(parts) if _on_disc(*both, (0.0, 0.0), radius, _READABLE) is None]
+
+
+def _together(network: Network, missing: list[int]) -> list[list[int]]:
+    """Those of a group together."""
+    left, result = set(missing), []
+    for group in network.neurons.groups:
+        members = [index for index in group.indices if index in left]
+        if members:
+            result.append(members)
     return result
 
 
@@ -81,10 +113,12 @@ def _common_size(parts: list[tuple[str, str]], radius: float) -> float:
     return size
 
 
-def _on_disc(base: str, subscript: str, centre: Point, radius: float, common: float) -> Label | None:
-    size = common
-    while size > (_NUMBERED if subscript else _SMALLEST) and not _fits((base, subscript), size, radius):
-        size -= 0.5
+def _on_disc(
+    base: str, subscript: str, centre: Point, radius: float, common: float, least: float | None = None
+) -> Label | None:
+    size, least = common, least or (_NUMBERED if subscript or common < _SMALLEST else _SMALLEST)
+    while size > least and not _fits((base, subscript), size, radius):
+        size = max(size - 0.5, least)
     if not _fits((base, subscript), size, radius):
         return None
     drop = 0.36 if not subscript else 0.32
@@ -93,32 +127,51 @@ def _on_disc(base: str, subscript: str, centre: Point, radius: float, common: fl
 
 def _chord(radius: float, size: float) -> float:
     """How wide a text of this size may be on a disc."""
-    return float(2 * (max(radius * radius - (0.4 * size) ** 2, 0.0)) ** 0.5 - 3)
+    return float(2 * (max(radius * radius - (0.4 * size) ** 2, 0.0)) ** 0.5 - min(2.5, 0.2 * radius))
 
 
 def _beside(label: str, centre: Point, radius: float, obstacles: Obstacles, picture: Rect) -> Label | None:
-    size, (x, y) = _BESIDE, centre
-    label = texts.shorten(label, size, _WIDEST_BESIDE * radius, _WEIGHT)
-    width = texts.width(label, size, _WEIGHT)
+    size, (x, y) = min(_BESIDE_LARGEST, max(_BESIDE_SMALLEST, _BESIDE_SHARE * radius)), centre
+    aside, corner = radius + 5, 0.75 * radius + 3
     places: tuple[tuple[Literal["start", "middle", "end"], float, float], ...] = (
         ("middle", x, y + radius + 4 + 0.8 * size),
         ("middle", x, y - radius - 6),
-        ("start", x + radius + 5, y + 0.36 * size),
-        ("end", x - radius - 5, y + 0.36 * size),
+        ("start", x + aside, y + 0.36 * size),
+        ("end", x - aside, y + 0.36 * size),
+        ("start", x + corner, y - corner),
+        ("end", x - corner, y - corner),
+        ("start", x + corner, y + corner + 0.72 * size),
+        ("end", x - corner, y + corner + 0.72 * size),
     )
-    for anchor, at, baseline in places:
-        left = at - {"start": 0.0, "middle": width / 2, "end": width}[anchor]
-        rect = (left - 2, baseline - 0.8 * size, left + width + 2, baseline + 0.25 * size)
-        inside = rect[0] >= picture[0] and rect[1] >= picture[1] and rect[2] <= picture[2] and rect[3] <= picture[3]
-        if inside and obstacles.hits(rect) == 0:
-            obstacles.add_text(rect)
-            return Label(label, "", size, (at, baseline), anchor, False)
-    return None
+    across: tuple[Label, Rect] | None = None
+    for text in dict.fromkeys(texts.shorten(label, size, room * radius, _WEIGHT) for room in _WIDEST_BESIDE):
+        width = texts.width(text, size, _WEIGHT)
+        for anchor, at, baseline in places:
+            left = at - {"start": 0.0, "middle": width / 2, "end": width}[anchor]
+            rect = (left - 2, baseline - 0.8 * size, left + width + 2, baseline + 0.25 * size)
+            inside = rect[0] >= picture[0] and rect[1] >= picture[1] and rect[2] <= picture[2] and rect[3] <= picture[3]
+            hits = obstacles.hits(rect) if inside else 1
+            if hits == 0:
+                obstacles.add_text(rect)
+                return Label(text, "", size, (at, baseline), anchor, False)
+            if across is None and inside and hits == obstacles.frame_hits(rect):
+                across = Label(text, "", size, (at, baseline), anchor, False, crosses=True), rect
+    if across is None:
+        return None
+    obstacles.add_text(across[1])
+    return across[0]
 
 
-def _shortened(label: str, centre: Point, radius: float) -> Label | None:
-    size = max(_SMALLEST, min(10.0, 0.5 * radius))
-    text = texts.shorten(label, size, _chord(radius, size), _WEIGHT)
+def _shortened(base: str, subscript: str, centre: Point, radius: float) -> Label | None:
+    """What fits on the disc: the beginning of a name; of a numbered one its number, if need be alone."""
+    if subscript:
+        for end in range(min(len(base) - 1, 3), 0, -1):
+            found = _on_disc(base[:end] + "…", subscript, centre, radius, _SMALLEST, _LEGIBLE)
+            if found is not None:
+                return found
+        return _on_disc(subscript, "", centre, radius, min(_SMALLEST, 0.76 * radius), _NUMBERED)
+    size = min(max(_SMALLEST, min(10.0, 0.5 * radius)), 0.76 * radius)
+    text = texts.shorten(base, size, _chord(radius, size), _WEIGHT)
     if len(text) < 2:
         return None
     return Label(text, "", size, (centre[0], centre[1] + 0.36 * size), "middle", True)

@@ -1,4 +1,4 @@
-"""The legend: what colour, thickness, glow, dotted lines and beads mean, with their scales.
+"""The legend: what colour, thickness, glow, dotted and faint lines and beads mean, with their scales.
 
 In: gains, a theme and what the picture holds. Out: entries, which flow into rows at the foot of a picture. An entry is
 a heading, a sample and two lines of text.
@@ -17,6 +17,7 @@ from neurovis_spec.scene.delays import bead
 from neurovis_spec.scene.encoding import THINNEST, glow_width
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.geometry import Point
+from neurovis_spec.scene.lesions import FAINT
 from neurovis_spec.scene.model import Group, Ramp, Rectangle, Shape, Spline, Text, Theme
 from neurovis_spec.scene.teachers import dash
 from neurovis_spec.scene.themes import colours
@@ -48,6 +49,8 @@ class Contents:
     teaches: str
     #: how long delays are, '' without any of several steps
     delays: str = ""
+    #: whether something is removed in the course of a run
+    lesions: bool = False
 
 
 def entries(contents: Contents, gains: Gains, theme: Theme) -> list[Entry]:
@@ -61,6 +64,8 @@ def entries(contents: Contents, gains: Gains, theme: Theme) -> list[Entry]:
         result.append(_dotted(contents.teaches, theme))
     if contents.delays:
         result.append(_bead(contents.delays, theme))
+    if contents.lesions:
+        result.append(_faint(theme))
     return result
 
 
@@ -212,7 +217,7 @@ def _dotted(words: str, theme: Theme) -> Entry:
 
 
 def _bead(words: str, theme: Theme) -> Entry:
-    first = "signal on its way"
+    first = "signal is delayed"
     across = max(texts.width(first, _SMALL), texts.width(words, _SMALL))
     shapes = (
         _heading("Bead", theme),
@@ -220,6 +225,18 @@ def _bead(words: str, theme: Theme) -> Entry:
         bead((32, _SAMPLE_Y), 3.2, theme),
         Text((0, _FIRST_Y), first, _SMALL, theme.muted),
         Text((0, _SECOND_Y), words, _SMALL, theme.muted),
+    )
+    return Entry(shapes, across)
+
+
+def _faint(theme: Theme) -> Entry:
+    first, second = "removed", "by a lesion"
+    across = max(64.0, texts.width(first, _SMALL), texts.width(second, _SMALL))
+    shapes = (
+        _heading("Faint", theme),
+        replace(_stroke(0, 64, theme.muted, 4.0), opacity=FAINT),
+        Text((0, _FIRST_Y), first, _SMALL, theme.muted),
+        Text((0, _SECOND_Y), second, _SMALL, theme.muted),
     )
     return Entry(shapes, across)
 

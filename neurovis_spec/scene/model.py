@@ -90,6 +90,9 @@ class Arrowhead:
         return self.tip, left, notch, right
 
 
+#: How far a halo reaches, in sizes of its text.
+HALO = 0.2
+
 #: How the half width of a head follows from its length and the width of its line.
 HEAD_OF_LENGTH, HEAD_OF_WIDTH, HEAD_MORE = 0.3, 0.6, 0.6
 
@@ -135,6 +138,8 @@ class Text:
     subscript: str = ""
     #: it stands on the disc of its group: the colour is the theme's that can be read on the disc's
     on_disc: bool = False
+    #: a colour around the letters, ``HALO`` wide, that keeps lines beneath away from them ('' for none)
+    halo: str = ""
 
 
 Shape: TypeAlias = Disc | Spline | Arrowhead | Rectangle | Ramp | Text
@@ -143,12 +148,13 @@ Shape: TypeAlias = Disc | Spline | Arrowhead | Rectangle | Ramp | Text
 @dataclass(frozen=True, slots=True)
 class Group:
     """Shapes that belong together. ``id`` is opaque and unique ('' for none); ``data`` becomes ``data-…`` attributes;
-    ``title`` is what a pointer shows."""
+    ``title`` is what a pointer shows; ``opacity`` is that of the whole group, drawn by itself."""
 
     shapes: tuple[Shape, ...]
     id: str = ""
     data: Mapping[str, str] = field(default_factory=dict)
     title: str = ""
+    opacity: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,7 +191,8 @@ class Film:
     ``lines[j]`` the line and its arrowhead have the colour value ``line_values[f, j]``, the line the width
     ``line_widths[f, j]`` (user units; the head follows by ``head_half_width``), and its glow the width
     ``glow_widths[f, j]`` (0 for none; a group that glows at any time has a glow in ``scene``, of width 0 where it
-    does not glow in frame 0). ``captions[f]`` is the text in group ``caption``. Colours are linear in sRGB between the
+    does not glow in frame 0). From frame ``faint[id]`` on, a group that stands there has the opacity ``faintness``.
+    ``captions[f]`` is the text in group ``caption``. Colours are linear in sRGB between the
     theme's anchors; ``still(f)`` is frame f as a scene.
     """
 
@@ -199,6 +206,8 @@ class Film:
     glow_widths: FloatArray
     caption: str
     captions: tuple[str, ...]
+    faint: Mapping[str, int] = field(default_factory=dict)
+    faintness: float = 1.0
 
     @property
     def frames(self) -> int:

@@ -6,7 +6,7 @@ or are left out.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,34 +16,41 @@ from neurovis_spec.scene.geometry import FloatArray, Rect, overlap
 class Obstacles:
     """Collects what is drawn; ``hits`` counts what a rectangle would cover."""
 
-    def __init__(self, lines: Iterable[FloatArray], centres: FloatArray, radius: float, line_reach: float) -> None:
-        """``line_reach``: how far a line (half its width and its glow) reaches beyond its sample points."""
-        arrays = list(lines)
-        self._dots = np.concatenate(arrays) if arrays else np.zeros((0, 2))
-        self._reach = line_reach
+    def __init__(
+        self, lines: Sequence[FloatArray], reaches: Sequence[float], centres: FloatArray, radius: float
+    ) -> None:
+        """``reaches``: how far each line (half its width and its glow) reaches beyond its sample points."""
+        self._dots = np.concatenate(lines) if lines else np.zeros((0, 2))
+        self._reaches = np.repeat(np.asarray(reaches, float), [len(line) for line in lines])
         self._centres = centres
         self._radius = radius
         self._texts: list[Rect] = []
+        self._frames = np.zeros((0, 2))
 
     def add_text(self, rect: Rect) -> None:
         """Room that a text has taken."""
         self._texts.append(rect)
 
-    def add_line(self, dots: FloatArray) -> None:
+    def drop_texts(self, count: int) -> None:
+        """The last so many texts are not drawn after all."""
+        del self._texts[len(self._texts) - count :]
+
+    def add_line(self, dots: FloatArray, reach: float = 2.5) -> None:
         """One more line, as sample points."""
         self._dots = np.concatenate([self._dots, dots])
+        self._reaches = np.concatenate([self._reaches, np.full(len(dots), reach)])
+
+    def add_frame(self, dots: FloatArray) -> None:
+        """The line of a box, as sample points."""
+        self._frames = np.concatenate([self._frames, dots])
+
+    def frame_hits(self, rect: Rect) -> int:
+        """How many sample points of boxes' lines a rectangle covers."""
+        return _within(self._frames, np.full(len(self._frames), 2.5), rect)
 
     def line_hits(self, rect: Rect) -> int:
         """How many sample points of lines a rectangle covers."""
-        x0, y0, x1, y1 = rect
-        dots, reach = self._dots, self._reach
-        inside = (
-            (dots[:, 0] > x0 - reach)
-            & (dots[:, 0] < x1 + reach)
-            & (dots[:, 1] > y0 - reach)
-            & (dots[:, 1] < y1 + reach)
-        )
-        return int(np.count_nonzero(inside))
+        return _within(self._dots, self._reaches, rect)
 
     def disc_hits(self, rect: Rect) -> int:
         """How many discs a rectangle touches."""
@@ -59,7 +66,7 @@ class Obstacles:
 
     def hits(self, rect: Rect) -> int:
         """How much is in the way: a text or a disc weighs more than all lines."""
-        return 10_000 * (self.text_hits(rect) + self.disc_hits(rect)) + self.line_hits(rect)
+        return 10_000 * (self.text_hits(rect) + self.disc_hits(rect)) + self.line_hits(rect) + self.frame_hits(rect)
 
     def path_hits(self, dots: FloatArray, ends: tuple[int, ...]) -> int:
         """How much a line through these points would cross: discs other than ``ends`` weigh more than lines."""
@@ -71,3 +78,12 @@ class Obstacles:
             if len(self._dots) and np.hypot(self._dots[:, 0] - x, self._dots[:, 1] - y).min() < 4:
                 hits += 1
         return hits
+
+
+def _within(dots: FloatArray, reach: FloatArray, rect: Rect) -> int:
+    """How many points are in a rectangle, or as near to it as each reaches."""
+    x0, y0, x1, y1 = rect
+    inside = (
+        (dots[:, 0] > x0 - reach) & (dots[:, 0] < x1 + reach) & (dots[:, 1] > y0 - reach) & (dots[:, 1] < y1 + reach)
+    )
+    return int(np.count_nonzero(inside))

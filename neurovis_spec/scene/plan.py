@@ -14,12 +14,13 @@ import numpy as np
 
 from neurovis_spec.compiler.network import Network, RenderSettings
 from neurovis_spec.layout.model import RADIUS, Layout
-from neurovis_spec.scene import delays, legend, texts
+from neurovis_spec.scene import delays, encoding, legend, texts
 from neurovis_spec.scene.boxes import Box, box_title, boxes_of, outline
-from neurovis_spec.scene.frame import MARGIN, MOST, Frame, Wishes, fit
+from neurovis_spec.scene.frame import MARGIN, MOST, UNIT, Frame, Wishes, fit
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.geometry import FloatArray, Point, Rect, bounds, sample
-from neurovis_spec.scene.labels import Label, labels_of
+from neurovis_spec.scene.labels import Label, labels_of, outgrown
+from neurovis_spec.scene.lesions import Lesions, lesions_of
 from neurovis_spec.scene.lines import Line, routes_of, trimmed
 from neurovis_spec.scene.model import Arrowhead, Group, Rectangle, Spline, Text, Theme, head_half_width
 from neurovis_spec.scene.obstacles import Obstacles
@@ -29,9 +30,11 @@ from neurovis_spec.scene.themes import THEMES
 _TITLE, _CAPTION = 17.0, 11.5
 _TITLE_Y, _CAPTION_Y, _HEADER = 35.0, 54.0, 58.0
 #: a picture is made so wide at most to have its legend in one row
-_LEGEND_ROOM = 640.0
+_LEGEND_ROOM = 740.0
 #: more dotted lines than this would not be quiet
 _MOST_TEACHERS = 200
+#: for a label beneath its disc, in layout units
+_LABEL_ROOM = 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +53,8 @@ class Plan:
     order: tuple[int, ...]
     #: on connections whose signal takes several steps, by index
     beads: Mapping[int, Rectangle]
+    #: what events remove, and when
+    lesions: Lesions
     labels: tuple[Label | None, ...]
     #: beneath the lines, and above the discs
     back: tuple[Group, ...]
@@ -70,15 +75,21 @@ def plan(network: Network, layout: Layout, gains: Gains, settings: RenderSetting
     positions, routes = _in_units(network, layout)
     boxes = boxes_of(network, positions, routes)
     teachers = teachers_of(network)[:_MOST_TEACHERS]
-    title, items, frame = _frame(network, gains, settings, theme, teachers, _extent(positions, routes, boxes))
+    low = outgrown(network, RADIUS * UNIT) if settings.labels else []
+    extent = _extent(positions, routes, boxes, low)
+    title, items, frame = _frame(network, gains, settings, theme, teachers, extent, delays.label_of(network))
+    if not delays.visible(RADIUS * frame.scale):
+        title, items, frame = _frame(network, gains, settings, theme, teachers, extent, "")
     centres = frame.map(positions)
     radius = RADIUS * frame.scale
-    gap, head = min(1.5, 0.1 * radius), min(10.0, 0.5 * radius)
+    gap, head = min(1.5, 0.1 * radius), _head(radius)
     lines = trimmed([frame.map(route) for route in routes], radius, gap, head)
-    obstacles = Obstacles([_dots(line) for line in lines], centres, radius, 2.5)
+    obstacles = Obstacles([_dots(line) for line in lines], _reaches(network, gains), centres, radius)
     dots = [(teacher, dotted(teacher, centres, radius, gap, head, obstacles)) for teacher in teachers]
     for _, line in dots:
         obstacles.add_line(_dots(line))
+    for box in boxes:
+        obstacles.add_frame(outline(_mapped(box.rect, frame)))
     header = _header(title, frame, theme) if title is not None else None
     top = _HEADER if header else 4.0
     bottom = frame.height - legend.height(items, frame.width - 2 * MARGIN) - (MARGIN if items else 4.0)
@@ -102,6 +113,7 @@ def plan(network: Network, layout: Layout, gains: Gains, settings: RenderSetting
         lines=tuple(lines),
         order=_order(network),
         beads=delays.beads(network, lines, radius, theme),
+        lesions=lesions_of(network),
         labels=tuple(labels),
         back=(*_box_frames(boxes, frame, theme), *_dotted_groups(network, dots, theme)),
         front=tuple(front),
@@ -120,9 +132,10 @@ def _in_units(network: Network, layout: Layout) -> tuple[FloatArray, list[FloatA
     return positions, routes_of(network.connection_names, ends, layout)
 
 
-def _extent(positions: FloatArray, routes: Sequence[FloatArray], boxes: Sequence[Box]) -> Rect:
-    """What the layout takes up, in its units."""
+def _extent(positions: FloatArray, routes: Sequence[FloatArray], boxes: Sequence[Box], low: list[int]) -> Rect:
+    """What the layout takes up, in its units; the neurons in ``low`` have their labels beneath."""
     corners = [np.array([box.rect[:2], box.rect[2:]]) for box in boxes]
+    corners.append(positions[low] + np.array([0.0, RADIUS + _LABEL_ROOM]))
     per_segment = 12 if len(routes) < 5000 else 4
     around = bounds([positions - RADIUS, positions + RADIUS, *corners, *(sample(r, per_segment) for r in routes)])
     return around if around is not None else (0.0, 0.0, 1.0, 1.0)
@@ -135,6 +148,7 @@ def _frame(
     theme: Theme,
     teachers: list[Teacher],
     extent: Rect,
+    delayed: str,
 ) -> tuple[str | None, list[legend.Entry], Frame]:
     """The title (None: no header), the legend's entries, and the frame. In a picture too small for them both go."""
     words = settings.title if isinstance(settings.title, str) else network.title or network.name
@@ -147,7 +161,8 @@ def _frame(
             learns=len(network.changing) > 0,
             heaviest=_heaviest(network),
             teaches=label_of(teachers) if teachers else "",
-            delays=delays.label_of(network),
+            delays=delayed,
+            lesions=bool(lesions_of(network)),
         )
         items = legend.entries(contents, gains, theme)
         widest = max(item.width for item in items)
@@ -186,6 +201,20 @@ def _order(network: Network) -> tuple[int, ...]:
     return tuple(order.tolist())
 
 
+def _head(radius: float) -> float:
+    """How long heads are: a little longer for their discs where these are small, so that they still can be seen."""
+    return min(10.0, max(0.5 * radius, min(6.5, 0.75 * radius)))
+
+
+def _reaches(network: Network, gains: Gains) -> list[float]:
+    """How far lines reach from their middle: half their width and a little air; those that learn glow as well."""
+    widths = encoding.line_width(network.connections.weights, gains.thickness)
+    reaches = np.maximum(2.5, 0.5 * widths + 1.5)
+    reaches[network.changing] = np.maximum(reaches[network.changing], 3.5)
+    result: list[float] = reaches.tolist()
+    return result
+
+
 def _dots(line: Line) -> FloatArray:
     return np.concatenate([sample(line.points, 24), np.array([line.tip])])
 
@@ -203,8 +232,6 @@ def _box_frames(boxes: Sequence[Box], frame: Frame, theme: Theme) -> list[Group]
 def _box_titles(boxes: Sequence[Box], frame: Frame, obstacles: Obstacles, theme: Theme, picture: Rect) -> list[Group]:
     if frame.scale < 12:  # the boxes are smaller than their titles
         return []
-    for box in boxes:
-        obstacles.add_line(outline(_mapped(box.rect, frame)))
     found = [
         box_title(box, _mapped(box.rect, frame), obstacles, theme, _room(box, boxes, frame, picture)) for box in boxes
     ]

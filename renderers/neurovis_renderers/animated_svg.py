@@ -42,6 +42,8 @@ LEVELS = 51
 LETTERS: tuple[str, ...] = (*ascii_lowercase, *(f"a{letter}" for letter in ascii_lowercase))
 #: At most so many different widths are told apart, and so many captions.
 _MOST_WIDTHS, _MOST_CAPTIONS = 240, 500
+#: The class of what is lesioned.
+_FAINT = "lesioned"
 
 
 class AnimatedSvgRenderer:
@@ -111,6 +113,9 @@ class _Writer:
         return self._animated(group, tokens)
 
     def _animated(self, group: Group, tokens: Sequence[str]) -> str:
+        since = self._film.faint.get(group.id)
+        if since is not None:
+            tokens = [f"{token} {_FAINT}" if frame >= since else token for frame, token in enumerate(tokens)]
         shapes = "".join(
             self._head_element(shape)
             if isinstance(shape, Arrowhead) and group.id in self._lines and self._changing[self._lines[group.id]]
@@ -162,6 +167,8 @@ class _Writer:
         ]
         if self._widths:
             rules += self._width_rules()
+        if self._film.faint:
+            rules.append(f".{_FAINT}{{opacity:{num(self._film.faintness)}}}")
         if self._captions > 1:
             rules.append(".caption text{display:none}")
             rules += [f".t{n}>:nth-child({n + 1}){{display:inline}}" for n in range(self._captions)]

@@ -6,13 +6,14 @@ else DejaVu Sans, else the scalable font that is part of Pillow: pictures are th
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from neurovis_renderers.coverage import Mask, Size
-from neurovis_spec.scene import SUBSCRIPT_DROP, SUBSCRIPT_SIZE, Text
+from neurovis_spec.scene import HALO, SUBSCRIPT_DROP, SUBSCRIPT_SIZE, Text
 
 #: (regular, bold), the first pair found is taken
 _FILES = (
@@ -38,8 +39,8 @@ def font(size: float, bold: bool) -> Font:
     return ImageFont.load_default(size)
 
 
-def lettering(text: Text, size: Size) -> Mask:
-    """The mask of a text with its subscript, in a picture of this size."""
+def lettering(text: Text, size: Size, halo: bool = False) -> Mask:
+    """The mask of a text with its subscript, or of its ``halo``, in a picture of this size."""
     bold = text.weight >= 600
     runs = [(text.text, text.size, 0.0)]
     if text.subscript:
@@ -47,13 +48,15 @@ def lettering(text: Text, size: Size) -> Mask:
     fonts = [font(_FINER * points, bold) for _, points, _ in runs]
     lengths = [made.getlength(words) / _FINER for made, (words, _, _) in zip(fonts, runs, strict=True)]
     x = text.point[0] - {"start": 0.0, "middle": sum(lengths) / 2, "end": sum(lengths)}[text.anchor]
-    left, top = int(np.floor(x)) - 2, int(np.floor(text.point[1] - 1.2 * text.size)) - 1
-    wide, high = int(sum(lengths)) + 6, int(2 * text.size) + 4
+    reach = math.ceil(HALO * text.size) if halo else 0
+    left, top = int(np.floor(x)) - 2 - reach, int(np.floor(text.point[1] - 1.2 * text.size)) - 1 - reach
+    wide, high = int(sum(lengths)) + 6 + 2 * reach, int(2 * text.size) + 4 + 2 * reach
     tile = Image.new("L", (wide * _FINER, high * _FINER))
     pen = ImageDraw.Draw(tile)
+    stroke = round(HALO * text.size * _FINER) if halo else 0
     for made, (words, _, drop), length in zip(fonts, runs, lengths, strict=True):
         at = ((x - left) * _FINER, (text.point[1] + drop - top) * _FINER)
-        pen.text(at, words, fill=255, font=made, anchor="ls")
+        pen.text(at, words, fill=255, font=made, anchor="ls", stroke_width=stroke)
         x += length
     share = np.asarray(tile.reduce(_FINER), float) / 255
     rows, columns = np.nonzero(share)

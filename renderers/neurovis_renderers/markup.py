@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 
 from neurovis_spec.scene import (
     FAMILIES,
+    HALO,
     SUBSCRIPT_DROP,
     SUBSCRIPT_SIZE,
     Arrowhead,
@@ -135,13 +136,19 @@ def _ramp(shape: Ramp) -> str:
 def _text(shape: Text, attributes: str, content: str) -> str:
     anchor = "" if shape.anchor == "start" else f' text-anchor="{shape.anchor}"'
     weight = "" if shape.weight == 400 else f' font-weight="{shape.weight}"'
+    halo = ""
+    if shape.halo:
+        halo = (
+            f' stroke="{shape.halo}" stroke-width="{num(2 * HALO * shape.size)}" stroke-linejoin="round" '
+            f'paint-order="stroke"'
+        )
     inner = escape(shape.text)
     if shape.subscript:
         drop, size = num(SUBSCRIPT_DROP * shape.size), num(SUBSCRIPT_SIZE * shape.size)
         inner += f'<tspan dy="{drop}" font-size="{size}">{escape(shape.subscript)}</tspan>'
     return (
         f'<text x="{num(shape.point[0])}" y="{num(shape.point[1])}" font-size="{num(shape.size)}" '
-        f'fill="{shape.fill}"{weight}{anchor}{attributes}>{inner}{content}</text>'
+        f'fill="{shape.fill}"{weight}{anchor}{halo}{attributes}>{inner}{content}</text>'
     )
 
 
@@ -149,7 +156,8 @@ def open_group(group: Group, attributes: str = "") -> str:
     """The start of a group, with its data attributes and its title."""
     data = "".join(f" data-{key}={quoted(value)}" for key, value in group.data.items())
     title = f"<title>{escape(group.title)}</title>" if group.title else ""
-    return f"<g{data}{attributes}>{title}"
+    opacity = f' opacity="{num(group.opacity)}"' if group.opacity != 1 else ""
+    return f"<g{data}{attributes}{opacity}>{title}"
 
 
 def document(scene: Scene, body: str, style: str = "", attributes: Mapping[str, str] | None = None) -> bytes:

@@ -91,8 +91,12 @@ class Canvas:
         """The picture, (height, width, 3)."""
         wide, high = self._size
         picture: FloatArray = np.tile(np.array(channels(scene.theme.background), float), (wide * high, 1))
-        for shape in scene.shapes():
-            self._draw(picture, shape)
+        for group in scene.groups:
+            before = picture.copy() if group.opacity < 1 else None
+            for shape in group.shapes:
+                self._draw(picture, shape)
+            if before is not None:  # the group as one: what it has changed, in part
+                picture = before + group.opacity * (picture - before)
         return np.rint(picture).astype(np.uint8).reshape(high, wide, 3)
 
     def _draw(self, picture: FloatArray, shape: Shape) -> None:
@@ -120,15 +124,18 @@ class Canvas:
                 self._ramp(picture, shape)
             case Text():
                 key = (shape.point, shape.text, shape.size, shape.weight, shape.subscript, shape.anchor)
+                if shape.halo:
+                    around = self._kept((*key, "halo"), lambda: self._lettering(shape, halo=True))
+                    around.onto(picture, channels(shape.halo))
                 self._kept(key, lambda: self._lettering(shape)).onto(picture, channels(shape.fill))
 
     def _pixels(self, points: Sequence[Point]) -> list[Point]:
         """User units to pixels."""
         return [(x * self._density, y * self._density) for x, y in points]
 
-    def _lettering(self, text: Text) -> Mask:
+    def _lettering(self, text: Text, halo: bool = False) -> Mask:
         (point,) = self._pixels((text.point,))
-        return lettering(replace(text, point=point, size=text.size * self._density), self._size)
+        return lettering(replace(text, point=point, size=text.size * self._density), self._size, halo)
 
     def _kept(self, key: object, make: Callable[[], Mask]) -> Mask:
         mask = self._masks.get(key)

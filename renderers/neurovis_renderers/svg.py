@@ -27,6 +27,6 @@ class SvgRenderer:
 
 def _group(group: Group) -> str:
     shapes = "".join(element(shape) for shape in group.shapes)
-    if not group.title and not group.data:
+    if not group.title and not group.data and group.opacity == 1:
         return shapes + "\n"
     return f"{open_group(group)}{shapes}</g>\n"

@@ -1,0 +1,183 @@
+"""Every shipped picture: no text over a text or a disc, all within the picture, no line over a foreign neuron, every
+neuron and box with its name; and the same of networks that are hard on labels and titles."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import neurovis_spec as nv
+from neurovis_spec import pipeline
+from neurovis_spec.scene import Arrowhead, Disc, Rectangle, Scene, Spline, Text, texts
+from neurovis_spec.scene.geometry import Rect, overlap, sample
+
+SPECS = Path(__file__).parent.parent / "specs"
+EXAMPLES = [*sorted(SPECS.glob("*.yaml")), SPECS / "hexapod" / "hexapod.yaml"]
+NETWORKS = {
+    "long names": """
+neurons:
+  a_neuron_with_a_long_name: {bias: 0.3, box: a box of sensors with quite a long title}
+  another_neuron_with_a_long_name: {box: a box of sensors with quite a long title}
+  short: {label: "Δθ/dt"}
+  wide: {label: "神經元神經元"}
+  step: {count: 5, label: Übergang}
+connections: {a_neuron_with_a_long_name -> short: 1, another_neuron_with_a_long_name -> step: 0.4, wide -> step: -1}
+""",
+    "a rank of 45": """
+neurons: {A: {count: 45, bias: 0.1}, B: {count: 5}, LongNameHere: {count: 42}}
+connections:
+  A -> B: {weight: 0.3, pattern: all_to_all}
+  B -> LongNameHere: {weight: 0.3, pattern: all_to_all}
+""",
+    "loops and parallels": """
+neurons: {A: {bias: 0.3}, B: {}, C: {}}
+connections:
+  - A -> A: 0.5
+  - A -> B: {weight: 1, delay: 0}
+  - A -> B: {weight: -1, delay: 1}
+  - A -> B: {weight: 0.5, delay: 4}
+  - B -> A: {weight: 0.5, delay: 4}
+  - B -> B: {weight: 0.5, delay: 1}
+  - B -> C: {weight: 1, delay: 0}
+  - C -> B: 0.2
+""",
+    "modules": """
+modules:
+  leg:
+    inputs: {load: {}}
+    neurons: {S: {input: load}, K: {count: 3, box: kernels}, M: {}}
+    connections: {S -> K: 1, K -> M: 0.5, M -> K: -0.4}
+neurons: {G: {bias: 0.2}, H: {}}
+instances: {left: {module: leg, count: 3}, right: {module: leg, count: 3}}
+connections:
+  {G -> H: 1, H -> G: -1, G -> left1.S: 0.2, H -> right1.S: 0.2, left1.M -> left2.S: 1, right1.M -> right2.S: 1}
+layout: {mirror: [[left, right]]}
+""",
+    "one neuron": "neurons: {A: {}}",
+    "no connection": "neurons: {A: {count: 7}, B: {box: x}}",
+}
+
+
+@dataclass(frozen=True)
+class Drawn:
+    network: nv.CompiledNetwork
+    scene: Scene
+
+
+def drawn(network: nv.CompiledNetwork, step: int = 20) -> Drawn:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        snapshot = network.run(step + 1).snapshot(step)
+        layout = pipeline.arrange(network.network)
+        return Drawn(
+            network, pipeline.picture(network.network, layout, snapshot, network.gains, network.network.render)
+        )
+
+
+@pytest.fixture(scope="module", params=EXAMPLES, ids=lambda path: path.stem)
+def example(request: pytest.FixtureRequest) -> Drawn:
+    return drawn(nv.compile(request.param))
+
+
+def hard(name: str) -> Drawn:
+    return drawn(nv.compile_text("neurovis: 1\nname: hard\n" + NETWORKS[name]))
+
+
+def text_rect(text: Text) -> Rect:
+    """What a text covers at most: digits and capitals above its line, little below."""
+    width = texts.width(text.text, text.size, text.weight, text.subscript)
+    left = text.point[0] - {"start": 0.0, "middle": width / 2, "end": width}[text.anchor]
+    return left, text.point[1] - 0.75 * text.size, left + width, text.point[1] + 0.2 * text.size
+
+
+def check(scene: Scene) -> None:
+    rects = [(t, text_rect(t)) for t in scene.shapes() if isinstance(t, Text)]
+    for place, (text, one) in enumerate(rects):
+        assert one[0] >= 0, text.text
+        assert one[1] >= 0, text.text
+        assert one[2] <= scene.width, text.text
+        assert one[3] <= scene.height, text.text
+        assert not [(text.text, t.text) for t, other in rects[place + 1 :] if overlap(one, other)]
+    discs = [shape for shape in scene.shapes() if isinstance(shape, Disc)]
+    for text, (x0, y0, x1, y1) in rects:
+        for disc in discs:
+            (x, y), r = disc.centre, disc.radius
+            apart = math.hypot(x - min(max(x, x0), x1), y - min(max(y, y0), y1))
+            assert text.on_disc or apart > r, text.text
+    for group in scene.groups:  # what stands on a disc does not reach beyond it
+        inside = [shape for shape in group.shapes if isinstance(shape, Disc)]
+        for label in group.shapes:
+            if isinstance(label, Text) and label.on_disc:
+                (x0, _, x1, _), (disc,) = text_rect(label), inside
+                assert x1 - x0 <= 2 * disc.radius, label.text
+    dots = np.concatenate([_reach(shape) for shape in scene.shapes()] or [np.zeros((1, 2))])
+    assert dots.min() >= 0
+    assert dots[:, 0].max() <= scene.width
+    assert dots[:, 1].max() <= scene.height
+
+
+def _reach(shape: object) -> npt.NDArray[np.float64]:
+    match shape:
+        case Spline():
+            line = sample(shape.points, 16)
+            return np.concatenate([line - shape.width / 2, line + shape.width / 2])
+        case Disc():
+            reach = shape.radius + shape.stroke_width / 2
+            x, y = shape.centre
+            return np.array([(x - reach, y - reach), (x + reach, y + reach)])
+        case Arrowhead():
+            return np.array(shape.points)
+        case Rectangle():
+            x, y = shape.corner
+            return np.array([(x, y), (x + shape.width, y + shape.height)])
+    return np.zeros((0, 2))
+
+
+def test_the_examples_touch_nothing_they_should_not(example: Drawn) -> None:
+    check(example.scene)
+
+
+@pytest.mark.parametrize("name", NETWORKS)
+def test_hard_networks_touch_nothing_they_should_not(name: str) -> None:
+    check(hard(name).scene)
+
+
+def test_no_line_runs_over_a_foreign_neuron(example: Drawn) -> None:
+    found = example.network.layout().metrics()
+    assert found["edges_over_neurons"] == 0
+    assert found["overlaps"] == 0
+
+
+def test_every_neuron_of_the_examples_has_a_label(example: Drawn) -> None:
+    scene = example.scene
+    bare = [g.data["neuron"] for g in scene.groups if "neuron" in g.data and not _texts(g.shapes)]
+    assert not bare
+
+
+def test_every_box_of_the_examples_has_its_whole_name(example: Drawn) -> None:
+    scene = example.scene
+    said = {g.id: text for g in scene.groups if g.id.startswith("title:") for text in _texts(g.shapes)}
+    frames = [g for g in scene.groups if g.id.startswith(("box:", "instance:"))]
+    assert {f"title:{g.title}" for g in frames} == set(said)
+    for frame in frames:
+        assert said[f"title:{frame.title}"].startswith(frame.title.rpartition(".")[2])
+
+
+def _texts(shapes: tuple[object, ...]) -> list[str]:
+    return [shape.text for shape in shapes if isinstance(shape, Text)]
+
+
+def test_numbered_neurons_that_are_crowded_say_their_numbers() -> None:
+    said: dict[str, str] = {}
+    for group in hard("a rank of 45").scene.groups:
+        for shape in group.shapes if "neuron" in group.data else ():
+            if isinstance(shape, Text):
+                said[group.data["neuron"]] = shape.subscript or shape.text
+    assert len(said) == 92
+    assert all(name.removeprefix(name.rstrip("0123456789")) == number for name, number in said.items())
