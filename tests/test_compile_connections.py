@@ -265,7 +265,7 @@ def test_patterns() -> None:
         ("{pattern: chain}", "wrong-size"),
         ("{pattern: ring}", "wrong-size"),
         ("{pattern: al_to_all}", "unknown-pattern"),
-        ("{pattern: {ring: {size: 1}}}", "unknown-parameter"),
+        ("{pattern: {all_to_all: {size: 1}}}", "unknown-parameter"),
         ("{pattern: random}", "missing-key"),
         ("{pattern: {random: {probability: 1.5}}}", "out-of-range"),
         ("{pattern: {random: {probability: 0}}}", "no-connection"),

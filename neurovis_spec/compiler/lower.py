@@ -12,7 +12,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from neurovis_spec.compiler.connect import Bundle
+from neurovis_spec.compiler.entries import Bundle
 from neurovis_spec.compiler.learning import Learning
 from neurovis_spec.compiler.network import (
     Block,

@@ -17,7 +17,9 @@ from neurovis_spec.compiler.ends import Ends, Pairs
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.patterns_drawn import fixed_indegree, fixed_outdegree, small_world
 from neurovis_spec.compiler.patterns_near import band, in_band, nearest
-from neurovis_spec.diagnostics import Findings, Span, suggest
+from neurovis_spec.compiler.settings import look_at_settings
+from neurovis_spec.diagnostics import Findings, Span, meant, suggest
+from neurovis_spec.diagnostics import nearest as nearest_names
 from neurovis_spec.language.located import Formula, formula_of, shown
 from neurovis_spec.language.values import Choice
 
@@ -78,46 +80,58 @@ PATTERNS = (*_FIXED, *_USES)
 
 
 def pairs_of(
-    choice: Choice, ends: Ends, constants: Constants, stream: Stream, fits: Callable[[int], bool]
+    choice: Choice, ends: Ends | None, constants: Constants, stream: Stream, fits: Callable[[int], bool]
 ) -> Pairs | None:
-    """The pairs of a pattern as the author wrote it; None where it is at fault, which is noted.
+    """The pairs of a pattern as the author wrote it; None where it is at fault, which is noted, or where the ends are
+    not known.
 
     ``fits`` says, before they are made, whether there is room for so many.
     """
     findings = constants.findings
-    name = choice.name.value
-    span = choice.name.span
-    allowed = _SETTINGS.get(name, ())
-    if name not in PATTERNS:
-        hint = suggest(name, PATTERNS, "patterns")
-        findings.error("unknown-pattern", span, f"there is no pattern '{shown(name)}'", hint)
+    written, span = choice.name.value, choice.name.span
+    name = written if written in PATTERNS else meant(written, PATTERNS)
+    if written not in PATTERNS:
+        hint = suggest(written, PATTERNS, "patterns")
+        findings.error("unknown-pattern", span, f"there is no pattern '{shown(written)}'", hint)
+    if name is None:
+        look_at_settings(choice, constants)
         return None
-    for entry in choice.settings:
-        if entry.name not in allowed:
-            hint = suggest(entry.name, allowed, "known here") or f"'{name}' has no settings"
-            findings.error("unknown-parameter", entry.key.span, f"there is no setting '{shown(entry.name)}'", hint)
-            return None
+    settings = _settings(name, choice, findings)
+    sized = _Sized(name, span, settings, constants)
+    values = sized.values()
+    if ends is None:
+        return None
     n, m = len(ends.sources), len(ends.targets)
     if n != m and ((name in _FIXED and name != "all_to_all") or name == "small_world"):
         message = f"'{name}' needs ends of equal size; these have {n} and {m} neurons"
         findings.error("wrong-size", span, message)
         return None
+    if len(values) < len(_SETTINGS.get(name, ())) or name != written:
+        return None
     if name in _FIXED:
         return _FIXED[name](ends) if fits(n * m if name == "all_to_all" else n) else None
-    settings = _settings(choice, allowed, findings)
-    return None if settings is None else _Sized(name, span, settings, ends, constants, stream, fits).pairs()
+    return sized.pairs(values, ends, stream, fits)
 
 
-def _settings(choice: Choice, allowed: tuple[str, ...], findings: Findings) -> dict[str, Formula] | None:
-    """The formulas of all settings; each of them has to be there."""
-    name = choice.name.value
-    given = {entry.name: formula_of(entry.value, findings) for entry in choice.settings}
-    for missing in [setting for setting in allowed if setting not in given][:1]:
+def _settings(name: str, choice: Choice, findings: Findings) -> dict[str, Formula]:
+    """The formulas of the settings; each of them has to be there."""
+    allowed = _SETTINGS.get(name, ())
+    entries = {entry.name: entry for entry in choice.settings if entry.name in allowed}
+    perhaps: set[str] = set()
+    for entry in choice.settings:
+        if entry.name not in allowed:
+            hint = suggest(entry.name, allowed, "known here") or f"'{name}' has no settings"
+            findings.error("unknown-parameter", entry.key.span, f"there is no setting '{shown(entry.name)}'", hint)
+            free = [setting for setting in allowed if setting not in entries]
+            right = meant(entry.name, free)
+            perhaps.update(nearest_names(entry.name, free))
+            if right is not None:
+                entries[right] = entry
+    for missing in [setting for setting in allowed if setting not in entries and setting not in perhaps][:1]:
         message = f"'{name}' needs a {missing}"
         findings.error("missing-key", choice.name.span, message, f"write {_USES[name]}")
-        return None
-    settings = {setting: formula for setting, formula in given.items() if formula is not None}
-    return settings if len(settings) == len(given) else None
+    formulas = {setting: formula_of(entry.value, findings) for setting, entry in entries.items()}
+    return {setting: formula for setting, formula in formulas.items() if formula is not None}
 
 
 @dataclass(frozen=True)
@@ -127,22 +141,24 @@ class _Sized:
     name: str
     span: Span
     settings: Mapping[str, Formula]
-    ends: Ends
     constants: Constants
-    stream: Stream
-    fits: Callable[[int], bool]
 
-    def pairs(self) -> Pairs | None:
-        if self.name == "random":
-            return self._random()
-        if self.name == "band":
-            return self._band()
-        if self.name == "small_world":
-            return self._small_world()
-        return self._counted()
+    def values(self) -> dict[str, float]:
+        """What the settings are, without those at fault."""
+        found = {setting: self._value(setting, formula) for setting, formula in self.settings.items()}
+        return {setting: value for setting, value in found.items() if value is not None}
 
-    def _probability(self, setting: str) -> float | None:
-        formula = self.settings[setting]
+    def _value(self, setting: str, formula: Formula) -> float | None:
+        if setting in ("probability", "rewire"):
+            return self._probability(formula)
+        least = {"width": 0, "degree": 2, "count": 1}[setting]
+        value = self.constants.integer(formula, f"a {setting}", least)
+        if setting != "degree" or value is None or not value % 2:
+            return value
+        self._too_many("degree", f"a degree is even, half of it on each side of the ring; this is {value}")
+        return None
+
+    def _probability(self, formula: Formula) -> float | None:
         value = self.constants.scalar(formula, structural=True)
         if value is None or 0 <= value <= 1:
             return value
@@ -153,58 +169,45 @@ class _Sized:
     def _too_many(self, setting: str, message: str) -> None:
         self.constants.findings.error("out-of-range", self.settings[setting].span, message)
 
-    def _random(self) -> Pairs | None:
-        probability = self._probability("probability")
-        if probability is None:
-            return None
-        n, m = len(self.ends.sources), len(self.ends.targets)
-        # So many there are at the least, but for one case in a million; who has made them is asked again.
-        least = n * m * probability - 5 * (n * m * probability * (1 - probability)) ** 0.5
-        return random(self.ends, probability, self.stream) if self.fits(max(0, int(least))) else None
+    def pairs(
+        self, values: Mapping[str, float], ends: Ends, stream: Stream, fits: Callable[[int], bool]
+    ) -> Pairs | None:
+        """The pairs; None, and a finding, where the settings do not fit the ends."""
+        n, m = len(ends.sources), len(ends.targets)
+        if self.name == "random":
+            probability = values["probability"]
+            # So many there are at the least, but for one case in a million; who has made them is asked again.
+            least = n * m * probability - 5 * (n * m * probability * (1 - probability)) ** 0.5
+            return random(ends, probability, stream) if fits(max(0, int(least))) else None
+        if self.name == "band":
+            width = min(int(values["width"]), max(n, m))
+            return band(ends, width) if fits(max(0, in_band(n, m, width) - min(n, m))) else None
+        if self.name == "small_world":
+            degree = int(values["degree"])
+            if degree > n - 1:
+                self._too_many("degree", f"a degree of {degree} where each has {plural(n - 1, 'neighbour')}")
+                return None
+            return small_world(ends, degree, values["rewire"], stream) if fits(n * degree) else None
+        return self._counted(int(values["count"]), ends, stream, fits)
 
-    def _band(self) -> Pairs | None:
-        n, m = len(self.ends.sources), len(self.ends.targets)
-        width = self.constants.integer(self.settings["width"], "a width", 0)
-        if width is None:
-            return None
-        width = min(width, max(n, m))
-        return band(self.ends, width) if self.fits(max(0, in_band(n, m, width) - min(n, m))) else None
-
-    def _small_world(self) -> Pairs | None:
-        n = len(self.ends.sources)
-        degree = self.constants.integer(self.settings["degree"], "a degree", 2)
-        rewire = self._probability("rewire")
-        if degree is None or rewire is None:
-            return None
-        if degree % 2:
-            self._too_many("degree", f"a degree is even, half of it on each side of the ring; this is {degree}")
-            return None
-        if degree > n - 1:
-            self._too_many("degree", f"a degree of {degree} where each has {plural(n - 1, 'neighbour')}")
-            return None
-        return small_world(self.ends, degree, rewire, self.stream) if self.fits(n * degree) else None
-
-    def _counted(self) -> Pairs | None:
-        count = self.constants.integer(self.settings["count"], "a count", 1)
-        if count is None:
-            return None
+    def _counted(self, count: int, ends: Ends, stream: Stream, fits: Callable[[int], bool]) -> Pairs | None:
         by_target = self.name == "fixed_indegree"
-        ends = self.ends.reversed() if by_target else self.ends
-        there = len(ends.targets) - bool((ends.excluded() >= 0).any())
+        turned = ends.reversed() if by_target else ends
+        there = len(turned.targets) - bool((turned.excluded() >= 0).any())
         if count > there:
             from_, to = ("target", "source") if by_target else ("source", "target")
-            itself = " but itself" if there < len(ends.targets) else ""
+            itself = " but itself" if there < len(turned.targets) else ""
             self._too_many("count", f"a count of {count} where a {from_} has {plural(there, to)}{itself}")
             return None
-        if not self.fits(count * len(ends.sources)):
+        if not fits(count * len(turned.sources)):
             return None
         if self.name == "nearest":
-            return nearest(self.ends, count) if self._placed() else None
-        return (fixed_indegree if by_target else fixed_outdegree)(self.ends, count, self.stream)
+            return nearest(ends, count) if self._placed(ends) else None
+        return (fixed_indegree if by_target else fixed_outdegree)(ends, count, stream)
 
-    def _placed(self) -> bool:
+    def _placed(self, ends: Ends) -> bool:
         """Whether all neurons have a position, or none; a finding where some have."""
-        places = np.concatenate((self.ends.source_places, self.ends.target_places))
+        places = np.concatenate((ends.source_places, ends.target_places))
         known = np.isfinite(places).all(axis=1)
         if known.all() or not known.any():
             return True

@@ -244,8 +244,16 @@ def resolve_end(text: Located[str], directory: Directory, findings: Findings) ->
 def resolve_ends(
     text: Located[str], directory: Directory, findings: Findings
 ) -> tuple[tuple[int, ...], tuple[int, ...]] | None:
-    """Both ends of ``FROM -> TO``, split at its first arrow; both are looked at even if one is at fault."""
+    """Both ends of ``FROM -> TO``; None where one is at fault."""
+    sources, targets = resolve_each(text, directory, findings)
+    return None if sources is None or targets is None else (sources, targets)
+
+
+def resolve_each(
+    text: Located[str], directory: Directory, findings: Findings
+) -> tuple[tuple[int, ...] | None, tuple[int, ...] | None]:
+    """Each end of ``FROM -> TO``, split at its first arrow; both are looked at even if one is at fault."""
     arrow = text.value.index("->")
     sources = resolve_end(piece(text, 0, arrow), directory, findings)
     targets = resolve_end(piece(text, arrow + 2, len(text.value)), directory, findings)
-    return None if sources is None or targets is None else (sources, targets)
+    return sources, targets

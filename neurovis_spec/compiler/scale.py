@@ -30,6 +30,32 @@ def scaled(
 
     ``ends`` are the neurons of both ends, ``pairs`` the positions in them of each connection's source and target.
     """
+    wanted = look_at_scale(model, constants)
+    i, j = pairs
+    if model.indegree is not None and wanted is not None:
+        return weights / np.bincount(j)[j] if wanted else weights
+    if model.norm is not None and wanted is not None:
+        cells = i * len(ends[1]) + j
+        _, place = np.unique(cells, return_inverse=True)
+        norm = float(np.linalg.norm(np.bincount(place, weights)))
+        return _to(model.norm, wanted, weights, norm, "norm", constants)
+    if model.spectral_radius is None or wanted is None:
+        return None
+    radius = _radius(model.spectral_radius, weights, ends, pairs, constants)
+    return None if radius is None else _to(model.spectral_radius, wanted, weights, radius, "spectral radius", constants)
+
+
+def look_at_scale(model: ScaleModel, constants: Constants) -> float | None:
+    """The number that a ``scale`` asks for, whatever the weights are; None where it is at fault."""
+    result: list[float | None] = [] if model.indegree is None else [float(model.indegree.value)]
+    for formula, what in ((model.spectral_radius, "spectral radius"), (model.norm, "norm")):
+        if formula is None:
+            continue
+        value = constants.scalar(formula)
+        if value is not None and value < 0:
+            constants.findings.error("out-of-range", formula.span, f"a {what} is not negative, this is {value:g}")
+            value = None
+        result.append(value)
     if model.lost:  # without what is at fault in it, it would be another one
         return None
     given = [key for key in ("spectral_radius", "norm", "indegree") if getattr(model, key) is not None]
@@ -39,26 +65,13 @@ def scaled(
         message = f"expected one kind of scale here, found {len(given)}"
         constants.findings.error("one-key", span, message, "keep one of spectral_radius, norm and indegree")
         return None
-    i, j = pairs
-    if model.indegree is not None:
-        return weights / np.bincount(j)[j] if model.indegree.value else weights
-    if model.norm is not None:
-        cells = i * len(ends[1]) + j
-        _, place = np.unique(cells, return_inverse=True)
-        return _to(model.norm, weights, float(np.linalg.norm(np.bincount(place, weights))), "norm", constants)
-    assert model.spectral_radius is not None
-    radius = _radius(model.spectral_radius, weights, ends, pairs, constants)
-    return None if radius is None else _to(model.spectral_radius, weights, radius, "spectral radius", constants)
+    return result[0]
 
 
-def _to(wanted: Formula, weights: FloatArray, found: float, what: str, constants: Constants) -> FloatArray | None:
+def _to(
+    wanted: Formula, value: float, weights: FloatArray, found: float, what: str, constants: Constants
+) -> FloatArray | None:
     """The weights times what makes a measure of theirs the wanted one."""
-    value = constants.scalar(wanted)
-    if value is None:
-        return None
-    if value < 0:
-        constants.findings.error("out-of-range", wanted.span, f"a {what} is not negative, this is {value:g}")
-        return None
     if found <= _NOTHING * float(np.abs(weights).sum()):
         message = f"the {what} of these weights is 0: there is nothing to scale"
         constants.findings.error("out-of-range", wanted.span, message)

@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from neurovis_spec.compiler.connect import Bundle
+from neurovis_spec.compiler.entries import Bundle
 from neurovis_spec.compiler.idle import idle_neurons
 from neurovis_spec.compiler.inert import changes_nothing
 from neurovis_spec.compiler.modules import Library

@@ -27,7 +27,7 @@ from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue, SkipJsonSchema
 from pydantic_core import core_schema
 
-from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.diagnostics import Findings, Span, nearest
 from neurovis_spec.language.keys import Words, read_keys
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Leaf, bad_name, findings_of, give_up, refuse
 from neurovis_spec.language.source import Mapping, Node, Scalar, ScalarValue
@@ -126,6 +126,12 @@ class Model(BaseModel):
             field.alias or name for name, field in type(self).model_fields.items() if name in self.model_fields_set
         }
         return frozenset(entry.name for entry in self.source.entries) - taken
+
+    @cached_property
+    def lost_keys(self) -> frozenset[str]:
+        """The known keys that were lost, or that an unknown one may be meant for."""
+        fields = self._fields()
+        return frozenset(key for name in self.lost for key in ((name,) if name in fields else nearest(name, fields)))
 
 
 def _home(name: str) -> str | None:

@@ -1,0 +1,346 @@
+"""Entries: one entry of ``connections``, from its ends and its body to arrays.
+
+In: the neurons of both ends, where these are known, and the body. Out: a Bundle, or None: of an entry that is at fault
+every part is still looked at, whatever is wrong with the others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from neurovis_spec.compiler.constants import Constants, Randomness
+from neurovis_spec.compiler.draws import Stream
+from neurovis_spec.compiler.edges import EdgeReader, delay_of
+from neurovis_spec.compiler.ends import Ends
+from neurovis_spec.compiler.learning import Learning, learning_of
+from neurovis_spec.compiler.limits import Limits, amount
+from neurovis_spec.compiler.matrices import Grid, grid_of
+from neurovis_spec.compiler.network import FloatArray, IntArray
+from neurovis_spec.compiler.patterns import all_to_all, pairs_of
+from neurovis_spec.compiler.populate import Population
+from neurovis_spec.compiler.references import Directory
+from neurovis_spec.compiler.scale import look_at_scale, scaled
+from neurovis_spec.compiler.units import Unit
+from neurovis_spec.diagnostics import Span
+from neurovis_spec.language.expressions.tree import names
+from neurovis_spec.language.located import Formula, Located
+from neurovis_spec.language.sections import ConnectionModel
+from neurovis_spec.language.values import FileReference, Rows
+
+#: Keys of a body that say which connections there are.
+_SHAPING = frozenset({"matrix", "edges", "pattern", "centre", "rows", "self"})
+#: What a weight may depend on.
+_PAIR = ("i", "j", "n_from", "n_to", "distance")
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """The connections of one entry: neuron indices and values, and the rule, if any."""
+
+    name: str
+    key: Span
+    sources: IntArray
+    targets: IntArray
+    weights: FloatArray
+    centres: FloatArray
+    delays: IntArray
+    low: float
+    high: float
+    learning: Learning | None
+    description: str | None
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """Which pairs of an entry exist (positions within its ends), and what its shape says of weights and delays."""
+
+    i: IntArray
+    j: IntArray
+    weights: FloatArray | None = None
+    delays: IntArray | None = None
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where an entry stands: its unit, what is called how there, and how many connections it may make."""
+
+    unit: Unit
+    directory: Directory
+    population: Population
+    limits: Limits
+    seed: int
+    room: int
+
+
+@dataclass(frozen=True)
+class EntryBuilder:
+    """Builds one entry, step by step: its shape, its weights, its rule. An end that is at fault is None."""
+
+    place: Place
+    key: Located[str]
+    body: ConnectionModel
+    name: str
+    sources: IntArray | None
+    targets: IntArray | None
+
+    @property
+    def constants(self) -> Constants:
+        """What evaluates the formulas of the unit."""
+        return self.place.unit.constants
+
+    def _stream(self, purpose: str) -> Stream:
+        return Stream(self.place.seed, purpose, self.name)
+
+    def _kept(self, *keys: str) -> bool:
+        """Whether nothing was lost that these keys may have said."""
+        return self.body.lost_keys.isdisjoint(keys)
+
+    def build(self) -> Bundle | None:
+        """The connections; None where anything of the entry is at fault, which is noted."""
+        before = self.constants.findings.errors
+        self._conflicts()
+        if self.constants.findings.errors == before:
+            return self._built(before)
+        # which of the keys is meant is not known, so nothing is held against the sizes of the ends
+        return replace(self, sources=None, targets=None)._built(before)
+
+    def _built(self, before: int) -> Bundle | None:
+        body, findings = self.body, self.constants.findings
+        delay = 1 if body.delay is None else delay_of(body.delay, self.constants)
+        sound = findings.errors
+        centre = self._grid(body.centre, "centre") if isinstance(body.centre, (Rows, FileReference)) else None
+        shape = self._shape(centre)
+        if shape is not None and findings.errors == sound and not len(shape.i):
+            findings.error("no-connection", self.key.span, "this entry makes no connection at all")
+        if findings.errors > sound or (shape is not None and not self._fits(len(shape.i))):
+            shape = None
+        weights = self._weights(shape)
+        centres = self._centres(centre, shape)
+        bounds = self._bounds(weights)
+        learning = self._learning(shape)
+        if shape is None or weights is None or centres is None or bounds is None or findings.errors > before:
+            return None
+        if self.sources is None or self.targets is None or body.lost:
+            return None
+        delays = np.full(len(shape.i), 0 if delay is None else delay, dtype=np.int64)
+        if shape.delays is not None:
+            delays = np.where(shape.delays >= 0, shape.delays, delays)
+        return Bundle(
+            self.name,
+            self.key.span,
+            self.sources[shape.i],
+            self.targets[shape.j],
+            weights,
+            centres,
+            delays,
+            bounds[0],
+            bounds[1],
+            learning,
+            None if body.description is None else body.description.value,
+        )
+
+    def _conflicts(self) -> None:
+        """What excludes each other: each pair is one finding, at the second key."""
+        body, findings = self.body, self.constants.findings
+        pairs = [
+            ("matrix", "weight"),
+            ("matrix", "edges"),
+            ("matrix", "pattern"),
+            ("edges", "weight"),
+            ("edges", "pattern"),
+        ]
+        table = isinstance(body.centre, (Rows, FileReference))
+        if table:
+            pairs += [("edges", "centre"), ("centre", "pattern")]
+        for first, second in pairs:
+            one, other = body.source.entry(first), body.source.entry(second)
+            if one is not None and other is not None:
+                later = max(one, other, key=lambda entry: entry.key.span)
+                message = f"'{second}' beside '{first}': the {first} says it already"
+                findings.error("conflicting-keys", later.key.span, message, f"remove '{second}'")
+        rows = body.source.entry("rows")
+        if rows is not None and body.matrix is None and not table:
+            message = "'rows' says how a matrix is read; there is no matrix"
+            findings.error("useless-key", rows.key.span, message)
+        loops = body.source.entry("self")
+        if loops is not None and (body.matrix is not None or body.edges is not None or table):
+            message = "'self' says what a pattern may do; here every connection is written"
+            findings.error("useless-key", loops.key.span, message)
+
+    def _fits(self, count: int) -> bool:
+        """Whether there is room for so many connections; a finding where there is not."""
+        room, limit = self.place.room, self.place.limits.connections
+        if count <= room:
+            return True
+        message = f"this makes {amount(limit - room + count)} connections; the limit is {limit:,}"
+        self.constants.findings.error("too-many", self.key.span, message, "raise it with --limit")
+        return False
+
+    def _grid(self, matrix: Rows | FileReference, purpose: str) -> Grid | None:
+        by_target = self.body.rows is not None and self.body.rows.value == "to"
+        n = None if self.sources is None or not self._kept("rows") else len(self.sources)
+        m = None if self.targets is None or not self._kept("rows") else len(self.targets)
+        return grid_of(matrix, n, m, by_target, self.constants, self.place.unit.files, self._stream(purpose))
+
+    def _shape(self, centre: Grid | None) -> _Shape | None:
+        """The pairs; every key that may say which they are is looked at."""
+        body = self.body
+        grid = None if body.matrix is None else self._grid(body.matrix, "weight")
+        edges = None if body.edges is None else self._edges()
+        pattern = None if body.pattern is None else self._pattern()
+        if self.sources is None or self.targets is None or not self._kept(*_SHAPING):
+            return None
+        if body.edges is not None:
+            return edges
+        if body.matrix is not None:
+            if grid is None:
+                return None
+            present = grid.present if centre is None else grid.present & centre.present
+            i, j = np.nonzero(present)
+            return _Shape(i, j, np.ascontiguousarray(grid.values[i, j]))
+        if isinstance(body.centre, (Rows, FileReference)):
+            if centre is None:
+                return None
+            i, j = np.nonzero(centre.present)
+            return _Shape(i, j)
+        return pattern if body.pattern is not None else self._all()
+
+    def _ends(self) -> Ends | None:
+        if self.sources is None or self.targets is None or not self._kept("self"):
+            return None
+        loops: bool | None = True if len(self.sources) == len(self.targets) == 1 else None
+        loops = loops if self.body.self is None else self.body.self.value
+        position = self.place.population.neurons.position
+        return Ends(self.sources, self.targets, loops, position[self.sources], position[self.targets])
+
+    def _pattern(self) -> _Shape | None:
+        assert self.body.pattern is not None
+        pairs = pairs_of(self.body.pattern, self._ends(), self.constants, self._stream("edges"), self._fits)
+        return None if pairs is None else _Shape(*pairs)
+
+    def _all(self) -> _Shape | None:
+        """All pairs, where nothing says which."""
+        ends = self._ends()
+        if ends is None:
+            return None
+        n, m = len(ends.sources), len(ends.targets)
+        if n > 1 and m > 1:
+            message = f"{n} neurons to {m} neurons: how are they connected?"
+            hint = "add pattern: all_to_all, or pattern: one_to_one, or a matrix"
+            self.constants.findings.error("pattern-missing", self.key.span, message, hint)
+            return None
+        return _Shape(*all_to_all(ends))
+
+    def _edges(self) -> _Shape | None:
+        assert self.body.edges is not None
+        ends = (self._named(self.sources), self._named(self.targets))
+        reader = EdgeReader(*ends, self.constants, self.place.unit.files, self._stream("weight"), self.place.room)
+        edges = reader.read(self.body.edges)
+        return None if edges is None else _Shape(edges.i, edges.j, edges.weights, edges.delays)
+
+    def _named(self, neurons: IntArray | None) -> dict[str, int] | None:
+        """The places of an end's neurons by the names that they have in the unit."""
+        if neurons is None:
+            return None
+        called, own = self.place.population.neurons.names, len(self.place.unit.called(""))
+        return {called[neuron][own:]: place for place, neuron in enumerate(neurons.tolist())}
+
+    def _values(self, formula: Formula, shape: _Shape | None, purpose: str) -> FloatArray | None:
+        """A formula of i, j, n_from, n_to (and distance) for every pair."""
+        if shape is None or self.sources is None or self.targets is None:
+            self.constants.look(formula, _PAIR, random=True)
+            return None
+        extra: dict[str, float | FloatArray] = {
+            "i": shape.i.astype(np.float64),
+            "j": shape.j.astype(np.float64),
+            "n_from": float(len(self.sources)),
+            "n_to": float(len(self.targets)),
+        }
+        tree = None
+        if isinstance(formula.value, str):
+            tree = self.constants.tree(formula, _PAIR, random=True)
+            if tree is None:
+                return None
+        if tree is not None and "distance" in names(tree):
+            position = self.place.population.neurons.position
+            apart = position[self.sources[shape.i]] - position[self.targets[shape.j]]
+            if not np.isfinite(apart).all():
+                self._without_position(formula)
+                return None
+            extra["distance"] = np.hypot(apart[:, 0], apart[:, 1])
+        value = self.constants.value(formula, extra, Randomness(self._stream(purpose), shape.i, shape.j))
+        return None if value is None else np.broadcast_to(np.asarray(value, dtype=np.float64), shape.i.shape).copy()
+
+    def _without_position(self, formula: Formula) -> None:
+        message = "'distance' needs a position of every neuron of both ends"
+        self.constants.findings.error("no-position", formula.span, message, "give the groups a 'position'")
+
+    def _weights(self, shape: _Shape | None) -> FloatArray | None:
+        weights = None if shape is None else shape.weights
+        if self.body.weight is not None:
+            weights = self._values(self.body.weight, shape, "weight")
+        elif weights is None and shape is not None and self._kept("weight"):
+            weights = np.ones(len(shape.i))
+        if self.body.scale is None:
+            return weights if self._kept("scale") else None
+        if weights is None or shape is None or self.sources is None or self.targets is None:
+            look_at_scale(self.body.scale, self.constants)
+            return None
+        return scaled(self.body.scale, weights, (self.sources, self.targets), (shape.i, shape.j), self.constants)
+
+    def _centres(self, grid: Grid | None, shape: _Shape | None) -> FloatArray | None:
+        centre = self.body.centre
+        if centre is None:
+            return None if shape is None else np.zeros(len(shape.i))
+        if not self._measures_distance():
+            entry = self.body.source.entry("centre")
+            span = self.key.span if entry is None else entry.key.span
+            message = "'centre' has no effect: none of the targets combines by distance"
+            self.constants.findings.error("useless-key", span, message, "give the targets combine: distance")
+        if isinstance(centre, Located):
+            return self._values(centre, shape, "centre")
+        if grid is None or shape is None:
+            return None
+        return np.ascontiguousarray(grid.values[shape.i, shape.j])
+
+    def _measures_distance(self) -> bool:
+        """Whether any of the targets combines by distance, or may, where what it says of that is at fault."""
+        return self.targets is None or bool(self.place.population.by_distance[self.targets].any())
+
+    def _bounds(self, weights: FloatArray | None) -> tuple[float, float] | None:
+        bounds = self.body.bounds
+        if bounds is None:
+            return (-np.inf, np.inf)
+        findings = self.constants.findings
+        entry = self.body.source.entry("bounds")
+        assert entry is not None
+        if self.body.plasticity is None and self._kept("plasticity"):
+            findings.error("useless-key", entry.key.span, "'bounds' hold plastic weights; there is no 'plasticity'")
+        low, high = self.constants.scalar(bounds[0]), self.constants.scalar(bounds[1])
+        if low is None or high is None:
+            return None
+        if low > high:
+            findings.error("out-of-range", entry.value.span, f"the lower bound {low:g} is above the upper one {high:g}")
+            return None
+        if weights is not None and ((weights < low) | (weights > high)).any():
+            first = weights[(weights < low) | (weights > high)][0]
+            message = f"the first weight {first:g} lies outside the bounds {low:g} to {high:g}"
+            findings.error("weight-outside", entry.value.span, message)
+            return None
+        return (low, high)
+
+    def _learning(self, shape: _Shape | None) -> Learning | None:
+        if self.body.plasticity is None:
+            return None
+        count = None if self.targets is None else len(self.targets)
+        found = None if shape is None else shape.j
+        return learning_of(
+            self.body.plasticity,
+            found,
+            count,
+            self.place.unit,
+            self.place.directory,
+            len(self.place.population.neurons),
+        )
