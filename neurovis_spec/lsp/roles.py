@@ -109,25 +109,30 @@ _VALUES: Final[Mapping[str, Role]] = {
     "neurons * position # #": _GROUP,
     "neurons * activation": Role("choice", "activation"),
     "neurons * model": Role("choice", "model"),
-    "neurons * activation * *": Role("formula", given=("i", "n")),
-    "neurons * model * *": Role("formula", given=("i", "n")),
+    "neurons * activation * * #": _GROUP,
+    "neurons * model * * #": _GROUP,
     "connections # *": _PAIR,
     "connections # * weight": _PAIR,
     "connections # * centre # #": _PAIR,
-    "connections # * matrix # #": _FORMULA,
+    "connections # * matrix # #": _PAIR,
     "connections # * delay": _FORMULA,
     "connections # * bounds #": _FORMULA,
     "connections # * scale *": _FORMULA,
     "connections # * pattern": Role("pattern"),
     "connections # * pattern * *": _FORMULA,
     "connections # * plasticity": Role("choice", "rule"),
-    "connections # * plasticity * *": Role("setting value", "rule"),
+    "connections # * plasticity * * #": Role("setting value", "rule"),
     "connections # * edges # #": Role("references"),
     "outputs * #": Role("references"),
     "layout boxes * #": Role("references"),
     "layout mirror # #": Role("references"),
     "layout align # #": Role("references"),
     "layout engine": Role("engine"),
+    "layout positions * #": _FORMULA,
+    "layout spacing *": _FORMULA,
+    "render gain *": _FORMULA,
+    "render size #": _FORMULA,
+    "ros rate": _FORMULA,
     "instances * module": Role("names", "module"),
     "instances * inputs *": Role("names", "input"),
     "instances * count": _FORMULA,
@@ -175,7 +180,7 @@ def role_of(path: Path, is_key: bool) -> tuple[Role | None, Scope]:
         module, path = path[1], path[2:]
     role = _role(tuple(0 if isinstance(part, int) else part for part in path), is_key)
     if path[-3:-2] == ("edges",) and path[-1] in (2, 3):  # behind its two ends an edge has a weight and a delay
-        role = _FORMULA
+        role = _PAIR if path[-1] == 2 else _FORMULA
     definition = None
     if len(path) > 2 and path[0] in DEFINITIONS:
         definition = (str(path[0]), str(path[1]))
