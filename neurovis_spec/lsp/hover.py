@@ -51,8 +51,8 @@ def hover(document: Document, place: Place) -> Hover | None:
             f"**{item.text}** (pattern): {PATTERNS[item.text]}" + (f" ({settings})" * bool(settings)), item.span
         )
     if role is not None and role.use == "ends" and item.is_key:
-        told = document.index.values.get((*item.path, "description"))
-        return None if told is None else Hover(f"**{item.text}**\n\n{told.text}", item.span)
+        description = document.index.values.get((*item.path, "description"))
+        return None if description is None else Hover(f"**{item.text}**\n\n{description.text}", item.span)
     key = key_at(item.path) if item.is_key else None
     return None if key is None else Hover(f"**{key.name}**: {key.description}", item.span)
 
