@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import chain
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -125,8 +125,7 @@ def check_finite(value: Value, formula: Formula, findings: Findings) -> bool:
     return False
 
 
-@dataclass(frozen=True, slots=True)
-class Randomness:
+class Randomness(NamedTuple):
     """Where the numbers of a formula are drawn from: a stream and the counters i, j of each value."""
 
     stream: Stream

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TypeAlias, TypeVar
+from typing import NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -34,8 +34,7 @@ _MODEL = ("drive", "k", "t")
 _RULE = ("pre", "sent", "post", "weight", "k", "t")
 
 
-@dataclass(frozen=True, slots=True)
-class Default:
+class Default(NamedTuple):
     """A parameter of a definition: its default and its bounds, which may use earlier parameters."""
 
     name: str

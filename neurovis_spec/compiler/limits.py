@@ -5,7 +5,7 @@ The findings of one list are limited as well: a hundred thousand wrong cells are
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 #: Findings in one list of values, after which the rest of the list is not looked at.
 PATIENCE = 20
@@ -17,8 +17,7 @@ MOST_INSTANCES, DEEPEST = 100_000, 64
 LONGEST_DELAY, MOST_SIGNALS = 1_000_000, 250_000_000
 
 
-@dataclass(frozen=True, slots=True)
-class Limits:
+class Limits(NamedTuple):
     """Most neurons and most connections (§3)."""
 
     neurons: int = 1_000_000

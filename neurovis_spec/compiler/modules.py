@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 from neurovis_spec.compiler.builtin import builtin_definitions
 from neurovis_spec.compiler.definitions import Definitions, define
@@ -41,8 +41,7 @@ class Module:
         return gaps_of(self.model)
 
 
-@dataclass(frozen=True, slots=True)
-class Library:
+class Library(NamedTuple):
     """All modules and definitions in reach, and what of them could not be read (``definitions.gaps``)."""
 
     modules: Mapping[str, Module]

@@ -6,15 +6,14 @@ that reach it without delay), or a cycle.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from neurovis_spec.compiler.network import IntArray
 
 
-@dataclass(frozen=True, slots=True)
-class Cycle:
+class Cycle(NamedTuple):
     """Neurons that wait for each other: the first is named again at the end; ``connection`` closes the cycle."""
 
     neurons: tuple[int, ...]

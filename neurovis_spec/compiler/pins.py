@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Final, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import Directory, key_of, resolve_end
@@ -28,20 +27,18 @@ DIAMETER: Final = 0.6
 FARTHEST: Final = 1e6
 
 
-@dataclass(frozen=True)
-class Pins:
+class Pins(NamedTuple):
     """Places by neuron; for each instance with pins of its module these, relative to its origin, by its path; and the
     origins that are known."""
 
     places: Mapping[int, Place]
-    relative: tuple[tuple[str, Mapping[int, Place]], ...] = ()
-    origins: Mapping[str, Place] = field(default_factory=dict)
+    relative: tuple[tuple[str, Mapping[int, Place]], ...]
+    origins: Mapping[str, Place]
     #: where the place of each neuron was said
-    spans: Mapping[int, Span] = field(default_factory=dict)
+    spans: Mapping[int, Span]
 
 
-@dataclass(frozen=True)
-class _Pin:
+class _Pin(NamedTuple):
     """A place, and where it was said."""
 
     x: float
@@ -57,12 +54,11 @@ class _Pin:
         return _Pin(self.x + origin.x, self.y + origin.y, origin.key, origin.span)
 
 
-@dataclass
-class _Said:
+class _Said(NamedTuple):
     """What one unit says: places of neurons, and origins of instances by the place of their unit."""
 
-    neurons: dict[int, _Pin] = field(default_factory=dict)
-    origins: dict[int, _Pin] = field(default_factory=dict)
+    neurons: dict[int, _Pin]
+    origins: dict[int, _Pin]
 
 
 def pins_of(units: tuple[Unit, ...], population: Population, findings: Findings) -> Pins:
@@ -132,7 +128,7 @@ def _frame(
 
 
 def _said(unit: Unit, directory: Directory, by_identity: Mapping[int, int], findings: Findings) -> _Said:
-    result = _Said()
+    result = _Said({}, {})
     model = unit.section.layout
     if model is None:
         return result

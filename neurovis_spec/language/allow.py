@@ -10,9 +10,8 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import islice
-from typing import Final
+from typing import Final, NamedTuple
 
 import yaml
 
@@ -27,8 +26,7 @@ _ALLOW: Final = re.compile(r"(?<![^\s#])#[ \t]*neurovis[ \t]*:[ \t]*allow(?![\w-
 _CODE: Final = re.compile(r"[^\s,]+")
 
 
-@dataclass(frozen=True, slots=True)
-class Allow:
+class Allow(NamedTuple):
     """One code in such a comment; the span is the code's, or the comment's where it names none (``code`` is '')."""
 
     code: str

@@ -11,7 +11,7 @@ import os.path
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.data_files import locate
@@ -29,16 +29,14 @@ DEEPEST: Final = 64
 ReadBytes: TypeAlias = Callable[[Path, int], bytes | FileFault]
 
 
-@dataclass(frozen=True, slots=True)
-class Included:
+class Included(NamedTuple):
     """An included file: what it holds, and the folder that its paths are relative to."""
 
     model: IncludedModel
     folder: Path
 
 
-@dataclass(frozen=True, slots=True)
-class Includes:
+class Includes(NamedTuple):
     """All included files. ``complete`` says whether each of them could be read."""
 
     files: tuple[Included, ...] = ()

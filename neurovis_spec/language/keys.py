@@ -7,8 +7,8 @@ place where it stands; so what it holds is looked at as well, and nothing that i
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass, replace
-from typing import Final
+from dataclasses import replace
+from typing import Final, NamedTuple
 
 from neurovis_spec.diagnostics import Findings, did_you_mean, meant, nearest, suggest
 from neurovis_spec.language.located import shown
@@ -18,8 +18,7 @@ from neurovis_spec.language.source import Entry, Mapping
 _MOST_HINTS: Final = 200  # as in the compiler
 
 
-@dataclass(frozen=True, slots=True)
-class Keys:
+class Keys(NamedTuple):
     """A mapping whose unknown keys are noted; ``perhaps`` are the known ones that those still unknown may be meant
     for."""
 
@@ -27,8 +26,7 @@ class Keys:
     perhaps: frozenset[str]
 
 
-@dataclass(frozen=True, slots=True)
-class Words:
+class Words(NamedTuple):
     """What is said of an unknown key. ``foreign``: the message and the hint for one that is no misspelling; ``home``: a
     hint for one that is like none of the known ones."""
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from yaml.error import MarkedYAMLError
 
@@ -19,8 +19,7 @@ CODE = "yaml-syntax"
 _TIGHT_COLON = re.compile(r"[A-Za-z_][\w.]*:(?=\S)")
 
 
-@dataclass(frozen=True, slots=True)
-class Syntax:
+class Syntax(NamedTuple):
     """A syntax error, worded; line and column count from 1."""
 
     message: str

@@ -5,8 +5,7 @@ In: nodes. Out: one frozen value each, so that nobody behind this module asks ag
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Annotated, TypeAlias
+from typing import Annotated, NamedTuple, TypeAlias
 
 from pydantic import ValidationInfo
 
@@ -33,8 +32,7 @@ from neurovis_spec.language.source import Entry, Mapping, Node, Packed, Scalar, 
 FORMULAS = {"anyOf": [*FORMULA["anyOf"], {"type": "array", "items": FORMULA}]}
 
 
-@dataclass(frozen=True, slots=True)
-class Choice:
+class Choice(NamedTuple):
     """``name`` or ``{name: {parameter: value, …}}``: an activation, a model or a rule with its settings."""
 
     name: Located[str]
@@ -84,8 +82,7 @@ ChoiceField = Annotated[
 ]
 
 
-@dataclass(frozen=True, slots=True)
-class FileReference:
+class FileReference(NamedTuple):
     """``{file: path}``; ``key`` names the array of an archive."""
 
     path: Located[str]
@@ -93,8 +90,7 @@ class FileReference:
     span: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Rows:
+class Rows(NamedTuple):
     """Dense rows as written: every row a list of formulas or nulls (checked when they are evaluated)."""
 
     node: Sequence | Packed
@@ -155,8 +151,7 @@ _ROWS = {"type": "array", "items": {"type": "array", "items": _CELL}}
 MatrixField = Annotated[Matrix, Leaf(as_matrix, {"anyOf": [_ROWS, FILE]})]
 
 
-@dataclass(frozen=True, slots=True)
-class EdgeRows:
+class EdgeRows(NamedTuple):
     """Edges as written: ``[from, to, weight, delay]``, the last two optional (checked when they are connected)."""
 
     node: Sequence | Packed
@@ -190,8 +185,7 @@ CentreField = Annotated[
 ]
 
 
-@dataclass(frozen=True, slots=True)
-class FormulaList:
+class FormulaList(NamedTuple):
     """A list of n values, one each."""
 
     items: tuple[Formula, ...]
@@ -208,8 +202,7 @@ def as_formulas(node: Node, info: ValidationInfo) -> Formula | FormulaList:
 FormulasField = Annotated[Formula | FormulaList, Leaf(as_formulas, FORMULAS)]
 
 
-@dataclass(frozen=True, slots=True)
-class Parameter:
+class Parameter(NamedTuple):
     """A named constant: its value, and the bounds within which it may be set."""
 
     value: Formula
@@ -261,8 +254,7 @@ ParameterField = Annotated[
 ]
 
 
-@dataclass(frozen=True, slots=True)
-class Reference:
+class Reference(NamedTuple):
     """One or several references to neurons, as written, each with its place."""
 
     parts: tuple[Located[str], ...]
@@ -280,8 +272,7 @@ ReferenceField = Annotated[
 ]
 
 
-@dataclass(frozen=True, slots=True)
-class Point:
+class Point(NamedTuple):
     """Two numbers or expressions, x and y."""
 
     x: Formula

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import reduce
 from types import MappingProxyType
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -125,8 +124,7 @@ def _unbounded(function: Callable[[float], float], odd: bool = False) -> Scalar:
 _exp = _unbounded(math.exp)
 
 
-@dataclass(frozen=True, slots=True)
-class Function:
+class Function(NamedTuple):
     """A function: ``least`` to ``most`` arguments (None: as many as wanted), and what it is to each consumer.
 
     ``code`` is a template with ``{0}``, ``{1}``, … for the code of its arguments, and gives a call; of a function

@@ -11,8 +11,7 @@ import math
 import re
 import unicodedata
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from neurovis_spec.language.expressions.errors import ExpressionError, shortened
 
@@ -24,8 +23,7 @@ MAX_LENGTH = 1000
 WORDS = frozenset({"and", "or", "not", "if", "else"})
 
 
-@dataclass(frozen=True, slots=True)
-class Token:
+class Token(NamedTuple):
     """A piece of the text, from ``start`` to ``end``; words that are operators are of kind ``operator``."""
 
     kind: Kind
