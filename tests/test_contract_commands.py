@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
 import neurovis_spec as nv
+from neurovis_spec.cli import progress
 from neurovis_spec.cli.commands import COMMANDS, neurovis
 
 SPEC = """\
@@ -100,6 +102,28 @@ def test_results_go_to_standard_output_and_diagnostics_to_standard_error(folder:
     bad = call(f"{name} bad.yaml {READS[name]}")
     assert (bad.exit_code, bad.stdout) == (1, "")
     assert "bad.yaml:2:7: error[yaml-syntax]" in bad.stderr
+
+
+@pytest.mark.parametrize("name", READS)
+def test_what_may_take_longer_than_a_second_shows_a_bar_on_a_terminal(
+    folder: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each command begins to count when it begins to work, and takes the bar away at its end."""
+    told: list[str] = []
+
+    class Watched(progress.Bar):
+        def start(self) -> None:
+            told.append(f"{self._label} begins")
+
+        def stop(self) -> None:
+            told.append(f"{self._label} ends")
+
+    monkeypatch.setattr(progress, "Bar", Watched)
+    monkeypatch.setattr(progress, "sys", SimpleNamespace(stderr=SimpleNamespace(isatty=lambda: True)))
+    good(f"{name} small.yaml {READS[name]}")
+    assert progress.PATIENCE == 1
+    assert told
+    assert [line.replace("begins", "ends") for line in told[::2]] == told[1::2]
 
 
 @pytest.mark.parametrize("name", ["live", "ros", "analyze", "import", "export"])
