@@ -68,7 +68,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
     make_parameters(spec, constants, request.parameters)
     _check_given(spec, constants, request.parameters)
     steps, episode = _clock(spec, constants)
-    expander = Expander(library, request.root, findings, constants.dt, files={**request.files})
+    expander = Expander(library, request.root, findings, constants.dt, files={**request.files}, limits=request.limits)
     expansion = expander.expand(spec, constants, request.base)
     units, inputs = expansion.units, expansion.inputs
     population = populate(units, request.limits, seed)

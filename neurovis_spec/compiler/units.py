@@ -9,14 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import NoReturn
 
-from neurovis_spec.compiler.census import Census, TooManyError
+from neurovis_spec.compiler.census import Census, Excess
 from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.definitions import Definitions
 from neurovis_spec.compiler.gaps import Gaps
-from neurovis_spec.compiler.limits import DEEPEST, MOST_INSTANCES, amount, plural
+from neurovis_spec.compiler.limits import DEEPEST, MOST_INSTANCES, Limits, plural
 from neurovis_spec.compiler.modules import Library, Module
 from neurovis_spec.compiler.network import Input
 from neurovis_spec.compiler.parameters import make_parameters
@@ -117,6 +118,11 @@ class Expander:
     #: how many units were made, and whether there would have been too many
     made: int = 0
     stopped: bool = False
+    limits: Limits = field(default_factory=Limits)
+
+    @cached_property
+    def _census(self) -> Census:
+        return Census(self.library.modules, self.dt, self.limits.neurons)
 
     def expand(self, section: Section, constants: Constants, folder: Path, module: str | None = None) -> Expansion:
         """The units of a section whose parameters are known, and the inputs of the network. ``module``: it is a module
@@ -197,31 +203,22 @@ class Expander:
         return index
 
     def _count(self, unit: Unit) -> None:
-        """Refuse more instances than there may be before any of them is made. Modules that are looked at by themselves
-        share what there may be: behind that, those within them are left out."""
+        """Refuse more instances, or neurons, than there may be before any of them is made. Modules that are looked at
+        by themselves share what there may be: behind that, those within them are left out."""
         if self.stopped:
             raise _StoppedError
-        census, total = Census(self.library.modules, self.dt), 0
-        for name, model in unit.section.instances.items():
+        if unit.section.instances:
             quiet = replace(unit.constants, findings=Findings(), structural=set())
-            try:
-                total += census.of_entry(model, quiet)
-            except TooManyError:
-                self._refuse_many(model, unit, name, None)
-            if total > MOST_INSTANCES:
-                self._refuse_many(model, unit, name, total)
-        if self.made + total > MOST_INSTANCES and unit.module is not None:
-            raise _StoppedError
+            found = self._census.check(unit.section, quiet)
+            if isinstance(found, Excess):
+                self._stop(found)
+            if self.made + found.instances > MOST_INSTANCES and unit.module is not None:
+                raise _StoppedError
 
-    def _refuse_many(self, model: InstanceModel, unit: Unit, name: str, total: int | None) -> NoReturn:
-        span = key_span(unit.section, "instances", name) if model.count is None else model.count.span
-        many = f"more than {MOST_INSTANCES:,}" if total is None else amount(total)
-        message = f"this makes {many} instances; {MOST_INSTANCES:,} are the most"
-        self._stop("too-many", span, message)
-
-    def _stop(self, code: str, span: Span, message: str) -> NoReturn:
+    def _stop(self, excess: Excess, code: str = "too-many") -> NoReturn:
         self.stopped = True
-        self.findings.error(code, span, message)
+        if excess.span is not None:
+            self.findings.error(code, excess.span, excess.message, excess.hint)
         raise _StoppedError
 
     def _at(self, index: int) -> Unit:
@@ -285,12 +282,9 @@ class Expander:
         if module is None or "count" in model.lost or (model.count is not None and count is None):
             self._look(model, unit)
             return None
-        total = len(self.units) - 1 + (count or 1)
-        if total > MOST_INSTANCES:
-            self._refuse_many(model, unit, name, total)
         if len(way) > DEEPEST:
             span = key_span(unit.section, "instances", name)
-            self._stop("too-deep", span, f"modules are nested at most {DEEPEST} deep")
+            self._stop(Excess(span, f"modules are nested at most {DEEPEST} deep"), "too-deep")
         called = [name] if count is None else [f"{name}{number}" for number in range(1, count + 1)]
         if len(called[-1]) > 64:
             self.findings.error("bad-name", key_span(unit.section, "instances", name), too_long(called[-1]), NAME_RULE)
