@@ -217,7 +217,8 @@ class EntryBuilder:
 
     def _pattern(self) -> _Shape | None:
         assert self.body.pattern is not None
-        pairs = pairs_of(self.body.pattern, self._ends(), self.constants, self._stream("edges"), self._fits)
+        ends = None if self._misplaced() else self._ends()
+        pairs = pairs_of(self.body.pattern, ends, self.constants, self._stream("edges"), self._fits)
         return None if pairs is None else _Shape(*pairs)
 
     def _all(self) -> _Shape | None:
@@ -266,16 +267,19 @@ class EntryBuilder:
         if tree is not None and "distance" in names(tree):
             position = self.place.population.neurons.position
             apart = position[self.sources[shape.i]] - position[self.targets[shape.j]]
-            if not np.isfinite(apart).all():
-                self._without_position(formula)
+            if self._misplaced() or not np.isfinite(apart).all():
+                if not self._misplaced():
+                    message = "'distance' needs a position of every neuron of both ends"
+                    self.constants.findings.error("no-position", formula.span, message, "give the groups a 'position'")
                 return None
             extra["distance"] = np.hypot(apart[:, 0], apart[:, 1])
         value = self.constants.value(formula, extra, Randomness(self._stream(purpose), shape.i, shape.j))
         return None if value is None else np.broadcast_to(np.asarray(value, dtype=np.float64), shape.i.shape).copy()
 
-    def _without_position(self, formula: Formula) -> None:
-        message = "'distance' needs a position of every neuron of both ends"
-        self.constants.findings.error("no-position", formula.span, message, "give the groups a 'position'")
+    def _misplaced(self) -> bool:
+        """Whether what the spec says of a position of these neurons is at fault."""
+        misplaced = self.place.population.misplaced
+        return any(end is not None and bool(misplaced[end].any()) for end in (self.sources, self.targets))
 
     def _weights(self, shape: _Shape | None) -> FloatArray | None:
         weights = None if shape is None else shape.weights

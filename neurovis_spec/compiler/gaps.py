@@ -14,6 +14,7 @@ from neurovis_spec.language.library import Library
 from neurovis_spec.language.model import lost_names
 from neurovis_spec.language.modules import INCLUDED, ModuleModel
 from neurovis_spec.language.sections import GroupModel
+from neurovis_spec.language.source import Node, Packed, Scalar, Sequence
 from neurovis_spec.language.spec import Spec
 
 SECTIONS = ("parameters", "inputs", "neurons", "instances", "modules", "activations", "models", "rules")
@@ -40,11 +41,13 @@ class Gaps:
         return replace(self, sections=self.sections | {section})
 
     def cover_reference(self, name: str) -> bool:
-        """The same for a reference: a group at fault may make any neuron that begins with its name, and so may an
-        instance."""
+        """The same for a reference: a group at fault may make any neuron that is called like it, with a number behind,
+        and so may an instance."""
         if not self.sections.isdisjoint(("neurons", "instances")):
             return True
-        return any(name.startswith(lost) for section in ("neurons", "instances") for lost in self.names[section])
+        head = name.partition(".")[0]
+        lost = self.names["neurons"] | self.names["instances"]
+        return head in lost or head.rstrip("0123456789") in lost
 
     def only(self, sections: Collection[str]) -> Gaps:
         """The gaps of these sections."""
@@ -57,12 +60,26 @@ class Gaps:
         return Gaps(names, self.sections | other.sections)
 
 
-def _names_neurons(key: str) -> bool:
+def _names_neurons(group: GroupModel, key: str) -> bool:
     """Whether a key of a group that was left out may have said which neurons there are."""
     if key in GroupModel.model_fields:
         return key in _NAMING
     close = nearest(key, GroupModel.model_fields)
-    return not close or not _NAMING.isdisjoint(close)
+    if close:
+        return not _NAMING.isdisjoint(close)
+    if group.count is not None or group.names is not None:
+        return False
+    value = group.source.get(key)  # a key of some other language: a number may be how many there are
+    return not isinstance(value, Scalar) or (
+        isinstance(value.value, (int, float)) and not isinstance(value.value, bool)
+    )
+
+
+def _texts(node: Node | None) -> frozenset[str] | None:
+    """The texts of a list; None where it is none."""
+    if not isinstance(node, (Sequence, Packed)):
+        return None
+    return frozenset(item.value for item in node.items if isinstance(item, Scalar) and isinstance(item.value, str))
 
 
 def gaps_of(library: Library | ModuleModel) -> Gaps:
@@ -78,8 +95,11 @@ def gaps_of(library: Library | ModuleModel) -> Gaps:
         names[section] = frozenset(lost_names(library.source, section, kept))
     if isinstance(library, (Spec, ModuleModel)):
         for name, group in library.neurons.items():
-            if any(_names_neurons(key) for key in group.lost):
+            if any(_names_neurons(group, key) for key in group.lost):
                 names["neurons"] |= {name}
-        if any("names" in group.lost for group in library.neurons.values()):
-            whole.add("neurons")
+            if "names" in group.lost:
+                texts = _texts(group.source.get("names"))
+                names["neurons"] |= texts or frozenset()
+                if texts is None:
+                    whole.add("neurons")
     return Gaps(names, frozenset(whole))

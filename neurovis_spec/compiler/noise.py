@@ -27,20 +27,28 @@ def make_noises(units: tuple[Unit, ...], population: Population, inputs: int) ->
         formula, constants = model.noise, units[owner].constants
         if formula is None:
             continue
-        tree = constants.tree(formula, ("k", "t", "i", "n"), random=True)
+        tree = _tree(formula, constants)
         if tree is None:
-            continue
-        if not draws(tree):
-            message = "this noise draws nothing: it is the same at each run"
-            hint = "use normal(mean, deviation) or uniform(low, high); a constant belongs to 'bias'"
-            constants.findings.error("no-draw", formula.span, message, hint)
             continue
         _check_deviations(tree, formula, group.count, constants)
         members = np.arange(group.start, group.start + group.count, dtype=np.int64)
         frozen(members)
         result.append(Noise(group.name, members, start, tree, dict(constants.parameters)))
         start += group.count
+    for model, owner in population.lost:
+        if model.noise is not None:
+            _tree(model.noise, units[owner].constants)
     return tuple(result)
+
+
+def _tree(formula: Formula, constants: Constants) -> Tree | None:
+    tree = constants.tree(formula, ("k", "t", "i", "n"), random=True)
+    if tree is None or draws(tree):
+        return tree
+    message = "this noise draws nothing: it is the same at each run"
+    hint = "use normal(mean, deviation) or uniform(low, high); a constant belongs to 'bias'"
+    constants.findings.error("no-draw", formula.span, message, hint)
+    return None
 
 
 def _check_deviations(tree: Tree, formula: Formula, count: int, constants: Constants) -> None:

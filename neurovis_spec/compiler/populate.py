@@ -6,6 +6,7 @@ its model are.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -32,13 +33,16 @@ from neurovis_spec.compiler.network import (
 )
 from neurovis_spec.compiler.positions import positions_of
 from neurovis_spec.compiler.references import Directory, key_span
-from neurovis_spec.compiler.settings import check_initials, choose, parameters, spread
+from neurovis_spec.compiler.settings import check_initials, choose, look_at_settings, parameters, spread
 from neurovis_spec.compiler.units import Unit
-from neurovis_spec.diagnostics import suggest
+from neurovis_spec.diagnostics import meant, suggest
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, shown, too_long
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.source import Scalar
 from neurovis_spec.language.values import Choice, FormulaList
+
+#: Characters that no name has.
+_NO_LETTERS = re.compile(r"[^A-Za-z0-9_]+")
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,10 @@ class Population:
     models: tuple[GroupModel, ...]
     #: the place of each group's unit
     owners: tuple[int, ...]
+    #: for each neuron whether what the spec says of its position is at fault
+    misplaced: npt.NDArray[np.bool_]
+    #: groups of which it is not known which neurons they have, each with the place of its unit
+    lost: tuple[tuple[GroupModel, int], ...] = ()
 
     @cached_property
     def by_distance(self) -> npt.NDArray[np.bool_]:
@@ -91,7 +99,7 @@ class _Built:
     bias: FloatArray
     initial: FloatArray
     input: IntArray
-    position: FloatArray
+    position: FloatArray | None
     first: int | None
 
 
@@ -103,6 +111,7 @@ class _Settled:
     built: tuple[_Built, ...]
     start: int
     gaps: Gaps
+    lost: tuple[GroupModel, ...]
 
 
 def populate(units: tuple[Unit, ...], limits: Limits, seed: int) -> Population:
@@ -123,17 +132,23 @@ def _settle(unit: Unit, start: int, limits: Limits, seed: int) -> _Settled:
     built: list[_Built] = []
     gaps = unit.gaps
     lost = set(gaps.names["neurons"])
+    models: list[GroupModel] = []
     at = start
     for name, model in unit.section.neurons.items():
         group = builder.group(name, model, at)
         if group is None:
-            lost.add(name)
-            if model.names is not None:  # which neurons these are nobody knows
-                gaps = gaps.with_section("neurons")
+            lost.update((name, *(item.value for item in model.names or ())))
+            models.append(model)
             continue
         built.append(group)
+        lost.update(mended for neuron in group.names if not IDENTIFIER.fullmatch(neuron) for mended in _mended(neuron))
         at += group.group.count
-    return _Settled(unit, tuple(built), start, gaps.with_names("neurons", lost))
+    return _Settled(unit, tuple(built), start, gaps.with_names("neurons", lost), tuple(models))
+
+
+def _mended(name: str) -> tuple[str, str]:
+    """What a name that is none may be called elsewhere, where its author had it right."""
+    return _NO_LETTERS.sub("", name), _NO_LETTERS.sub("_", name)
 
 
 def _owners(unit: Unit, built: tuple[_Built, ...]) -> None:
@@ -192,14 +207,23 @@ def _join(settled: list[_Settled]) -> Population:
         bias=np.concatenate([item.bias for item in built] or [empty]),
         initial=np.concatenate([item.initial for item in built] or [empty]),
         input=np.concatenate([item.input for item in built] or [empty.astype(np.int64)]),
-        position=np.concatenate([item.position for item in built] or [np.zeros((0, 2))]),
+        position=np.concatenate([_placed(item) for item in built] or [np.zeros((0, 2))]),
     )
     for array in (neurons.bias, neurons.initial, neurons.input, neurons.position):
         frozen(array)
     directories = _directories(settled, len(names))
     kinds, models = tuple(item.kind for item in built), tuple(item.model for item in built)
     owners = tuple(place for place, one in enumerate(settled) for _ in one.built)
-    return Population(neurons, directories, kinds, models, owners)
+    sizes = [item.group.count for item in built]
+    wrong = [item.position is None or "position" in item.model.lost for item in built]
+    misplaced = np.repeat(np.array(wrong, dtype=np.bool_), sizes)
+    lost = tuple((model, place) for place, one in enumerate(settled) for model in one.lost)
+    return Population(neurons, directories, kinds, models, owners, misplaced, lost)
+
+
+def _placed(item: _Built) -> FloatArray:
+    """The positions of a group's neurons, NaN where there is none."""
+    return np.full((item.group.count, 2), np.nan) if item.position is None else item.position
 
 
 def _directories(settled: list[_Settled], total: int) -> tuple[Directory, ...]:
@@ -247,7 +271,7 @@ class _Builder:
         if name not in self.definitions.gaps.names["neurons"]:
             names, first_number = self._names(name, model, start)
         if names is None:
-            self._choices(model)
+            self._look(name, model)
             return None
         n = len(names)
         kind = self._kind(model, n)
@@ -281,9 +305,18 @@ class _Builder:
             bias=np.zeros(n) if bias is None else bias,
             initial=np.full(n, np.nan) if initial is None else initial,
             input=np.full(n, -1, dtype=np.int64) if input_index is None else input_index,
-            position=np.full((n, 2), np.nan) if position is None else position,
+            position=position,
             first=first_number,
         )
+
+    def _look(self, name: str, model: GroupModel) -> None:
+        """What can be said of a group of which it is not known which neurons it has."""
+        self._kind(model, None)
+        for formulas, purpose in ((model.bias, "bias"), (model.initial, "initial")):
+            if formulas is not None:
+                self._drawn(formulas, None, purpose, name)
+        self._input(model, None)
+        positions_of(model.position, None, self.constants, self.unit.files)
 
     def _fed(self, model: GroupModel) -> str | None:
         """The network's name of the input of a group."""
@@ -335,8 +368,8 @@ class _Builder:
             seen[item.value] = item
             if findings.errors - before >= PATIENCE:
                 break
-        if findings.errors > before:
-            return None
+        if findings.errors > before:  # how many they are is known
+            return tuple(item.value for item in model.names)
         if not seen or (count is not None and count != len(seen)):
             wanted = "at least one is wanted" if count is None else f"'count' says {count}"
             node = model.source.get("names")
@@ -355,13 +388,17 @@ class _Builder:
             choose(neuron, known.models, "model", known, findings),
         )
 
-    def _kind(self, model: GroupModel, n: int) -> Kind:
+    def _kind(self, model: GroupModel, n: int | None) -> Kind:
         """What the neurons are; identity and static in the place of what is at fault."""
         activation, neuron = self._choices(model)
         activity: dict[str, FloatArray] | None = None
         settings: dict[str, FloatArray] | None = None
         if activation is not None:
             activity = parameters(model.activation or _default("identity", model), activation[1], n, self.constants)
+        elif model.activation is not None:
+            look_at_settings(model.activation, self.constants, ("i", "n"))
+        if neuron is None and model.model is not None:
+            look_at_settings(model.model, self.constants, ("i", "n"))
         if neuron is not None:
             choice = model.model or _default("static", model)
             settings = parameters(choice, neuron[1], n, self.constants)
@@ -373,10 +410,10 @@ class _Builder:
             neuron, settings = self.definitions.models["static"], {}
         return Kind(activation[0], activity, neuron[0], settings)
 
-    def _drawn(self, formulas: Formula | FormulaList, n: int, purpose: str, name: str) -> FloatArray | None:
+    def _drawn(self, formulas: Formula | FormulaList, n: int | None, purpose: str, name: str) -> FloatArray | None:
         return spread(formulas, n, self.constants, f"'{purpose}'", Stream(self.seed, purpose, self.unit.called(name)))
 
-    def _input(self, model: GroupModel, n: int) -> IntArray | None:
+    def _input(self, model: GroupModel, n: int | None) -> IntArray | None:
         if model.input is None:
             return None
         name = model.input.value
@@ -387,6 +424,8 @@ class _Builder:
             if name not in known and not self.definitions.gaps.cover("inputs", name):
                 hint = suggest(name, known, "inputs") or "no inputs are declared; add it under 'inputs'"
                 findings.error("unknown-input", model.input.span, f"there is no input '{shown(name)}'", hint)
+                found = self.unit.inputs.get(meant(name, known) or "")
+        if found is None or n is None:
             return None
         if found.size == 1:
             return np.full(n, found.start, dtype=np.int64)

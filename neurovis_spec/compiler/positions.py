@@ -57,9 +57,13 @@ def _one_for_all(items: Iterable[Node], n: int, constants: Constants) -> FloatAr
 
 
 def positions_of(
-    node: FileReference | Sequence | Packed | None, n: int, constants: Constants, files: Files
+    node: FileReference | Sequence | Packed | None, n: int | None, constants: Constants, files: Files
 ) -> FloatArray | None:
-    """One position for each of n neurons; None where they are at fault."""
+    """One position for each of n neurons; None where they are at fault, or where n is not known and they are looked at
+    only."""
+    if n is None:
+        _look(node, constants, files)
+        return None
     if node is None:
         return np.full((n, 2), np.nan)
     if isinstance(node, FileReference):
@@ -77,6 +81,17 @@ def positions_of(
     if any(point is None for point in points):
         return None
     return np.array([point for point in points if point is not None], dtype=np.float64)
+
+
+def _look(node: FileReference | Sequence | Packed | None, constants: Constants, files: Files) -> None:
+    """What can be said of positions of which it is not known how many there should be."""
+    if isinstance(node, FileReference):
+        files.table(node)
+    for item in () if node is None or isinstance(node, FileReference) else node.items:
+        for number in item.items if isinstance(item, (Sequence, Packed)) else (item,):
+            formula = formula_of(number, constants.findings)
+            if formula is not None:
+                constants.look(formula, ("i", "n"))
 
 
 def _from_file(reference: FileReference, n: int, constants: Constants, files: Files) -> FloatArray | None:

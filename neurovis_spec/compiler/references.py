@@ -15,7 +15,7 @@ from typing import TypeAlias
 from neurovis_spec.compiler.gaps import Gaps
 from neurovis_spec.compiler.limits import MOST_HINTS, PATIENCE
 from neurovis_spec.compiler.network import Group
-from neurovis_spec.diagnostics import Findings, Span, did_you_mean, nearest, suggest
+from neurovis_spec.diagnostics import Findings, Span, did_you_mean, meant, nearest, suggest
 from neurovis_spec.language.located import Located, shown
 from neurovis_spec.language.modules import ModuleModel
 from neurovis_spec.language.source import Mapping as SourceMapping
@@ -96,6 +96,17 @@ class Directory:
             return tuple(group.indices)
         neuron = self.neurons.get(name)
         return None if neuron is None else (neuron,)
+
+    def meant(self, name: str) -> str | None:
+        """The name that an unknown one can only be meant for."""
+        head, dot, rest = name.partition(".")
+        if not dot:
+            return meant(name, few(name, self.known))
+        if head not in self.instances:
+            right = meant(head, few(head, tuple(self.instances)))
+            return None if right is None or self.find(f"{right}.{rest}") is None else f"{right}.{rest}"
+        right = self.instances[head][0].meant(rest)
+        return None if right is None else f"{head}.{right}"
 
     def instance(self, name: str) -> tuple[Directory, ...]:
         """The instances that a name means; none where it means something else, or nothing."""
@@ -193,6 +204,8 @@ def resolve_part(name: str, span: Span, directory: Directory, findings: Findings
             findings.error("empty-reference", span, "a reference is missing here", "name a group, a neuron or a range")
         elif not directory.covers(name):
             _unknown(name, span, directory, findings)
+            right = directory.meant(name) if findings.errors < MOST_HINTS else None
+            return None if right is None else directory.find(right)
     return result
 
 
