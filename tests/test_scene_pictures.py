@@ -181,3 +181,30 @@ def test_numbered_neurons_that_are_crowded_say_their_numbers() -> None:
                 said[group.data["neuron"]] = shape.subscript or shape.text
     assert len(said) == 92
     assert all(name.removeprefix(name.rstrip("0123456789")) == number for name, number in said.items())
+
+
+def test_titles_of_boxes_that_are_alike_stand_alike() -> None:
+    """In the same place of their frames, or in its mirror image; those of instances are heavier."""
+    scene = hard("modules").scene
+    frames = {g.title: s for g in scene.groups if g.id.startswith(("box:", "instance:")) for s in g.shapes}
+    titles = {g.id.removeprefix("title:"): s for g in scene.groups if g.id.startswith("title:") for s in g.shapes}
+    assert set(titles) == set(frames)
+    for end, weight in ((".kernels", 400), ("", 600)):
+        found = set()
+        for side in ("left", "right"):
+            for number in (1, 2, 3):
+                frame, title = frames[f"{side}{number}{end}"], titles[f"{side}{number}{end}"]
+                assert isinstance(frame, Rectangle)
+                assert isinstance(title, Text)
+                assert title.weight == weight
+                x, y = title.point[0] - frame.corner[0], title.point[1] - frame.corner[1]
+                width = texts.width(title.text, title.size, title.weight)
+                found.add((title.size, round(y, 6), round(min(x, frame.width - x - width), 6)))
+        assert len(found) == 1
+
+
+def test_a_box_that_foreign_neurons_stand_in_has_no_frame() -> None:
+    words = "neurovis: 1\nname: b\nneurons: {A: {}, B: {}, C: {}}\nlayout: {engine: manual, boxes: {both: [A, C]}, "
+    for x, shown in ((1, False), (5, True)):
+        scene = drawn(nv.compile_text(words + f"positions: {{A: [0, 0], B: [{x}, 0], C: [2, 0]}}}}\n")).scene
+        assert bool([g for g in scene.groups if g.id == "box:both"]) == shown

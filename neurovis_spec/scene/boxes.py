@@ -1,7 +1,7 @@
-"""Named boxes: the frame around their neurons, and a place for their title where no line crosses it.
+"""Named boxes: the frame around their neurons.
 
 In: the groups' ``box``, the layout section's ``boxes`` and the instances of modules. Out: rectangles in layout units,
-largest first, and titles in user units.
+largest first. ``titles`` finds room for their titles.
 """
 
 from __future__ import annotations
@@ -9,19 +9,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from neurovis_spec.compiler.network import Group, Network
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.geometry import FloatArray, Rect, bounds, overlap, sample
-from neurovis_spec.scene.model import Text, Theme
-from neurovis_spec.scene.obstacles import Obstacles
 
 _PAD_ACROSS, _PAD_DOWN = 0.62, 0.6
 _TIGHT = 0.42
-#: of a title; where nothing else helps its name gets as small as the last
-_SIZE, _SMALLER = 11.5, (10.0, 9.0)
-
 #: Around what an instance's frame holds: centres, routes, frames; and room for its title on top.
 _PAD_FRAME, _PAD_ROUTE, _PAD_INNER, _TITLE_ROOM = 0.65, 0.2, 0.35, 0.35
 
@@ -48,7 +41,8 @@ class _Named:
 
 def boxes_of(network: Network, positions: FloatArray, routes: Sequence[FloatArray]) -> list[Box]:
     """All boxes, and the instances of modules, largest first. Boxes that would touch another's are drawn tighter, what
-    holds another is drawn around it, and an instance that foreign neurons stand in has no frame. Layout units."""
+    holds another is drawn around it, and what foreign neurons stand in has no frame: it would say that they belong to
+    it. Layout units."""
     named = _named(network)
     within = {id(n): frozenset(n.members) for n in named}
     inner = _routes_within(network, routes, [n for n in named if n.kind == "instance"])
@@ -69,7 +63,7 @@ def boxes_of(network: Network, positions: FloatArray, routes: Sequence[FloatArra
     boxes = [
         Box(_titled(network, n), n.path.rpartition(".")[2], n.members, rects[id(n)], n.kind, n.path)
         for n in named
-        if n.kind == "box" or not _entered(positions, rects[id(n)], n.members)
+        if not _entered(positions, rects[id(n)], n.members)
     ]
     return sorted(boxes, key=lambda b: (-(b.rect[2] - b.rect[0]) * (b.rect[3] - b.rect[1]), b.kind, b.path))
 
@@ -189,68 +183,3 @@ def _computes(group: Group) -> str:
             if len(group.activation_parameters) == 1 and len(set(values)) == 1:
                 words[-1] += f", {_GREEK.get(key, key)} = {texts.number(values[0])}"
     return " ".join(words)
-
-
-def outline(rect: Rect) -> FloatArray:
-    """Points on the line of a box, in user units."""
-    x0, y0, x1, y1 = rect
-    across, down = np.arange(x0, x1, 4.0), np.arange(y0, y1, 4.0)
-    return np.concatenate(
-        [np.column_stack([across, np.full(len(across), y)]) for y in (y0, y1)]
-        + [np.column_stack([np.full(len(down), x), down]) for x in (x0, x1)]
-    )
-
-
-def box_title(box: Box, rect: Rect, obstacles: Obstacles, theme: Theme, picture: Rect) -> Text | None:
-    """The title where nothing crosses it: first inside the corners, then just outside; the name alone where the whole
-    finds no room, or as much of the name as finds it. ``rect`` and ``picture``: the box and what may be drawn on, in
-    user units."""
-    best: tuple[int, int, Text, Rect] | None = None
-    for penalty, (text, size) in enumerate(_wordings(box, rect, picture)):
-        width = texts.width(text, size)
-        for rank, (x, y) in enumerate(_places(rect, width, picture)):
-            x = min(max(x, picture[0]), picture[2] - width)
-            taken = (x - 2, y - size, x + width + 2, y + 0.3 * size)
-            if taken[1] < picture[1] or taken[3] > picture[3]:
-                continue
-            hits = obstacles.hits(taken)
-            if best is None or (hits, penalty * 1000 + rank) < best[:2]:
-                halo = theme.box_fill if hits else ""
-                best = (hits, penalty * 1000 + rank, Text((x, y), text, size, theme.muted, halo=halo), taken)
-            if hits == 0:
-                break
-        if best is not None and best[0] == 0:
-            break
-    if best is None or best[0] >= 10_000:
-        return None
-    obstacles.add_text(best[3])
-    return best[2]
-
-
-def _wordings(box: Box, rect: Rect, picture: Rect) -> list[tuple[str, float]]:
-    """What a title may say and how large, best first: all, the name, the name in small, the beginning of the name."""
-    room = picture[2] - picture[0]
-    whole = [(texts.shorten(box.title, _SIZE, room), _SIZE)]
-    whole += [(texts.shorten(box.name, size, room), size) for size in (_SIZE, *_SMALLER)]
-    shares = [texts.shorten(box.name, _SIZE, share * min(room, rect[2] - rect[0])) for share in (1, 0.7, 0.5, 0.35)]
-    return whole + [(text, _SIZE) for text in shares if len(text) > 3]
-
-
-def _places(rect: Rect, width: float, picture: Rect) -> list[tuple[float, float]]:
-    """Starts of the baseline, best first."""
-    x0, y0, x1, y1 = rect
-    left, right = x0 + 10, x1 - 10 - width
-    inside_top, inside_bottom, above, below = y0 + 14, y1 - 6, y0 - 6, y1 + 15
-    corners = [
-        (x, y) for y in (inside_top, inside_bottom, above, below) for x in ((left, right) if right > left else (left,))
-    ]
-    slid = [
-        (left + (right - left) * share / 12, y)
-        for y in (inside_top, inside_bottom, above, below)
-        for share in range(1, 12)
-        if right > left
-    ]
-    outside = [(x0 + 2, above), (x0 + 2, below), (x1 - 2 - width, above), (x1 - 2 - width, below)]
-    sides = [x for x in (x0 - 8 - width, x1 + 8) if picture[0] <= x <= picture[2] - width]
-    beside = [(x, y) for y in (y0 + 13, y1 - 5) for x in sides]
-    return corners + outside + slid + beside

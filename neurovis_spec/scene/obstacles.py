@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from neurovis_spec.scene.geometry import FloatArray, Rect, overlap
 
@@ -48,6 +49,15 @@ class Obstacles:
         """How many sample points of boxes' lines a rectangle covers."""
         return _within(self._frames, np.full(len(self._frames), 2.5), rect)
 
+    def near(self, rect: Rect) -> Obstacles:
+        """Only what lies in a rectangle, and all texts, also those that will be added."""
+        result = Obstacles([], [], self._centres, self._radius)
+        inside = _inside(self._dots, rect)
+        result._dots, result._reaches = self._dots[inside], self._reaches[inside]
+        result._frames = self._frames[_inside(self._frames, rect)]
+        result._texts = self._texts
+        return result
+
     def line_hits(self, rect: Rect) -> int:
         """How many sample points of lines a rectangle covers."""
         return _within(self._dots, self._reaches, rect)
@@ -82,8 +92,10 @@ class Obstacles:
 
 def _within(dots: FloatArray, reach: FloatArray, rect: Rect) -> int:
     """How many points are in a rectangle, or as near to it as each reaches."""
-    x0, y0, x1, y1 = rect
-    inside = (
-        (dots[:, 0] > x0 - reach) & (dots[:, 0] < x1 + reach) & (dots[:, 1] > y0 - reach) & (dots[:, 1] < y1 + reach)
-    )
-    return int(np.count_nonzero(inside))
+    return int(np.count_nonzero(_inside(dots, rect, reach)))
+
+
+def _inside(dots: FloatArray, rect: Rect, reach: FloatArray | float = 0.0) -> npt.NDArray[np.bool_]:
+    (x0, y0, x1, y1), (x, y) = rect, dots.T
+    result: npt.NDArray[np.bool_] = (x > x0 - reach) & (x < x1 + reach) & (y > y0 - reach) & (y < y1 + reach)
+    return result

@@ -15,7 +15,7 @@ import numpy as np
 from neurovis_spec.compiler.network import Network, RenderSettings
 from neurovis_spec.layout.model import RADIUS, Layout
 from neurovis_spec.scene import delays, encoding, legend, texts
-from neurovis_spec.scene.boxes import Box, box_title, boxes_of, outline
+from neurovis_spec.scene.boxes import Box, boxes_of
 from neurovis_spec.scene.frame import MARGIN, MOST, UNIT, Frame, Wishes, fit
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.geometry import FloatArray, Point, Rect, bounds, sample
@@ -26,6 +26,7 @@ from neurovis_spec.scene.model import Arrowhead, Group, Rectangle, Spline, Text,
 from neurovis_spec.scene.obstacles import Obstacles
 from neurovis_spec.scene.teachers import Teacher, dash, dotted, label_of, teachers_of
 from neurovis_spec.scene.themes import THEMES
+from neurovis_spec.scene.titles import Titled, outline, titles_of
 
 _TITLE, _CAPTION = 17.0, 11.5
 _TITLE_Y, _CAPTION_Y, _HEADER = 35.0, 54.0, 58.0
@@ -232,9 +233,8 @@ def _box_frames(boxes: Sequence[Box], frame: Frame, theme: Theme) -> list[Group]
 def _box_titles(boxes: Sequence[Box], frame: Frame, obstacles: Obstacles, theme: Theme, picture: Rect) -> list[Group]:
     if frame.scale < 12:  # the boxes are smaller than their titles
         return []
-    found = [
-        box_title(box, _mapped(box.rect, frame), obstacles, theme, _room(box, boxes, frame, picture)) for box in boxes
-    ]
+    items = [Titled(box, _mapped(box.rect, frame), _room(box, boxes, frame, picture)) for box in boxes]
+    found = titles_of(items, obstacles, theme)
     return [Group((text,), id=f"title:{box.path}") for box, text in zip(boxes, found, strict=True) if text is not None]
 
 
