@@ -99,6 +99,15 @@ layout: {mirror: [[L, R]], align: [[O, Q]], spacing: {neuron: 1.5, rank: 3}}
     assert codes("neurons: {L: {count: 2}, R: {}}\nlayout: {mirror: [[L, R]]}") == ["unequal-mirror"]
 
 
+def test_neighbours_are_1_apart_and_ranks_2_by_default() -> None:
+    """In units of the layout."""
+    text = "neurons: {A: {count: 2, bias: 1}, B: {}}\nconnections: {A -> B: 1}\n"
+    settings = network_of(text).layout
+    assert (settings.neuron_spacing, settings.rank_spacing) == (1, 2)
+    places = compiled(text).layout().positions
+    assert (places["A2"][0] - places["A1"][0], places["B"][1] - places["A1"][1]) == (1, 2)
+
+
 def test_the_same_spec_gives_the_same_layout_byte_for_byte() -> None:
     """The order of keys and edges does not show in it, nor does renaming that keeps the names' order."""
     every = "A -> B: {pattern: all_to_all}"
