@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 
 import numpy as np
 import pytest
 from small_specs import answer, codes, compiled
+
+from neurovis_spec.compiler.draws import Stream
 
 PRINTED = """\
 parameters: {phi: 0.049}
@@ -141,3 +144,45 @@ def test_an_undefined_constant_is_a_finding_and_an_undefined_activity_a_warning(
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         compiled(text).run(3)
+
+
+@pytest.mark.parametrize("backend", ["reference", "numpy"])
+@pytest.mark.parametrize("combine", ["sum", "product", "distance"])
+def test_terms_are_added_in_the_order_of_the_connections_bit_for_bit(combine: str, backend: str) -> None:
+    """As written, a matrix or pattern row by row; then bias, input and noise."""
+    centre = ", centre: 0.3*i + 0.7*j" if combine == "distance" else ""
+    text = f"""
+seed: 3
+inputs: {{s: {{expression: 0.1*k + 1/3}}}}
+neurons:
+  A: {{count: 7, bias: "normal(1, 0.3)"}}
+  B: {{count: 5, bias: "normal(1, 0.3)"}}
+  O: {{count: 2, combine: {combine}, bias: [0.1, 0.7], input: s, noise: "normal(0, 1)"}}
+connections:
+  - B3 -> O: {{weight: 0.7, delay: 2{centre}}}
+  - A -> O: {{weight: "normal(1, 0.2)", pattern: all_to_all, delay: 0{centre}}}
+  - B -> O: {{matrix: [[1.1, 0.9], [0.3, null], [1.7, 1.3], [null, 0.8], [0.6, 1.2]]{centre}}}
+  - A2..A5 -> O: {{weight: "normal(1, 0.2)", pattern: all_to_all, delay: 3{centre}}}
+  - A7 -> O1: {{weight: 1/3{centre}}}
+"""
+    network = compiled(text)
+    run = network.run(6, backend=backend)
+    lines, names = network.network.connections, network.network.neurons.names
+    noise = Stream(3, "noise", "O")
+    for step in range(6):
+        for number, target in enumerate(("O1", "O2")):
+            into = [index for index in range(len(lines)) if names[lines.targets[index]] == target]
+            total = 1.0 if combine == "product" else 0.0
+            for index in into:
+                past = step - int(lines.delays[index])
+                signal = (
+                    float(lines.weights[index]) * float(run[names[lines.sources[index]]][past]) if past >= 0 else 0.0
+                )
+                if combine == "distance":
+                    gap = signal - float(lines.centres[index])
+                    total += gap * gap
+                else:
+                    total = total * signal if combine == "product" else total + signal
+            total = math.sqrt(total) if combine == "distance" else total
+            drive = total + (0.1, 0.7)[number] + (0.1 * step + 1 / 3) + float(noise.normal(number, 0, step, 0))
+            assert run[target][step] == drive
