@@ -3,6 +3,7 @@ neuron and box with its name; and the same of networks that are hard on labels a
 
 from __future__ import annotations
 
+import json
 import math
 import warnings
 from dataclasses import dataclass
@@ -11,6 +12,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pytest
+from hypothesis import given
+from random_specs import Spec, specs
 
 import neurovis_spec as nv
 from neurovis_spec import pipeline
@@ -146,6 +149,11 @@ def test_the_examples_touch_nothing_they_should_not(example: Drawn) -> None:
 @pytest.mark.parametrize("name", NETWORKS)
 def test_hard_networks_touch_nothing_they_should_not(name: str) -> None:
     check(hard(name).scene)
+
+
+@given(specs())
+def test_any_network_touches_nothing_it_should_not(spec: Spec) -> None:
+    check(drawn(nv.compile_text(json.dumps(spec)), step=2).scene)
 
 
 def test_no_line_runs_over_a_foreign_neuron(example: Drawn) -> None:

@@ -30,8 +30,8 @@ from neurovis_spec.scene.titles import Titled, outline, titles_of
 
 _TITLE, _CAPTION = 17.0, 11.5
 _TITLE_Y, _CAPTION_Y, _HEADER = 35.0, 54.0, 58.0
-#: a picture is made so wide at most to have its legend in one row
-_LEGEND_ROOM = 740.0
+#: a picture is made so wide at most to have its legend in one row, and its whole title
+_ROOM = 740.0
 #: more dotted lines than this would not be quiet
 _MOST_TEACHERS = 200
 #: for a label beneath its disc, in layout units
@@ -176,8 +176,8 @@ def _frame(
     def footer(width: float) -> float:
         return legend.height(items, width - 2 * MARGIN) + (0.9 * MARGIN if items else 0.0)
 
-    narrowest = min(max(legend.row_width(items) + 2 * MARGIN, 120.0), _LEGEND_ROOM)
-    wishes = Wishes((min(header[0], 560.0), header[1]), footer, narrowest)
+    narrowest = min(max(legend.row_width(items) + 2 * MARGIN, 120.0), _ROOM)
+    wishes = Wishes((min(header[0], _ROOM - 2 * MARGIN), header[1]), footer, narrowest)
     return title, items, fit(extent, wishes, settings.size)
 
 
