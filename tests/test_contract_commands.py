@@ -127,6 +127,23 @@ def test_what_may_take_longer_than_a_second_shows_a_bar_on_a_terminal(
     assert [line.replace("begins", "ends") for line in told[::2]] == told[1::2]
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        "animate small.yaml -o x.svg --fps nan", "animate small.yaml -o x.svg --fps inf",
+        "validate small.yaml --limit 0",
+        "validate small.yaml --root small.yaml", "run small.yaml --root nowhere", "run small.yaml --set gain=nan",
+        "inspect small.yaml --format yaml", "schema more", "new", "docs a b", "fmt", "layout small.yaml --engine -",
+    ],
+)  # fmt: skip
+def test_wrong_usage_is_status_2(folder: Path, words: str) -> None:
+    """Whatever the option; nothing is written."""
+    result = call(words)
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert "Error: " in result.stderr
+    assert [path.name for path in folder.iterdir()] == ["small.yaml"]
+
+
 @pytest.mark.parametrize("name", ["live", "ros", "analyze", "import", "export"])
 def test_a_command_that_is_not_there_yet_is_answered_with_those_that_are(name: str) -> None:
     """Wrong usage, not a misspelling of another."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import click
@@ -16,6 +17,13 @@ from neurovis_spec.cli.options import (
     theme_option,
 )
 from neurovis_spec.cli.progress import progress
+
+
+def _finite(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
+    """What passes every comparison, NaN and infinity, is no number of frames either."""
+    if value is not None and not math.isfinite(value):
+        raise click.BadParameter(f"{value} is not a finite number.")
+    return value
 
 
 @click.command(
@@ -35,6 +43,7 @@ from neurovis_spec.cli.progress import progress
     "--fps",
     type=click.FloatRange(min=0, min_open=True),
     metavar="F",
+    callback=_finite,
     help="Frames a second; default 1/dt, at most 60, and 25 where the spec writes no dt.",
 )
 @recording_option

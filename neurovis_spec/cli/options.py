@@ -76,7 +76,7 @@ def compile_options(command: F) -> F:
     """Where the files of a spec may lie, and how large it may become."""
     root = click.option(
         "--root",
-        type=click.Path(path_type=Path),
+        type=click.Path(path_type=Path, exists=True, file_okay=False),
         metavar="DIR",
         expose_value=False,
         callback=_noted,
