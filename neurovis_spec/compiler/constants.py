@@ -88,14 +88,16 @@ def parse_formula(
     except ExpressionError as error:
         findings.error(error.code, formula.node.at(error.start, error.end), error.message, error.hint)
         return None
-    used = names(tree)
-    unknown = unknown_names(tree, [name for name in used if name in known])
+    unused = [name for name in names(tree) if name not in known]
+    if not unused:
+        return tree
+    unknown = unknown_names(tree, names(tree).difference(unused))
     for node in () if incomplete else unknown:
         place = formula.node.at(node.start, node.end)
         few = known if findings.errors < MOST_HINTS else ()
         message, hint = _unknown(node.name, few, functions or {}, what)
         findings.error("unknown-name", place, message, hint)
-    return None if unknown else tree
+    return None
 
 
 def _unknown(name: str, known: Collection[str], functions: Mapping[str, int], what: str) -> tuple[str, str | None]:
@@ -118,7 +120,7 @@ def is_constant(tree: Tree, constants: Collection[str] = ALWAYS) -> bool:
 
 def check_finite(value: Value, formula: Formula, findings: Findings) -> bool:
     """Whether a value is finite everywhere; a finding where it is not."""
-    if np.all(np.isfinite(value)):
+    if math.isfinite(value) if isinstance(value, float) else np.isfinite(value).all():
         return True
     what = "not finite everywhere" if np.ndim(value) else "undefined" if np.isnan(value) else "infinite"
     findings.error("not-finite", formula.span, f"the value of this expression is {what}", _NOT_FINITE)
@@ -172,14 +174,20 @@ class Constants:
             return None
         if structural:
             self.depend(names(tree))
-        fixed: Mapping[str, Value] = {**extra, **CONSTANTS, "dt": self.dt}
-        values = {name: fixed[name] if name in fixed else self.parameters[name] for name in names(tree)}
+        values = {name: self._known(name, extra) for name in names(tree)}
         drawing = None if randomness is None else _Drawing(randomness)
         result = evaluate_array(tree, values, draw=drawing)
         if drawing is not None and drawing.negative is not None and np.isnan(result).any():
             self.refuse_deviation(formula, *drawing.negative)
             return None
         return float(result) if np.ndim(result) == 0 else np.asarray(result, dtype=np.float64)
+
+    def _known(self, name: str, extra: Mapping[str, Value]) -> Value:
+        if name in CONSTANTS:
+            return CONSTANTS[name]
+        if name == "dt":
+            return self.dt
+        return extra[name] if name in extra else self.parameters[name]
 
     def refuse_deviation(self, formula: Formula, draw: Draw, deviation: float) -> None:
         """The finding about a draw from ``normal`` whose deviation is negative."""

@@ -7,15 +7,23 @@ In: the parts of a Network. Out: a hexadecimal digest. Formatting, titles, ``tim
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from neurovis_spec.language.located import Located
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
 #: Where a node of an expression stood, and what is only shown, is no content.
 _SHOWN = frozenset({"start", "end", "title", "description", "descriptions", "labels", "label", "box", "role", "module"})
+
+
+#: Pieces that are fed to the hash together.
+_MANY = 4096
 
 
 class _Writer:
@@ -23,23 +31,33 @@ class _Writer:
 
     def __init__(self) -> None:
         self.hash = hashlib.sha256()
+        self._pieces: list[bytes] = []
+        #: for each kind of record its beginning, and its fields: how each is called, in the hash and by itself
+        self._records: dict[type, tuple[bytes, tuple[tuple[bytes, str], ...]]] = {}
 
     def put(self, tag: str, content: bytes = b"") -> None:
-        self.hash.update(f"{tag}:{len(content)}:".encode())
-        self.hash.update(content)
+        self._pieces.append(_piece(tag, content))
+        if len(self._pieces) > _MANY:
+            self.flush()
+
+    def flush(self) -> None:
+        self.hash.update(b"".join(self._pieces))
+        self._pieces.clear()
 
     def value(self, value: object) -> None:
         if value is None:
             self.put("none")
+        elif isinstance(value, str):
+            self.put("text", value.encode())
+        elif isinstance(value, float):
+            self.put("number", value.hex().encode())
+        elif isinstance(value, (bool, int)):
+            self.put("integer", str(int(value)).encode())
         elif isinstance(value, np.ndarray):
             kind = "<f8" if value.dtype.kind == "f" else "<i8"
             self.put(f"array{value.shape}{kind}", np.ascontiguousarray(value, dtype=kind).tobytes())
-        elif isinstance(value, (bool, int)):
-            self.put("integer", str(int(value)).encode())
-        elif isinstance(value, float):
-            self.put("number", value.hex().encode())
-        elif isinstance(value, str):
-            self.put("text", value.encode())
+        elif isinstance(value, (list, tuple)) and not isinstance(value, Located):
+            self._list(value)
         elif isinstance(value, Mapping):
             self.put("mapping", str(len(value)).encode())
             for key, item in sorted(value.items()):  # no mapping of a network has an order that matters
@@ -49,19 +67,33 @@ class _Writer:
             written = value.value
             self.value(float(written) if isinstance(written, int) else written)
         elif is_dataclass(value) and not isinstance(value, type):
-            self.put("record", type(value).__name__.encode())
-            hidden = _SHOWN if type(value).__name__ not in _KEEP_START else _SHOWN - {"start"}
-            for field in fields(value):
-                if field.name not in hidden:
-                    self.value(field.name)
-                    self.value(getattr(value, field.name))
+            self._record(value)
         elif isinstance(value, Iterable):
-            items = list(value)
-            self.put("list", str(len(items)).encode())
-            for item in items:
-                self.value(item)
+            self._list(list(value))
         else:  # pragma: no cover - a new kind of value must be given a way here
             raise TypeError(f"no canonical form for {type(value).__name__}")
+
+    def _list(self, items: Sequence[object]) -> None:
+        self.put("list", str(len(items)).encode())
+        for item in items:
+            self.value(item)
+
+    def _record(self, value: DataclassInstance) -> None:
+        kind = type(value)
+        if kind not in self._records:
+            hidden = _SHOWN if kind.__name__ not in _KEEP_START else _SHOWN - {"start"}
+            called = (field.name for field in fields(kind) if field.name not in hidden)
+            parts = tuple((_piece("text", name.encode()), name) for name in called)
+            self._records[kind] = _piece("record", kind.__name__.encode()), parts
+        begin, parts = self._records[kind]
+        self._pieces.append(begin)
+        for piece, name in parts:
+            self._pieces.append(piece)
+            self.value(getattr(value, name))
+
+
+def _piece(tag: str, content: bytes) -> bytes:
+    return b"%b:%d:%b" % (tag.encode(), len(content), content)
 
 
 #: Records whose ``start`` is content (an index), not a place in a text.
@@ -73,4 +105,5 @@ def digest(*parts: object) -> str:
     writer = _Writer()
     for part in parts:
         writer.value(part)
+    writer.flush()
     return writer.hash.hexdigest()

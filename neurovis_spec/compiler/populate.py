@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import cast
 
@@ -118,17 +118,24 @@ def populate(units: tuple[Unit, ...], limits: Limits, seed: int) -> Population:
     """Make every neuron, unit by unit. A group that is at fault is made as far as its names are known, so that what
     refers to it can be looked at."""
     settled: list[_Settled] = []
+    kinds: dict[tuple[int, int], Kind] = {}
     start = 0
     for unit in units:
-        made = _settle(unit, start, limits, seed)
+        made = _settle(unit, start, limits, seed, kinds)
         settled.append(made)
         start += sum(item.group.count for item in made.built)
         _owners(unit, made.built)
     return _join(settled)
 
 
-def _settle(unit: Unit, start: int, limits: Limits, seed: int) -> _Settled:
-    builder = _Builder(unit, limits, seed)
+def without_neurons(population: Population) -> Population:
+    """A population without any neuron, in which nobody complains of a name: that there are none is said already."""
+    first, *others = population.directories
+    return replace(population, directories=(replace(first, gaps=first.gaps.with_section("neurons")), *others))
+
+
+def _settle(unit: Unit, start: int, limits: Limits, seed: int, kinds: dict[tuple[int, int], Kind]) -> _Settled:
+    builder = _Builder(unit, limits, seed, kinds)
     built: list[_Built] = []
     gaps = unit.gaps
     lost = set(gaps.names["neurons"])
@@ -251,6 +258,8 @@ class _Builder:
     unit: Unit
     limits: Limits
     seed: int
+    #: what groups are that are the same in all instances of a module, by the group's model and its count
+    kinds: dict[tuple[int, int], Kind]
 
     @property
     def constants(self) -> Constants:
@@ -390,6 +399,14 @@ class _Builder:
 
     def _kind(self, model: GroupModel, n: int | None) -> Kind:
         """What the neurons are; identity and static in the place of what is at fault."""
+        if n is None or not (_fixed(model.activation) and _fixed(model.model)):
+            return self._made(model, n)
+        key = id(model), n
+        if key not in self.kinds:
+            self.kinds[key] = self._made(model, n)
+        return self.kinds[key]
+
+    def _made(self, model: GroupModel, n: int | None) -> Kind:
         activation, neuron = self._choices(model)
         activity: dict[str, FloatArray] | None = None
         settings: dict[str, FloatArray] | None = None
@@ -451,3 +468,10 @@ class _Builder:
 
 def _default(name: str, model: GroupModel) -> Choice:
     return Choice(Located(name, Scalar(name, model.source.span)), ())
+
+
+def _fixed(choice: Choice | None) -> bool:
+    """Whether a choice means the same wherever it stands: what is set in it are numbers."""
+    return choice is None or not any(
+        not isinstance(entry.value, Scalar) or isinstance(entry.value.value, str) for entry in choice.settings
+    )

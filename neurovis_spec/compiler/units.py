@@ -118,6 +118,7 @@ class Expander:
     #: how many units were made, and whether there would have been too many
     made: int = 0
     stopped: bool = False
+    gaps: dict[str | None, Gaps] = field(default_factory=dict)
     limits: Limits = field(default_factory=Limits)
 
     @cached_property
@@ -161,11 +162,9 @@ class Expander:
         files = self.files_in(folder)
         own = self._inputs(section, constants, files, place, bound or {})
         lost = section.inputs.keys() - own.keys()
-        gaps = self.library.definitions.gaps if module is None else self.library.modules[module].gaps
-        gaps = gaps.with_names("inputs", gaps.names["inputs"] | lost)
-        if module is not None:
-            everywhere = self.library.definitions.gaps.only(INCLUDED)
-            gaps = replace(gaps, sections=gaps.sections - {"modules"}).joined(everywhere)
+        gaps = self._gaps(module)
+        if lost:
+            gaps = gaps.with_names("inputs", gaps.names["inputs"] | lost)
         unit = Unit(
             path=place.path,
             section=section,
@@ -182,6 +181,8 @@ class Expander:
         self.units[index] = unit
         if not way:
             self._count(unit)
+        if not section.instances:
+            return index
         children: dict[str, tuple[int, ...]] = {}
         absent: set[str] = set()
         for name, model in section.instances.items():
@@ -201,6 +202,16 @@ class Expander:
             unit, children=children, inputs={**own, **inner}, definitions=replace(unit.definitions, gaps=gaps)
         )
         return index
+
+    def _gaps(self, module: str | None) -> Gaps:
+        """What could not be read of the spec or of a module, and of the definitions."""
+        if module not in self.gaps:
+            everywhere = self.library.definitions.gaps
+            own = everywhere if module is None else self.library.modules[module].gaps
+            if module is not None:
+                own = replace(own, sections=own.sections - {"modules"}).joined(everywhere.only(INCLUDED))
+            self.gaps[module] = own
+        return self.gaps[module]
 
     def _count(self, unit: Unit) -> None:
         """Refuse more instances, or neurons, than there may be before any of them is made. Modules that are looked at

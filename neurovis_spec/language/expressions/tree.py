@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal, TypeAlias
 
 from neurovis_spec.language.expressions.errors import ExpressionError
@@ -134,6 +135,17 @@ def walk(tree: Tree) -> Iterator[Tree]:
 
 def names(tree: Tree) -> frozenset[str]:
     """All names that occur (functions are no names)."""
+    if isinstance(tree, Number):
+        return _NONE
+    return frozenset((tree.name,)) if isinstance(tree, Name) else _names(tree)
+
+
+_NONE: frozenset[str] = frozenset()
+
+
+@lru_cache(maxsize=4096)
+def _names(tree: Tree) -> frozenset[str]:
+    """The same; formulas of a module are looked at in each of its instances."""
     return frozenset(node.name for node in walk(tree) if isinstance(node, Name))
 
 
