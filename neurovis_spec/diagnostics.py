@@ -11,7 +11,6 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from difflib import SequenceMatcher
 from typing import Literal
 
 Severity = Literal["error", "warning"]
@@ -126,6 +125,8 @@ def nearest(name: str, known: Iterable[str], most: int = 3) -> tuple[str, ...]:
     >>> nearest("kerel", ["kernel", "sigmoid", "keel"]), nearest("tahn", ["tanh", "sigmoid", "atan"])
     (('kernel', 'keel'), ('tanh',))
     """
+    from difflib import SequenceMatcher
+
     folded = name.casefold()
     letters = Counter(folded)
     scored: list[tuple[float, str]] = []

@@ -6,7 +6,6 @@ what could move its cursor, change its colours or reorder its text is shown as a
 
 from __future__ import annotations
 
-import json
 import re
 import unicodedata
 from collections.abc import Iterable, Mapping
@@ -54,6 +53,8 @@ def summary(diagnostics: Iterable[Diagnostic]) -> str:
 
 def to_json(diagnostics: Iterable[Diagnostic]) -> str:
     """Findings as a JSON array of objects; lines and columns count from 1, ``hint`` may be null."""
+    import json
+
     written = json.dumps([_record(diagnostic) for diagnostic in diagnostics], indent=2)
     return written.replace("\x7f", "\\u007f")  # the one control character that JSON leaves as it is
 

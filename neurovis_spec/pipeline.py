@@ -23,7 +23,6 @@ import numpy.typing as npt
 from neurovis_spec.compiler.compile import Request, compile_spec
 from neurovis_spec.compiler.network import Network, RenderSettings
 from neurovis_spec.diagnostics import Findings
-from neurovis_spec.language.allow import silence
 from neurovis_spec.language.includes import read_includes
 from neurovis_spec.language.reader import read_file, read_text
 from neurovis_spec.language.shape import read_spec
@@ -65,7 +64,11 @@ def build(spec: Spec, request: Request, findings: Findings) -> Network | None:
 
 def allow(findings: Findings) -> None:
     """Take out the warnings that comments allow on their lines."""
-    silence(findings)
+
+    if any("allow" in text for text in findings.sources.values()):
+        from neurovis_spec.language.allow import silence
+
+        silence(findings)
 
 
 def simulate(

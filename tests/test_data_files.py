@@ -15,9 +15,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from neurovis_spec.diagnostics import Diagnostic, Findings
-from neurovis_spec.language.data_files import EdgeTable, read_edges, read_table
+from neurovis_spec.language.data_files import read_edges, read_table
 from neurovis_spec.language.data_files_csv import parse_numbers
-from neurovis_spec.language.data_files_edges import parse_edges
+from neurovis_spec.language.data_files_edges import EdgeTable, parse_edges
 from neurovis_spec.language.data_files_npy import parse_npy
 from neurovis_spec.language.data_files_table import CellError
 

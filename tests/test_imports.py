@@ -64,6 +64,13 @@ def test_validating_imports_nothing_that_runs_lays_out_or_draws() -> None:
     assert not {name for name in found if name.startswith(later)} - {"runtime.files"}
 
 
+def test_validating_imports_no_more_than_the_spec_needs() -> None:
+    """This spec has no comment that allows, one table as ``.csv`` and no mistake."""
+    modules = loaded(command("validate", "specs/cpg_rbf.yaml"))
+    kinds = {f"neurovis_spec.language.data_files_{kind}" for kind in ("edges", "mtx", "npy", "npz", "zip")}
+    assert not modules & (kinds | {"neurovis_spec.language.allow", "difflib"})
+
+
 def test_running_imports_nothing_that_lays_out_or_draws() -> None:
     modules = loaded(command("run", "specs/ring.yaml", "--steps", "3"))
     assert not modules & {"networkx", "scipy", "PIL", "rich", "neurovis_layouts", "neurovis_renderers"}

@@ -7,14 +7,18 @@ standard output has gone. One module a command; a command's module is imported w
 
 from __future__ import annotations
 
+import gc
 import sys
 
 
 def main() -> None:
     """Run ``neurovis`` on the arguments of the process; ends it."""
+    gc.set_threshold(200_000, 20, 100)  # a process that soon ends need not look for cycles all the time
     try:
         from neurovis_spec.cli.commands import neurovis
 
         neurovis.main(prog_name="neurovis")
     except KeyboardInterrupt:  # while something was still being imported, or after the command has ended
         sys.exit(130)
+    finally:
+        gc.freeze()  # nor look through everything once more at its end

@@ -6,7 +6,6 @@ module nor anything heavy is imported before that command is called, so that ``n
 
 from __future__ import annotations
 
-import gc
 import os
 import sys
 import warnings
@@ -109,7 +108,6 @@ class Commands(click.Group):
         **extra: object,
     ) -> NoReturn:
         """Run, and end the process with the status that the module ``neurovis_spec.cli`` states."""
-        gc.set_threshold(50_000, 20, 100)  # a process that soon ends need not look for cycles all the time
         for stream in (sys.stdout, sys.stderr):
             if hasattr(stream, "reconfigure"):
                 stream.reconfigure(errors="backslashreplace")
@@ -160,7 +158,8 @@ def _flushed(status: int) -> int:
         _silence(sys.stdout)
         return status or NO_READER
     except OSError as error:
-        click.echo(f"error: standard output: {error.strerror or error}", err=True)
+        if not status:  # else it is said already, of the first part of what is buffered
+            click.echo(f"error: standard output: {error.strerror or error}", err=True)
         _silence(sys.stdout)
         return status or 1
     return status

@@ -9,13 +9,16 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from neurovis_spec.compiler.limits import amount
 from neurovis_spec.diagnostics import Findings
-from neurovis_spec.language.data_files import CellError, EdgeTable, Room, Table, read_edges, read_table
+from neurovis_spec.language.data_files import CellError, Room, Table, read_edges, read_table
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.values import FileReference
+
+if TYPE_CHECKING:
+    from neurovis_spec.language.data_files_edges import EdgeTable
 
 T = TypeVar("T")
 #: Cells of a table that is read whatever its place needs: what is said of it then is more exact.

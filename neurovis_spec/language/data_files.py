@@ -1,26 +1,25 @@
 """Data files that a spec names: tables of numbers and lists of edges.
 
 In: a path as the author wrote it, the folders it may lie in, and its place in the spec. Out: arrays, or findings at
-that place. Files are opened only inside the root, only if they are regular ones, and never run or unpickled.
+that place. Files are opened only inside the root, only if they are regular ones, and never run or unpickled. What
+reads a kind of file is imported with the first file of that kind.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path, PureWindowsPath
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from neurovis_spec.diagnostics import Findings, Span, suggest
-from neurovis_spec.language.data_files_csv import parse_numbers
-from neurovis_spec.language.data_files_edges import EdgeTable, parse_edges
-from neurovis_spec.language.data_files_mtx import parse_mtx
-from neurovis_spec.language.data_files_npy import parse_npy
-from neurovis_spec.language.data_files_npz import parse_npz
 from neurovis_spec.language.data_files_table import CellError, Room, Table, full
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.reader_files import FileFault, read_bytes
 
-__all__ = ["KINDS", "CellError", "EdgeTable", "Room", "Table", "locate", "read_data", "read_edges", "read_table"]
+if TYPE_CHECKING:
+    from neurovis_spec.language.data_files_edges import EdgeTable
+
+__all__ = ["KINDS", "CellError", "Room", "Table", "locate", "read_data", "read_edges", "read_table"]
 
 LARGEST: Final = 256 << 20  # bytes; ten million connections in double precision are 80 MB
 #: characters of a path: what common systems take
@@ -103,19 +102,32 @@ def read_table(
     if data is None:
         return None
     try:
-        if suffix == ".csv":
-            return parse_numbers(data, room)
-        if suffix == ".npy":
-            return full(parse_npy(data, room))
-        if suffix == ".mtx":
-            return parse_mtx(data, room)
-        return parse_npz(data, None if key is None else key.value, room)
+        return _parsed(suffix, data, None if key is None else key.value, room)
     except CellError as error:
         if error.code == "missing-key" and not keyed:
             error = CellError("file-format", str(error), "keep the one that is meant in a file of its own")
         place = key.span if key is not None and error.code == "unknown-array" else span
         _refuse(error, path_text, place, findings)
         return None
+
+
+def _parsed(suffix: str, data: bytes, key: str | None, room: Room | None) -> Table:
+    """The table in a file of one of KINDS. Raises CellError."""
+    if suffix == ".csv":
+        from neurovis_spec.language.data_files_csv import parse_numbers
+
+        return parse_numbers(data, room)
+    if suffix == ".npy":
+        from neurovis_spec.language.data_files_npy import parse_npy
+
+        return full(parse_npy(data, room))
+    if suffix == ".mtx":
+        from neurovis_spec.language.data_files_mtx import parse_mtx
+
+        return parse_mtx(data, room)
+    from neurovis_spec.language.data_files_npz import parse_npz
+
+    return parse_npz(data, key, room)
 
 
 def read_edges(
@@ -143,6 +155,8 @@ def read_edges(
     data = read_data(path_text, root, base, span, findings)
     if data is None:
         return None
+    from neurovis_spec.language.data_files_edges import parse_edges
+
     try:
         return parse_edges(data, room)
     except CellError as error:
