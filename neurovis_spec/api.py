@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import operator
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -21,7 +22,7 @@ from neurovis_spec import pipeline
 from neurovis_spec.compiler.compile import Request, rebind
 from neurovis_spec.compiler.limits import Limits
 from neurovis_spec.compiler.network import Network, RenderSettings
-from neurovis_spec.diagnostics import Diagnostic, Findings, Span, SpecError
+from neurovis_spec.diagnostics import Diagnostic, Findings, Span, SpecError, suggest
 from neurovis_spec.language.source import SourceDocument
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.progress import Progress
@@ -129,7 +130,8 @@ def _request(
 ) -> Request:
     limits = Limits.of(limit)
     values = {name: float(value) for name, value in parameters.items()}
-    return Request(folder, folder if root is None else Path(root), values, seed, limits)
+    whole = None if seed is None else operator.index(seed)
+    return Request(folder, folder if root is None else Path(root), values, whole, limits)
 
 
 def _plain(value: object) -> object:
@@ -313,6 +315,11 @@ class CompiledNetwork:
             file.write(content)
 
     def _settings(self, theme: str | None) -> RenderSettings:
+        from neurovis_spec.scene.renderers import RendererError
+        from neurovis_spec.scene.themes import THEMES
+
+        if theme is not None and theme not in THEMES:
+            raise RendererError(f"there is no theme '{theme}'", suggest(theme, THEMES, "there are"))
         return self.network.render if theme is None else replace(self.network.render, theme=theme)
 
     def _snapshot(self, step: int | None, recording: Recording | None, progress: Progress | None) -> Snapshot:

@@ -112,3 +112,16 @@ def test_in_a_notebook_they_draw_themselves(network: nv.CompiledNetwork) -> None
     """A network, a layout and a recording."""
     for shown in (network, network.layout(), network.run(20)):
         assert shown._repr_svg_().lstrip().startswith("<svg")
+
+
+def test_what_python_gives_is_checked_like_what_a_spec_says(network: nv.CompiledNetwork, tmp_path: Path) -> None:
+    """Unknown names are answered with the nearest, and a seed is an integer."""
+    with pytest.raises(ValueError, match="no theme 'drak'") as unknown:
+        network.render(tmp_path / "x.svg", step=1, theme="drak")
+    assert getattr(unknown.value, "hint", "") == "did you mean 'dark'?"
+    with pytest.raises(TypeError):
+        nv.compile(SPEC, seed=1.5)  # type: ignore[arg-type]
+    with pytest.raises(nv.SpecError) as caught:
+        nv.compile(SPEC, phy=0.06)
+    assert [item.hint for item in caught.value.diagnostics] == ["did you mean 'phi'?"]
+    assert not (tmp_path / "x.svg").exists()
