@@ -27,3 +27,35 @@ def test_every_neuron_of_a_row_has_a_shortened_label() -> None:
         assert LONG.startswith(text[:-1].rstrip())
         assert len(text) >= 8
     assert all(LONG in group.title for group in scene.groups if group.data.get("neuron") in ("A1", "A2", "A3"))
+
+
+def labels(spec: str) -> dict[str, Text]:
+    network = nv.compile_text("neurovis: 1\nname: labels\n" + spec)
+    snapshot, layout = network.run(3).snapshot(2), network.layout().value
+    scene = pipeline.picture(network.network, layout, snapshot, network.gains, network.network.render)
+    return {g.data["neuron"]: s for g in scene.groups if "neuron" in g.data for s in g.shapes if isinstance(s, Text)}
+
+
+def test_labels_on_discs_are_of_much_the_same_size() -> None:
+    found = labels("neurons: {a: {}, hidden: {count: 3}, food: {}}\nconnections: {a -> hidden: 1, hidden -> food: 1}\n")
+    assert set(found) == {"a", "hidden1", "hidden2", "hidden3", "food"}
+    sizes = [text.size for text in found.values()]
+    assert all(text.on_disc for text in found.values())
+    assert max(sizes) <= 1.25 * min(sizes)
+
+
+def test_where_signals_run_across_names_stand_at_the_ends() -> None:
+    spec = "neurons: {right_wheel: {}, proximity: {count: 3}}\nconnections: {proximity -> right_wheel: 1}\n"
+    found = labels(spec + "layout: {direction: right}\n")
+    assert {name: text.text for name, text in found.items()} == {name: name for name in found}
+    assert found["right_wheel"].anchor == "start"
+    assert {found[f"proximity{i}"].anchor for i in (1, 2, 3)} == {"end"}
+
+
+def test_a_label_across_the_line_of_a_box_keeps_it_away() -> None:
+    found = labels(
+        "neurons: {a_neuron_with_a_long_name: {box: b}, B: {}}\nconnections: {a_neuron_with_a_long_name -> B: 1}\n"
+    )
+    assert found["a_neuron_with_a_long_name"].text == "a_neuron_with_a_long_name"
+    assert found["a_neuron_with_a_long_name"].halo
+    assert not found["B"].halo

@@ -20,8 +20,10 @@ _WEIGHT = 600
 _SMALLEST, _READABLE, _LARGEST = 9.0, 10.5, 14.0
 #: beside it: these, and so much for each unit of the radius between them
 _BESIDE_SMALLEST, _BESIDE_LARGEST, _BESIDE_SHARE = 8.5, 11.0, 0.8
-#: a numbered name may be smaller: it says where one is among many
-_NUMBERED = 6.0
+#: a numbered name may be smaller: it says where one is among many; on small discs so may all
+_NUMBERED, _TINY = 7.5, 6.0
+#: how much larger than the smallest the others are at most
+_UNLIKE = 1.25
 #: one that is shortened may be
 _LEGIBLE = 8.0
 #: how wide, in radii, a text beside a disc may be, if there is room: it must not look like a title of those around
@@ -57,6 +59,7 @@ def labels_of(
     network: Network, centres: list[Point], radius: float, obstacles: Obstacles, picture: Rect
 ) -> list[Label | None]:
     """A label for every neuron, or None where there is no room for any of it. ``picture``: where texts may be."""
+    level = _level(network)
     neurons = network.neurons
     if radius < _SMALLEST_DISC:
         return [None] * len(neurons)
@@ -66,7 +69,9 @@ def labels_of(
     missing = [index for index, found in enumerate(result) if found is None]
     if len(missing) <= _MOST_BESIDE:
         for members in _together(network, missing):
-            placed = [_beside(neurons.labels[index], centres[index], radius, obstacles, picture) for index in members]
+            placed = [
+                _beside(neurons.labels[index], centres[index], radius, obstacles, picture, level) for index in members
+            ]
             if len(members) >= _MANY and None in placed:
                 obstacles.drop_texts(len(placed) - placed.count(None))
                 continue
@@ -78,11 +83,21 @@ def labels_of(
     return result
 
 
-def outgrown(network: Network, radius: float) -> list[int]:
-    """The neurons whose labels do not fit on discs of this radius, so that they need room beneath."""
-    neurons = network.neurons
-    parts = [_parts(label, name) for label, name in zip(neurons.labels, neurons.names, strict=True)]
-    return [index for index, both in enumerate(parts) if _on_disc(*both, (0.0, 0.0), radius, _READABLE) is None]
+def room_beside(network: Network, radius: float) -> list[tuple[int, Point]]:
+    """The neurons whose labels do not fit on discs of this radius, and how far from their centres these reach then:
+    down, or to either side where signals run across."""
+    neurons, level = network.neurons, _level(network)
+    result: list[tuple[int, Point]] = []
+    for index, (label, name) in enumerate(zip(neurons.labels, neurons.names, strict=True)):
+        if _on_disc(*_parts(label, name), (0.0, 0.0), radius, _READABLE) is None:
+            width = min(texts.width(label, _BESIDE_LARGEST, _WEIGHT), _WIDEST_BESIDE[-1] * radius)
+            result.append((index, (radius + 8 + width, 0.0) if level else (0.0, radius + 17)))
+    return result
+
+
+def _level(network: Network) -> bool:
+    """Whether signals run across, so that there is more room at the ends than beneath."""
+    return network.layout.direction in ("right", "left")
 
 
 def _together(network: Network, missing: list[int]) -> list[list[int]]:
@@ -110,13 +125,26 @@ def _common_size(parts: list[tuple[str, str]], radius: float) -> float:
     readable = [p for p in dict.fromkeys(parts) if _fits(p, min(_READABLE, largest), radius)]
     while size > _READABLE and not all(_fits(p, size, radius) for p in readable):
         size -= 0.5
-    return size
+    smallest = size
+    for both in dict.fromkeys(parts):
+        least = _least(both[1], largest)
+        if _fits(both, least, radius):
+            while smallest > least and not _fits(both, smallest, radius):
+                smallest = max(smallest - 0.5, least)
+    return min(size, max(_UNLIKE * smallest, min(_SMALLEST, largest)))
+
+
+def _least(subscript: str, common: float) -> float:
+    """The smallest size on a disc, where most labels have the ``common`` one."""
+    if common < _SMALLEST:
+        return _TINY
+    return _NUMBERED if subscript else _SMALLEST
 
 
 def _on_disc(
     base: str, subscript: str, centre: Point, radius: float, common: float, least: float | None = None
 ) -> Label | None:
-    size, least = common, least or (_NUMBERED if subscript or common < _SMALLEST else _SMALLEST)
+    size, least = common, least or _least(subscript, common)
     while size > least and not _fits((base, subscript), size, radius):
         size = max(size - 0.5, least)
     if not _fits((base, subscript), size, radius):
@@ -130,7 +158,7 @@ def _chord(radius: float, size: float) -> float:
     return float(2 * (max(radius * radius - (0.4 * size) ** 2, 0.0)) ** 0.5 - min(2.5, 0.2 * radius))
 
 
-def _beside(label: str, centre: Point, radius: float, obstacles: Obstacles, picture: Rect) -> Label | None:
+def _beside(label: str, centre: Point, radius: float, obstacles: Obstacles, picture: Rect, level: bool) -> Label | None:
     size, (x, y) = min(_BESIDE_LARGEST, max(_BESIDE_SMALLEST, _BESIDE_SHARE * radius)), centre
     aside, corner = radius + 5, 0.75 * radius + 3
     places: tuple[tuple[Literal["start", "middle", "end"], float, float], ...] = (
@@ -143,6 +171,8 @@ def _beside(label: str, centre: Point, radius: float, obstacles: Obstacles, pict
         ("start", x + corner, y + corner + 0.72 * size),
         ("end", x - corner, y + corner + 0.72 * size),
     )
+    if level:
+        places = (*places[2:4], *places[:2], *places[4:])
     across: tuple[Label, Rect] | None = None
     for text in dict.fromkeys(texts.shorten(label, size, room * radius, _WEIGHT) for room in _WIDEST_BESIDE):
         width = texts.width(text, size, _WEIGHT)
@@ -169,7 +199,7 @@ def _shortened(base: str, subscript: str, centre: Point, radius: float) -> Label
             found = _on_disc(base[:end] + "…", subscript, centre, radius, _SMALLEST, _LEGIBLE)
             if found is not None:
                 return found
-        return _on_disc(subscript, "", centre, radius, min(_SMALLEST, 0.76 * radius), _NUMBERED)
+        return _on_disc(subscript, "", centre, radius, min(_SMALLEST, 0.76 * radius), _TINY)
     size = min(max(_SMALLEST, min(10.0, 0.5 * radius)), 0.76 * radius)
     text = texts.shorten(base, size, _chord(radius, size), _WEIGHT)
     if len(text) < 2:

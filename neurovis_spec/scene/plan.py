@@ -19,7 +19,7 @@ from neurovis_spec.scene.boxes import Box, boxes_of
 from neurovis_spec.scene.frame import MARGIN, MOST, UNIT, Frame, Wishes, fit
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.geometry import FloatArray, Point, Rect, bounds, sample
-from neurovis_spec.scene.labels import Label, labels_of, outgrown
+from neurovis_spec.scene.labels import Label, labels_of, room_beside
 from neurovis_spec.scene.lesions import Lesions, lesions_of
 from neurovis_spec.scene.lines import Line, routes_of, trimmed
 from neurovis_spec.scene.model import Arrowhead, Group, Rectangle, Spline, Text, Theme, head_half_width
@@ -34,8 +34,6 @@ _TITLE_Y, _CAPTION_Y, _HEADER = 35.0, 54.0, 58.0
 _ROOM = 740.0
 #: more dotted lines than this would not be quiet
 _MOST_TEACHERS = 200
-#: for a label beneath its disc, in layout units
-_LABEL_ROOM = 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,8 +74,8 @@ def plan(network: Network, layout: Layout, gains: Gains, settings: RenderSetting
     positions, routes = _in_units(network, layout)
     boxes = boxes_of(network, positions, routes)
     teachers = teachers_of(network)[:_MOST_TEACHERS]
-    low = outgrown(network, RADIUS * UNIT) if settings.labels else []
-    extent = _extent(positions, routes, boxes, low)
+    beside = room_beside(network, RADIUS * UNIT) if settings.labels else []
+    extent = _extent(positions, routes, boxes, beside)
     title, items, frame = _frame(network, gains, settings, theme, teachers, extent, delays.label_of(network))
     if not delays.visible(RADIUS * frame.scale):
         title, items, frame = _frame(network, gains, settings, theme, teachers, extent, "")
@@ -133,10 +131,14 @@ def _in_units(network: Network, layout: Layout) -> tuple[FloatArray, list[FloatA
     return positions, routes_of(network.connection_names, ends, layout)
 
 
-def _extent(positions: FloatArray, routes: Sequence[FloatArray], boxes: Sequence[Box], low: list[int]) -> Rect:
-    """What the layout takes up, in its units; the neurons in ``low`` have their labels beneath."""
+def _extent(
+    positions: FloatArray, routes: Sequence[FloatArray], boxes: Sequence[Box], beside: Sequence[tuple[int, Point]]
+) -> Rect:
+    """What the layout takes up, in its units; the neurons in ``beside`` have labels that reach so far."""
     corners = [np.array([box.rect[:2], box.rect[2:]]) for box in boxes]
-    corners.append(positions[low] + np.array([0.0, RADIUS + _LABEL_ROOM]))
+    for index, (across, down) in beside:
+        x, y = positions[index].tolist()
+        corners.append(np.array([(x - across / UNIT, y), (x + across / UNIT, y + down / UNIT)]))
     per_segment = 12 if len(routes) < 5000 else 4
     around = bounds([positions - RADIUS, positions + RADIUS, *corners, *(sample(r, per_segment) for r in routes)])
     return around if around is not None else (0.0, 0.0, 1.0, 1.0)
