@@ -5,9 +5,12 @@ from __future__ import annotations
 import re
 
 import pytest
+import yaml
+from jsonschema import Draft202012Validator
 from lsp_marks import marked
 from test_contract_numbers import HEAD, PLACES
 
+from neurovis_spec import api
 from neurovis_spec.lsp.check import check
 from neurovis_spec.lsp.completion import complete
 from neurovis_spec.lsp.document import Document
@@ -45,6 +48,13 @@ def test_parameters_are_offered_in_every_place_that_takes_an_expression(place: s
     text = text.replace("‹", "").replace("›", "")
     document, spot = marked(TOP + (text if text.startswith("parameters") else HEAD + text))
     assert {"two", "half", "sin"} <= {item.label for item in complete(document, spot)}
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_the_schema_takes_an_expression_wherever_the_language_does(place: str) -> None:
+    """So that an editor does not underline one."""
+    found = Draft202012Validator(api.schema()).iter_errors(yaml.safe_load(written(place)))
+    assert [error.message for error in found] == []
 
 
 DESCRIBED = """\
