@@ -164,6 +164,7 @@ MANY = "neurons: {A: {count: 4000, bias: 1}}\nconnections: {A -> A: {pattern: "
         "neurons: {A: {count: 1000001}}",
         "neurons: {A: {count: 9e15}}",
         "modules: {m: {neurons: {K: {count: 1000001}}}}\ninstances: {i: {module: m, count: 2}}",
+        "modules: {m: {neurons: {K: {count: 10000}}}}\ninstances: {i: {module: m, count: 10000}}",
         MANY + "all_to_all}}",
         MANY + "{random: {probability: 0.7}}}}",
         MANY + "{fixed_indegree: {count: 2501}}}}",
