@@ -7,7 +7,7 @@ and for each signal where it comes from.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,8 +21,7 @@ from neurovis_spec.language.source import Entry, Scalar
 from neurovis_spec.language.values import Choice
 
 
-@dataclass(frozen=True)
-class Learning:
+class Learning(NamedTuple):
     """A rule in use. ``signals`` are indices into all activities followed by all inputs, one a connection."""
 
     rule: Rule

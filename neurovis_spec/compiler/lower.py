@@ -7,8 +7,7 @@ In: the Population, the connections, the levels. Out: Blocks (neurons that are u
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -74,8 +73,7 @@ def make_blocks(population: Population, sources: IntArray, targets: IntArray, le
     return tuple(blocks)
 
 
-@dataclass(frozen=True)
-class _Part:
+class _Part(NamedTuple):
     """The neurons of one group that belong to one block, by their rows within the group."""
 
     kind: Kind

@@ -5,7 +5,7 @@ In: rows as written (numbers, expressions, null) or a file. Out: a Grid: values,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,8 +21,7 @@ from neurovis_spec.language.source import NULL
 from neurovis_spec.language.values import FileReference, Matrix, Rows
 
 
-@dataclass(frozen=True)
-class Grid:
+class Grid(NamedTuple):
     """A matrix: (rows, columns) values, NaN where a cell is null, and the mask of the cells that are present."""
 
     values: FloatArray

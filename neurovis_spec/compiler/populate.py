@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import cast
+from typing import NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -45,8 +45,7 @@ from neurovis_spec.language.values import Choice, FormulaList
 _NO_LETTERS = re.compile(r"[^A-Za-z0-9_]+")
 
 
-@dataclass(frozen=True)
-class Kind:
+class Kind(NamedTuple):
     """What the neurons of a group are: definitions with parameters, one value a neuron."""
 
     activation: Activation
@@ -85,8 +84,7 @@ class Population:
         return self.directories[0]
 
 
-@dataclass(frozen=True)
-class _Built:
+class _Built(NamedTuple):
     """One group, before its values are joined with those of the others. ``name`` and ``names`` are those that it and
     its neurons have in their unit."""
 
@@ -103,8 +101,7 @@ class _Built:
     first: int | None
 
 
-@dataclass(frozen=True)
-class _Settled:
+class _Settled(NamedTuple):
     """A unit with its groups: the neurons from ``start`` on, and what of their names could not be read."""
 
     unit: Unit

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 from neurovis_spec.compiler.entries import Bundle
 from neurovis_spec.compiler.idle import idle_neurons
@@ -31,8 +30,7 @@ _NO_EXPRESSIONS: Final = frozenset(
 )
 
 
-@dataclass(frozen=True)
-class Compiled:
+class Compiled(NamedTuple):
     """What the warnings look at: a spec without errors, what it became, and which modules are used in it."""
 
     spec: Spec

@@ -11,7 +11,7 @@ from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from neurovis_spec.diagnostics import Span
 
@@ -142,8 +142,7 @@ class Packed:
 Node: TypeAlias = Scalar | Mapping | Sequence | Packed
 
 
-@dataclass(frozen=True)
-class SourceDocument:
+class SourceDocument(NamedTuple):
     """One file, read: its root is a mapping."""
 
     file: str
