@@ -16,8 +16,9 @@ from neurovis_spec.scene import Arrowhead, Disc, Group, Rectangle, Scene, Spline
 from neurovis_spec.scene.encode import encode
 from neurovis_spec.scene.film import film
 from neurovis_spec.scene.gains import Gains, choose_gains
-from neurovis_spec.scene.geometry import Rect, overlap, sample
+from neurovis_spec.scene.geometry import Rect, overlap, sample, samples
 from neurovis_spec.scene.legend import nice_weights
+from neurovis_spec.scene.lines import trimmed
 
 CASE = use_case_1(400)
 GAINS = choose_gains(CASE.network, RenderSettings(), *CASE.peaks)
@@ -417,3 +418,19 @@ def test_every_step_has_the_same_geometry_and_a_films_frames_are_the_stills() ->
 def test_a_film_needs_a_frame() -> None:
     with pytest.raises(ValueError, match="at least one frame"):
         film(CASE.network, CASE.layout, [], GAINS, RenderSettings(), 40)
+
+
+def test_curves_are_cut_together_as_they_are_one_by_one() -> None:
+    chooser = np.random.default_rng(3)
+    routes = [chooser.uniform(0, 9, (1 + 3 * k, 2)) + np.linspace(0, 90, 1 + 3 * k)[:, None] for k in (1, 1, 2, 1, 3)]
+    together, alone = trimmed(routes, 4.0, 1.0, 3.0), [trimmed([route], 4.0, 1.0, 3.0)[0] for route in routes]
+    for one, other, route in zip(together, alone, routes, strict=True):
+        assert one == other
+        start, end = np.array(one.points[0]), np.array(one.tip)
+        assert math.dist(start, route[0]) == pytest.approx(5)
+        assert math.dist(end, route[-1]) == pytest.approx(5)
+        dots = sample([(x, y) for x, y in route.tolist()], 4000)
+        for x, y in one.points[:: len(one.points) - 1]:
+            assert np.hypot(dots[:, 0] - x, dots[:, 1] - y).min() < 0.02
+    dots = np.concatenate(samples(routes, 8))
+    assert np.array_equal(dots, np.concatenate([sample(route, 8) for route in routes]))

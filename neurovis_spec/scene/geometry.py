@@ -6,7 +6,7 @@ discs, again a cubic spline (de Casteljau). Routes of as many points are worked 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -21,11 +21,32 @@ _SAMPLES = 24
 
 def sample(points: Sequence[Point] | FloatArray, per_segment: int = _SAMPLES) -> FloatArray:
     """Points on a spline, ``per_segment`` for each of its segments and its end: (k · per_segment + 1, 2)."""
-    control = np.asarray(points, float)
-    segments = np.stack([control[0:-1:3], control[1::3], control[2::3], control[3::3]], axis=1)
+    return samples([points], per_segment)[0]
+
+
+def samples(splines: Sequence[Sequence[Point] | FloatArray], per_segment: int = _SAMPLES) -> list[FloatArray]:
+    """The same of many splines."""
+    result = [np.zeros((0, 2))] * len(splines)
     t = np.arange(per_segment) / per_segment
-    inner = _at(segments[:, None], t[None, :]).reshape(-1, 2)
-    return np.concatenate([inner, control[-1:]])
+    for members, control in batches(splines):
+        inner = _at(_segments(control)[:, :, None], t).reshape(len(control), -1, 2)
+        for index, dots in zip(members, np.concatenate([inner, control[:, -1:]], axis=1), strict=True):
+            result[index] = dots
+    return result
+
+
+def batches(splines: Sequence[Sequence[Point] | FloatArray]) -> Iterator[tuple[list[int], FloatArray]]:
+    """Splines of as many points together: their indices, and their points (m, 1 + 3k, 2)."""
+    sizes: dict[int, list[int]] = {}
+    for index, spline in enumerate(splines):
+        sizes.setdefault(len(spline), []).append(index)
+    for _, members in sorted(sizes.items()):
+        yield members, np.array([splines[index] for index in members], float)
+
+
+def _segments(control: FloatArray) -> FloatArray:
+    """Splines (m, 1 + 3k, 2) as segments (m, k, 4, 2)."""
+    return np.stack([control[:, 0:-1:3], control[:, 1::3], control[:, 2::3], control[:, 3::3]], axis=2)
 
 
 def _at(segments: FloatArray, t: FloatArray) -> FloatArray:
@@ -58,7 +79,7 @@ def leaving(routes: FloatArray, radius: float) -> FloatArray:
     """
     m, size, _ = routes.shape
     k = (size - 1) // 3
-    segments = np.stack([routes[:, 0:-1:3], routes[:, 1::3], routes[:, 2::3], routes[:, 3::3]], axis=2)
+    segments = _segments(routes)
     steps = np.arange(1, 16 * k + 1) / 16
     segment = np.minimum(np.floor(steps).astype(int), k - 1)
     dots = _at(segments[:, segment], np.broadcast_to(steps - segment, (m, len(steps))))
@@ -88,6 +109,19 @@ def between(points: Sequence[Point], start: float, end: float) -> tuple[Point, .
         cut = _cut(piece, low, high)
         result.extend(cut if not result else cut[1:])
     return tuple(result)
+
+
+def between_all(curves: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    """The same of single cubics (m, 4, 2), each from and to parameters of its own (m,)."""
+
+    def blossom(*parameters: FloatArray) -> FloatArray:
+        row = [curves[:, place] for place in range(4)]
+        for t in parameters:
+            row = [p + t[:, None] * (q - p) for p, q in pairwise(row)]
+        return row[0]
+
+    corners = [(start, start, start), (start, start, end), (start, end, end), (end, end, end)]
+    return np.stack([blossom(*corner) for corner in corners], axis=1)
 
 
 def _cut(piece: Sequence[Point], low: float, high: float) -> list[Point]:

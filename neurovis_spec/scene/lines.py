@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from neurovis_spec.layout.model import Layout
-from neurovis_spec.scene.geometry import FloatArray, Point, between, leaving, point_at
+from neurovis_spec.scene.geometry import FloatArray, Point, batches, between, between_all, leaving, point_at
 from neurovis_spec.scene.model import Arrowhead
 
 
@@ -43,17 +43,33 @@ def routes_of(names: Sequence[str], ends: Sequence[tuple[str, str]], layout: Lay
 def trimmed(routes: Sequence[FloatArray], radius: float, gap: float, head: float) -> list[Line]:
     """Lines for routes (user units) between discs of ``radius``: ``gap`` is left free, a head is ``head`` long."""
     lines: list[Line | None] = [None] * len(routes)
-    for size in sorted({len(route) for route in routes}):
-        members = [index for index, route in enumerate(routes) if len(route) == size]
-        batch = np.stack([routes[index] for index in members])
+    for members, batch in batches(routes):
         backward = batch[:, ::-1]
-        k = (size - 1) // 3
+        k = (batch.shape[1] - 1) // 3
         starts = leaving(batch, radius + gap)
         tips = k - leaving(backward, radius + gap)
         notches = k - leaving(backward, radius + gap + Arrowhead.NOTCH * head)
-        for index, start, tip, notch in zip(members, starts.tolist(), tips.tolist(), notches.tolist(), strict=True):
-            lines[index] = _line([(x, y) for x, y in routes[index].tolist()], start, notch, tip, head)
+        apart = (starts < notches) & (notches < tips) & (k == 1)  # single cubics are cut together
+        cut = _cut(batch[apart], starts[apart], notches[apart], tips[apart], head) if apart.any() else []
+        for index, line in zip(np.flatnonzero(apart).tolist(), cut, strict=True):
+            lines[members[index]] = line
+        for index in np.flatnonzero(~apart).tolist():
+            route = [(x, y) for x, y in batch[index].tolist()]
+            lines[members[index]] = _line(route, float(starts[index]), float(notches[index]), float(tips[index]), head)
     return [line for line in lines if line is not None]
+
+
+def _cut(curves: FloatArray, starts: FloatArray, notches: FloatArray, tips: FloatArray, head: float) -> list[Line]:
+    """Single cubics between discs that are apart, as ``_line`` makes them one by one."""
+    parts, points = between_all(curves, starts, notches), between_all(curves, tips, tips)[:, 0]
+    away = points - parts[:, -1]
+    lengths = np.hypot(*away.T)
+    directions = np.divide(away, lengths[:, None], out=np.tile([1.0, 0.0], (len(away), 1)), where=lengths[:, None] > 0)
+    rows = zip(parts.tolist(), points.tolist(), directions.tolist(), lengths.tolist(), strict=True)
+    return [
+        Line(tuple((x, y) for x, y in part), (tip[0], tip[1]), (way[0], way[1]), min(head, length / Arrowhead.NOTCH))
+        for part, tip, way, length in rows
+    ]
 
 
 def _line(route: list[Point], start: float, notch: float, tip: float, head: float) -> Line:

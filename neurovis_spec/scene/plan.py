@@ -18,7 +18,7 @@ from neurovis_spec.scene import delays, encoding, legend, texts
 from neurovis_spec.scene.boxes import Box, boxes_of
 from neurovis_spec.scene.frame import MARGIN, MOST, UNIT, Frame, Wishes, fit
 from neurovis_spec.scene.gains import Gains
-from neurovis_spec.scene.geometry import FloatArray, Point, Rect, bounds, sample
+from neurovis_spec.scene.geometry import FloatArray, Point, Rect, bounds, samples
 from neurovis_spec.scene.labels import Label, labels_of, room_beside
 from neurovis_spec.scene.lesions import Lesions, lesions_of
 from neurovis_spec.scene.lines import Line, routes_of, trimmed
@@ -83,10 +83,10 @@ def plan(network: Network, layout: Layout, gains: Gains, settings: RenderSetting
     radius = RADIUS * frame.scale
     gap, head = min(1.5, 0.1 * radius), _head(radius)
     lines = trimmed([frame.map(route) for route in routes], radius, gap, head)
-    obstacles = Obstacles([_dots(line) for line in lines], _reaches(network, gains), centres, radius)
+    obstacles = Obstacles(_dots(lines), _reaches(network, gains), centres, radius)
     dots = [(teacher, dotted(teacher, centres, radius, gap, head, obstacles)) for teacher in teachers]
-    for _, line in dots:
-        obstacles.add_line(_dots(line))
+    for points in _dots([line for _, line in dots]):
+        obstacles.add_line(points)
     for box in boxes:
         obstacles.add_frame(outline(_mapped(box.rect, frame)))
     header = _header(title, frame, theme) if title is not None else None
@@ -140,7 +140,7 @@ def _extent(
         x, y = positions[index].tolist()
         corners.append(np.array([(x - across / UNIT, y), (x + across / UNIT, y + down / UNIT)]))
     per_segment = 12 if len(routes) < 5000 else 4
-    around = bounds([positions - RADIUS, positions + RADIUS, *corners, *(sample(r, per_segment) for r in routes)])
+    around = bounds([positions - RADIUS, positions + RADIUS, *corners, *samples(routes, per_segment)])
     return around if around is not None else (0.0, 0.0, 1.0, 1.0)
 
 
@@ -218,8 +218,10 @@ def _reaches(network: Network, gains: Gains) -> list[float]:
     return result
 
 
-def _dots(line: Line) -> FloatArray:
-    return np.concatenate([sample(line.points, 24), np.array([line.tip])])
+def _dots(lines: Sequence[Line]) -> list[FloatArray]:
+    """Points on lines, up to the tips of their heads."""
+    found = samples([line.points for line in lines], 24)
+    return [np.concatenate([dots, [line.tip]]) for dots, line in zip(found, lines, strict=True)]
 
 
 def _box_frames(boxes: Sequence[Box], frame: Frame, theme: Theme) -> list[Group]:
