@@ -28,10 +28,20 @@ def _pair(text: str, form: str) -> tuple[str, str]:
     return name, value
 
 
+def _once(pairs: Iterable[tuple[str, str]]) -> dict[str, str]:
+    """Name to text; a name that is there twice is wrong usage, as a key is that a spec has twice."""
+    result: dict[str, str] = {}
+    for name, text in pairs:
+        if name in result:
+            raise click.BadParameter(f"'{name}' is given twice, as '{result[name]}' and as '{text}'")
+        result[name] = text
+    return result
+
+
 def _settings(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, float]:
-    """Name to number; the last of several counts."""
+    """Name to number."""
     settings = {}
-    for name, text in (_pair(value, "name=value") for value in values):
+    for name, text in _once(_pair(value, "name=value") for value in values).items():
         try:
             number = float(text)
         except ValueError:
@@ -43,8 +53,8 @@ def _settings(ctx: click.Context, param: click.Parameter, values: tuple[str, ...
 
 
 def _files(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, str]:
-    """Name to path; the last of several counts."""
-    return dict(_pair(value, "name=FILE") for value in values)
+    """Name to path."""
+    return _once(_pair(value, "name=FILE") for value in values)
 
 
 def known(what: str, names: Callable[[], Iterable[str]]) -> Callback:
@@ -104,7 +114,7 @@ set_option = click.option(
     metavar="name=value",
     multiple=True,
     callback=_settings,
-    help="Give a parameter another value. Repeatable.",
+    help="Give a parameter another value. Repeatable, once for each.",
 )
 input_option = click.option(
     "--input",
@@ -112,7 +122,7 @@ input_option = click.option(
     metavar="name=FILE",
     multiple=True,
     callback=_files,
-    help="Replace the source of an input by a .csv or .npy file, one row a step. Repeatable.",
+    help="Replace the source of an input by a .csv or .npy file, one row a step. Repeatable, once for each.",
 )
 backend_option = click.option(
     "--backend",

@@ -30,6 +30,9 @@ from neurovis_spec.language.located import NAME_RULE, Formula, Located, shown, t
 from neurovis_spec.language.model import lost_names
 from neurovis_spec.language.modules import INCLUDED, InstanceModel
 
+#: What ``set`` knows beside the parameters: the number of the instance, from 0, and how many its entry makes.
+COUNTED = ("i", "n")
+
 
 @dataclass(frozen=True)
 class Unit:
@@ -327,7 +330,7 @@ class Expander:
     def _look(self, model: InstanceModel, unit: Unit) -> None:
         """What can be said of an instance whose module or count is not known."""
         for formula in model.set.values():
-            unit.constants.tree(formula, ("i", "n"))
+            unit.constants.tree(formula, COUNTED)
         self._bound(model, unit)
 
     def _check_keys(self, model: InstanceModel, module: Module) -> None:
@@ -371,7 +374,7 @@ class Expander:
     ) -> tuple[Constants, dict[str, frozenset[str]]]:
         """The constants of one instance, and what its settings depend on."""
         constants = constants_of(module, self.dt, self.findings)
-        extra = {"i": float(place.position), "n": float(place.count)}
+        extra = dict(zip(COUNTED, (float(place.position), float(place.count)), strict=True))
         given: dict[str, float] = {}
         settings: dict[str, frozenset[str]] = {}
         for name, formula in model.set.items():
@@ -397,5 +400,5 @@ def constants_of(module: Module, dt: float, findings: Findings) -> Constants:
 
 def _used(formula: Formula, constants: Constants) -> frozenset[str]:
     """The parameters that a formula uses."""
-    tree = constants.tree(formula, ("i", "n")) if isinstance(formula.value, str) else None
+    tree = constants.tree(formula, COUNTED) if isinstance(formula.value, str) else None
     return frozenset() if tree is None else frozenset(names(tree))

@@ -16,8 +16,10 @@ from neurovis_spec.compiler.inert import changes_nothing
 from neurovis_spec.compiler.modules import Library
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.references import Section, key_span
-from neurovis_spec.compiler.units import Unit
+from neurovis_spec.compiler.units import COUNTED, Unit
 from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.language.expressions.parser import parse, unknown_names
+from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.sections import ConnectionModel
 from neurovis_spec.language.source import Mapping, Node, Packed, Scalar, Sequence
 from neurovis_spec.language.spec import Spec
@@ -54,6 +56,7 @@ def warn(compiled: Compiled, findings: Findings) -> None:
     _inputs(compiled, findings)
     for section, _ in compiled.sections():
         _parameters(section, findings)
+        _numbers(section, findings)
     _definitions(compiled.spec, compiled.network, findings)
     _modules(compiled, findings)
     _neurons(compiled, findings)
@@ -92,6 +95,17 @@ def _parameters(section: Section, findings: Findings) -> None:
         if name not in used:
             message = f"no expression uses the parameter '{name}'"
             findings.warning("unused-parameter", key_span(section, "parameters", name), message, "remove it, or use it")
+
+
+def _numbers(section: Section, findings: Findings) -> None:
+    """``i`` and ``n`` in what is set in the one instance of an entry without ``count``."""
+    for name, model in section.instances.items():
+        for formula in model.set.values() if model.count is None else ():
+            tree = parse(formula.value) if isinstance(formula.value, str) else None
+            for node in () if tree is None else unknown_names(tree, names(tree).difference(COUNTED)):
+                message = f"'{node.name}' is always {COUNTED.index(node.name)} here: '{name}' is one instance"
+                hint = "'i' and 'n' count the instances of an entry; give it a 'count'"
+                findings.warning("lone-index", formula.node.at(node.start, node.end), message, hint)
 
 
 def _definitions(spec: Spec, network: Network, findings: Findings) -> None:
