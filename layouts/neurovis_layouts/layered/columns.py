@@ -52,11 +52,15 @@ def with_spines(problem: LayoutProblem, levels: Levels, columns: AbstractSet[int
 def straightened(levels: Levels, order: Sequence[Sequence[int]], columns: AbstractSet[int]) -> list[list[int]] | None:
     """The order with everything foreign on one side of each column; None where two columns cannot both have that."""
     found = [list(rank) for rank in order]
+    sides: dict[tuple[int, int], int] = {}
     for _ in range(len(columns) + 2):
-        before = [list(rank) for rank in found]
+        moved = False
         for box in sorted(columns):
-            _part(levels, found, box)
-        if found == before:
+            before = [list(rank) for rank in found]
+            if not _part(levels, found, box, sides):
+                return None
+            moved |= found != before
+        if not moved:
             segments = Segments(levels)
             boxes = np.array([node.box for node in levels.nodes], dtype=np.int64)
             kin = np.array([node.kin for node in levels.nodes], dtype=np.int64)
@@ -69,8 +73,12 @@ def straightened(levels: Levels, order: Sequence[Sequence[int]], columns: Abstra
     return None
 
 
-def _part(levels: Levels, order: list[list[int]], box: int) -> None:
-    """Everything foreign in the ranks of a column to the side where most of what it is connected to there stands."""
+def _part(levels: Levels, order: list[list[int]], box: int, sides: dict[tuple[int, int], int]) -> bool:
+    """Everything foreign in the ranks of a column to the side where most of what it is connected to there stands.
+
+    ``sides`` says for two columns on which side of the first the second stands; what is settled here is added. False
+    where that is not to be had.
+    """
     spans = [r for r, rank in enumerate(order) if any(levels.nodes[n].box == box for n in rank)]
     foreign = [n for r in spans for n in order[r] if levels.nodes[n].box != box]
     root = {n: n for n in foreign}
@@ -100,10 +108,20 @@ def _part(levels: Levels, order: list[list[int]], box: int) -> None:
         for i, n in enumerate(order[r]):
             if n in root:
                 lean[find(n)] = lean.get(find(n), 0) + (1 if i > start else -1)
+    for other, n in sorted(first.items()):
+        settled = sides.get((box, other), 0)
+        if settled and lean[find(n)] * settled <= 0:
+            if any(sides.get((box, b), settled) != settled for b, m in first.items() if find(m) == find(n)):
+                return False
+            lean[find(n)] = settled
+    for other, n in first.items():
+        side = -1 if lean[find(n)] < 0 else 1
+        sides[box, other], sides[other, box] = side, -side
     for r in spans:
         left = [n for n in order[r] if n in root and lean[find(n)] < 0]
         right = [n for n in order[r] if n in root and lean[find(n)] >= 0]
         order[r] = left + [n for n in order[r] if n not in root] + right
+    return True
 
 
 def tied(levels: Levels, order: Sequence[Sequence[int]], columns: AbstractSet[int]) -> tuple[Levels, list[list[int]]]:
