@@ -13,10 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from neurovis_spec.compiler.connect import Bundle, connect, join
+from neurovis_spec.compiler.connect import Connected, connect, join
 from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.digest import digest
-from neurovis_spec.compiler.events import EventReader, with_phases
+from neurovis_spec.compiler.entries import Bundle
+from neurovis_spec.compiler.events import EventReader, wires_of, with_phases
 from neurovis_spec.compiler.gaps import gaps_of
 from neurovis_spec.compiler.limits import MOST_SIGNALS, Limits, amount
 from neurovis_spec.compiler.lower import make_blocks, make_plasticity, make_program
@@ -25,7 +26,7 @@ from neurovis_spec.compiler.network import Instance, IntArray, Network
 from neurovis_spec.compiler.noise import make_noises
 from neurovis_spec.compiler.order import Cycle, levels
 from neurovis_spec.compiler.parameters import make_parameters
-from neurovis_spec.compiler.populate import Population, populate
+from neurovis_spec.compiler.populate import Population, populate, without_neurons
 from neurovis_spec.compiler.references import Directory, key_span
 from neurovis_spec.compiler.sections import check_ros, layout_settings, make_outputs, render_settings
 from neurovis_spec.compiler.tables import Files
@@ -78,21 +79,24 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
     check_ros(spec.ros, constants)
     if not len(population.neurons):
         _report_no_neurons(spec, population, findings)
-        return None
+        population = without_neurons(population)
     directory = population.directory
     outputs = make_outputs(spec, directory, findings)
     layout = layout_settings(spec.layout, units, population, findings)
-    bundles = connect(units, population, request.limits, seed)
+    made = connect(units, population, request.limits, seed)
+    bundles = made.bundles
     noises = make_noises(units, population, sum(entry.size for entry in inputs))
     expansion.depend()
-    if bundles is None or findings.errors > before or not _under_way(bundles, findings):
-        EventReader(None, directory, constants).read(spec.events)
+    if not made.complete or findings.errors > before or not _under_way(bundles, findings):
+        _look_at_cycles(made, population, findings)
+        EventReader(wires_of(made), directory, constants).read(spec.events)
         return None
     plasticity, rules = make_plasticity(bundles)
     connections = join(bundles, rules)
     level = levels(len(population.neurons), connections.sources, connections.targets, connections.delays)
     if isinstance(level, Cycle):
         _report_cycle(level, population, connections.entry, bundles, findings)
+        EventReader(wires_of(made), directory, constants).read(spec.events)
         return None
     blocks = make_blocks(population, connections.sources, connections.targets, level)
     program = make_program(blocks, plasticity)
@@ -137,10 +141,10 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
     )
     if not with_events:
         return network
-    made = _eventful(spec, replace(request, files=expander.files), network, directory, constants)
-    if made is not None and not findings.failed:  # the shape may have been at fault
-        warn(Compiled(spec, units, library, expander.used, made, bundles), findings)
-    return made
+    eventful = _eventful(spec, replace(request, files=expander.files), network, directory, constants, made)
+    if eventful is not None and not findings.failed:  # the shape may have been at fault
+        warn(Compiled(spec, units, library, expander.used, eventful, bundles), findings)
+    return eventful
 
 
 def _look_at_unused(expander: Expander, limits: Limits, seed: int) -> None:
@@ -157,11 +161,11 @@ def _look_at_unused(expander: Expander, limits: Limits, seed: int) -> None:
         make_parameters(module.model, constants, {})
         units = expander.expand(module.model, constants, module.folder, name).units
         population = populate(units, limits, seed)
-        bundles = connect(units, population, limits, seed)
+        made = connect(units, population, limits, seed)
         make_noises(units, population, 0)
         layout_settings(None, units, population, expander.findings)
         neurons -= len(population.neurons)
-        connections -= sum(len(bundle.sources) for bundle in bundles or ())
+        connections -= sum(len(bundle.sources) for bundle in made.bundles)
 
 
 def _instances(units: tuple[Unit, ...], population: Population) -> tuple[Instance, ...]:
@@ -173,14 +177,14 @@ def _instances(units: tuple[Unit, ...], population: Population) -> tuple[Instanc
 
 
 def _eventful(
-    spec: Spec, request: Request, network: Network, directory: Directory, constants: Constants
+    spec: Spec, request: Request, network: Network, directory: Directory, constants: Constants, connected: Connected
 ) -> Network | None:
     """The network with the phases that its events make; its hash says that they are there."""
     if not spec.events:
         return network
     findings = constants.findings
     before = findings.errors
-    events = EventReader(network, directory, constants).read(spec.events)
+    events = EventReader(wires_of(connected), directory, constants).read(spec.events)
 
     def again(values: Mapping[str, float]) -> Network | None:
         parameters = {**request.parameters, **values}
@@ -203,6 +207,16 @@ def _report_no_neurons(spec: Spec, population: Population, findings: Findings) -
     node = spec.source.entry("neurons")
     span = opening(spec.source) if node is None else node.key.span
     findings.error("no-neurons", span, "a network needs at least one neuron", "add a group under 'neurons'")
+
+
+def _look_at_cycles(made: Connected, population: Population, findings: Findings) -> None:
+    """A cycle of the connections that are not at fault is one whatever becomes of the others."""
+    sizes = [len(bundle.sources) for bundle in made.bundles]
+    delays = np.concatenate([bundle.delays for bundle in made.bundles] or [np.zeros(0, dtype=np.int64)])
+    level = levels(len(population.neurons), made.sources, made.targets, delays)
+    if isinstance(level, Cycle):
+        entry = np.repeat(np.arange(len(sizes), dtype=np.int64), sizes)
+        _report_cycle(level, population, entry, made.bundles, findings)
 
 
 def _under_way(bundles: tuple[Bundle, ...], findings: Findings) -> bool:

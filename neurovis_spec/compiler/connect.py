@@ -20,25 +20,43 @@ from neurovis_spec.compiler.units import Unit
 from neurovis_spec.language.located import Located, shown
 from neurovis_spec.language.sections import ConnectionModel
 
-__all__ = ["Bundle", "connect", "join"]
+
+@dataclass(frozen=True)
+class Connected:
+    """The entries that are not at fault, and whether these are all."""
+
+    bundles: tuple[Bundle, ...]
+    complete: bool
+
+    @property
+    def sources(self) -> IntArray:
+        """The source of every connection."""
+        return np.concatenate([bundle.sources for bundle in self.bundles] or [_NONE])
+
+    @property
+    def targets(self) -> IntArray:
+        """The target of every connection."""
+        return np.concatenate([bundle.targets for bundle in self.bundles] or [_NONE])
 
 
-def connect(units: tuple[Unit, ...], population: Population, limits: Limits, seed: int) -> tuple[Bundle, ...] | None:
-    """The entries of all units, a unit's own before those of the instances within it; None where one is at fault. What
-    is at fault in one instance of a module is so in all: it is said once."""
+_NONE = np.zeros(0, dtype=np.int64)
+
+
+def connect(units: tuple[Unit, ...], population: Population, limits: Limits, seed: int) -> Connected:
+    """The entries of all units, a unit's own before those of the instances within it. What is at fault in one instance
+    of a module is so in all: it is said once."""
     result: list[Bundle] = []
     total = 0
     failed: set[str | None] = set()
     for unit, directory in zip(units, population.directories, strict=True):
         if unit.module is not None and unit.module in failed:
             continue
-        bundles = Connector(unit, directory, population, limits, seed).connect(total)
-        if bundles is None:
+        made = Connector(unit, directory, population, limits, seed).connect(total)
+        if not made.complete:
             failed.add(unit.module)
-            continue
-        result += bundles
-        total += sum(len(bundle.sources) for bundle in bundles)
-    return None if failed else tuple(result)
+        result += made.bundles
+        total += sum(len(bundle.sources) for bundle in made.bundles)
+    return Connected(tuple(result), not failed)
 
 
 @dataclass(frozen=True)
@@ -56,8 +74,8 @@ class Connector:
         """What evaluates the formulas of the unit."""
         return self.unit.constants
 
-    def connect(self, total: int) -> tuple[Bundle, ...] | None:
-        """All entries, behind ``total`` connections; None where one is at fault, the others are still looked at."""
+    def connect(self, total: int) -> Connected:
+        """All entries, behind ``total`` connections."""
         result: list[Bundle] = []
         failed = False
         seen: dict[str, int] = {}
@@ -68,7 +86,7 @@ class Connector:
                 continue
             total += len(bundle.sources)
             result.append(bundle)
-        return None if failed else tuple(result)
+        return Connected(tuple(result), not failed)
 
     def _entry(self, key: Located[str], body: ConnectionModel, seen: dict[str, int], total: int) -> Bundle | None:
         """One entry; None where it is at fault, and then all that does not depend on that is still looked at."""

@@ -58,16 +58,22 @@ class Definitions:
 
 M = TypeVar("M", bound=LanguageModel)
 D = TypeVar("D")
+#: Keys of a definition that declare names.
+_DECLARING = frozenset({"parameters", "signals", "let", "state"})
 
 
 class _Checker:
     """Checks one definition: the names that are taken, and the trees of its formulas."""
 
-    def __init__(self, given: tuple[str, ...], source: SourceMapping, findings: Findings, dt: float) -> None:
+    def __init__(
+        self, given: tuple[str, ...], source: SourceMapping, findings: Findings, dt: float, incomplete: bool
+    ) -> None:
         self.source = source
         self.findings = findings
         self.constants = {**CONSTANTS, "dt": dt}
         self.known: dict[str, Span | None] = dict.fromkeys((*ALWAYS, *given))
+        #: whether there may be names that could not be read at all
+        self.incomplete = incomplete
 
     def declare(self, section: str, name: str) -> None:
         """A parameter, state, signal or intermediate value; each name once, and none that is given."""
@@ -93,7 +99,10 @@ class _Checker:
 
     def tree(self, formula: Formula, functions: Mapping[str, int] | None = None) -> Tree | None:
         """The tree of a formula over what is declared so far."""
-        tree = parse_formula(formula, self.known, self.findings, functions=functions, what="known in this definition")
+        what = "known in this definition"
+        tree = parse_formula(
+            formula, self.known, self.findings, functions=functions, what=what, incomplete=self.incomplete
+        )
         if tree is not None and not functions and is_constant(tree):
             check_finite(evaluate_array(tree, self.constants), formula, self.findings)
         return tree
@@ -172,7 +181,7 @@ def check_bounds(value: Value, default: Default, values: Mapping[str, Value], sp
 
 def _activation(name: str, model: ActivationModel, findings: Findings, dt: float) -> tuple[Activation, Defaults] | None:
     """The activation; None where an intermediate value is at fault."""
-    checker = _Checker(_ACTIVATION, model.source, findings, dt)
+    checker = _Checker(_ACTIVATION, model.source, findings, dt, not model.lost_keys.isdisjoint(_DECLARING))
     defaults = checker.parameters(model.parameters)
     replaced: dict[str, Tree] = {}
     let = checker.let(model.let)
@@ -196,7 +205,7 @@ def _expanded(tree: Tree, let: Mapping[str, Tree], span: Span, findings: Finding
 
 
 def _model(name: str, model: ModelModel, findings: Findings, dt: float) -> tuple[Model, Defaults]:
-    checker = _Checker(_MODEL, model.source, findings, dt)
+    checker = _Checker(_MODEL, model.source, findings, dt, not model.lost_keys.isdisjoint(_DECLARING))
     defaults = checker.parameters(model.parameters)
     for key in (*model.state, *lost_names(model.source, "state", dict(model.state))):
         checker.declare("state", key)
@@ -209,7 +218,7 @@ def _model(name: str, model: ModelModel, findings: Findings, dt: float) -> tuple
 
 def _rule(name: str, model: RuleModel, findings: Findings, dt: float) -> tuple[Rule, Defaults] | None:
     """The rule; None where it is not known which signals it has."""
-    checker = _Checker(_RULE, model.source, findings, dt)
+    checker = _Checker(_RULE, model.source, findings, dt, not model.lost_keys.isdisjoint(_DECLARING))
     defaults = checker.parameters(model.parameters)
     before = findings.errors
     for signal in model.signals:
@@ -259,10 +268,12 @@ def _defined(
     findings: Findings,
     dt: float,
 ) -> tuple[dict[str, tuple[D, Defaults]], Gaps]:
-    """The definitions of a section. One of which a part could not be read is a gap: what it means is not known."""
-    made = {
-        name: None if model.lost - {"description"} else make(name, model, findings, dt)
-        for name, model in models.items()
+    """The definitions of a section. One whose declarations could not be read is a gap: which parameters and signals it
+    has is not known."""
+    made = {name: make(name, model, findings, dt) for name, model in models.items()}
+    found = {
+        name: definition
+        for name, definition in made.items()
+        if definition is not None and models[name].lost_keys.isdisjoint(_DECLARING)
     }
-    found = {name: definition for name, definition in made.items() if definition is not None}
     return found, gaps.with_names(section, gaps.names[section] | (made.keys() - found.keys()))

@@ -6,7 +6,7 @@ an edge names none), in the order written. Long plain lists go from the reader's
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,12 +37,25 @@ class EdgeList:
 
 
 @dataclass(frozen=True)
-class EdgeReader:
-    """Reads the edges of one entry. ``sources`` and ``targets`` map the names that belong to its ends to positions;
-    None where an end is at fault, whose names are not looked at then."""
+class End:
+    """The positions within an end of the neurons that belong to it, by name. ``perhaps``: the end is at fault, and this
+    says which other names may belong to it."""
 
-    sources: Mapping[str, int] | None
-    targets: Mapping[str, int] | None
+    positions: Mapping[str, int]
+    perhaps: Callable[[str], bool] | None = None
+
+    def position(self, name: str) -> int:
+        """The position of a neuron; −1 where it cannot belong to the end."""
+        found = self.positions.get(name, -1)
+        return 0 if found < 0 and self.perhaps is not None and self.perhaps(name) else found
+
+
+@dataclass(frozen=True)
+class EdgeReader:
+    """Reads the edges of one entry."""
+
+    sources: End
+    targets: End
     constants: Constants
     files: Files
     stream: Stream
@@ -82,7 +95,7 @@ class EdgeReader:
         delays[delayed] = later
         return EdgeList(i, j, weights, delays)
 
-    def _ends(self, cells: Cells, which: IntArray, known: Mapping[str, int] | None, what: str) -> IntArray | None:
+    def _ends(self, cells: Cells, which: IntArray, end: End, what: str) -> IntArray | None:
         """The positions of the neurons that these cells name."""
         findings = self.constants.findings
         no_names = which[cells.kinds[which] != TEXT]
@@ -91,22 +104,20 @@ class EdgeReader:
                 continue
             findings.error("wrong-type", cells.node(cell).span, f"the {what} of an edge is the name of a neuron")
         which = which[cells.kinds[which] == TEXT]
-        if known is None:
-            return None
         texts = cells.numbers[which].astype(np.int64)
-        positions = np.array([known.get(text, -1) for text in cells.texts], dtype=np.int64)[texts]
+        positions = np.array([end.position(text) for text in cells.texts], dtype=np.int64)[texts]
         unknown = np.flatnonzero(positions < 0)
         _, once = np.unique(texts[unknown], return_index=True)
         for place in sorted(unknown[once].tolist())[:PATIENCE]:
-            self._outside(cells.texts[int(texts[place])], cells.node(int(which[place])).span, known, what)
-        return None if len(unknown) or len(no_names) else positions
+            self._outside(cells.texts[int(texts[place])], cells.node(int(which[place])).span, end, what)
+        return None if len(unknown) or len(no_names) or end.perhaps is not None else positions
 
     def _given(self, cells: Cells, which: IntArray, ends: tuple[IntArray, IntArray] | None) -> FloatArray | None:
         """The weights in these cells; they are looked at even if their ends are at fault."""
         missing = which[cells.kinds[which] == NULL]
         for cell in missing[:PATIENCE].tolist():
             formula_of(cells.node(cell), self.constants.findings)
-        sizes = {"n_from": float(len(self.sources or ())), "n_to": float(len(self.targets or ()))}
+        sizes = {"n_from": float(len(self.sources.positions)), "n_to": float(len(self.targets.positions))}
         i, j = ends or (which, which)
         values = values_of(cells, which, self.constants, Pairs(i, j, sizes, self.stream, vague=ends is None))
         return None if len(missing) else values
@@ -123,8 +134,8 @@ class EdgeReader:
             result[place] = found[key] or 0
         return None if None in found.values() else result
 
-    def _outside(self, name: str, span: Span, known: Mapping[str, int], what: str, where: str = "") -> None:
-        hint = suggest(name, few(name, known), f"{what}s of this entry")
+    def _outside(self, name: str, span: Span, end: End, what: str, where: str = "") -> None:
+        hint = suggest(name, few(name, end.positions), f"{what}s of this entry" if end.perhaps is None else "neurons")
         message = f"'{shown(name)}'{where} is not among the {what}s of this entry"
         self.constants.findings.error("edge-outside", span, message, hint)
 
@@ -148,16 +159,12 @@ class EdgeReader:
             return None
         return EdgeList(i, j, table.weights, table.delays)
 
-    def _named(
-        self, names: tuple[str, ...], rows: IntArray, known: Mapping[str, int] | None, what: str, span: Span
-    ) -> IntArray | None:
-        if known is None:
-            return None
-        positions = np.array([known.get(name, -1) for name in names], dtype=np.int64)
+    def _named(self, names: tuple[str, ...], rows: IntArray, end: End, what: str, span: Span) -> IntArray | None:
+        positions = np.array([end.position(name) for name in names], dtype=np.int64)
         unknown = {names[place]: int(rows[place]) for place in reversed(np.flatnonzero(positions < 0).tolist())}
         for name in sorted(unknown, key=unknown.__getitem__)[:PATIENCE]:
-            self._outside(name, span, known, what, f" (row {unknown[name]} of the file)")
-        return None if unknown else positions
+            self._outside(name, span, end, what, f" (row {unknown[name]} of the file)")
+        return None if unknown or end.perhaps is not None else positions
 
 
 def delay_of(formula: Formula, constants: Constants) -> int | None:

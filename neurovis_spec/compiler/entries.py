@@ -12,7 +12,7 @@ import numpy as np
 
 from neurovis_spec.compiler.constants import Constants, Randomness
 from neurovis_spec.compiler.draws import Stream
-from neurovis_spec.compiler.edges import EdgeReader, delay_of
+from neurovis_spec.compiler.edges import EdgeReader, End, delay_of
 from neurovis_spec.compiler.ends import Ends
 from neurovis_spec.compiler.learning import Learning, learning_of
 from neurovis_spec.compiler.limits import Limits, amount
@@ -241,12 +241,13 @@ class EntryBuilder:
         edges = reader.read(self.body.edges)
         return None if edges is None else _Shape(edges.i, edges.j, edges.weights, edges.delays)
 
-    def _named(self, neurons: IntArray | None) -> dict[str, int] | None:
+    def _named(self, neurons: IntArray | None) -> End:
         """The places of an end's neurons by the names that they have in the unit."""
         if neurons is None:
-            return None
+            directory = self.place.directory
+            return End(directory.neurons, lambda name: directory.find(name) is not None or directory.covers(name))
         called, own = self.place.population.neurons.names, len(self.place.unit.called(""))
-        return {called[neuron][own:]: place for place, neuron in enumerate(neurons.tolist())}
+        return End({called[neuron][own:]: place for place, neuron in enumerate(neurons.tolist())})
 
     def _values(self, formula: Formula, shape: _Shape | None, purpose: str) -> FloatArray | None:
         """A formula of i, j, n_from, n_to (and distance) for every pair."""

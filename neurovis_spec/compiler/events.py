@@ -13,11 +13,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from neurovis_spec.compiler.connect import Connected
 from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.network import Block, IntArray, Learn, Network, Plasticity, frozen
-from neurovis_spec.compiler.references import Directory, key_of, resolve_end, resolve_ends
+from neurovis_spec.compiler.references import Directory, few, key_of, look_at_keys, resolve_end, resolve_ends
 from neurovis_spec.diagnostics import Findings, Span, suggest
-from neurovis_spec.language.located import Formula, Located
+from neurovis_spec.language.located import Formula, Located, shown
+from neurovis_spec.language.model import lost_names
 from neurovis_spec.language.sections import EventModel
 
 #: Compiles the network anew with other parameters, without its events; None where that is at fault.
@@ -41,10 +43,28 @@ class Event:
 
 
 @dataclass(frozen=True)
-class EventReader:
-    """Reads the events of a spec; without a network, which is at fault then, they are only checked."""
+class Wires:
+    """The connections that a lesion may name: sources and targets, one each, and what the entries are called."""
 
-    network: Network | None
+    sources: IntArray
+    targets: IntArray
+    names: tuple[str, ...]
+
+    def between(self, sources: tuple[int, ...], targets: tuple[int, ...]) -> list[int]:
+        """The connections from any of some neurons to any of others."""
+        return np.flatnonzero(np.isin(self.sources, sources) & np.isin(self.targets, targets)).tolist()
+
+
+def wires_of(made: Connected) -> Wires | None:
+    """The connections of a spec, if all of them are known."""
+    return Wires(made.sources, made.targets, tuple(one.name for one in made.bundles)) if made.complete else None
+
+
+@dataclass(frozen=True)
+class EventReader:
+    """Reads the events of a spec, whose connections are ``wires``; None where these are not known."""
+
+    wires: Wires | None
     directory: Directory
     constants: Constants
 
@@ -62,15 +82,17 @@ class EventReader:
         before = self.findings.errors
         self._check_keys(model)
         begin = model.at if model.at is not None else model.from_
-        if begin is None or self.findings.errors > before:
-            return None
-        at = self.constants.integer(begin, "the step of an event", 0)
+        at = None if begin is None else self.constants.integer(begin, "the step of an event", 0)
         to = None if model.to is None else self.constants.integer(model.to, "the end of a clamp", 1)
         if at is not None and to is not None and model.to is not None and to <= at:
             message = f"the clamp ends before it begins: from {at} to {to}, which is exclusive"
             self.findings.error("out-of-range", model.to.span, message)
+        for name in lost_names(model.source, "set", dict(model.set)):
+            self._check_set(model, name)
         for name, formula in model.set.items():
-            self._check_set(model, name, formula)
+            self._check_set(model, name)
+            self.constants.scalar(formula)
+        look_at_keys(model.source, "clamp", model.clamp, self.directory, self.findings)
         clamps = [one for name, formula in model.clamp.items() for one in self._clamp(model, name, formula)]
         neurons: list[int] = []
         connections: list[int] = []
@@ -96,19 +118,20 @@ class EventReader:
         if not actions:
             return
         timed = {name for name in ("at", "from", "to") if source.entry(name) is not None}
+        perhaps = model.lost_keys - timed  # an unknown key may be meant for these
         if "clamp" in actions:
             if "at" in timed:
                 wrong("at", "a clamp lasts: it has 'from', and perhaps 'to'", "write from: instead of at:")
-            elif "from" not in timed:
+            elif "from" not in timed | perhaps:
                 wrong("clamp", "a clamp needs 'from'")
             if len(actions) > 1:
                 wrong("clamp", "a clamp is an event of its own", "make it an entry of its own")
         elif timed & {"from", "to"}:
             wrong(min(timed & {"from", "to"}), f"'{actions[0]}' takes 'at' alone", "write at: STEP")
-        elif "at" not in timed:
+        elif "at" not in timed | perhaps:
             wrong(actions[0], "at which step? 'at' is missing")
 
-    def _check_set(self, model: EventModel, name: str, formula: Formula) -> None:
+    def _check_set(self, model: EventModel, name: str) -> None:
         span = key_of(model.source, "set", name).span
         known = (*self.constants.parameters, *self.constants.broken)
         if name not in known and not self.constants.incomplete:
@@ -117,7 +140,6 @@ class EventReader:
         elif name in self.constants.structural:
             message = f"'{name}' cannot be set in a run: the structure of the network depends on it"
             self.findings.error("structural-parameter", span, message)
-        self.constants.scalar(formula)
 
     def _clamp(self, model: EventModel, name: str, formula: Formula) -> list[tuple[int, float]]:
         neurons = resolve_end(key_of(model.source, "clamp", name), self.directory, self.findings)
@@ -129,13 +151,23 @@ class EventReader:
             neurons.extend(resolve_end(text, self.directory, self.findings) or ())
             return
         ends = resolve_ends(text, self.directory, self.findings)
-        if ends is None or self.network is None:
+        if ends is None or self.wires is None:
             return
-        wires = self.network.connections
-        found = np.flatnonzero(np.isin(wires.sources, ends[0]) & np.isin(wires.targets, ends[1])).tolist()
+        found = self.wires.between(*ends)
         if not found:
-            self.findings.error("no-connection", text.span, f"there is no connection '{text.value}'")
+            message = f"there is no connection '{shown(text.value)}'"
+            self.findings.error("no-connection", text.span, message, self._other(text, ends))
         connections.extend(found)
+
+    def _other(self, text: Located[str], ends: tuple[tuple[int, ...], tuple[int, ...]]) -> str | None:
+        """Which connection may be meant: the one the other way, those that are called alike, those of either end."""
+        assert self.wires is not None
+        source, target = (part.strip() for part in text.value.split("->", 1))
+        if self.wires.between(ends[1], ends[0]):
+            return f"there is '{shown(target)} -> {shown(source)}', the other way"
+        names = self.wires.names
+        near = [name for name in names if source in name.split(" -> ")[0] or target in name.split(" -> ")[-1]]
+        return suggest(f"{source} -> {target}", few(text.value, near or names), "connections")
 
 
 def with_phases(

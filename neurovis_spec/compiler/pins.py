@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple, TypeAlias
 
 from neurovis_spec.compiler.populate import Population
-from neurovis_spec.compiler.references import Directory, key_of, resolve_end
+from neurovis_spec.compiler.references import Directory, key_of, look_at_keys, resolve_end
 from neurovis_spec.compiler.units import Unit
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel
@@ -132,9 +132,12 @@ def _said(unit: Unit, directory: Directory, by_identity: Mapping[int, int], find
     model = unit.section.layout
     if model is None:
         return result
+    look_at_keys(model.source, "positions", model.positions, directory, findings)
     for key, point in _points(model):
         x, y = unit.constants.scalar(point.x), unit.constants.scalar(point.y)
         if x is None or y is None:
+            if not directory.instance(key.value):
+                _neuron(key, directory, findings)
             continue
         if max(abs(x), abs(y)) > FARTHEST:
             findings.error("out-of-range", point.span, f"a pin lies within {FARTHEST:g} of the origin")

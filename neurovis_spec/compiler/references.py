@@ -165,6 +165,16 @@ def key_span(section: Section, part: str, name: str) -> Span:
     return key_of(section.source, part, name).span
 
 
+def look_at_keys(
+    section: SourceMapping, part: str, kept: Collection[str], directory: Directory, findings: Findings
+) -> None:
+    """The references that are keys of a part of a section and whose values are at fault, which ``kept`` are not."""
+    node = section.get(part)
+    for entry in node.entries if isinstance(node, SourceMapping) else ():
+        if entry.name not in kept and not directory.instance(entry.name):
+            resolve_end(Located(entry.name, entry.key), directory, findings)
+
+
 def piece(text: Located[str], start: int, end: int) -> Located[str]:
     """Characters ``start`` to ``end`` of a text as a text of their own, with their place."""
     span = text.node.at(start, end)

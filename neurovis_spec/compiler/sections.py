@@ -16,7 +16,7 @@ from neurovis_spec.compiler.mirrors import check_pins, lines_of, mirrors_of
 from neurovis_spec.compiler.network import LayoutSettings, Output, RenderSettings, frozen
 from neurovis_spec.compiler.pins import DIAMETER, FARTHEST, pins_of
 from neurovis_spec.compiler.populate import Population
-from neurovis_spec.compiler.references import Directory, key_of, resolve, resolve_end
+from neurovis_spec.compiler.references import Directory, key_of, look_at_keys, resolve, resolve_end
 from neurovis_spec.compiler.units import Unit
 from neurovis_spec.diagnostics import Findings, Span, suggest
 from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel, RenderModel
@@ -32,7 +32,7 @@ def make_outputs(spec: Spec, directory: Directory, findings: Findings) -> tuple[
     result = []
     for name, reference in spec.outputs.items():
         neurons = resolve(reference.parts, directory, findings)
-        if not reference.parts:
+        if not reference.parts and not reference.failed:
             findings.error("empty-reference", reference.span, f"the output '{name}' names no neuron")
         elif neurons is not None:
             array = np.array(neurons, dtype=np.int64)
@@ -96,6 +96,7 @@ def _spacing(formula: Formula | None, default: float, constants: Constants) -> f
 def _arranged(
     model: LayoutModel | ModuleLayoutModel, directory: Directory, findings: Findings
 ) -> Iterator[tuple[tuple[int, ...], str]]:
+    look_at_keys(model.source, "arrange", model.arrange, directory, findings)
     for name, how in model.arrange.items():
         members = resolve_end(key_of(model.source, "arrange", name), directory, findings)
         if members is not None:
@@ -108,6 +109,8 @@ def _boxed(
     """The named boxes; a reference in them may name an instance, which stands for all of its neurons."""
     for name, reference in model.boxes.items():
         if not reference.parts:
+            if reference.failed:
+                continue
             findings.error("empty-reference", reference.span, f"the box '{shown(name)}' holds no neuron")
             continue
         members = resolve(reference.parts, directory, findings, instances=True)

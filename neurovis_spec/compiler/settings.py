@@ -78,12 +78,12 @@ def settle(choice: Choice, known: Collection[str], findings: Findings) -> Settle
 
 
 def look_at_settings(choice: Choice, constants: Constants, extra: tuple[str, ...] = ()) -> None:
-    """What can be said of the settings of a definition that is not known: those that are formulas, not names."""
+    """What can be said of the settings of a definition that is not known: of those that are no names."""
     for entry in choice.settings:
         nodes = entry.value.items if isinstance(entry.value, (Sequence, Packed)) else (entry.value,)
         for node in nodes[:_MOST_LOOKS]:
             name = isinstance(node, Scalar) and isinstance(node.value, str) and IDENTIFIER.fullmatch(node.value.strip())
-            formula = None if name else formula_of(node, Findings())
+            formula = None if name else formula_of(node, constants.findings)
             if formula is not None:
                 constants.look(formula, extra)
 

@@ -40,6 +40,8 @@ def _pairs(node: Node, info: ValidationInfo) -> tuple[Reference, ...]:
     """A list of pairs of references."""
     found = _references(node, info)
     for reference in found:
+        if reference.failed:
+            give_up()
         if len(reference.parts) != 2:
             message = f"a mirror has two sides, [left, right]; this has {len(reference.parts)}"
             findings_of(info).error("wrong-size", reference.span, message)

@@ -19,8 +19,8 @@ from neurovis_spec.language.located import (
     findings_of,
     give_up,
 )
-from neurovis_spec.language.model import Model, Named
-from neurovis_spec.language.source import Node, ScalarValue
+from neurovis_spec.language.model import Model, Named, StandIns
+from neurovis_spec.language.source import Node
 from neurovis_spec.language.values import ParameterField
 
 LANGUAGE_VERSION = 1
@@ -47,6 +47,8 @@ class StateModel(Model):
 class ActivationModel(Model):
     """An activation function of one's own."""
 
+    STAND_INS: ClassVar[StandIns] = {"value": 0}
+
     parameters: Named[ParameterField] = Field(default_factory=dict, description="Names and defaults.")
     let: Named[FormulaField] = Field(default_factory=dict, description="Intermediate values, in order.")
     value: FormulaField = Field(description="An expression of x, the combined input, and the parameters.")
@@ -55,6 +57,8 @@ class ActivationModel(Model):
 
 class ModelModel(Model):
     """A neuron model of one's own: how the activity follows from the drive."""
+
+    STAND_INS: ClassVar[StandIns] = {"activity": 0}
 
     parameters: Named[ParameterField] = Field(default_factory=dict, description="Names and defaults.")
     let: Named[FormulaField] = Field(default_factory=dict, description="Intermediate values, in order.")
@@ -73,6 +77,8 @@ class WeightModel(Model):
 class RuleModel(Model):
     """A plasticity rule of one's own."""
 
+    STAND_INS: ClassVar[StandIns] = {"weight": {"each_step": 0}}
+
     parameters: Named[ParameterField] = Field(default_factory=dict, description="Names and defaults.")
     signals: TextsField = Field(default=(), description="Names of signals that the connection must supply.")
     let: Named[FormulaField] = Field(default_factory=dict, description="Intermediate values, in order.")
@@ -84,7 +90,7 @@ class RuleModel(Model):
 class Library(Model):
     """A file of definitions, as the built-in ones ship."""
 
-    STAND_INS: ClassVar[dict[str, ScalarValue]] = {"neurovis": LANGUAGE_VERSION}
+    STAND_INS: ClassVar[StandIns] = {"neurovis": LANGUAGE_VERSION}
 
     neurovis: Annotated[Located[int], Leaf(version_field, {"const": 1})] = Field(
         description="The version of the language: 1."

@@ -179,6 +179,15 @@ def as_integer(node: Node, info: ValidationInfo) -> Located[int]:
 
 def as_texts(node: Node, info: ValidationInfo) -> tuple[Located[str], ...]:
     """A text or a list of texts; each that is none is noted."""
+    before = findings_of(info).errors
+    result = as_parts(node, info)
+    if findings_of(info).errors > before:
+        give_up()
+    return result
+
+
+def as_parts(node: Node, info: ValidationInfo) -> tuple[Located[str], ...]:
+    """The same, without those that are none: each of the others stands for itself."""
     if not isinstance(node, (Sequence, Packed)):
         return (as_text(node, info),)
     result: list[Located[str]] = []
@@ -188,8 +197,6 @@ def as_texts(node: Node, info: ValidationInfo) -> tuple[Located[str], ...]:
             result.append(as_text(item, info))
         if findings_of(info).errors - before >= _PATIENCE:
             break
-    if findings_of(info).errors > before:
-        give_up()
     return tuple(result)
 
 
@@ -223,6 +230,10 @@ TextField = Annotated[Located[str], Leaf(as_text, {"type": "string"})]
 TextsField = Annotated[
     tuple[Located[str], ...],
     Leaf(as_texts, {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
+]
+PartsField = Annotated[
+    tuple[Located[str], ...],
+    Leaf(as_parts, {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
 ]
 IdentifierField = Annotated[
     Located[str],

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, ClassVar, TypeVar
+from typing import Annotated, ClassVar, TypeAlias, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -30,13 +30,17 @@ from pydantic_core import core_schema
 from neurovis_spec.diagnostics import Findings, Span, nearest
 from neurovis_spec.language.keys import Words, read_keys
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Leaf, bad_name, findings_of, give_up, refuse
-from neurovis_spec.language.source import Mapping, Node, Scalar, ScalarValue
+from neurovis_spec.language.source import Entry, Mapping, Node, Scalar, ScalarValue
 
 V = TypeVar("V")
 
 
 def _as_it_is(value: Node, info: ValidationInfo) -> Node:
     return value
+
+
+#: What required keys are taken for where they are missing or at fault, to go on looking: scalars, or mappings of these.
+StandIns: TypeAlias = dict[str, ScalarValue | dict[str, ScalarValue]]
 
 
 class Model(BaseModel):
@@ -46,8 +50,7 @@ class Model(BaseModel):
 
     #: what a mapping of this kind is called in a finding, for keys that are written elsewhere
     PLACE: ClassVar[str] = ""
-    #: what required keys are taken for where they are missing or at fault, to go on looking
-    STAND_INS: ClassVar[dict[str, ScalarValue]] = {}
+    STAND_INS: ClassVar[StandIns] = {}
 
     source: SkipJsonSchema[Annotated[Mapping, Leaf(_as_it_is, {})]] = Field(alias="$", exclude=True, repr=False)
 
@@ -71,7 +74,7 @@ class Model(BaseModel):
                     if cls._fields()[key].is_required():
                         if key not in cls.STAND_INS:
                             give_up()
-                        values[key] = Scalar(cls.STAND_INS[key], data.span)
+                        values[key] = _standing_in(cls.STAND_INS[key], data.span)
         give_up()
 
     @classmethod
@@ -102,7 +105,7 @@ class Model(BaseModel):
                         "missing-key", opening(data), f"the key '{name}' is missing", cls._without(name, data)
                     )
                 if name in cls.STAND_INS:
-                    result[name] = Scalar(cls.STAND_INS[name], opening(data))
+                    result[name] = _standing_in(cls.STAND_INS[name], opening(data))
                 else:
                     hopeless = True
         if hopeless:
@@ -132,6 +135,12 @@ class Model(BaseModel):
         """The known keys that were lost, or that an unknown one may be meant for."""
         fields = self._fields()
         return frozenset(key for name in self.lost for key in ((name,) if name in fields else nearest(name, fields)))
+
+
+def _standing_in(value: ScalarValue | dict[str, ScalarValue], span: Span) -> Node:
+    if not isinstance(value, dict):
+        return Scalar(value, span)
+    return Mapping(tuple(Entry(Scalar(key, span), Scalar(inner, span)) for key, inner in value.items()), span)
 
 
 def _home(name: str) -> str | None:

@@ -13,9 +13,8 @@ from pydantic import Field
 from neurovis_spec.language.drawing import ModuleLayoutModel
 from neurovis_spec.language.library import Library, version_field
 from neurovis_spec.language.located import FormulaField, IdentifierField, Leaf, Located, TextField, TextsField
-from neurovis_spec.language.model import Model, Named
+from neurovis_spec.language.model import Model, Named, StandIns
 from neurovis_spec.language.sections import ConnectionsField, GroupModel, InputModel
-from neurovis_spec.language.source import ScalarValue
 from neurovis_spec.language.values import ParameterField
 
 #: the sections of an included file
@@ -68,7 +67,7 @@ class IncludedModel(Library):
     """A file that a spec includes: modules, definitions and metadata, nothing else."""
 
     PLACE: ClassVar[str] = "an included file"
-    STAND_INS: ClassVar[dict[str, ScalarValue]] = {}
+    STAND_INS: ClassVar[StandIns] = {}
 
     neurovis: Annotated[Located[int], Leaf(version_field, {"const": 1})] | None = Field(  # type: ignore[assignment]
         None, description="The version of the language: 1."

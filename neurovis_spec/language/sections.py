@@ -18,6 +18,7 @@ from neurovis_spec.language.located import (
     FormulaField,
     Leaf,
     Located,
+    PartsField,
     TextField,
     TextsField,
     findings_of,
@@ -183,7 +184,7 @@ class EventModel(Model):
     to: FormulaField | None = Field(None, description="The step before which a clamp ends; without it, it lasts.")
     set: Named[FormulaField] = Field(default_factory=dict, description="{parameter: value} from this step on.")
     clamp: Keyed[FormulaField] = Field(default_factory=dict, description="{neurons: activity}.")
-    lesion: TextsField = Field(default=(), description="Neurons and connections (FROM -> TO) that are removed.")
+    lesion: PartsField = Field(default=(), description="Neurons and connections (FROM -> TO) that are removed.")
 
 
 #: Findings of one list, after which the rest of it is not looked at.

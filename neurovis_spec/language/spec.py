@@ -21,10 +21,10 @@ from neurovis_spec.language.located import (
     TextsField,
     refuse,
 )
-from neurovis_spec.language.model import Model, Named
+from neurovis_spec.language.model import Model, Named, StandIns
 from neurovis_spec.language.modules import INCLUDED, InstanceModel, ModuleModel
 from neurovis_spec.language.sections import ConnectionsField, EventsField, GroupModel, InputModel, Time
-from neurovis_spec.language.source import Mapping, Node, ScalarValue
+from neurovis_spec.language.source import Mapping, Node
 from neurovis_spec.language.values import ParameterField, ReferenceField
 
 
@@ -51,7 +51,7 @@ class Spec(Library):
     """A whole spec."""
 
     PLACE: ClassVar[str] = "the top level"
-    STAND_INS: ClassVar[dict[str, ScalarValue]] = {"neurovis": LANGUAGE_VERSION, "name": "unnamed"}
+    STAND_INS: ClassVar[StandIns] = {"neurovis": LANGUAGE_VERSION, "name": "unnamed"}
 
     name: IdentifierField = Field(description="The name of the network, an identifier.")
     authors: TextsField | None = Field(None, description="Who wrote it.")

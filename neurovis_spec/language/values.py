@@ -18,8 +18,8 @@ from neurovis_spec.language.located import (
     Located,
     as_bool,
     as_formula,
+    as_parts,
     as_text,
-    as_texts,
     findings_of,
     give_up,
     refuse,
@@ -255,15 +255,18 @@ ParameterField = Annotated[
 
 
 class Reference(NamedTuple):
-    """One or several references to neurons, as written, each with its place."""
+    """One or several references to neurons, as written, each with its place. ``failed``: others were no texts."""
 
     parts: tuple[Located[str], ...]
     span: Span
+    failed: bool = False
 
 
 def as_reference(node: Node, info: ValidationInfo) -> Reference:
     """A reference, or a list of them."""
-    return Reference(as_texts(node, info), node.span)
+    before = findings_of(info).errors
+    parts = as_parts(node, info)
+    return Reference(parts, node.span, findings_of(info).errors > before)
 
 
 ReferenceField = Annotated[
