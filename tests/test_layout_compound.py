@@ -265,6 +265,18 @@ def test_mirrored_instances_and_a_mirror_within_a_module() -> None:
             assert at[f"{side}{i}.S2"][0] * 2 == inner
 
 
+def test_a_module_with_a_mirror_is_mirrored_itself() -> None:
+    at, _ = drawn("{mirror: [[left, right], [C1, C2]]}", leg="{mirror: [[hip, foot], [S1, S3]]}")
+    twice = at["C1"][0] + at["C2"][0]
+    for i in (1, 2, 3):
+        inner = 2 * at[f"left{i}.T"][0]
+        for joint in ("E", "F", "M"):
+            hip, foot = at[f"left{i}.hip.{joint}"], at[f"left{i}.foot.{joint}"]
+            assert (hip[0] + foot[0], hip[1]) == (inner, foot[1])
+            for leg, (x, y) in ((f"hip.{joint}", hip), (f"foot.{joint}", foot)):
+                assert at[f"right{i}.{leg}"] == (twice - x, y)
+
+
 def test_a_modules_pins_and_arrangements_hold_in_every_instance() -> None:
     at, _ = drawn(leg="{arrange: {S: column}}", knee="{positions: {E: [0, 0], M: [2, 0.5]}}")
     for path in (f"{side}{i}" for side in ("left", "right") for i in (1, 2, 3)):

@@ -7,6 +7,7 @@ mirror are of equal make: as many neurons, in instances with the same names; how
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import takewhile
 from typing import Literal
 
 from neurovis_spec.compiler.limits import plural
@@ -24,30 +25,39 @@ _SLACK = 1e-9
 
 
 def mirrors_of(units: tuple[Unit, ...], population: Population, findings: Findings) -> tuple[Mirror, ...]:
-    """All mirrors. A neuron that stands on two sides, or twice on one, is a finding."""
+    """All mirrors. A neuron with two mirror images in one frame is a finding; in an instance it may have one, and in what
+    is around the instance another."""
     paths = {id(directory): unit.path for unit, directory in zip(units, population.directories, strict=True)}
     result: list[Mirror] = []
-    taken: set[int] = set()
+    taken: set[tuple[str, int]] = set()
     for unit, directory in zip(units, population.directories, strict=True):
         layout = unit.section.layout
         for reference in () if layout is None else layout.mirror:
             mirror = _mirror(unit, reference, directory, population.neurons.names, paths, findings)
             if mirror is None:
                 continue
-            twice = next((m for pair in mirror.pairs for m in pair if m in taken), None)
+            names = population.neurons.names
+            sides = [(_frame(names[a], names[b]), m) for a, b in mirror.pairs for m in (a, b)]
+            twice = next((m for frame, m in sides if (frame, m) in taken), None)
             itself = next((a for a, b in mirror.pairs if a == b), None)
             if itself is not None:
-                name = population.neurons.names[itself]
+                name = names[itself]
                 hint = "what stands on the axis needs no mirror"
                 findings.error("bad-mirror", reference.span, f"'{name}' would be its own mirror image", hint)
                 continue
-            taken.update(index for pair in mirror.pairs for index in pair)
+            taken.update(sides)
             if twice is not None:
-                name = population.neurons.names[twice]
+                name = names[twice]
                 findings.error("bad-mirror", reference.span, f"'{name}' has a mirror image already")
             else:
                 result.append(mirror)
     return tuple(result)
+
+
+def _frame(one: str, other: str) -> str:
+    """The path of the innermost instance that holds both neurons."""
+    paths = one.split(".")[:-1], other.split(".")[:-1]
+    return ".".join(a for a, _ in takewhile(lambda step: step[0] == step[1], zip(*paths, strict=False)))
 
 
 def _mirror(
