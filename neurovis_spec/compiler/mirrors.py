@@ -25,8 +25,8 @@ _SLACK = 1e-9
 
 
 def mirrors_of(units: tuple[Unit, ...], population: Population, findings: Findings) -> tuple[Mirror, ...]:
-    """All mirrors. A neuron with two mirror images in one frame is a finding; in an instance it may have one, and in what
-    is around the instance another."""
+    """All mirrors. A neuron with two mirror images in one frame is a finding; in an instance it may have one, and in
+    what is around the instance another."""
     paths = {id(directory): unit.path for unit, directory in zip(units, population.directories, strict=True)}
     result: list[Mirror] = []
     taken: set[tuple[str, int]] = set()
