@@ -6,7 +6,6 @@ is imported by who does so: a spec is compiled, and thereby checked, without it.
 
 from __future__ import annotations
 
-import json
 import math
 import operator
 from collections.abc import Iterable, Mapping
@@ -64,6 +63,8 @@ def compile(
     """
     given = {**(parameters or {}), **more}
     if isinstance(source, Mapping):
+        import json
+
         text = json.dumps(_plain(source), indent=1, ensure_ascii=False, allow_nan=True)
         return compile_text(text, file="<mapping>", parameters=given, seed=seed, root=root, limit=limit)
     path = Path(source)

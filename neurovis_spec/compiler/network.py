@@ -1,8 +1,9 @@
 """The Network: frozen arrays and an update program; what a spec becomes.
 
 In: nothing; this is the value that ``compiler`` makes and that ``runtime``, ``layout`` and ``scene`` read. Neurons and
-connections are structures of arrays; all arrays are read-only. What a step does is a list of operations
-(``program``), each of which says what it reads and what it writes.
+connections are structures of arrays; all arrays are read-only. What holds arrays is compared by identity: the ``hash``
+of a Network compares content. What a step does is a list of operations (``program``), each of which says what it reads
+and what it writes.
 """
 
 from __future__ import annotations
@@ -74,7 +75,7 @@ class Instance:
         return range(self.start, self.start + self.count)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Neurons:
     """All neurons, in the order of the spec (structure of arrays, n long)."""
 
@@ -93,7 +94,7 @@ class Neurons:
         return len(self.names)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Connections:
     """All connections, in the order written, a matrix or pattern row by row (structure of arrays, m long)."""
 
@@ -121,7 +122,7 @@ class Connections:
         return len(self.sources)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Input:
     """A signal from outside, ``size`` numbers a step, from ``start`` on in the vector of all inputs.
 
@@ -136,7 +137,7 @@ class Input:
     table: FloatArray | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Noise:
     """Random numbers that are drawn anew at each step and added to the drive of a group's neurons.
 
@@ -151,7 +152,7 @@ class Noise:
     parameters: Mapping[str, float]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Output:
     """A name for neurons whose activity leaves the network; ``scalar`` where it refers to a single neuron."""
 
@@ -204,7 +205,7 @@ class Rule:
     each_episode: Tree | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Block:
     """Neurons that are updated together: the same activation, model, combination and level.
 
@@ -224,7 +225,7 @@ class Block:
     slots: IntArray
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Plasticity:
     """Connections that learn by one rule. ``signals`` gives, for each signal of the rule, one index a
     connection into the activities of all neurons followed by the vector of all inputs. Parameters are as long as
