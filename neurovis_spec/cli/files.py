@@ -77,17 +77,13 @@ def earlier_layout(path: Path) -> Layout | None:
     from neurovis_spec.diagnostics import Findings, Span
     from neurovis_spec.language.reader import LARGEST
     from neurovis_spec.language.reader_files import FileFault, read_bytes
-    from neurovis_spec.layout.file import parse
+    from neurovis_spec.layout.file import parse_bytes
 
     data = read_bytes(path, LARGEST)
     findings = Findings()
     layout = None
     if not isinstance(data, FileFault):
-        try:
-            layout = parse(data.decode("utf-8"), str(path), findings)
-        except UnicodeDecodeError as error:
-            span = Span(str(path), 1, 1, 1, 1)
-            findings.error("invalid-utf8", span, f"the byte 0x{data[error.start]:02x} is not UTF-8")
+        layout = parse_bytes(data, str(path), findings)
     elif data.code != "file-missing":
         findings.error(data.code, Span(str(path), 1, 1, 1, 1), f"the file {data.reason}")
     findings.check()

@@ -11,8 +11,8 @@ import math
 import re
 
 from neurovis_spec.diagnostics import Findings, suggest
-from neurovis_spec.language.reader import read_text
-from neurovis_spec.language.source import Mapping, Node, Packed, Scalar, Sequence, describe
+from neurovis_spec.language.reader import read_content, read_text
+from neurovis_spec.language.source import Mapping, Node, Packed, Scalar, Sequence, SourceDocument, describe
 from neurovis_spec.layout.model import Layout, Point, Route
 from neurovis_spec.layout.naming import edge_key, natural_key
 
@@ -83,7 +83,16 @@ def parse(text: str, file: str, findings: Findings) -> Layout | None:
     ``network`` and ``engine`` may be missing (then '' and 'manual'), and so may any neuron and any route.
     """
     before = findings.errors
-    document = read_text(text, file, findings)
+    return _parsed(read_text(text, file, findings), before, findings)
+
+
+def parse_bytes(data: bytes, file: str, findings: Findings) -> Layout | None:
+    """The same of the bytes of a file."""
+    before = findings.errors
+    return _parsed(read_content(data, file, findings), before, findings)
+
+
+def _parsed(document: SourceDocument | None, before: int, findings: Findings) -> Layout | None:
     if document is None or findings.errors > before:
         return None
     root = document.root

@@ -14,7 +14,7 @@ from neurovis_spec.language.data_files import locate
 from neurovis_spec.language.located import Located, shown
 from neurovis_spec.language.reader import LARGEST
 from neurovis_spec.language.reader_files import FileFault, read_bytes
-from neurovis_spec.layout.file import parse
+from neurovis_spec.layout.file import parse_bytes
 from neurovis_spec.layout.model import Layout
 
 
@@ -36,13 +36,7 @@ def read_memory(path: Located[str], folder: Path, root: Path, network: Network, 
             findings.error(data.code, path.span, f"the file '{shown(path.value)}' {data.reason}")
         return None
     name = str(Path(path.span.file).parent / path.value)
-    try:
-        text = data.decode("utf-8")
-    except UnicodeDecodeError as error:
-        message = f"the byte 0x{data[error.start]:02x} of '{shown(path.value)}' is not UTF-8"
-        findings.error("invalid-utf8", path.span, message, "save the file as UTF-8")
-        return None
-    layout = parse(text, name, findings)
+    layout = parse_bytes(data, name, findings)
     return None if layout is None else known_part(layout, network, path.span, findings)
 
 
