@@ -35,6 +35,7 @@ RESERVED = frozenset({"t", "k", "dt", "i", "j", "n", "pi", "e"})
 _ELSEWHERE: Mapping[str, str] = {
     "k": "the step is known in a run; this value is worked out once, before it",
     "t": "the time is known in a run; this value is worked out once, before it",
+    "dt": "this is 'dt' itself",
     "i": "'i' is known within a group (the neuron's index) and in a connection's weight and centre (the source's)",
     "j": "'j' is known in a connection's weight and centre (the target's index)",
     "n": "'n' is known within a group (its count); a connection has n_from and n_to",
@@ -86,17 +87,21 @@ def parse_formula(
     try:
         tree = _parsed(formula.value, random, tuple((functions or {}).items()))
     except ExpressionError as error:
-        findings.error(error.code, formula.node.at(error.start, error.end), error.message, error.hint)
-        return None
-    unused = [name for name in names(tree) if name not in known]
-    if not unused:
-        return tree
-    unknown = unknown_names(tree, names(tree).difference(unused))
-    for node in () if incomplete else unknown:
-        place = formula.node.at(node.start, node.end)
+        for one in (error, *error.others):
+            if one.code == "draw-not-allowed" and findings.at_fault(formula.span):
+                continue  # a comma has cut it: what it was meant to be is not sure
+            findings.error(one.code, formula.node.at(one.start, one.end), one.message, one.hint)
+        used = [one for one in error.used if one[0] not in known]
+    else:
+        unused = [name for name in names(tree) if name not in known]
+        if not unused:
+            return tree
+        unknown = unknown_names(tree, names(tree).difference(unused))
+        used = [(node.name, node.start, node.end) for node in unknown]
+    for name, start, end in () if incomplete else used:
         few = known if findings.errors < MOST_HINTS else ()
-        message, hint = _unknown(node.name, few, functions or {}, what)
-        findings.error("unknown-name", place, message, hint)
+        message, hint = _unknown(name, few, functions or {}, what)
+        findings.error("unknown-name", formula.node.at(start, end), message, hint)
     return None
 
 

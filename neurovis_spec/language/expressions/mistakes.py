@@ -6,7 +6,7 @@ the characters at fault, with what to write instead where a habit from another l
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 
 from neurovis_spec.diagnostics import nearest
 from neurovis_spec.language.expressions.errors import ExpressionError, shortened
@@ -85,10 +85,11 @@ def unexpected(previous: Token | None, token: Token) -> ExpressionError:
     return _at("missing-operator", message, token, f"for a product write '{product}'")
 
 
-def unknown_function(name: Token, known: Iterable[str]) -> ExpressionError:
-    """A name before a parenthesis that is no function: misspelled, from another language, or a factor."""
-    functions = tuple(known)
+def unknown_function(name: Token, functions: Sequence[str], fitting: Sequence[str]) -> ExpressionError:
+    """A name before a parenthesis that is no function: misspelled, from another language, or a factor. ``fitting`` are
+    the functions that take as many arguments as are there: they come first."""
     close = nearest(name.text, functions) if len(name.text) > 1 else ()
+    close = tuple(sorted(close, key=lambda one: one not in fitting))
     if name.text in _INSTEAD:
         hint = _INSTEAD[name.text]
     elif close:

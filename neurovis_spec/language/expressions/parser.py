@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Literal, cast
+from typing import Literal, TypeAlias, cast
 
 from neurovis_spec.language.expressions import mistakes
 from neurovis_spec.language.expressions.errors import ExpressionError
@@ -38,6 +38,9 @@ __all__ = ["ExpressionError", "parse", "unknown_names"]
 MAX_NESTING = 64
 #: The functions that draw a number from two arguments.
 DRAWS: Mapping[str, str] = {"normal": "normal(mean, deviation)", "uniform": "uniform(low, high)"}
+
+#: The least and the most arguments of a function; None where there is no most.
+Arity: TypeAlias = tuple[int, int | None]
 
 _COMPARISON, _SIGN, _POWER = LEVELS["<"], LEVELS["%"] + 1, LEVELS["^"]
 _NOT = LEVELS["<"] - 1
@@ -67,6 +70,11 @@ def unknown_names(tree: Tree, known: Iterable[str]) -> list[Name]:
     return sorted(unknown, key=lambda node: node.start)
 
 
+def _takes(arity: Arity | None, given: int) -> bool:
+    """Whether a function may have so many arguments."""
+    return arity is not None and arity[0] <= given and (arity[1] is None or given <= arity[1])
+
+
 class _Parser:
     """Goes through the tokens once. Each method starts at the first token of what it is named after."""
 
@@ -77,6 +85,8 @@ class _Parser:
         self.draws = 0
         self.random = random
         self.extra_functions = extra_functions
+        #: mistakes that do not keep one from going on
+        self.faults: list[ExpressionError] = []
 
     @property
     def token(self) -> Token:
@@ -114,10 +124,19 @@ class _Parser:
     def whole(self) -> Tree:
         if self.at_end():
             raise ExpressionError("empty-expression", "an expression is missing here", 0, self.token.end)
-        tree = self.conditional()
-        if not self.at_end():
-            raise mistakes.unexpected(self.previous, self.token)
-        check_extent(tree)
+        try:
+            tree = self.conditional()
+            if not self.at_end():
+                raise mistakes.unexpected(self.previous, self.token)
+            check_extent(tree)
+        except ExpressionError as error:
+            error.others = tuple(self.faults)
+            raise
+        if self.faults:
+            first, *others = self.faults
+            first.others = tuple(others)
+            first.used = tuple((node.name, node.start, node.end) for node in walk(tree) if isinstance(node, Name))
+            raise first
         return tree
 
     def conditional(self) -> Tree:
@@ -184,39 +203,55 @@ class _Parser:
         return tree
 
     def call(self, name: Token) -> Tree:
-        least, most = self.arity(name)
+        arity = self.arity(name.text)
         index, drawn = self.draws, name.text in DRAWS and name.text not in self.extra_functions
         self.draws += drawn
         opening = self.advance()
         arguments: list[Tree] = []
-        with self.deeper(opening):
-            while not (self.is_operator(")") and not arguments):
-                arguments.append(self.conditional())
-                if not self.is_operator(","):
-                    break
-                self.advance()
-        end = self.close(opening).end
-        if len(arguments) < least or (most is not None and len(arguments) > most):
-            usage = DRAWS.get(name.text) if drawn else FUNCTIONS[name.text].usage if name.text in FUNCTIONS else None
-            raise mistakes.wrong_arguments(name, end, len(arguments), (least, most), usage)
+        try:
+            with self.deeper(opening):
+                while not (self.is_operator(")") and not arguments):
+                    arguments.append(self.conditional())
+                    if not self.is_operator(","):
+                        break
+                    self.advance()
+            end = self.close(opening).end
+        except ExpressionError:
+            self.check_call(name, arity, None, name.end)
+            raise
+        if not self.check_call(name, arity, len(arguments), end):
+            return Call(name.text, tuple(arguments), name.start, end)
         if drawn:
             kind = cast(Literal["normal", "uniform"], name.text)
             return Draw(kind, arguments[0], arguments[1], index, name.start, end)
         return Call(name.text, tuple(arguments), name.start, end)
 
-    def arity(self, name: Token) -> tuple[int, int | None]:
-        """The least and the most arguments of a function. Raises ExpressionError where there is no such function."""
-        if name.text in self.extra_functions:
-            return self.extra_functions[name.text], self.extra_functions[name.text]
-        if name.text in FUNCTIONS:
-            return FUNCTIONS[name.text].least, FUNCTIONS[name.text].most
-        if name.text not in DRAWS:
-            raise mistakes.unknown_function(name, (*self.extra_functions, *FUNCTIONS, *(DRAWS if self.random else ())))
-        if not self.random:
+    def arity(self, name: str) -> Arity | None:
+        """The least and the most arguments of a function; None where there is no such function."""
+        if name in self.extra_functions:
+            return self.extra_functions[name], self.extra_functions[name]
+        if name in FUNCTIONS:
+            return FUNCTIONS[name].least, FUNCTIONS[name].most
+        return (2, 2) if name in DRAWS else None
+
+    def check_call(self, name: Token, arity: Arity | None, given: int | None, end: int) -> bool:
+        """Whether a function may be called here with so many arguments (None where that is not known); what is wrong is
+        noted."""
+        drawn = name.text in DRAWS and name.text not in self.extra_functions
+        if arity is None:
+            known = [*self.extra_functions, *FUNCTIONS, *(DRAWS if self.random else ())]
+            fitting = [other for other in known if given is None or _takes(self.arity(other), given)]
+            self.faults.append(mistakes.unknown_function(name, known, fitting))
+        elif drawn and not self.random:
             message = f"'{name.text}' draws a random number, which this place does not allow"
             hint = "draw in 'weight', 'centre', 'bias', 'initial' (once) or in 'noise' (at every step)"
-            raise ExpressionError("draw-not-allowed", message, name.start, name.end, hint)
-        return 2, 2
+            self.faults.append(ExpressionError("draw-not-allowed", message, name.start, name.end, hint))
+        elif given is not None and not _takes(arity, given):
+            usage = DRAWS.get(name.text) if drawn else FUNCTIONS[name.text].usage if name.text in FUNCTIONS else None
+            self.faults.append(mistakes.wrong_arguments(name, end, given, arity, usage))
+        else:
+            return True
+        return False
 
     def close(self, opening: Token) -> Token:
         if self.is_operator(")"):
