@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -119,8 +120,7 @@ def _written(node: Sequence | Packed, findings: Findings, row: str) -> Cells | N
     )
 
 
-@dataclass(frozen=True)
-class Pairs:
+class Pairs(NamedTuple):
     """What the formulas of cells see: source ``i`` and target ``j``, which also count the numbers drawn, and more.
     ``vague``: what these are is not known, as an end is at fault; a formula that depends on them has no value then."""
 

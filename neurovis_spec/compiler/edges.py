@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,8 +27,7 @@ from neurovis_spec.language.values import EdgeRows, FileReference
 _AN_EDGE = "an edge is [from, to], [from, to, weight] or [from, to, weight, delay]"
 
 
-@dataclass(frozen=True)
-class EdgeList:
+class EdgeList(NamedTuple):
     """Edges: positions within the ends, weights, delays (−1: the entry's)."""
 
     i: IntArray

@@ -7,8 +7,7 @@ every parameter, one for each of n neurons; the neuron's index ``i`` and the cou
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -31,8 +30,7 @@ T = TypeVar("T")
 _MOST_LOOKS = 1000
 
 
-@dataclass(frozen=True, slots=True)
-class Settled:
+class Settled(NamedTuple):
     """Settings by name; ``perhaps`` are names that an unknown one may be meant for. ``failed``: one was unknown."""
 
     entries: Mapping[str, Entry]

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 
 from neurovis_spec.compiler.census import Census, Excess
 from neurovis_spec.compiler.constants import Constants
@@ -66,8 +66,7 @@ class Unit:
         return self.definitions.gaps
 
 
-@dataclass(frozen=True)
-class Expansion:
+class Expansion(NamedTuple):
     """All units, and the inputs of the network in the order of their places in the vector of all inputs."""
 
     units: tuple[Unit, ...]
@@ -92,8 +91,7 @@ class _Place:
     count: int
 
 
-@dataclass(frozen=True)
-class _Binding:
+class _Binding(NamedTuple):
     """What an instance says an input of its module is, where, and what it is; None where that is at fault."""
 
     name: str
