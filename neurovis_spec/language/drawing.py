@@ -51,10 +51,23 @@ def _pairs(node: Node, info: ValidationInfo) -> tuple[Reference, ...]:
 
 _TEXT = {"type": "string"}
 _PAIR = {"type": "array", "items": _TEXT, "minItems": 2, "maxItems": 2}
-ReferencesField = Annotated[
-    tuple[Reference, ...], Leaf(_references, {"type": "array", "items": {"type": "array", "items": _TEXT}})
+
+# what a spec and a module both say of their drawing
+ArrangeField = Annotated[
+    Keyed[Annotated[Located[str], words("row", "column", "grid", "ring", "arc")]],
+    Field(default_factory=dict, description="{reference: row | column | grid | ring | arc}."),
 ]
-PairsField = Annotated[tuple[Reference, ...], Leaf(_pairs, {"type": "array", "items": _PAIR})]
+BoxesField = Annotated[Keyed[ReferenceField], Field(default_factory=dict, description="{title: references}.")]
+MirrorField = Annotated[
+    tuple[Reference, ...],
+    Leaf(_pairs, {"type": "array", "items": _PAIR}),
+    Field(default=(), description="[[left, right], …]: groups or instances; the second is the first's mirror image."),
+]
+AlignField = Annotated[
+    tuple[Reference, ...],
+    Leaf(_references, {"type": "array", "items": {"type": "array", "items": _TEXT}}),
+    Field(default=(), description="[[references], …]: each list on one line across the direction."),
+]
 
 
 class Spacing(Model):
@@ -83,16 +96,10 @@ class LayoutModel(Model):
         None, description="Where the signals go: down, up, right, left (default down)."
     )
     positions: Keyed[PointField] = Field(default_factory=dict, description="Pins: {neuron: [x, y]}.")
-    arrange: Keyed[Annotated[Located[str], words("row", "column", "grid", "ring", "arc")]] = Field(
-        default_factory=dict, description="{reference: row | column | grid | ring | arc}."
-    )
-    boxes: Keyed[ReferenceField] = Field(default_factory=dict, description="{title: references}.")
-    mirror: PairsField = Field(
-        default=(), description="[[left, right], …]: groups or instances; the second is the first's mirror image."
-    )
-    align: ReferencesField = Field(
-        default=(), description="[[references], …]: each list on one line across the direction."
-    )
+    arrange: ArrangeField
+    boxes: BoxesField
+    mirror: MirrorField
+    align: AlignField
     file: TextField | None = Field(None, description="An earlier layout, whose places are kept where they can be.")
     spacing: Spacing | None = Field(None, description="Distances in units of the layout.")
 
@@ -105,16 +112,10 @@ class ModuleLayoutModel(Model):
     positions: Keyed[PointField] = Field(
         default_factory=dict, description="{neuron: [x, y]}, relative to the instance's origin."
     )
-    arrange: Keyed[Annotated[Located[str], words("row", "column", "grid", "ring", "arc")]] = Field(
-        default_factory=dict, description="{reference: row | column | grid | ring | arc}."
-    )
-    boxes: Keyed[ReferenceField] = Field(default_factory=dict, description="{title: references}.")
-    mirror: PairsField = Field(
-        default=(), description="[[left, right], …]: groups or instances; the second is the first's mirror image."
-    )
-    align: ReferencesField = Field(
-        default=(), description="[[references], …]: each list on one line across the direction."
-    )
+    arrange: ArrangeField
+    boxes: BoxesField
+    mirror: MirrorField
+    align: AlignField
 
 
 class Gain(Model):
