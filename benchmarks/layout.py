@@ -14,7 +14,7 @@ import argparse
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
@@ -66,9 +66,12 @@ def cases(folder: Path | None, slow: bool) -> Iterator[Case]:
     north, name = sample(folder, "north")
     yield Case(name, north)
     for path in sorted(HEXAPOD.glob("*.yaml")) if HEXAPOD.is_dir() else ():
-        yield Case(
-            f"specs/hexapod/{path.name}", [problem_of(nv.compile(path).network)], peers=("dot", "dot, clusters", "sfdp")
-        )
+        problem = problem_of(nv.compile(path).network)
+        peers: tuple[str, ...] = ("dot", "dot, clusters", "sfdp")
+        yield Case(f"specs/hexapod/{path.name}", [problem], peers=peers)
+        # the peers know no mirrors and no lines; without them ours, too, is free to let everything run along
+        plain = replace(problem, mirrors=(), align=())
+        yield Case(f"{path.name}, without mirror and align", [plain], peers=peers)
     yield Case("small worlds 300/2,500", [small_worlds(300, 2500)], ("layered", "large"), _HURRIED)
     if slow:
         worm, name = connectome(folder)
