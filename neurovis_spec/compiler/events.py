@@ -16,7 +16,15 @@ import numpy as np
 from neurovis_spec.compiler.connect import Connected
 from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.network import Block, IntArray, Learn, Network, Plasticity, frozen
-from neurovis_spec.compiler.references import Directory, few, key_of, look_at_keys, resolve_end, resolve_ends
+from neurovis_spec.compiler.references import (
+    Directory,
+    few,
+    key_of,
+    look_at_keys,
+    other_parameter,
+    resolve_end,
+    resolve_ends,
+)
 from neurovis_spec.diagnostics import Findings, Span, suggest
 from neurovis_spec.language.located import Formula, Located, shown
 from neurovis_spec.language.model import lost_names
@@ -135,8 +143,8 @@ class EventReader:
         span = key_of(model.source, "set", name).span
         known = (*self.constants.parameters, *self.constants.broken)
         if name not in known and not self.constants.incomplete:
-            hint = suggest(name, known, "parameters") or "the spec has no parameters"
-            self.findings.error("unknown-parameter", span, f"there is no parameter '{name}' to be set", hint)
+            message = f"there is no parameter '{shown(name)}' to be set"
+            self.findings.error("unknown-parameter", span, message, other_parameter(name, known))
         elif name in self.constants.structural:
             message = f"'{name}' cannot be set in a run: the structure of the network depends on it"
             self.findings.error("structural-parameter", span, message)

@@ -246,6 +246,7 @@ def _directories(settled: list[_Settled], total: int) -> tuple[Directory, ...]:
             one.gaps,
             {name: tuple(made[place] for place in places) for name, places in one.unit.children.items()},
             range(one.start, stop),
+            one.unit.section.inputs,
         )
     return tuple(made[index] for index in range(len(settled)))
 

@@ -46,6 +46,8 @@ class Directory:
     instances: Mapping[str, tuple[Directory, ...]] = field(default_factory=dict)
     #: all neurons, those of the instances behind its own
     members: range = range(0)
+    #: the inputs that are declared there
+    inputs: Collection[str] = ()
 
     @cached_property
     def known(self) -> tuple[str, ...]:
@@ -114,6 +116,11 @@ class Directory:
         found = self.instances.get(head, ())
         return tuple(one for inner in found for one in inner.instance(rest)) if dot else found
 
+    def feeds(self, name: str) -> bool:
+        """Whether a name is that of an input, of this place or of an instance within it."""
+        head, dot, rest = name.partition(".")
+        return any(inner.feeds(rest) for inner in self.instances.get(head, ())) if dot else name in self.inputs
+
     def covers(self, name: str) -> bool:
         """Whether an unknown name may be one whose declaration is at fault."""
         head, dot, rest = name.partition(".")
@@ -151,6 +158,16 @@ def few(name: str, known: Collection[str]) -> Collection[str]:
         return known
     begin = name[: max(1, len(name.rstrip("0123456789")) // 2)]
     return tuple(islice((other for other in known if other.startswith(begin)), _MANY))
+
+
+def other_parameter(name: str, known: Collection[str]) -> str:
+    """A help line for a parameter that cannot be set as there is none of that name; ``known`` are the spec's own."""
+    there = "the spec has no parameters" if not known else f"parameters of the spec: {', '.join(islice(known, 12))}"
+    if "." in name:
+        instance, _, own = name.partition(".")
+        where = f"{instance}: {{set: {{{own}: …}}}}"
+        return f"parameters of a module are set at its instance, as in {where}; {there}"
+    return suggest(name, known, "parameters") or there
 
 
 def key_of(section: SourceMapping, part: str, name: str) -> Located[str]:
@@ -225,6 +242,11 @@ def _unknown(name: str, span: Span, directory: Directory, findings: Findings) ->
         some = next(iter((*inside[0].groups, *inside[0].instances)), None)
         hint = None if some is None else f"name a group or a neuron in it, as in {name}.{some}"
         findings.error("unknown-neuron", span, f"'{shown(name)}' is an instance, not a neuron", hint)
+        return
+    if directory.feeds(name):
+        path, dot, own = name.rpartition(".")
+        hint = f"connect a neuron that takes it in: {{input: {own}}}{f' in the module of {path!r}' if dot else ''}"
+        findings.error("unknown-neuron", span, f"'{shown(name)}' is an input, not a neuron", hint)
         return
     message = f"there is no neuron or group '{shown(name)}'"
     hint = directory.hint(name) if findings.errors < MOST_HINTS else None

@@ -204,8 +204,8 @@ Keyed = Annotated[dict[str, V], WrapValidator(_keyed)]
 
 
 @dataclass(frozen=True, slots=True)
-class _KeysAreNames:
-    """Says in the schema what ``_named`` checks."""
+class KeysAreNames:
+    """Says in the schema that keys are names."""
 
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
@@ -214,4 +214,4 @@ class _KeysAreNames:
 
 
 #: A mapping whose keys are names of the author's: ``Named[Group]``.
-Named = Annotated[dict[str, V], WrapValidator(_named), _KeysAreNames()]
+Named = Annotated[dict[str, V], WrapValidator(_named), KeysAreNames()]

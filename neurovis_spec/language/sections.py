@@ -26,7 +26,7 @@ from neurovis_spec.language.located import (
     shown,
     words,
 )
-from neurovis_spec.language.model import Keyed, Model, Named
+from neurovis_spec.language.model import Keyed, KeysAreNames, Model
 from neurovis_spec.language.source import Entry, Mapping, Node, Packed, Scalar, Sequence
 from neurovis_spec.language.values import (
     FILE,
@@ -182,7 +182,9 @@ class EventModel(Model):
     at: FormulaField | None = Field(None, description="The step from which on it applies (set, lesion).")
     from_: FormulaField | None = Field(None, alias="from", description="The first step of a clamp.")
     to: FormulaField | None = Field(None, description="The step before which a clamp ends; without it, it lasts.")
-    set: Named[FormulaField] = Field(default_factory=dict, description="{parameter: value} from this step on.")
+    set: Annotated[Keyed[FormulaField], KeysAreNames()] = Field(
+        default_factory=dict, description="{parameter: value} from this step on."
+    )
     clamp: Keyed[FormulaField] = Field(default_factory=dict, description="{neurons: activity}.")
     lesion: PartsField = Field(default=(), description="Neurons and connections (FROM -> TO) that are removed.")
 

@@ -6,6 +6,7 @@ at a time, the same stretches however one runs, so that stepping and running giv
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 
 import numpy as np
@@ -102,9 +103,18 @@ def check_names(network: Network, names: Iterable[str]) -> None:
 def _entry(network: Network, name: str) -> Input:
     found = network.input_index.get(name)
     if found is None:
-        hint = suggest(name, network.input_index, "the inputs are")
+        hint = _numbered(network, name) or suggest(name, network.input_index, "the inputs are")
         raise InputError(f"no input '{name}'" + (f"; {hint}" if hint else "; the network has no inputs"))
     return found
+
+
+def _numbered(network: Network, name: str) -> str | None:
+    """What to say of an input of several instances, ``left.load``: each has its own."""
+    head, dot, own = name.partition(".")
+    pattern = re.compile(rf"{re.escape(head)}\d+\.{re.escape(own)}")
+    found = [other for other in network.input_index if dot and pattern.fullmatch(other)]
+    shown = ", ".join(f"'{other}'" for other in found[:6]) + (", …" if len(found) > 6 else "")
+    return f"'{head}' is several instances, each with its own: {shown}" if found else None
 
 
 def _numbers(entry: Input, value: npt.ArrayLike) -> FloatArray:
