@@ -107,7 +107,7 @@ class Census:
         """What a section makes with all that is within it, or the first of its instances that are too many, for the
         instances before it or its own neurons."""
         entries = tuple(section.instances.items())
-        own = sum(float(_size(group, constants, {}, 1)[0]) for group in section.neurons.values())
+        own = sum(float(size_of(group, constants, {}, 1)[0]) for group in section.neurons.values())
         if own > self._most:
             return Excess()
         start = Tally(0, int(own))
@@ -167,7 +167,7 @@ class Census:
                 if value is not None:
                     known[name] = value
         for group in module.model.neurons.values():
-            sizes = _size(group, constants, known, rows)
+            sizes = size_of(group, constants, known, rows)
             done.neurons += float(np.minimum(alike.many * sizes, _HUGE).sum())
             if done.large is None and group.count is not None and sizes.max() > self._most:
                 done.large = group.count, int(sizes.max())
@@ -222,7 +222,7 @@ def _used(model: ModuleModel) -> Iterable[str]:
     return dict.fromkeys(entry.module.value for entry in model.instances.values())
 
 
-def _size(group: GroupModel, constants: Constants, known: Mapping[str, Value], rows: int) -> FloatArray:
+def size_of(group: GroupModel, constants: Constants, known: Mapping[str, Value], rows: int) -> FloatArray:
     """How many neurons a group has, in each row."""
     if group.count is None:
         return np.full(rows, float(len(group.names or ()) or 1))

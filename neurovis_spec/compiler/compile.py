@@ -15,6 +15,7 @@ import numpy as np
 
 from neurovis_spec.compiler.connect import Connected, connect, join
 from neurovis_spec.compiler.constants import Constants
+from neurovis_spec.compiler.crowds import crowded
 from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.entries import Bundle
 from neurovis_spec.compiler.events import EventReader, wires_of, with_phases
@@ -27,12 +28,12 @@ from neurovis_spec.compiler.noise import make_noises
 from neurovis_spec.compiler.order import Cycle, levels
 from neurovis_spec.compiler.parameters import make_parameters
 from neurovis_spec.compiler.populate import Population, populate, without_neurons
-from neurovis_spec.compiler.references import Directory, key_span, other_parameter
+from neurovis_spec.compiler.references import Directory, key_span
 from neurovis_spec.compiler.sections import check_ros, layout_settings, make_outputs, render_settings
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.compiler.units import Expander, Unit, constants_of
 from neurovis_spec.compiler.warnings import Compiled, warn
-from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError
+from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError, suggest
 from neurovis_spec.language.includes import Includes, read_includes
 from neurovis_spec.language.model import opening
 from neurovis_spec.language.spec import Spec
@@ -69,6 +70,8 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
     make_parameters(spec, constants, request.parameters)
     _check_given(spec, constants, request.parameters)
     steps, episode = _clock(spec, constants)
+    if crowded(spec, constants, request.limits):
+        return None
     expander = Expander(library, request.root, findings, constants.dt, files={**request.files}, limits=request.limits)
     expansion = expander.expand(spec, constants, request.base)
     units, inputs = expansion.units, expansion.inputs
@@ -249,7 +252,7 @@ def _check_given(spec: Spec, constants: Constants, given: Mapping[str, float]) -
         if name not in spec.parameters:
             node = spec.source.entry("parameters")
             span = opening(spec.source) if node is None else node.key.span
-            hint = other_parameter(name, spec.parameters)
+            hint = suggest(name, spec.parameters, "parameters") or "the spec has no parameters"
             constants.findings.error("unknown-parameter", span, f"there is no parameter '{name}' to be set", hint)
 
 

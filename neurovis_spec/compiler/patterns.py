@@ -109,8 +109,29 @@ def pairs_of(
     if len(values) < len(_SETTINGS.get(name, ())) or name != written:
         return None
     if name in _FIXED:
-        return _FIXED[name](ends) if fits(n * m if name == "all_to_all" else n) else None
+        return _FIXED[name](ends) if fits(least_pairs(name, n, m, {})) else None
     return sized.pairs(values, ends, stream, fits)
+
+
+def least_pairs(name: str, n: int, m: int, values: Mapping[str, float]) -> int:
+    """How many pairs a pattern makes of n sources and m targets, but for a neuron's connection to itself: at the least,
+    or nearly so. 0 where that cannot be said, as these are no settings for such ends."""
+    if name in _FIXED:
+        return n * m if name == "all_to_all" else n
+    if not set(_SETTINGS.get(name, (name,))) <= values.keys():
+        return 0
+    if name == "random":
+        probability = values["probability"]
+        if not 0 < probability <= 1:
+            return 0
+        # fewer there are in one case in a million; who has made them is asked again
+        return max(0, int(n * m * probability - 5 * (n * m * probability * (1 - probability)) ** 0.5))
+    if name == "band":
+        return max(0, in_band(n, m, min(int(values["width"]), max(n, m))) - min(n, m))
+    each, ends, others = (values["count"], n, m) if name != "small_world" else (values["degree"], n, n)
+    if name == "fixed_indegree":
+        ends, others = m, n
+    return int(each) * ends if each <= others else 0
 
 
 def _settings(name: str, choice: Choice, findings: Findings) -> dict[str, Formula]:
@@ -174,20 +195,17 @@ class _Sized:
     ) -> Pairs | None:
         """The pairs; None, and a finding, where the settings do not fit the ends."""
         n, m = len(ends.sources), len(ends.targets)
+        least = least_pairs(self.name, n, m, values)
         if self.name == "random":
-            probability = values["probability"]
-            # So many there are at the least, but for one case in a million; who has made them is asked again.
-            least = n * m * probability - 5 * (n * m * probability * (1 - probability)) ** 0.5
-            return random(ends, probability, stream) if fits(max(0, int(least))) else None
+            return random(ends, values["probability"], stream) if fits(least) else None
         if self.name == "band":
-            width = min(int(values["width"]), max(n, m))
-            return band(ends, width) if fits(max(0, in_band(n, m, width) - min(n, m))) else None
+            return band(ends, min(int(values["width"]), max(n, m))) if fits(least) else None
         if self.name == "small_world":
             degree = int(values["degree"])
             if degree > n - 1:
                 self._too_many("degree", f"a degree of {degree} where each has {plural(n - 1, 'neighbour')}")
                 return None
-            return small_world(ends, degree, values["rewire"], stream) if fits(n * degree) else None
+            return small_world(ends, degree, values["rewire"], stream) if fits(least) else None
         return self._counted(int(values["count"]), ends, stream, fits)
 
     def _counted(self, count: int, ends: Ends, stream: Stream, fits: Callable[[int], bool]) -> Pairs | None:
