@@ -28,12 +28,12 @@ from neurovis_spec.compiler.noise import make_noises
 from neurovis_spec.compiler.order import Cycle, levels
 from neurovis_spec.compiler.parameters import make_parameters
 from neurovis_spec.compiler.populate import Population, populate, without_neurons
-from neurovis_spec.compiler.references import Directory, key_span
+from neurovis_spec.compiler.references import Directory, key_span, other_parameter
 from neurovis_spec.compiler.sections import check_ros, layout_settings, make_outputs, render_settings
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.compiler.units import Expander, Unit, constants_of
 from neurovis_spec.compiler.warnings import Compiled, warn
-from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError, suggest
+from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError
 from neurovis_spec.language.includes import Includes, read_includes
 from neurovis_spec.language.model import opening
 from neurovis_spec.language.spec import Spec
@@ -252,7 +252,7 @@ def _check_given(spec: Spec, constants: Constants, given: Mapping[str, float]) -
         if name not in spec.parameters:
             node = spec.source.entry("parameters")
             span = opening(spec.source) if node is None else node.key.span
-            hint = suggest(name, spec.parameters, "parameters") or "the spec has no parameters"
+            hint = other_parameter(name, spec.parameters)
             constants.findings.error("unknown-parameter", span, f"there is no parameter '{name}' to be set", hint)
 
 
