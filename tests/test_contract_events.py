@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from small_specs import answer, codes, compiled
 
+import neurovis_spec as nv
 from neurovis_spec.compiler.draws import Stream
 
 PRINTED = """\
@@ -186,3 +187,24 @@ connections:
             total = math.sqrt(total) if combine == "distance" else total
             drive = total + (0.1, 0.7)[number] + (0.1 * step + 1 / 3) + float(noise.normal(number, 0, step, 0))
             assert run[target][step] == drive
+
+
+@pytest.mark.parametrize("backend", ["reference", "numpy"])
+def test_a_parameter_that_a_plastic_weight_began_with_may_be_set_beyond_its_bounds(backend: str) -> None:
+    """``set`` changes no plastic weight, so what it would begin as does not matter any more; by hand as by an event."""
+    text = """
+parameters: {g: 1}
+neurons: {A: {bias: g}, B: {}}
+connections: {A -> B: {weight: g, bounds: [0, 2], plasticity: {decay: {rate: 0.5}}}}
+"""
+    run = compiled(text + "events: [{at: 2, set: {g: 5}}]").run(4, backend=backend)
+    assert run["A"].tolist() == [1, 1, 5, 5]
+    assert run.weights[:, 0].tolist() == [1, 0.5, 0.25, 0.125]
+    simulation = compiled(text).simulator(backend)
+    simulation.step()
+    simulation.set(g=5)
+    simulation.step()
+    assert simulation.activity[0] == 5
+    assert simulation.weights.tolist() == [0.25]
+    with pytest.raises(nv.SpecError):
+        nv.compile_text("neurovis: 1\nname: x\n" + text, g=5)

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from neurovis_spec.compiler.connect import Connected, connect, join
-from neurovis_spec.compiler.constants import Constants
+from neurovis_spec.compiler.constants import Constants, parse_formula
 from neurovis_spec.compiler.crowds import crowded
 from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.entries import Bundle
@@ -34,6 +34,7 @@ from neurovis_spec.compiler.tables import Files
 from neurovis_spec.compiler.units import Expander, Unit, constants_of
 from neurovis_spec.compiler.warnings import Compiled, warn
 from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError
+from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.includes import Includes, read_includes
 from neurovis_spec.language.model import opening
 from neurovis_spec.language.spec import Spec
@@ -51,6 +52,8 @@ class Request:
     #: the included files, where they are read already, and the data files by the folder that paths are relative to
     includes: Includes | None = None
     files: Mapping[Path, Files] = field(default_factory=dict)
+    #: whether this is for a run that has begun: a plastic weight is then what it has become, not what it would begin as
+    begun: bool = False
 
 
 def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_events: bool = True) -> Network | None:
@@ -86,7 +89,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
     directory = population.directory
     outputs = make_outputs(spec, directory, findings)
     layout = layout_settings(spec.layout, units, population, findings)
-    made = connect(units, population, request.limits, seed)
+    made = connect(units, population, request.limits, seed, request.begun)
     bundles = made.bundles
     noises = make_noises(units, population, sum(entry.size for entry in inputs))
     expansion.depend()
@@ -191,7 +194,7 @@ def _eventful(
 
     def again(values: Mapping[str, float]) -> Network | None:
         parameters = {**request.parameters, **values}
-        changed = replace(request, parameters=parameters, seed=network.seed)
+        changed = replace(request, parameters=parameters, seed=network.seed, begun=True)
         return compile_spec(spec, changed, findings, with_events=False)
 
     if findings.errors > before:
@@ -237,6 +240,9 @@ def _under_way(bundles: tuple[Bundle, ...], findings: Findings) -> bool:
 def _step_length(spec: Spec, constants: Constants) -> None:
     """dt, before anything else: parameters may use it, so it uses none of them."""
     if spec.time is None or spec.time.dt is None:
+        return
+    known = "'dt' comes before the parameters, which may use it; known here"
+    if parse_formula(spec.time.dt, CONSTANTS, constants.findings, what=known) is None:
         return
     dt = constants.scalar(spec.time.dt)
     if dt is not None and not dt > 0:
@@ -287,7 +293,7 @@ def rebind(spec: Spec, request: Request, network: Network, changes: Mapping[str,
         findings.error("structural-parameter", span, message)
     findings.check()
     parameters = {**request.parameters, **changes}
-    made = compile_spec(spec, replace(request, parameters=parameters, seed=network.seed), findings)
+    made = compile_spec(spec, replace(request, parameters=parameters, seed=network.seed, begun=True), findings)
     findings.check()
     if made is None:  # pragma: no cover - an error is among the findings where there is no network
         raise SpecError((Diagnostic("internal", "the network could not be made", opening(spec.source)),))

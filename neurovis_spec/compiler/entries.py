@@ -64,7 +64,8 @@ class _Shape:
 
 @dataclass(frozen=True)
 class Place:
-    """Where an entry stands: its unit, what is called how there, and how many connections it may make."""
+    """Where an entry stands: its unit, what is called how there, how many connections it may make, whether the run has
+    begun for which they are made."""
 
     unit: Unit
     directory: Directory
@@ -72,6 +73,7 @@ class Place:
     limits: Limits
     seed: int
     room: int
+    begun: bool
 
 
 @dataclass(frozen=True)
@@ -329,7 +331,7 @@ class EntryBuilder:
         if low > high:
             findings.error("out-of-range", entry.value.span, f"the lower bound {low:g} is above the upper one {high:g}")
             return None
-        if weights is not None and ((weights < low) | (weights > high)).any():
+        if weights is not None and not self.place.begun and ((weights < low) | (weights > high)).any():
             first = weights[(weights < low) | (weights > high)][0]
             message = f"the first weight {first:g} lies outside the bounds {low:g} to {high:g}"
             findings.error("weight-outside", entry.value.span, message)
