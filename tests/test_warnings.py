@@ -160,12 +160,36 @@ def test_a_neuron_that_may_be_active_is_let_be(neuron: str) -> None:
     assert warnings(body) == []
 
 
-def test_a_neuron_of_which_nothing_depends_is_let_be() -> None:
-    assert warnings("neurons: {A: {}}\n") == []
+def test_a_neuron_without_any_connection_is_told_of_where_others_have_some() -> None:
+    assert warnings("neurons: {A: {}, B: {count: 2}}\n") == []  # a sketch
+    assert warnings("neurons: {A: {bias: 1}, B: {}, C: {}}\nconnections: {A -> B: 1}\n") == [("idle-neuron", "C")]
 
 
-def test_what_feeds_itself_is_reached() -> None:
-    assert warnings("neurons: {A: {}, B: {}}\nconnections: {A -> A: 1, A -> B: 1}\n") == []
+@pytest.mark.parametrize(
+    ("neurons", "connections", "told"),
+    [
+        ("A: {}, B: {}", "A -> A: 1, A -> B: 1", ["A"]),
+        ("A: {}, B: {}, C: {}", "A -> B: 1, B -> A: 1, B -> C: 1, C -> C: 1", ["A", "B"]),
+        ("K: {count: 3, activation: tanh}", "K -> K: {pattern: ring}", ["K"]),
+        ("A: {initial: 0.1}, B: {}", "A -> A: 1, A -> B: 1", []),
+        ("A: {activation: cos}, B: {}", "A -> A: 1, A -> B: 1, B -> B: 1", []),
+        ("A: {activation: {gaussian: {sigma: 1}}, combine: distance}", "A -> A: {centre: 1}", []),
+        ("A: {combine: distance}, B: {}", "A -> A: {centre: 1}, A -> B: 1", []),
+        ("A: {bias: 1}, B: {}, C: {}", "A -> B: 0, B -> B: 1, B -> C: 1, C -> B: 1", []),
+    ],
+)
+def test_what_only_feeds_itself_is_not_reached(neurons: str, connections: str, told: list[str]) -> None:
+    body = f"neurons: {{{neurons}}}\nconnections: {{{connections}}}\n"
+    assert warnings(body) == [("idle-neuron", name) for name in told]
+    run = nv.compile_text(f"neurovis: 1\nname: x\n{body}").run(20)
+    assert all(not run[name].any() for name in told)
+
+
+def test_a_long_way_from_what_is_active() -> None:
+    body = "neurons: {A: {bias: 1}, K: {count: 60}, B: {}}\n"
+    body += "connections: {A -> K1: 1, K -> K: {pattern: chain}, K60 -> B: 1"
+    assert warnings(body + "}\n") == []
+    assert warnings(body.replace("A -> K1: 1, ", "") + ", A -> B: 1}\n") == [("idle-neuron", "K")]
 
 
 def test_a_clamp_is_a_source() -> None:

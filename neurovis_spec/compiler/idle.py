@@ -1,50 +1,111 @@
 """Idle neurons: those whose activity is 0 at every step, whatever happens elsewhere.
 
-In: a Network. Out: for each group the neurons that nothing reaches, that have no input, bias, initial value or noise,
-and that stay at 0 by their model and activation (a cosine would not), while something depends on them.
+In: a Network. Out: for each group the neurons that nothing reaches but themselves or each other, that have no input,
+bias, initial value or noise, and that stay at 0 by their model and activation (a cosine would not). Those that are only
+behind such neurons are not told of: they follow from these. A network without a single connection is a sketch: of its
+neurons only those are told of that an output or a rule asks for.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.network import Block, Group, Network
+from neurovis_spec.compiler.network import Block, Group, IntArray, Network
 from neurovis_spec.language.expressions.arrays import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 
+Mask = npt.NDArray[np.bool_]
+#: How far what is active is followed at once; only long ways are gone step by step.
+_AT_ONCE = 8
 
-def idle_neurons(network: Network) -> Iterator[tuple[Group, list[int]]]:
+
+class Idle(NamedTuple):
+    """Neurons of a group that stay at 0; ``driven``: by themselves or each other."""
+
+    group: Group
+    members: list[int]
+    driven: bool
+
+
+def idle_neurons(network: Network) -> Iterator[Idle]:
     """Groups with their idle neurons, in the order of the groups."""
-    neurons = network.neurons
-    idle = (neurons.input < 0) & (neurons.bias == 0) & np.isnan(neurons.initial)
-    idle[network.connections.targets] = False
+    neurons, connections = network.neurons, network.connections
+    quiet = (neurons.input < 0) & (neurons.bias == 0) & np.isnan(neurons.initial)
     for noise in network.noises:
-        idle[noise.members] = False
-    idle &= _needed(network)
-    if not idle.any():
+        quiet[noise.members] = False
+    for block in network.blocks:
+        if block.combine == "distance":  # |c| away from a signal of 0
+            quiet[connections.targets[block.incoming]] = False
+    if not len(connections.sources):
+        quiet &= _needed(network)
+    if not quiet.any():
         return
     for block in network.blocks:
-        idle[block.members] &= _stays_at_zero(block, network.dt)
+        quiet[block.members] &= _stays_at_zero(block, network.dt)
+    idle = _unreached(quiet, connections.sources, connections.targets)
+    if not idle.any():
+        return
+    idle = _first(idle, connections.sources, connections.targets)
+    driven = np.zeros(len(neurons), dtype=np.bool_)
+    driven[connections.targets] = True
     for group in neurons.groups:
         members = [member for member in group.indices if idle[member]]
         if members:
-            yield group, members
+            yield Idle(group, members, bool(driven[members].any()))
 
 
-def _needed(network: Network) -> npt.NDArray[np.bool_]:
-    """Whether something depends on a neuron: a connection, an output or a rule."""
+def _needed(network: Network) -> Mask:
+    """Whether an output or a rule asks for a neuron."""
     n = len(network.neurons)
     needed = np.zeros(n, dtype=np.bool_)
-    needed[network.connections.sources] = True
     for output in network.outputs:
         needed[output.neurons] = True
     for plasticity in network.plasticity:
         for signal in plasticity.signals.values():
             needed[signal[signal < n]] = True
     return needed
+
+
+def _unreached(quiet: Mask, sources: IntArray, targets: IntArray) -> Mask:
+    """The quiet neurons that no way leads to from one that is not."""
+    reached = ~quiet
+    for _ in range(_AT_ONCE):
+        before = int(reached.sum())
+        reached[targets[reached[sources]]] = True
+        if int(reached.sum()) == before:
+            return ~reached
+    rest = np.flatnonzero(~reached[targets])  # connections that may still lead somewhere
+    order = rest[np.argsort(sources[rest], kind="stable")]
+    starts = np.searchsorted(sources[order], np.arange(len(quiet) + 1))
+    waiting = np.flatnonzero(reached).tolist()
+    while waiting:
+        neuron = waiting.pop()
+        for target in targets[order[starts[neuron] : starts[neuron + 1]]].tolist():
+            if not reached[target]:
+                reached[target] = True
+                waiting.append(target)
+    return ~reached
+
+
+def _first(idle: Mask, sources: IntArray, targets: IntArray) -> Mask:
+    """Of the idle neurons those that are not behind other ones: without sources, or on a cycle that has none."""
+    inside = np.flatnonzero(idle[sources] & idle[targets] & (sources != targets))
+    behind = np.zeros(len(idle), dtype=np.bool_)
+    behind[targets[inside]] = True
+    if not behind.any():
+        return idle
+    import networkx
+
+    graph = networkx.DiGraph(zip(sources[inside].tolist(), targets[inside].tolist(), strict=True))
+    result = idle & ~behind
+    for cycle in networkx.strongly_connected_components(graph):
+        if len(cycle) > 1 and all(before in cycle for neuron in cycle for before in graph.predecessors(neuron)):
+            result[list(cycle)] = True
+    return result
 
 
 def _stays_at_zero(block: Block, dt: float) -> npt.NDArray[np.bool_]:

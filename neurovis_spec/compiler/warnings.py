@@ -140,14 +140,14 @@ _INSTANCE: Final = "add one under 'instances', or remove it"
 
 
 def _neurons(compiled: Compiled, findings: Findings) -> None:
-    """Neurons that stay at 0 for ever while something depends on them; a finding for each group as it is written."""
+    """Neurons that stay at 0 for ever; a finding for each group as it is written."""
     spec, network = compiled.spec, compiled.network
     events = spec.source.get("events")
     if events is not None and any(text == "clamp" for text in _texts(events, frozenset(), keys=True)):
         return  # what is clamped is active from outside
     written = {unit.called(name): (unit, name) for unit in compiled.units for name in unit.section.neurons}
     told: set[Span] = set()
-    for group, members in idle_neurons(network):
+    for group, members, driven in idle_neurons(network):
         unit, own = written[group.name]
         model, span = unit.section.neurons[own], key_span(unit.section, "neurons", own)
         if span in told or model.bias is not None or model.initial is not None:
@@ -157,7 +157,10 @@ def _neurons(compiled: Compiled, findings: Findings) -> None:
         shown = f"'{group.name}'" if len(names) == group.count else ", ".join(f"'{name}'" for name in names[:5])
         if len(names) > 5 and len(names) < group.count:
             shown += " and others"
-        message = f"nothing reaches {shown}, and there is no input, bias, initial or noise: the activity stays 0"
+        outside = "from outside " if driven else ""
+        message = (
+            f"nothing {outside}reaches {shown}, and there is no input, bias, initial or noise: the activity stays 0"
+        )
         hint = "connect something to it, or give it an input, a bias, an initial or a noise"
         findings.warning("idle-neuron", span, message, hint)
 
