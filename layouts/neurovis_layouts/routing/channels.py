@@ -8,26 +8,18 @@ its ends (dynamic programming over rows); ways that share a gap keep apart.
 from __future__ import annotations
 
 import math
-from bisect import bisect_left, insort
-from collections.abc import Mapping, Sequence
+from bisect import bisect_left, bisect_right
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
-from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
 from neurovis_layouts.routing.curves import Waypoint
+from neurovis_layouts.routing.rows import Own, Rows, Span
+from neurovis_layouts.routing.walls import FloatArray, Frame, IntArray
 from neurovis_spec.layout.model import LayoutEdge, Point
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
-IntArray: TypeAlias = npt.NDArray[np.int64]
-Rect: TypeAlias = tuple[float, float, float, float]
-Frame: TypeAlias = tuple[frozenset[int], Rect]
-_Span: TypeAlias = tuple[float, float]
-
-_DISC, _ROW = 0.45, 0.42
-_BESIDE_FRAME = 0.2
-#: Rows closer than this are one.
 _FINE = 0.15
 _INSET = 0.25
 _NARROW = 0.3
@@ -36,10 +28,11 @@ _APART = 0.22
 _SHARED, _SQUEEZED, _ACROSS = 1.5, 0.4, 1.25
 _LEAST = 0.75
 _WALL = 60.0
-#: Places tried in a row, about; ways closer than this to the straight line are kept apart from.
-_CHOICES, _NEAR, _KEPT = 24, 2.0, 2
-#: Where a way is pulled straight, over how many rows, and how close to another.
-_FARTHEST, _BESIDE_WAY = 40, 0.12
+#: Places tried in a row, about; ways closer than this to the straight line are kept apart from, but for so many on
+#: either side.
+_CHOICES, _NEAR, _MOST_NEAR, _KEPT = 24, 2.0, 8, 2
+#: Where a way is pulled straight: over how many rows, how far aside, and how close to another.
+_FARTHEST, _ASIDE, _BESIDE_WAY = 40, 0.6, 0.12
 #: With more edges than this nobody can follow one: they take the straight way.
 _MOST = 1500
 
@@ -56,26 +49,30 @@ def channels(
     across: dict[int, list[Waypoint]] = {}
     if len(edges) > _MOST:
         return {i: [] for i in edges}, {}
-    down = _Rows(centres, frames)
-    side = _Rows([(y, x) for x, y in centres], [(own, (r[1], r[0], r[3], r[2])) for own, r in frames])
+    times = Counter(frozenset((edge.source, edge.target)) for edge in edges.values())
+    down = Rows(centres, frames, len(edges))
+    side = Rows([(y, x) for x, y in centres], [(own, (r[1], r[0], r[3], r[2])) for own, r in frames], len(edges))
     for i, edge in sorted(edges.items(), key=lambda item: (_length(item[1], centres), item[0])):
         if edge.source == edge.target:
             continue
+        ends = edge.source, edge.target
+        alone = times[frozenset(ends)] == 1
         if gates.get(i):
-            path = down.through(edge.source, edge.target, gates[i])
-            down.use(path)
-            along[i] = down.knots(path, edge.source, edge.target)
+            path = _through(down, ends, gates[i])
+            down.use(path[1:-1])
+            along[i] = _knots(down, path, ends, alone)
             continue
-        found = [
-            (cost * factor, place, path)
-            for place, (rows, factor) in enumerate(((down, 1.0), (side, _ACROSS)))
-            for cost, path in [rows.way(edge.source, edge.target)]
-        ]
-        cost, place, path = min(found, key=lambda item: item[:2])
-        if math.isinf(cost):
+        cost, path = _way(down, ends)
+        least = _straight(centres[ends[0]], centres[ends[1]]) * _ACROSS
+        other, aside = _way(side, ends) if cost > least else (math.inf, [])
+        if math.isinf(min(cost, other)):
             continue
-        (down, side)[place].use(path)
-        (along, across)[place][i] = (down, side)[place].knots(path, edge.source, edge.target)
+        if cost <= other * _ACROSS:
+            down.use(path[1:-1])
+            along[i] = _knots(down, path, ends, alone)
+        else:
+            side.use(aside[1:-1])
+            across[i] = _knots(side, aside, ends, alone)
     return along, across
 
 
@@ -84,155 +81,169 @@ def _length(edge: LayoutEdge, centres: Sequence[Point]) -> float:
     return abs(ax - bx) + abs(ay - by)
 
 
-class _Rows:
-    """Discs and frames by rows, and where ways run already."""
-
-    def __init__(self, centres: Sequence[Point], frames: Sequence[Frame]) -> None:
-        self._centres = centres
-        self._frames = frames
-        self._sorted = sorted((y, x, i) for i, (x, y) in enumerate(centres))
-        self._heights = [y for y, _, _ in self._sorted]
-        self._used: dict[float, list[float]] = {}
-        stops = sorted(set(self._heights) | {y for _, r in frames for y in (r[1], r[3])})
-        self._rows: list[float] = []
-        for y in stops:
-            if not self._rows or y - self._rows[-1] >= _FINE:
-                self._rows.append(y)
-
-    def way(self, source: int, target: int) -> tuple[float, list[Point]]:
-        """The cost of the best way, infinite where the ends are level, and its points: both ends, one in each row."""
-        start, end = self._centres[source], self._centres[target]
-        if abs(end[1] - start[1]) < _LEAST:
-            return math.inf, []
-        if start[1] > end[1]:
-            cost, path = self._way(end, start, (source, target))
-            return cost, path[::-1]
-        return self._way(start, end, (source, target))
-
-    def through(self, source: int, target: int, gates: Sequence[Waypoint]) -> list[Point]:
-        """The points of the best way through these gates, from above to below or the other way round."""
-        start, end = self._centres[source], self._centres[target]
-        if start[1] > end[1]:
-            return self.through(target, source, gates[::-1])[::-1]
-        path = [start]
-        for gate in gates:
-            top, bottom = (gate.x, gate.y - gate.half), (gate.x, gate.y + gate.half)
-            path += self._way(path[-1], top, (source, target))[1][1:]
-            path += [(gate.x, y) for y in self._rows if top[1] + _FINE < y < bottom[1] - _FINE]
-            if gate.half > 0:
-                path.append(bottom)
-        return [*path, *self._way(path[-1], end, (source, target))[1][1:]]
-
-    def _way(self, start: Point, end: Point, own: tuple[int, int]) -> tuple[float, list[Point]]:
-        """The cost of the best way down from one point to another, and its points: both ends, one in each row."""
-        source, target = own
-        rows = [y for y in self._rows if start[1] + _ROW < y < end[1] - _ROW]
-        foreign = self._foreign(source, target)
-        layers: list[tuple[FloatArray, IntArray]] = []
-        cost, across, before = np.zeros(1), np.array([start[0]]), start[1]
-        for y in [*rows, end[1]]:
-            places, extra = np.array([end[0]]), np.zeros(1)
-            if y != end[1]:
-                kept = across[np.argsort(cost, kind="stable")[:_KEPT]].tolist()
-                places, extra = self._places(self._spans(y, source, target, foreign), y, start, end, kept)
-            walls = [(r[0], r[2]) for r in foreign if r[1] <= y and before <= r[3]]
-            ways = cost[None, :] + _step(across, places, y - before) + _through(across, places, walls)
-            chosen = np.argmin(ways, axis=1)
-            layers.append((places, chosen))
-            cost, across, before = ways[np.arange(len(places)), chosen] + extra, places, y
-        path: list[Point] = []
-        k = 0
-        for (places, chosen), y in zip(layers[::-1], [end[1], *rows[::-1]], strict=True):
-            path.append((float(places[k]), y))
-            k = int(chosen[k])
-        return float(cost[0]), [start, *path[::-1]]
-
-    def _foreign(self, source: int, target: int) -> list[Rect]:
-        return [rect for own, rect in self._frames if source not in own and target not in own]
-
-    def _spans(self, y: float, source: int, target: int, foreign: Sequence[Rect]) -> list[_Span]:
-        """What is free in a row."""
-        low, high = bisect_left(self._heights, y - _ROW), bisect_left(self._heights, y + _ROW)
-        blocked = [(x - _DISC, x + _DISC) for _, x, i in self._sorted[low:high] if i not in (source, target)]
-        blocked += [(x0 - _BESIDE_FRAME, x1 + _BESIDE_FRAME) for x0, y0, x1, y1 in foreign if y0 <= y <= y1]
-        blocked.sort()
-        free: list[_Span] = []
-        edge = -math.inf
-        for low_x, high_x in blocked:
-            if low_x > edge:
-                free.append((edge, low_x))
-            edge = max(edge, high_x)
-        return [*free, (edge, math.inf)]
-
-    def _places(
-        self, free: Sequence[_Span], y: float, start: Point, end: Point, kept: Sequence[float]
-    ) -> tuple[FloatArray, FloatArray]:
-        """Where a way may run through a row, in order, and what that costs: the places nearest to the straight line,
-        and straight on from the best ones before (``kept``)."""
-        line = start[0] + (end[0] - start[0]) * (y - start[1]) / (end[1] - start[1])
-        used = self._used.get(y, [])
-        near = used[bisect_left(used, line - _NEAR) : bisect_left(used, line + _NEAR)]
-        wishes = [line, start[0], end[0], *(x - _APART for x in near), *(x + _APART for x in near)]
-        straight = {x for x in kept if any(low <= x <= high for low, high in free)}
-        found: dict[float, float] = {}
-        for low, high in sorted(free, key=lambda span: (max(span[0] - line, line - span[1], 0.0), span)):
-            inset = min(_INSET, (high - low) / 2)
-            if len(found) > _CHOICES and not any(low <= x <= high for x in straight):
-                continue
-            for wish in [*wishes, low + inset, high - inset, *(x for x in kept if low <= x <= high)]:
-                x = min(max(wish, low + inset), high - inset)
-                if math.isfinite(x) and x not in found:
-                    beside = used[bisect_left(used, x - _APART) : bisect_left(used, x + _APART)]
-                    crowd = sum(1 - abs(x - other) / _APART for other in beside)
-                    found[x] = _SHARED * crowd + (_SQUEEZED if high - low < _NARROW else 0.0)
-        places = sorted(found)
-        return np.array(places), np.array([found[x] for x in places])
-
-    def use(self, path: Sequence[Point]) -> None:
-        """Note where a way runs."""
-        for x, y in path[1:-1]:
-            insort(self._used.setdefault(y, []), x)
-
-    def knots(self, path: Sequence[Point], source: int, target: int) -> list[Waypoint]:
-        """The points of a way at which it bends; what lies on a line that is free is left out."""
-        foreign = self._foreign(source, target)
-        free = [self._spans(y, source, target, foreign) for _, y in path]
-        knots: list[Waypoint] = []
-        at = 0
-        while at < len(path) - 1:
-            reach = next(
-                n
-                for n in range(min(len(path) - 1, at + _FARTHEST), at, -1)
-                if n == at + 1 or self._clear(path, free, at, n)
-            )
-            if reach < len(path) - 1:
-                x, y = path[reach]
-                narrow = any(low <= x <= high and high - low < 1.2 for low, high in free[reach])
-                knots.append(Waypoint(x, y, 0.2 if narrow else 0.0))
-            at = reach
-        return _spaced(knots)
-
-    def _clear(self, path: Sequence[Point], free: Sequence[Sequence[_Span]], at: int, to: int) -> bool:
-        (ax, ay), (bx, by) = path[at], path[to]
-        for n in range(at + 1, to):
-            y = path[n][1]
-            x = ax + (bx - ax) * (y - ay) / (by - ay)
-            if abs(x - path[n][0]) > 0.6 or not any(low <= x <= high for low, high in free[n]):
-                return False
-            used = self._used.get(y, [])
-            beside = used[bisect_left(used, x - _BESIDE_WAY) : bisect_left(used, x + _BESIDE_WAY)]
-            if any(other != path[n][0] for other in beside):
-                return False
-        return True
+def _straight(a: Point, b: Point) -> float:
+    """Hardly more than the least that a way between two points costs."""
+    return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2) * (1 - 1e-9)
 
 
-def _through(a: FloatArray, b: FloatArray, walls: Sequence[_Span]) -> FloatArray:
-    """What it costs to run from one side of frames to the other between two rows: (to b, from a)."""
+def _way(rows: Rows, ends: tuple[int, int]) -> tuple[float, list[Point]]:
+    """The cost of the best way, infinite where the ends are level, and its points: both ends, one in each row."""
+    start, end = rows.centres[ends[0]], rows.centres[ends[1]]
+    if abs(end[1] - start[1]) < _LEAST:
+        return math.inf, []
+    own = rows.own(*ends)
+    if start[1] > end[1]:
+        cost, path = _down(rows, end, start, own)
+        return cost, path[::-1]
+    return _down(rows, start, end, own)
+
+
+def _through(rows: Rows, ends: tuple[int, int], gates: Sequence[Waypoint]) -> list[Point]:
+    """The points of the best way through these gates, from above to below or the other way round."""
+    start, end = rows.centres[ends[0]], rows.centres[ends[1]]
+    if start[1] > end[1]:
+        return _through(rows, ends[::-1], gates[::-1])[::-1]
+    own = rows.own(*ends)
+    path = [start]
+    for gate in gates:
+        top, bottom = (gate.x, gate.y - gate.half), (gate.x, gate.y + gate.half)
+        path += _down(rows, path[-1], top, own)[1][1:]
+        path += [(gate.x, y) for y in rows.between(top[1], bottom[1], own, _FINE)]
+        if gate.half > 0:
+            path.append(bottom)
+    return [*path, *_down(rows, path[-1], end, own)[1][1:]]
+
+
+def _down(rows: Rows, start: Point, end: Point, own: Own) -> tuple[float, list[Point]]:
+    """The cost of the best way down from one point to another, and its points: both ends, one in each row."""
+    heights = [*rows.between(start[1], end[1], own), end[1]]
+    line = [(_at(start, end, y), y) for y in heights]
+    if _open(rows, [start, *line], own):
+        # nothing is shorter
+        return _cost([start, *line]), [start, *line]
+    layers: list[tuple[list[float], IntArray]] = []
+    cost, across, before = np.zeros(1), [start[0]], start[1]
+    for middle, y in line:
+        places, extra = [end[0]], [0.0]
+        if y != end[1]:
+            kept = [across[k] for k in np.argsort(cost, kind="stable")[:_KEPT].tolist()]
+            places, extra = _places(rows.free(y, own), rows.used(y), middle, (start[0], end[0]), kept)
+        ways = cost[None, :] + _step(np.array(across), np.array(places), y - before)
+        limits = min(across[0], places[0]), max(across[-1], places[-1])
+        walls = rows.walls(before, y, own, limits)
+        if walls:
+            ways = ways + _WALL * _sides(np.array(across), np.array(places), walls)
+        chosen = np.argmin(ways, axis=1)
+        layers.append((places, chosen))
+        cost, across, before = ways[np.arange(len(places)), chosen] + np.array(extra), places, y
+    path: list[Point] = []
+    k = 0
+    for (places, chosen), y in zip(layers[::-1], heights[::-1], strict=True):
+        path.append((places[k], y))
+        k = int(chosen[k])
+    return float(cost[0]), [start, *path[::-1]]
+
+
+def _open(rows: Rows, line: Sequence[Point], own: Own) -> bool:
+    """Whether a straight line runs through rows with room on both sides."""
+    for x, y in line[1:-1]:
+        free = rows.free(y, own)
+        low, high = free[bisect_left(free, x, key=_end)]
+        if not low + _INSET <= x <= high - _INSET or _crowd(rows.used(y), x):
+            return False
+    for (ax, top), (bx, bottom) in pairwise(line):
+        if rows.walls(top, bottom, own, (min(ax, bx), max(ax, bx))):
+            return False
+    return True
+
+
+def _cost(path: Sequence[Point]) -> float:
+    """What a way costs where it has room."""
+    total = 0.0
+    for (ax, ay), (bx, by) in pairwise(path):
+        total += float(_step(np.array([ax]), np.array([bx]), by - ay)[0, 0])
+    return total
+
+
+def _end(span: Span) -> float:
+    return span[1]
+
+
+def _at(start: Point, end: Point, y: float) -> float:
+    """Where the straight line between two points is at a height."""
+    return start[0] + (end[0] - start[0]) * (y - start[1]) / (end[1] - start[1])
+
+
+def _sides(a: FloatArray, b: FloatArray, walls: Sequence[Span]) -> FloatArray:
+    """How many walls a step leads through, from one side to the other: (to b, from a)."""
     low, high = np.minimum(a[None, :], b[:, None]), np.maximum(a[None, :], b[:, None])
     total = np.zeros(low.shape)
     for x0, x1 in walls:
-        total += _WALL * ((low <= x0) & (x1 <= high))
+        total += (low <= x0) & (x1 <= high)
     return total
+
+
+def _places(
+    free: Sequence[Span], used: Sequence[float], line: float, ends: Span, kept: Sequence[float]
+) -> tuple[list[float], list[float]]:
+    """Where a way may run through a row, in order, and what that costs: the places nearest to the straight line, and
+    straight on from the best ones before (``kept``)."""
+    at = bisect_left(used, line)
+    near = used[max(bisect_left(used, line - _NEAR), at - _MOST_NEAR) : at + _MOST_NEAR]
+    near = near[: bisect_left(near, line + _NEAR)]
+    wishes = sorted([line, *ends, *(x - _APART for x in near), *(x + _APART for x in near)])
+    found: dict[float, float] = {}
+    for number in _outward(free, line):
+        if len(found) > _CHOICES:
+            break
+        _try(free[number], wishes, kept, used, found)
+    for x in kept:
+        number = bisect_left(free, x, key=_end)
+        if number < len(free) and free[number][0] <= x:
+            _try(free[number], wishes, kept, used, found)
+    places = sorted(found)
+    return places, [found[x] for x in places]
+
+
+def _outward(free: Sequence[Span], line: float) -> Iterator[int]:
+    """The free spans of a row, the nearest to a place first, that to the left of two as near."""
+    right = bisect_left(free, line, key=_end)
+    left = right - 1
+    while left >= 0 or right < len(free):
+        if right == len(free) or (left >= 0 and line - free[left][1] <= max(free[right][0] - line, 0.0)):
+            yield left
+            left -= 1
+        else:
+            yield right
+            right += 1
+
+
+def _try(
+    span: Span, wishes: Sequence[float], kept: Sequence[float], used: Sequence[float], found: dict[float, float]
+) -> None:
+    """Add the places in a span that are nearest to what is wished for, with their costs; ``wishes`` are in order."""
+    first, last = span
+    width = last - first
+    inset = width / 2 if width < 2 * _INSET else _INSET
+    low, high = first + inset, last - inset
+    squeezed = _SQUEEZED if width < _NARROW else 0.0
+    chosen = [low, high] if low <= high else [high]
+    for x in kept:
+        if first <= x <= last:
+            chosen.append(low if x < low else high if x > high else x)
+    if low < high:
+        chosen += wishes[bisect_right(wishes, low) : bisect_left(wishes, high)]
+    for x in chosen:
+        if x not in found and -math.inf < x < math.inf:
+            found[x] = squeezed + _SHARED * _crowd(used, x) if used else squeezed
+
+
+def _crowd(used: Sequence[float], x: float) -> float:
+    """How many ways run closer to a place than they should, and how much."""
+    crowd = 0.0
+    for number in range(bisect_left(used, x - _APART), bisect_left(used, x + _APART)):
+        crowd += 1 - abs(x - used[number]) / _APART
+    return crowd
 
 
 def _step(a: FloatArray, b: FloatArray, dy: float) -> FloatArray:
@@ -240,6 +251,56 @@ def _step(a: FloatArray, b: FloatArray, dy: float) -> FloatArray:
     squared = (b[:, None] - a[None, :]) ** 2
     result: FloatArray = np.sqrt(squared + dy * dy) + 0.12 * squared / max(dy, 0.1)
     return result
+
+
+def _knots(rows: Rows, path: Sequence[Point], ends: tuple[int, int], alone: bool) -> list[Waypoint]:
+    """The points of a way at which it bends; what lies on a line that is free is left out. One that is not ``alone``
+    between its ends has two at least, so that it does not bulge across the others."""
+    own = rows.own(*ends)
+    spans = [_span(rows.free(y, own), x) for x, y in path]
+    limits = np.array(
+        [(max(low, x - _ASIDE), min(high, x + _ASIDE)) for (low, high), (x, _) in zip(spans, path, strict=True)]
+    )
+    line = np.array(path, dtype=np.float64)
+    knots: list[Waypoint] = []
+    at = _reach(rows, line, limits, 0)
+    while at < len(path) - 1:
+        low, high = spans[at]
+        knots.append(Waypoint(*path[at], 0.2 if 0 <= high - low < 1.2 else 0.0))
+        at = _reach(rows, line, limits, at)
+    if not knots and not alone and len(path) > 3:
+        knots = [Waypoint(*path[1]), Waypoint(*path[-2])]
+    return _spaced(knots)
+
+
+def _span(free: Sequence[Span], x: float) -> Span:
+    """The free span that a place is in; one that holds nothing where it is in none."""
+    number = bisect_left(free, x, key=_end)
+    return free[number] if free[number][0] <= x else (math.inf, -math.inf)
+
+
+def _reach(rows: Rows, path: FloatArray, limits: FloatArray, at: int) -> int:
+    """The farthest point of a way that can be reached straight from another: clear of what stands in the rows between,
+    of other ways, and close to the way."""
+    last = min(len(path) - 1, at + _FARTHEST)
+    if last == at + 1:
+        return last
+    (ax, ay), ends = path[at], path[at + 2 : last + 1]
+    y, low, high = path[at + 1 : last, 1], limits[at + 1 : last, 0], limits[at + 1 : last, 1]
+    x = ax + (ends[:, 0] - ax)[:, None] * (y - ay)[None, :] / (ends[:, 1] - ay)[:, None]
+    behind = np.arange(len(ends))[:, None] < np.arange(len(y))[None, :]
+    clear = (((low <= x) & (x <= high)) | behind).all(axis=1)
+    for number in np.flatnonzero(clear)[::-1].tolist():
+        line = zip(x[number, : number + 1].tolist(), path[at + 1 : at + 2 + number].tolist(), strict=True)
+        if not any(_beside(rows.used(height), place, own) for place, (own, height) in line):
+            return at + 2 + int(number)
+    return at + 1
+
+
+def _beside(used: Sequence[float], x: float, own: float) -> bool:
+    """Whether another way runs beside a place."""
+    beside = used[bisect_left(used, x - _BESIDE_WAY) : bisect_left(used, x + _BESIDE_WAY)]
+    return any(other != own for other in beside)
 
 
 def _spaced(knots: list[Waypoint]) -> list[Waypoint]:

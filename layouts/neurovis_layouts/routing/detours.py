@@ -8,6 +8,7 @@ graph, searched by A*: Hart, Nilsson and Raphael 1968); where a detour runs alre
 from __future__ import annotations
 
 import heapq
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -15,8 +16,8 @@ from itertools import pairwise
 import numpy as np
 
 from neurovis_layouts.routing.rounded import rounded
-from neurovis_layouts.routing.walls import BoolArray, FloatArray, Walls, meet, touch
-from neurovis_spec.layout.geometry import sampled
+from neurovis_layouts.routing.walls import BoolArray, FloatArray, IntArray, Walls, meet, touch
+from neurovis_spec.layout.geometry import distance, sampled
 from neurovis_spec.layout.model import Point, Route
 
 #: How far off a frame's lines lanes run, and how far off a disc's centre.
@@ -24,8 +25,8 @@ _LANES = (0.16, 0.3, 0.44, 0.58)
 _BESIDE = 0.52
 #: How close to frames and to centres a line may come: at best, and at all.
 _CLEAR = ((0.1, 0.44), (0.02, 0.34))
-#: How far around both ends ways are looked for.
-_WINDOWS = (2.0, 8.0, 1e9)
+#: Ways that look longer than the best by this factor are not followed up: a tenth of the work.
+_HASTE = 1.05
 #: What a bend costs, a lane that is taken already, and a corner that an edge between the same neurons has taken.
 _BEND, _TAKEN, _SAME = 0.2, 0.6, 1e6
 #: Directions round a disc.
@@ -86,64 +87,89 @@ class _Taken:
 class Detours:
     """Finds detours, one after the other."""
 
-    def __init__(self, walls: Walls, centres: Sequence[Point]) -> None:
+    def __init__(self, walls: Walls, centres: Sequence[Point], lanes: int = len(_LANES)) -> None:
+        """``lanes`` is how many there are around a frame, at most."""
         self._walls = walls
         self._centres: FloatArray = np.array(centres, dtype=np.float64).reshape(-1, 2)
         x0, y0, x1, y1 = walls.rects.T
-        lanes = [
-            np.stack([x + right * off, y + down * off], axis=1)
-            for off in _LANES
-            for x, right in ((x0, -1), (x1, 1))
-            for y, down in ((y0, -1), (y1, 1))
+        corners = [
+            np.stack([x + right * off, y + down * off, np.full(len(x), right), np.full(len(x), down)], axis=1)
+            for off in _LANES[:lanes]
+            for x, right in ((x0, -1.0), (x1, 1.0))
+            for y, down in ((y0, -1.0), (y1, 1.0))
         ]
-        self._corners: FloatArray = np.concatenate(lanes)
-        self._frame = np.tile(np.arange(len(x0), dtype=np.int64), len(lanes))
+        #: (lane and corner, frame, 4): where, and to which sides the corner points
+        self._corners: FloatArray = np.stack(corners)
         self._taken = _Taken()
         self._between: dict[tuple[int, int], list[Point]] = {}
 
     def route(self, source: int, target: int, alone: bool) -> Route | None:
         """A way round, None where there is none; one that is not ``alone`` between its ends keeps off the straight
         line and off those before it."""
-        ends = self._centres[[source, target]]
         same = self._between.setdefault((min(source, target), max(source, target)), [])
-        bends = {**self._taken.corners, **dict.fromkeys(same, _SAME)}
-        for off, clear in _CLEAR:
-            for window in _WINDOWS:
-                low, high = ends.min(axis=0) - window, ends.max(axis=0) + window
-                ground, nodes = self._ground(source, target, low, high, off, clear)
-                path = _shortest(ends, nodes, ground, bends, self._taken, alone)
-                if path is not None:
-                    self._taken.add(path)
-                    same += path[1:-1]
-                    return rounded(path, ground.clears)
-        return None
+        path, ground = self._way(source, target, same, alone)
+        if path is None:
+            return None
+        self._taken.add(path)
+        same += path[1:-1]
+        return rounded(path, ground.clears)
 
-    def _ground(
-        self, source: int, target: int, low: FloatArray, high: FloatArray, off: float, clear: float
-    ) -> tuple[_Ground, FloatArray]:
-        """What is in the way within a window, and where a way may bend in it."""
+    def longer(self, source: int, target: int) -> float:
+        """By how much the way round is longer than the straight one; 0 where there is none."""
+        path, _ = self._way(source, target, (), True)
+        if path is None:
+            return 0.0
+        return math.fsum(distance(a, b) for a, b in pairwise(path)) - distance(path[0], path[-1])
+
+    def _way(self, source: int, target: int, same: Sequence[Point], alone: bool) -> tuple[list[Point] | None, _Ground]:
+        """The line that a detour follows, and what is in its way."""
+        ends = self._centres[[source, target]]
+        bends = {**self._taken.corners, **dict.fromkeys(same, _SAME)}
         foreign = self._walls.foreign(source, target)
         loose: BoolArray = np.logical_not(self._walls.inside[:, foreign].any(axis=1))
         loose[[source, target]] = False
-        rects = self._walls.rects
-        near = foreign & (rects[:, :2] < high).all(axis=1) & (rects[:, 2:] > low).all(axis=1)
-        centres = self._centres
-        discs = centres[loose & (centres > low - 1).all(axis=1) & (centres < high + 1).all(axis=1)]
-        ground = _Ground(rects[near] + np.array([-off, -off, off, off]), discs, clear)
-        beside = (discs[:, None, :] + _BESIDE * _AROUND[None, :, :]).reshape(-1, 2)
-        nodes = np.concatenate([self._corners[near[self._frame]], beside])
-        nodes = nodes[(nodes > low).all(axis=1) & (nodes < high).all(axis=1)]
-        return ground, nodes[ground.free(nodes, nodes)]
+        frames, discs = np.flatnonzero(foreign), np.flatnonzero(loose)
+        for off, clear in _CLEAR:
+            rects = self._walls.rects[frames] + np.array([-off, -off, off, off])
+            whole = _Ground(rects, self._centres[discs], clear)
+            path = self._over(ends, whole, frames, bends, alone)
+            if path is not None:
+                break
+        return path, whole
+
+    def _over(
+        self, ends: FloatArray, whole: _Ground, frames: IntArray, bends: Mapping[Point, float], alone: bool
+    ) -> list[Point] | None:
+        """The shortest line round what is in its way: at first nothing, then whatever the last one ran into."""
+        met, touched = np.zeros(len(whole.rects), dtype=np.bool_), np.zeros(len(whole.discs), dtype=np.bool_)
+        if not alone:
+            met |= meet(ends[:1], ends[1:], whole.rects + np.array([-1.0, -1.0, 1.0, 1.0]))[0]
+        path: list[Point] | None = [(x, y) for x, y in ends.tolist()]
+        while path is not None:
+            line = np.array(path, dtype=np.float64)
+            new = meet(line[:-1], line[1:], whole.rects).any(axis=0) & ~met
+            near = touch(line[:-1], line[1:], whole.discs, whole.clear).any(axis=0) & ~touched
+            if len(path) > 2 - alone and not (new.any() or near.any()):
+                return path
+            met, touched = met | new, touched | near
+            ground = _Ground(whole.rects[met], whole.discs[touched], whole.clear)
+            beside = (ground.discs[:, None, :] + _BESIDE * _AROUND[None, :, :]).reshape(-1, 2)
+            beside = np.concatenate([beside, np.zeros_like(beside)], axis=1)
+            nodes = np.concatenate([self._corners[:, frames[met]].reshape(-1, 4), beside])
+            nodes = nodes[whole.free(nodes[:, :2], nodes[:, :2])]
+            path = _shortest(ends, nodes, ground, bends, self._taken, alone)
+        return None
 
 
 def _shortest(
     ends: FloatArray, nodes: FloatArray, ground: _Ground, bends: Mapping[Point, float], taken: _Taken, alone: bool
 ) -> list[Point] | None:
-    """The shortest line from the first end to the second, over nodes."""
-    points = np.concatenate([ends, nodes])
+    """The shortest line from the first end to the second, over nodes (n, 4), a place and to which sides the corner
+    there points."""
+    points, sides = np.concatenate([ends, nodes[:, :2]]), np.concatenate([np.zeros((2, 2)), nodes[:, 2:]])
     places: list[Point] = [(x, y) for x, y in points.tolist()]
     extra = np.array([0.0, 0.0, *(_BEND + bends.get(place, 0.0) for place in places[2:])])
-    ahead = _far(points, points[1])
+    ahead = _HASTE * _far(points, points[1])
     best = np.full(len(points), np.inf)
     best[0] = 0.0
     before = np.zeros(len(points), dtype=np.int64)
@@ -160,7 +186,8 @@ def _shortest(
             continue
         done[at] = True
         cost = best[at] + _far(points, points[at]) + extra + taken.beside(places[at], points)
-        better = np.flatnonzero((cost < best) & ~done)
+        way = points - points[at]
+        better = np.flatnonzero((cost < best) & ~done & _round(way, sides) & _round(way, sides[at]))
         if at == 0 and not alone:
             better = better[better != 1]
         better = better[ground.free(np.repeat(points[at][None, :], len(better), axis=0), points[better])]
@@ -169,6 +196,13 @@ def _shortest(
         for node in better.tolist():
             heapq.heappush(waiting, (float(best[node] + ahead[node]), node))
     return None
+
+
+def _round(way: FloatArray, sides: FloatArray) -> BoolArray:
+    """Whether a line runs along a corner, as a taut string does: neither to it from the front nor through it."""
+    (x, y), least = (way * sides).T, 1e-9
+    along: BoolArray = ~(((x > least) & (y > least)) | ((x < -least) & (y < -least)))
+    return along
 
 
 def _far(points: FloatArray, point: FloatArray) -> FloatArray:

@@ -6,13 +6,12 @@ once which of them come too close to anything.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.layout.geometry import cubics, distance, sampled
+from neurovis_spec.layout.geometry import cubics
 from neurovis_spec.layout.model import Point, Route
 
 #: A route this far from a centre is clear of the disc and of its ring.
@@ -29,55 +28,48 @@ class Obstacles:
     """Centres by cell; each is entered in every cell that it can reach, so that a look-up is one cell."""
 
     def __init__(self, centres: Sequence[Point]) -> None:
-        self._cells: dict[tuple[int, int], list[tuple[int, Point]]] = {}
-        for index, (x, y) in enumerate(centres):
-            for column in range(math.floor((x - REACH) / _CELL), math.floor((x + REACH) / _CELL) + 1):
-                for row in range(math.floor((y - REACH) / _CELL), math.floor((y + REACH) / _CELL) + 1):
-                    self._cells.setdefault((column, row), []).append((index, (x, y)))
+        at = np.array(centres, dtype=np.float64).reshape(-1, 2)
+        low = np.floor((at - REACH) / _CELL).astype(np.int64)
+        spans = np.floor((at + REACH) / _CELL).astype(np.int64) - low + 1
+        counts = spans[:, 0] * spans[:, 1]
+        index = np.repeat(np.arange(len(at), dtype=np.int64), counts)
+        place = np.arange(len(index), dtype=np.int64) - np.repeat(np.cumsum(counts) - counts, counts)
+        column, row = np.divmod(place, spans[index, 1])
+        keys = (low[index, 0] + column) * _ROW + low[index, 1] + row
+        order = np.argsort(keys, kind="stable")
+        self._index, self._centres = index[order], at[index[order]]
+        self._cells, self._starts, self._counts = np.unique(keys[order], return_index=True, return_counts=True)
 
-    def clearance(self, route: Route, own: tuple[int, int], enough: float = REACH) -> float:
-        """The least distance of the route to a foreign centre, at most ``enough``."""
-        least = enough
-        cells, get = self._cells, self._cells.get
-        if not cells:
-            return least
-        for point in sampled(route):
-            for index, centre in get((math.floor(point[0] / _CELL), math.floor(point[1] / _CELL)), ()):
-                if index not in own:
-                    least = min(least, distance(point, centre))
-        return least
+    def clearance(self, route: Route, own: tuple[int, int]) -> float:
+        """The least distance of the route to a foreign centre, at most ``REACH``."""
+        return self.clearances([route], [own])[0]
 
     def crowded(self, routes: Sequence[Route], own: Sequence[tuple[int, int]], enough: float) -> list[bool]:
-        """For each route whether its clearance is less than ``enough`` (at most ``REACH``), from the same points."""
+        """For each route whether its clearance is less than ``enough`` (at most ``REACH``)."""
+        return [clearance < enough for clearance in self.clearances(routes, own)]
+
+    def clearances(self, routes: Sequence[Route], own: Sequence[tuple[int, int]]) -> list[float]:
+        """For each route the least distance to a centre that is none of its two ``own`` neurons', at most ``REACH``."""
         pieces = [(i, piece) for i, route in enumerate(routes) for piece in cubics(route)]
-        result = np.zeros(len(routes), dtype=np.bool_)
-        if not pieces or not self._cells:
-            return [False] * len(routes)
-        entries = sorted(
-            (column * _ROW + row, index, centre)
-            for (column, row), near in self._cells.items()
-            for index, centre in near
-        )
-        keys = np.array([key for key, _, _ in entries], dtype=np.int64)
-        index = np.array([i for _, i, _ in entries], dtype=np.int64)
-        centres = np.array([centre for _, _, centre in entries], dtype=np.float64)
+        result = np.full(len(routes), REACH)
+        if not pieces or not len(self._cells):
+            return [REACH] * len(routes)
         owner = np.array([i for i, _ in pieces], dtype=np.int64)
         ends = np.array(own, dtype=np.int64)
         points, owner = points_on(np.array([piece for _, piece in pieces], dtype=np.float64), owner)
         cell = np.floor(points / _CELL).astype(np.int64)
         key = cell[:, 0] * _ROW + cell[:, 1]
-        cells, starts, counts = np.unique(keys, return_index=True, return_counts=True)
-        place = np.minimum(np.searchsorted(cells, key), len(cells) - 1)
-        near = np.flatnonzero(cells[place] == key)  # few: most of a drawing is not near a disc
-        first, count = starts[place[near]], counts[place[near]]
-        for step in range(int(counts.max())):
+        place = np.minimum(np.searchsorted(self._cells, key), len(self._cells) - 1)
+        near = np.flatnonzero(self._cells[place] == key)  # few: most of a drawing is not near a disc
+        first, count = self._starts[place[near]], self._counts[place[near]]
+        for step in range(int(count.max(initial=0))):
             some = step < count
             at, entry = near[some], first[some] + step
             route = owner[at]
-            x, y = (points[at] - centres[entry]).T
-            foreign = (index[entry] != ends[route, 0]) & (index[entry] != ends[route, 1])
-            result[route[foreign & (np.sqrt(x * x + y * y) < enough)]] = True
-        return [bool(value) for value in result]
+            x, y = (points[at] - self._centres[entry]).T
+            foreign = (self._index[entry] != ends[route, 0]) & (self._index[entry] != ends[route, 1])
+            np.minimum.at(result, route[foreign], np.sqrt(x * x + y * y)[foreign])
+        return [float(value) for value in result]
 
 
 def points_on(

@@ -70,16 +70,18 @@ def route_all(
 def _round_frames(
     edges: Sequence[LayoutEdge], centres: Sequence[Point], routes: Mapping[int, Route], walls: Walls
 ) -> dict[int, Route]:
-    """Detours for the routes that enter foreign frames, the shortest edges first."""
+    """Detours for the routes that enter foreign frames: first those that are longest by their straight way, which so
+    take the inner lanes round what they share with others."""
     chosen = sorted(routes)
     entered = walls.entered([routes[i] for i in chosen], [(edges[i].source, edges[i].target) for i in chosen])
     through = [i for i, enters in zip(chosen, entered, strict=True) if enters]
     if not through:
         return {}
     shared = _shared(edges)
-    detours = Detours(walls, centres)
+    first, detours = Detours(walls, centres, 1), Detours(walls, centres)
+    longer = {i: first.longer(edges[i].source, edges[i].target) for i in through}
     found: dict[int, Route] = {}
-    for i in sorted(through, key=lambda i: (distance(centres[edges[i].source], centres[edges[i].target]), i)):
+    for i in sorted(through, key=lambda i: (-longer[i], i)):
         own = edges[i].source, edges[i].target
         route = detours.route(*own, own not in shared)
         if route is not None:
@@ -108,25 +110,37 @@ def _curves(
         curve(centres[own[0]], centres[own[1]], waypoints.get(i, ()), (lean[i, True], lean[i, False]))
         for i, own in zip(chosen, owns, strict=True)
     ]
-    tight = obstacles.crowded(plain, owns, REACH - 0.1)
-    for i, own, best, crowded in zip(chosen, owns, plain, tight, strict=True):
-        routes[i] = best
-        if not crowded:
-            continue
-        start, end = centres[own[0]], centres[own[1]]
-        ends = (lean[i, True], lean[i, False])
-        clearance = obstacles.clearance(best, own)
-        for grip, share, slope in _OTHERWISE:
-            other = curve(start, end, waypoints.get(i, ()), (ends[0] * share, ends[1] * share), grip, slope)
-            found = obstacles.clearance(other, own)
-            if found > clearance + 0.02:
-                best, clearance = other, found
+    for i, route in zip(chosen, plain, strict=True):
+        routes[i] = route
+    tight = [k for k, found in enumerate(obstacles.crowded(plain, owns, REACH - 0.1)) if found]
+    # those too close to a disc, each with all its alternatives
+    others = [
+        curve(
+            centres[owns[k][0]],
+            centres[owns[k][1]],
+            waypoints.get(chosen[k], ()),
+            (lean[chosen[k], True] * share, lean[chosen[k], False] * share),
+            grip,
+            slope,
+        )
+        for k in tight
+        for grip, share, slope in ((0.0, 1.0, 1.0), *_OTHERWISE)
+    ]
+    many = len(_OTHERWISE) + 1
+    clearances = obstacles.clearances(others, [owns[k] for k in tight for _ in range(many)])
+    for number, k in enumerate(tight):
+        start, end = centres[owns[k][0]], centres[owns[k][1]]
+        tried = range(number * many, (number + 1) * many)
+        best, clearance = others[tried[0]], clearances[tried[0]]
+        for other in tried[1:]:
+            if clearances[other] > clearance + 0.02:
+                best, clearance = others[other], clearances[other]
         if clearance < TOUCH + 0.02:
-            least = heights.get(own, 0.0) + 0.3
-            other, found, height = clear_bow(start, end, own, obstacles, least, own in shared)
+            least = heights.get(owns[k], 0.0) + 0.3
+            bowed, found, height = clear_bow(start, end, owns[k], obstacles, least, owns[k] in shared)
             if found > clearance + 0.02:
-                best, heights[own] = other, height
-        routes[i] = best
+                best, heights[owns[k]] = bowed, height
+        routes[chosen[k]] = best
     return routes
 
 

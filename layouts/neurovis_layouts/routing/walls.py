@@ -63,17 +63,13 @@ class Walls:
 
 def meet(a: FloatArray, b: FloatArray, rects: FloatArray) -> BoolArray:
     """(k, f) whether the segments from ``a`` (k, 2) to ``b`` (k, 2) enter rectangles (f, 4), borders apart."""
-    # after Liang and Barsky 1984: the stretch of a segment between both pairs of borders
-    with np.errstate(divide="ignore", invalid="ignore"):
-        first, last = np.zeros((len(a), len(rects))), np.ones((len(a), len(rects)))
-        for axis in (0, 1):
-            start, way = a[:, axis, None], (b - a)[:, axis, None]
-            low, high = (rects[None, :, axis] - start) / way, (rects[None, :, axis + 2] - start) / way
-            level = way == 0
-            beside = level & ((start <= rects[None, :, axis]) | (start >= rects[None, :, axis + 2]))
-            first = np.maximum(first, np.where(level, np.where(beside, np.inf, 0.0), np.minimum(low, high)))
-            last = np.minimum(last, np.where(level, 1.0, np.maximum(low, high)))
-    entered: BoolArray = first < last
+    # apart on no axis: across, along, and that square to the segment (separating axes)
+    half, middle = (rects[:, 2:] - rects[:, :2]) / 2, (rects[:, 2:] + rects[:, :2]) / 2
+    ex, ey = ((b - a) / 2).T[:, :, None]
+    mx, my = ((a + b) / 2)[:, None, :].transpose(2, 0, 1) - middle.T[:, None, :]
+    wide, high = np.abs(ex), np.abs(ey)
+    entered: BoolArray = (np.abs(mx) < half[:, 0] + wide) & (np.abs(my) < half[:, 1] + high)
+    entered &= np.abs(mx * ey - my * ex) <= half[:, 0] * high + half[:, 1] * wide
     return entered
 
 
