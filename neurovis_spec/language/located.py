@@ -240,6 +240,5 @@ IdentifierField = Annotated[
     Leaf(as_identifier, {"type": "string", "pattern": "^[A-Za-z_][A-Za-z0-9_]{0,63}$"}),
 ]
 BoolField = Annotated[Located[bool], Leaf(as_bool, {"type": "boolean"})]
-NumberField = Annotated[Located[float], Leaf(as_number, {"type": "number"})]
 IntegerField = Annotated[Located[int], Leaf(as_integer, {"type": "integer"})]
 FormulaField = Annotated[Formula, Leaf(as_formula, FORMULA)]
