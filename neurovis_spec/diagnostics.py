@@ -11,15 +11,14 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, NamedTuple
 
 Severity = Literal["error", "warning"]
 #: A number in a message, with what belongs to it; that of a name (K3) is none.
 _NUMBER = re.compile(r"(?<![\w.])-?\d[\d.,]*(e[+-]?\d+)?")
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Span:
+class Span(NamedTuple):
     """A stretch of a file. Lines and columns count from 1, columns in code points; the end is exclusive."""
 
     file: str
@@ -156,16 +155,22 @@ def nearest(name: str, known: Iterable[str], most: int = 3) -> tuple[str, ...]:
 
 def meant(name: str, known: Iterable[str]) -> str | None:
     """The known name that a misspelt one can only be meant for: it is one slip away, two in a word of five letters or
-    more, and no other is as near. None where that is not sure.
+    more, or in one of four of which three are kept, and no other is as near. None where that is not sure.
 
     >>> meant("wieght", ["weight", "centre"]), meant("modles", ["models", "modules"]), meant("note", ["noise"])
     ('weight', None, None)
+    >>> meant("fomr", ["from", "to"]), meant("size", ["file"])
+    ('from', None)
     """
-    most = 1 if len(name) < 5 else 2
+    most = 1 if len(name) < 4 else 2
     far = sorted((slips(name, other), other) for other in known if abs(len(name) - len(other)) <= most)
     if not far or far[0][0] > most or (len(far) > 1 and far[1][0] == far[0][0]):
         return None
-    return far[0][1]
+    right = far[0][1]
+    if len(name) == 4 and far[0][0] == 2:
+        kept = (Counter(name.casefold()) & Counter(right.casefold())).total()
+        return right if len(right) == 4 and kept >= 3 else None
+    return right
 
 
 def slips(one: str, other: str) -> int:

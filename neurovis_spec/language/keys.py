@@ -7,7 +7,6 @@ place where it stands; so what it holds is looked at as well, and nothing that i
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import replace
 from typing import Final, NamedTuple
 
 from neurovis_spec.diagnostics import Findings, did_you_mean, meant, nearest, suggest
@@ -64,7 +63,7 @@ def _read(
                 perhaps.update(close)
         if right is not None:
             del free[right]
-        yield entry if right is None else Entry(replace(entry.key, value=right, inner=None), entry.value)
+        yield entry if right is None else Entry(entry.key._replace(value=right, inner=None), entry.value)
 
 
 def _unknown(name: str) -> str:

@@ -12,7 +12,7 @@ import re
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Annotated, Generic, NoReturn, TypeAlias, TypeVar
+from typing import Annotated, Generic, NamedTuple, NoReturn, TypeAlias, TypeVar
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic.json_schema import JsonSchemaValue
@@ -51,8 +51,7 @@ class Leaf(Generic[N]):
         return dict(self.schema)
 
 
-@dataclass(frozen=True, slots=True)
-class Located(Generic[T]):
+class Located(NamedTuple, Generic[T]):
     """A value and its place; ``node`` is the scalar it came from."""
 
     value: T

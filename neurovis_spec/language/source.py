@@ -18,8 +18,7 @@ from neurovis_spec.diagnostics import Span
 ScalarValue: TypeAlias = bool | int | float | str | None
 
 
-@dataclass(frozen=True, slots=True)
-class Scalar:
+class Scalar(NamedTuple):
     """A null, truth value, number or text. ``inner`` is the offset of the value's first character in the span
     (1 behind a quote), or None where the value's characters do not stand one by one in the source (escapes,
     several lines)."""
@@ -35,8 +34,7 @@ class Scalar:
         return self.span.within(self.inner + start, self.inner + end)
 
 
-@dataclass(frozen=True, slots=True)
-class Entry:
+class Entry(NamedTuple):
     """One ``key: value`` of a mapping. The key is a text: a key that YAML reads otherwise was refused."""
 
     key: Scalar

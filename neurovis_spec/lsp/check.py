@@ -80,6 +80,6 @@ def _library(document: Document) -> Checked:
 def _renamed(found: list[Diagnostic], path: Path, file: str) -> tuple[Diagnostic, ...]:
     """The findings with the document called as it is called everywhere else."""
     return tuple(
-        replace(item, span=replace(item.span, file=file)) if place_of(item.span.file, path.parent) == path else item
+        replace(item, span=item.span._replace(file=file)) if place_of(item.span.file, path.parent) == path else item
         for item in found
     )
