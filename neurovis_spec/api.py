@@ -220,6 +220,25 @@ class CompiledNetwork:
         """
         return pipeline.simulate(self.network, steps, inputs, backend, every, start, progress)
 
+    def run_to(
+        self,
+        path: str | Path,
+        steps: int | None = None,
+        inputs: Mapping[str, npt.ArrayLike] | None = None,
+        *,
+        backend: str | None = None,
+        every: int = 1,
+        start: Recording | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        """Run as ``run`` does and write the recording to a file while it is made, in memory that does not grow with the
+        steps. What was there stays until the end. Raises what ``run`` and ``Recording.save`` raise, and
+        RecordingError where the disk has not the room."""
+        from neurovis_spec.runtime.record import Course
+
+        steps = self.network.steps if steps is None else steps
+        pipeline.simulate_to(self.network, Path(path), Course(steps, every, inputs, backend), start, progress)
+
     def layout(
         self, engine: str | None = None, *, earlier: Layout | None = None, progress: Progress | None = None
     ) -> NetworkLayout:

@@ -32,6 +32,7 @@ from neurovis_spec.progress import Progress
 
 if TYPE_CHECKING:  # what only some stages need is imported there: a spec is validated without all of it
     from neurovis_spec.layout.model import Layout
+    from neurovis_spec.runtime.record import Course
     from neurovis_spec.runtime.recording import Recording, Snapshot
     from neurovis_spec.scene import Film, Scene
     from neurovis_spec.scene.gains import Gains
@@ -85,6 +86,20 @@ def simulate(
     from neurovis_spec.runtime.record import record
 
     return record(network, steps, inputs, backend, every, start, progress)
+
+
+def simulate_to(
+    network: Network,
+    path: Path,
+    course: Course,
+    start: Recording | None = None,
+    progress: Progress | None = None,
+) -> None:
+    """The same, written to a file while it runs."""
+
+    from neurovis_spec.runtime.stream import record_to
+
+    record_to(network, path, course, start, progress)
 
 
 def remember(spec: Spec, request: Request, network: Network, findings: Findings) -> Layout | None:

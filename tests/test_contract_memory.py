@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner
@@ -16,17 +17,19 @@ TEXT = "neurovis: 1\nname: x\nneurons: {A: {count: 2, bias: 0.1}}\n"
 
 
 def test_so_many_steps_that_no_memory_holds_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The input's fault (1), with the size and the way out; nothing is written."""
+    """The input's fault (1), with the size and the way out; what is written to a file is not held in memory, and the
+    disk has to have the room. Nothing is written."""
     monkeypatch.setattr(memory, "available", lambda: 8 * 2**30)
+    monkeypatch.setattr("neurovis_spec.runtime.memory.shutil.disk_usage", lambda path: SimpleNamespace(free=8 * 2**30))
     (tmp_path / "x.yaml").write_text(TEXT, encoding="utf-8")
     target = tmp_path / "x.npz"
-    result = CliRunner().invoke(
-        neurovis, ["run", str(tmp_path / "x.yaml"), "--steps", "1000000000000", "-o", str(target)]
-    )
-    assert result.exit_code == 1
-    assert "a recording of 1,000,000,000,000 steps takes 21.8 TiB of memory, and 8.0 GiB are free" in result.output
-    assert "--every 10000" in result.output
-    assert not target.exists()
+    for where, output in (("memory", ()), ("the disk", ("-o", str(target)))):
+        result = CliRunner().invoke(neurovis, ["run", str(tmp_path / "x.yaml"), "--steps", "1000000000000", *output])
+        assert result.exit_code == 1
+        message = f"a recording of 1,000,000,000,000 steps takes 21.8 TiB of {where}, and 8.0 GiB are free"
+        assert message in result.output
+        assert "--every 10000" in result.output
+        assert not target.exists()
 
 
 def test_more_steps_than_numbers_can_count_are_wrong_usage(tmp_path: Path) -> None:

@@ -71,18 +71,20 @@ def command(
     _check_format(output)
     network = network_of(spec, settings)
     arrays, before = tables(inputs, network.network), recording_of(start)
+    made = network.network.steps if steps is None else steps
     begun = perf_counter()
+    if output is not None:
+        with writing(output), progress("running") as bar:
+            network.run_to(output, steps, arrays, backend=backend, every=every, start=before, progress=bar)
+        click.echo(f"{output}: {_summary(network, made, perf_counter() - begun, backend)}")
+        return
     with progress("running") as bar:
         recording = network.run(steps, arrays, backend=backend, every=every, start=before, progress=bar)
-    seconds = perf_counter() - begun
-    made = network.network.steps if steps is None else steps
-    summary = f"{count(made, 'step')} in {seconds:.2f} s, backend {backend or network.choose_backend()[0]}"
-    if output is None:
-        _print(network, recording, summary)
-        return
-    with progress("writing"), writing(output):
-        recording.save(output)
-    click.echo(f"{output}: {summary}")
+    _print(network, recording, _summary(network, made, perf_counter() - begun, backend))
+
+
+def _summary(network: CompiledNetwork, steps: int, seconds: float, backend: str | None) -> str:
+    return f"{count(steps, 'step')} in {seconds:.2f} s, backend {backend or network.choose_backend()[0]}"
 
 
 def _list_backends() -> None:

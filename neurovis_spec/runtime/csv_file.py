@@ -11,29 +11,69 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
-from neurovis_spec.compiler.network import FloatArray
+from neurovis_spec.compiler.network import FloatArray, IntArray
 from neurovis_spec.runtime.files import regular_size, replacing
 from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.rows import RowWriter, Steps
 
 _CONNECTION = re.compile(r"(?P<source>\S+) -> (?P<target>\S+)(?: \((?P<rank>[0-9]{1,9})\))?")
 
 
 def write_csv(recording: Recording, path: Path) -> None:
     """Write a recording; what was there stays until all is written."""
-    names = [recording.connection_names[index] for index in recording.plastic.tolist()]
+    with _table_of(recording, path) as rows:
+        rows(recording.step, recording.activity, recording.weights)
+
+
+def csv_size(frame: Recording, steps: Steps) -> int:
+    """About the bytes that a file takes: numbers have up to 24 characters, most of them fewer."""
+    return len(steps) * 10 * (2 + len(frame.neurons) + len(frame.plastic))
+
+
+@contextmanager
+def stream_csv(path: Path, frame: Recording, steps: Steps) -> Iterator[RowWriter]:
+    """A writer for rows as they come; what was there stays until all is written."""
+    with _table_of(frame, path) as rows:
+        yield _CsvRows(rows, steps)
+
+
+class _CsvRows:
+    """Writes rows, and knows of which steps they are."""
+
+    def __init__(self, rows: Callable[[IntArray, FloatArray, FloatArray], None], steps: Steps) -> None:
+        self._rows, self._steps = rows, steps
+        self._written = 0
+
+    def write(self, activity: FloatArray, weights: FloatArray) -> None:
+        numbers = np.arange(self._written, self._written + len(activity)) * self._steps.every
+        self._rows(numbers, activity, weights)
+        self._written += len(activity)
+
+
+@contextmanager
+def _table_of(frame: Recording, path: Path) -> Iterator[Callable[[IntArray, FloatArray, FloatArray], None]]:
+    """A file with the header of a recording, and what writes rows into it."""
+    names = [frame.connection_names[index] for index in frame.plastic.tolist()]
     with replacing(path) as file:
         text = io.TextIOWrapper(file, encoding="utf-8", newline="")
         writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(["step", "t", *recording.neurons, *names])
-        for step, activity, weights in zip(recording.step.tolist(), recording.activity, recording.weights, strict=True):
-            writer.writerow([step, step * recording.dt, *activity.tolist(), *weights.tolist()])
-        text.flush()
-        text.detach()
+        writer.writerow(["step", "t", *frame.neurons, *names])
+
+        def rows(steps: IntArray, activity: FloatArray, weights: FloatArray) -> None:
+            for step, active, strong in zip(steps.tolist(), activity, weights, strict=True):
+                writer.writerow([step, step * frame.dt, *active.tolist(), *strong.tolist()])
+
+        try:
+            yield rows
+            text.flush()
+        finally:
+            text.detach()
 
 
 def read_csv(path: Path) -> Recording:

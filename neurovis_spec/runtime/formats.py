@@ -7,13 +7,15 @@ group ``neurovis.formats`` by the suffix of the path.
 from __future__ import annotations
 
 import os
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 from neurovis_spec import plugins
-from neurovis_spec.runtime.csv_file import read_csv, write_csv
-from neurovis_spec.runtime.npz_file import read_npz, write_npz
+from neurovis_spec.runtime.csv_file import csv_size, read_csv, stream_csv, write_csv
+from neurovis_spec.runtime.npz_file import npz_size, read_npz, stream_npz, write_npz
 from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.rows import RowWriter, Steps
 
 
 @runtime_checkable
@@ -42,6 +44,14 @@ class NpzFormat:
         """Write the arrays of §12, and ``about``."""
         write_npz(recording, path)
 
+    def stream(self, path: Path, frame: Recording, steps: Steps) -> AbstractContextManager[RowWriter]:
+        """Write the same while the network runs."""
+        return stream_npz(path, frame, steps)
+
+    def size(self, frame: Recording, steps: Steps) -> int:
+        """Bytes of the disk."""
+        return npz_size(frame, steps)
+
     def load(self, path: Path) -> Recording:
         """Read the arrays; no pickles, and no more memory than the file's size warrants."""
         return read_npz(path)
@@ -56,6 +66,14 @@ class CsvFormat:
     def save(self, recording: Recording, path: Path) -> None:
         """Write the table row by row."""
         write_csv(recording, path)
+
+    def stream(self, path: Path, frame: Recording, steps: Steps) -> AbstractContextManager[RowWriter]:
+        """Write the same while the network runs."""
+        return stream_csv(path, frame, steps)
+
+    def size(self, frame: Recording, steps: Steps) -> int:
+        """About the bytes of the disk."""
+        return csv_size(frame, steps)
 
     def load(self, path: Path) -> Recording:
         """Read the table: what stays is not in it, so the recording knows the changing connections alone."""

@@ -1,4 +1,4 @@
-"""Memory: what a recording takes, and a refusal before it is taken.
+"""Memory, and room on a disk: what a recording takes, and a refusal before it is taken.
 
 In: numbers of rows and columns. Out: nothing, or RecordingError that says the size and the way out. An operating system
 may promise more memory than there is and end the process much later, so what is free is asked beforehand.
@@ -7,6 +7,7 @@ may promise more memory than there is and end the process much later, so what is
 from __future__ import annotations
 
 import os
+import shutil
 from pathlib import Path
 
 from neurovis_spec.runtime.recording import RecordingError
@@ -18,7 +19,7 @@ _NUMBER = 8
 
 
 class TooLargeError(RecordingError):
-    """A recording for which there is not the memory."""
+    """A recording for which there is not the memory, or not the room on the disk."""
 
     def __init__(self, message: str, hint: str) -> None:
         super().__init__(message)
@@ -29,14 +30,26 @@ def check_room(steps: int, every: int, columns: int) -> None:
     """Refuse a recording of ``steps`` steps, every ``every``-th kept, with ``columns`` numbers a step, if it takes more
     memory than is free. Raises TooLargeError."""
     rows, row = -(-steps // every), (columns + 1) * _NUMBER
-    size, room = rows * row, available()
-    if room is None or size <= room:
+    room = available()
+    if room is not None and rows * row > room:
+        raise _too_large(steps, every, rows * row, room, "memory")
+
+
+def check_disk(path: Path, steps: int, every: int, size: int) -> None:
+    """Refuse a recording for which the disk has not the room before anything is run. Raises TooLargeError."""
+    try:
+        room = shutil.disk_usage(path.resolve().parent).free
+    except OSError:  # what is wrong with the folder is said when the file is opened
         return
-    fewer = _round_up(-(-steps * row // max(room // 2, 1)))
-    message = f"a recording of {rows:,} steps takes {shown(size)} of memory, and {shown(room)} are free"
+    if size > room:
+        raise _too_large(steps, every, size, room, "the disk")
+
+
+def _too_large(steps: int, every: int, size: int, room: int, where: str) -> TooLargeError:
+    fewer = _round_up(-(-every * size // max(room // 2, 1)))
+    message = f"a recording of {-(-steps // every):,} steps takes {shown(size)} of {where}, and {shown(room)} are free"
     ways = f"neurovis run --every {fewer}, in Python every={fewer}"
-    hint = f"run fewer steps, or record every {fewer:,}th step only ({ways})"
-    raise TooLargeError(message, hint)
+    return TooLargeError(message, f"run fewer steps, or record every {fewer:,}th step only ({ways})")
 
 
 def available() -> int | None:

@@ -1,4 +1,4 @@
-"""Recordings as ``.npz``: written in one go, read with suspicion.
+"""Recordings as ``.npz``: written in one go or row by row, read with suspicion.
 
 In: a Recording and a path, or a path. Out: a file, or a Recording. A file is believed in nothing: headers are read
 before memory is taken, sizes must agree with each other and with the archive, and pickles are never loaded. Beside the
@@ -10,20 +10,25 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 import sys
+import tempfile
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.network import IntArray
+from neurovis_spec.compiler.network import FloatArray, IntArray
 from neurovis_spec.language.data_files_npy import LONGEST_HEADER, read_header
 from neurovis_spec.language.data_files_table import CellError
 from neurovis_spec.runtime.files import regular_size, replacing
 from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.rows import RowWriter, Steps
 
 Array: TypeAlias = npt.NDArray[np.generic]
 
@@ -43,10 +48,74 @@ REQUIRED: Mapping[str, tuple[str, int]] = {
 #: an archive may always grow to this many bytes, and beyond that to a hundred times its size
 ROOM = 256 * 2**20
 RATIO = 100
+#: bytes of a number, and those that are copied together
+_NUMBER, _CHUNK = 8, 1 << 20
 
 
 def write_npz(recording: Recording, path: Path) -> None:
     """Write a recording; what was there stays until all is written."""
+    large = {"activity": recording.activity, "weights": recording.weights, "step": recording.step}
+    with replacing(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
+        _put(archive, {**large, **_small(recording)})
+
+
+def npz_size(frame: Recording, steps: Steps) -> int:
+    """The bytes that a streamed file takes, weights once more while it is written."""
+    n, p = len(frame.neurons), len(frame.plastic)
+    small = sum(array.nbytes for array in _small(frame).values())
+    return len(steps) * _NUMBER * (n + 1 + 2 * p) + small
+
+
+@contextmanager
+def stream_npz(path: Path, frame: Recording, steps: Steps) -> Iterator[RowWriter]:
+    """A writer for rows: activities go into the archive as they come; the weights, which must lie together, into a file
+    without a name beside it, and into the archive at the end. What was there stays until all is written."""
+    n, p = len(frame.neurons), len(frame.plastic)
+    with (
+        replacing(path) as file,
+        zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive,
+        tempfile.TemporaryFile(dir=path.resolve().parent) as spool,
+    ):
+        _put(archive, _small(frame))
+        with archive.open("step.npy", "w", force_zip64=True) as member:
+            _begin(member, "<i8", (len(steps),))
+            for part in steps.parts():
+                member.write(part.astype("<i8").tobytes())
+        with archive.open("activity.npy", "w", force_zip64=True) as member:
+            _begin(member, "<f8", (len(steps), n))
+            yield _NpzRows(member, spool)
+        with archive.open("weights.npy", "w", force_zip64=True) as member:
+            _begin(member, "<f8", (len(steps), p))
+            spool.seek(0)
+            shutil.copyfileobj(spool, member, _CHUNK)
+
+
+@dataclass(frozen=True)
+class _NpzRows:
+    """Writes rows into two files."""
+
+    activity: IO[bytes]
+    weights: IO[bytes]
+
+    def write(self, activity: FloatArray, weights: FloatArray) -> None:
+        self.activity.write(activity.astype("<f8").tobytes())
+        self.weights.write(weights.astype("<f8").tobytes())
+
+
+def _put(archive: zipfile.ZipFile, arrays: Mapping[str, Array]) -> None:
+    """Whole arrays, as ``numpy.savez`` puts them into an archive."""
+    for name, array in arrays.items():
+        with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+            np.lib.format.write_array(member, array, allow_pickle=False)
+
+
+def _begin(member: IO[bytes], descr: str, shape: tuple[int, ...]) -> None:
+    """The header of an array whose numbers follow."""
+    np.lib.format.write_array_header_1_0(member, {"descr": descr, "fortran_order": False, "shape": shape})
+
+
+def _small(recording: Recording) -> dict[str, Array]:
+    """The arrays that do not grow with the steps."""
     parallel = np.flatnonzero(recording.ranks > 1)
     about = {
         "network": recording.network,
@@ -54,21 +123,16 @@ def write_npz(recording: Recording, path: Path) -> None:
         "views": {name: [list(members), single] for name, (members, single) in recording.views.items()},
         "parallel": [[int(index), int(recording.ranks[index])] for index in parallel],
     }
-    with replacing(path) as file:
-        np.savez(
-            file,
-            activity=recording.activity,
-            neurons=np.array(recording.neurons, dtype=np.str_),
-            weights=recording.weights,
-            weights_static=recording.weights_static,
-            plastic=recording.plastic,
-            sources=recording.sources,
-            targets=recording.targets,
-            delays=recording.delays,
-            dt=np.float64(recording.dt),
-            step=recording.step,
-            about=np.array(json.dumps(about)),
-        )
+    return {
+        "neurons": np.array(recording.neurons, dtype=np.str_),
+        "weights_static": recording.weights_static,
+        "plastic": recording.plastic,
+        "sources": recording.sources,
+        "targets": recording.targets,
+        "delays": recording.delays,
+        "dt": np.array(recording.dt, dtype=np.float64),
+        "about": np.array(json.dumps(about)),
+    }
 
 
 def read_npz(path: Path) -> Recording:

@@ -1,16 +1,19 @@
 """Running and recording: many steps in one loop, into arrays taken beforehand.
 
-In: a Network, inputs, a number of steps. Out: a Recording of steps 0 … steps − 1, or of every K-th of them.
+In: a Network, inputs, a number of steps. Out: a Recording of steps 0 … steps − 1, or of every K-th of them. ``go``
+hands the rows on while it runs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.network import FloatArray, Network
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.backend import Backend, prepare
 from neurovis_spec.runtime.inputs import STRETCH, InputReader
@@ -18,7 +21,7 @@ from neurovis_spec.runtime.memory import check_room
 from neurovis_spec.runtime.phases import go_over, segments
 from neurovis_spec.runtime.recording import Recording, recording_of
 from neurovis_spec.runtime.resume import resumed_state
-from neurovis_spec.runtime.state import initial_state
+from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.runtime.watch import Watch
 
 
@@ -36,23 +39,75 @@ def record(
     ``inputs`` as in ``InputReader``; ``start`` as in ``resume``. Warns once (RuntimeWarning) when something is no
     longer finite. Raises InputError, BackendError, RecordingError (also where there is not the memory), ValueError.
     """
+    steps = checked_steps(network, steps, every)
+    check_room(steps, every, len(network.neurons) + len(network.changing))
+    state = initial_state(network) if start is None else resumed_state(network, start)
+    kept = np.arange(0, steps, every, dtype=np.int64)
+    rows = _InMemory(network, len(kept))
+    go(network, state, Course(steps, every, inputs, backend), rows, progress)
+    return recording_of(network, kept, rows.activity, rows.weights, state.weights)
+
+
+class Rows(Protocol):
+    """Where rows go, a stretch of the run at a time."""
+
+    def begin(self, count: int) -> tuple[FloatArray, FloatArray]:
+        """Arrays for the next ``count`` rows: activities (count, n), changing weights (count, p)."""
+        ...
+
+    def end(self) -> None:
+        """The arrays are filled."""
+        ...
+
+
+class _InMemory:
+    """All rows in two arrays."""
+
+    def __init__(self, network: Network, rows: int) -> None:
+        self.activity = np.empty((rows, len(network.neurons)))
+        self.weights = np.empty((rows, len(network.changing)))
+        self._filled = 0
+
+    def begin(self, count: int) -> tuple[FloatArray, FloatArray]:
+        first = self._filled
+        self._filled += count
+        return self.activity[first : first + count], self.weights[first : first + count]
+
+    def end(self) -> None:
+        return
+
+
+@dataclass(frozen=True)
+class Course:
+    """How long a run is, which steps of it are kept, and what it runs on."""
+
+    steps: int
+    every: int = 1
+    inputs: Mapping[str, npt.ArrayLike] | None = None
+    backend: str | Backend | None = None
+
+
+def checked_steps(network: Network, steps: int | None, every: int) -> int:
+    """The steps of a run. Raises ValueError."""
     steps = network.steps if steps is None else steps
     if steps < 0 or every < 1:
         raise ValueError(f"{steps} steps, every {every}: at least 0 and at least 1 are needed")
-    check_room(steps, every, len(network.neurons) + len(network.changing))
-    watch = Watch(network)
-    state = initial_state(network) if start is None else resumed_state(network, start)
-    kept = np.arange(0, steps, every, dtype=np.int64)
-    activity = np.empty((len(kept), len(network.neurons)))
-    weights = np.empty((len(kept), len(network.changing)))
+    return steps
+
+
+def go(network: Network, state: State, course: Course, rows: Rows, progress: Progress | None = None) -> None:
+    """Run a network from a state, and hand on the rows that are kept."""
+    every, steps = course.every, course.steps
     changing = _subscript(network.changing)
-    look, row, before = watch.look, 0, network
+    look, before = Watch(network).look, network
     with np.errstate(all="ignore"):
         for phase, begin, end in segments(network, steps):
-            step, reader = prepare(phase, backend).step, InputReader(phase, inputs)
+            step, reader = prepare(phase, course.backend).step, InputReader(phase, course.inputs)
             go_over(state, before, phase)
             before = phase
             for first, stop in _stretches(begin, end):
+                activity, weights = rows.begin((stop - 1) // every - (first - 1) // every)
+                row = 0
                 for k, vector in enumerate(reader.rows(first, stop), first):
                     keep = k % every == 0
                     if keep and changing is not None:
@@ -62,9 +117,9 @@ def record(
                     if keep:
                         activity[row] = state.activity
                         row += 1
+                rows.end()
                 if progress is not None:
                     progress(stop, steps)
-    return recording_of(network, kept, activity, weights, state.weights)
 
 
 def _stretches(begin: int, end: int) -> Iterator[tuple[int, int]]:

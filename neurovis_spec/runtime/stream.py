@@ -1,0 +1,73 @@
+"""Recordings that are written while the network runs: a stretch of rows at a time, so that no run is too long.
+
+In: a Network, a path, how to run. Out: a file, which is there when the run has come to its end; else what was there
+before. A format that writes in streams says so by having ``stream``; of the others the whole recording is saved.
+"""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from neurovis_spec.compiler.network import FloatArray, Network
+from neurovis_spec.progress import Progress
+from neurovis_spec.runtime.formats import for_path
+from neurovis_spec.runtime.inputs import STRETCH
+from neurovis_spec.runtime.memory import check_disk
+from neurovis_spec.runtime.record import Course, checked_steps, go, record
+from neurovis_spec.runtime.recording import Recording, recording_of
+from neurovis_spec.runtime.resume import resumed_state
+from neurovis_spec.runtime.rows import RowWriter, Steps
+from neurovis_spec.runtime.state import initial_state
+
+
+@runtime_checkable
+class StreamingFormat(Protocol):
+    """A format that takes rows as they come."""
+
+    def stream(self, path: Path, frame: Recording, steps: Steps) -> AbstractContextManager[RowWriter]:
+        """A writer for the rows of these steps; ``frame`` is the recording without them. The file is there when the
+        block ends; after an exception nothing has changed. Raises OSError."""
+        ...
+
+    def size(self, frame: Recording, steps: Steps) -> int:
+        """About how many bytes of the disk it takes."""
+        ...
+
+
+def record_to(
+    network: Network, path: Path, course: Course, start: Recording | None = None, progress: Progress | None = None
+) -> None:
+    """Run a network and write what ``record`` returns to a file. Raises what ``record`` and ``formats.save`` raise."""
+    format_ = for_path(path)
+    if not isinstance(format_, StreamingFormat):
+        format_.save(record(network, course.steps, course.inputs, course.backend, course.every, start, progress), path)
+        return
+    steps = Steps(checked_steps(network, course.steps, course.every), course.every)
+    state = initial_state(network) if start is None else resumed_state(network, start)
+    none = np.zeros((0, len(network.neurons))), np.zeros((0, len(network.changing)))
+    frame = recording_of(network, np.zeros(0, dtype=np.int64), *none, state.weights)
+    check_disk(path, steps.total, steps.every, format_.size(frame, steps))
+    with format_.stream(path, frame, steps) as writer:
+        go(network, state, course, _Handed(network, writer), progress)
+
+
+class _Handed:
+    """Rows that are handed on when a stretch is full; the arrays for them are used again."""
+
+    def __init__(self, network: Network, writer: RowWriter) -> None:
+        self._activity = np.empty((STRETCH, len(network.neurons)))
+        self._weights = np.empty((STRETCH, len(network.changing)))
+        self._writer = writer
+        self._count = 0
+
+    def begin(self, count: int) -> tuple[FloatArray, FloatArray]:
+        self._count = count
+        return self._activity[:count], self._weights[:count]
+
+    def end(self) -> None:
+        if self._count:
+            self._writer.write(self._activity[: self._count], self._weights[: self._count])

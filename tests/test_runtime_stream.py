@@ -1,0 +1,146 @@
+"""Recordings written while the network runs: the same as those saved at once, in memory that does not grow."""
+
+from __future__ import annotations
+
+import tracemalloc
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_specs import compiled
+
+import neurovis_spec as nv
+from neurovis_spec.api import CompiledNetwork
+from neurovis_spec.runtime.memory import TooLargeError
+from neurovis_spec.runtime.recording import Recording, RecordingError
+
+SPEC = """
+parameters: {gain: 1}
+inputs: {push: {size: 2}}
+neurons: {A: {count: 2, input: push, activation: tanh}, B: {count: 3, bias: 0.1, noise: "normal(0, 0.1)"}}
+connections:
+  A -> B: {weight: "normal(0, 1)", pattern: all_to_all, plasticity: {hebbian: {rate: 0.001}}}
+  B -> A: {weight: gain, pattern: all_to_all, delay: 3}
+outputs: {y: B2}
+events: [{at: 300, lesion: [B3]}]
+"""
+
+
+@pytest.fixture(scope="module")
+def network() -> CompiledNetwork:
+    return compiled(SPEC)
+
+
+def assert_equal(one: Recording, other: Recording) -> None:
+    assert one.neurons == other.neurons
+    assert one.connection_names == other.connection_names
+    assert one.dt == other.dt
+    for name in ("activity", "weights", "weights_static", "plastic", "sources", "targets", "delays", "step", "ranks"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name, strict=True)
+
+
+@pytest.mark.parametrize(
+    ("steps", "every"), [(0, 1), (1, 1), (255, 1), (256, 1), (700, 1), (700, 3), (700, 1000), (513, 256)]
+)
+@pytest.mark.parametrize("suffix", ["npz", "csv"])
+def test_what_is_streamed_is_what_is_saved(
+    network: CompiledNetwork, tmp_path: Path, suffix: str, steps: int, every: int
+) -> None:
+    inputs = {"push": np.arange(20.0).reshape(10, 2) / 10}
+    network.run(steps, inputs, every=every).save(tmp_path / f"saved.{suffix}")
+    network.run_to(tmp_path / f"streamed.{suffix}", steps, inputs, every=every)
+    if suffix == "csv":
+        assert (tmp_path / "streamed.csv").read_bytes() == (tmp_path / "saved.csv").read_bytes()
+    else:
+        streamed, saved = nv.load(tmp_path / "streamed.npz"), nv.load(tmp_path / "saved.npz")
+        assert_equal(streamed, saved)
+        assert (streamed.views, streamed.hash, streamed.network) == (saved.views, saved.hash, saved.network)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [f"saved.{suffix}", f"streamed.{suffix}"]
+
+
+def test_numpy_reads_what_is_streamed(network: CompiledNetwork, tmp_path: Path) -> None:
+    network.run_to(tmp_path / "x.npz", 600)
+    with np.load(tmp_path / "x.npz") as arrays:
+        assert arrays["activity"].shape == (600, 5)
+        assert arrays["weights"].shape == (600, 6)
+        assert arrays["step"].tolist() == list(range(600))
+        assert float(arrays["dt"]) == 1
+    with zipfile.ZipFile(tmp_path / "x.npz") as archive:
+        assert archive.testzip() is None
+
+
+def test_a_streamed_run_goes_on_from_another(network: CompiledNetwork, tmp_path: Path) -> None:
+    first = network.run(400)
+    network.run_to(tmp_path / "x.npz", 50, start=first)
+    assert_equal(nv.load(tmp_path / "x.npz"), network.run(50, start=first))
+
+
+@pytest.mark.parametrize(("suffix", "steps"), [("npz", 8000), ("csv", 300)])
+def test_memory_does_not_grow_with_the_steps(tmp_path: Path, suffix: str, steps: int) -> None:
+    """A recording of 128 MB in far less than that; of a table of 12 MB no more than a stretch is held."""
+    wide = compiled("neurons: {A: {count: 2000, bias: 0.5}}\nconnections: {A -> A: {pattern: one_to_one}}")
+    wide.run_to(tmp_path / f"x.{suffix}", 2)  # what is loaded for the first time does not count
+    tracemalloc.start()
+    try:
+        wide.run_to(tmp_path / f"x.{suffix}", steps)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert (tmp_path / f"x.{suffix}").stat().st_size > 5 * steps * 2000
+    assert peak < 16_000_000
+
+
+class _StoppedError(Exception):
+    pass
+
+
+@pytest.mark.parametrize("suffix", ["npz", "csv"])
+@pytest.mark.parametrize("error", [KeyboardInterrupt, _StoppedError])
+def test_what_is_stopped_leaves_what_was_there(
+    network: CompiledNetwork, tmp_path: Path, suffix: str, error: type[BaseException]
+) -> None:
+    path = tmp_path / f"x.{suffix}"
+    network.run_to(path, 10)
+    before = path.read_bytes()
+
+    def stop(done: int, total: int) -> None:
+        if done >= 512:
+            raise error
+
+    with pytest.raises(error):
+        network.run_to(path, 2000, progress=stop)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_disk_that_is_too_small_is_said_beforehand(
+    network: CompiledNetwork, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def usage(path: Path) -> object:
+        return type("Usage", (), {"free": 1_000_000})()
+
+    monkeypatch.setattr("neurovis_spec.runtime.memory.shutil.disk_usage", usage)
+    for suffix in ("npz", "csv"):
+        with pytest.raises(TooLargeError, match=r"of the disk, and 976\.6 KiB are free") as refused:
+            network.run_to(tmp_path / f"x.{suffix}", 10**12)
+        assert "--every" in refused.value.hint
+        network.run_to(tmp_path / f"y.{suffix}", 100)
+
+
+def test_a_format_that_cannot_stream_saves(
+    network: CompiledNetwork, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Plain:
+        name = "plain"
+        suffixes = frozenset({".plain"})
+
+        def save(self, recording: Recording, path: Path) -> None:
+            path.write_text(f"{len(recording)}")
+
+        def load(self, path: Path) -> Recording:
+            raise RecordingError("never")
+
+    monkeypatch.setattr("neurovis_spec.runtime.stream.for_path", lambda path: Plain())
+    network.run_to(tmp_path / "x.plain", 7)
+    assert (tmp_path / "x.plain").read_text() == "7"
