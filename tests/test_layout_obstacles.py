@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from neurovis_layouts.routing.bows import Wish, clear_bow, clear_bows
 from neurovis_layouts.routing.obstacles import REACH, Obstacles
 
 from neurovis_spec.layout.geometry import straight
@@ -40,3 +41,25 @@ def test_a_line_is_crowded_by_a_disc_beside_it_but_not_by_its_own_ends(middle: P
 def test_nothing_crowds_where_there_is_nothing() -> None:
     assert Obstacles(()).crowded([straight((0.0, 0.0), (1.0, 0.0))], [(0, 1)], 0.3) == [False]
     assert Obstacles([(0.0, 0.0)]).crowded([], [], 0.3) == []
+
+
+@given(st.lists(places, min_size=2, max_size=20, unique=True), st.data())
+@settings(deadline=None)
+def test_bows_found_together_are_those_found_one_by_one(centres: list[Point], data: st.DataObject) -> None:
+    obstacles = Obstacles(centres)
+    ends = st.lists(st.integers(0, len(centres) - 1), min_size=2, max_size=2, unique=True)
+    wishes = [
+        Wish(centres[a], centres[b], (a, b), least, sided)
+        for (a, b), least, sided in data.draw(
+            st.lists(st.tuples(ends, st.sampled_from([0.0, 0.2, -0.4]), st.booleans()), min_size=1, max_size=6)
+        )
+    ]
+    together = clear_bows(wishes, obstacles)
+    assert together == [clear_bow(wish, obstacles) for wish in wishes]
+    for wish, (route, clearance, height) in zip(wishes, together, strict=True):
+        assert (route[0], route[-1]) == (wish.start, wish.end)
+        assert clearance == obstacles.clearance(route, wish.own)
+        assert not wish.sided or height * wish.least >= 0
+        if clearance < REACH - 0.03:  # then the flattest, among others, is no better
+            flat, _, _ = clear_bows([wish], Obstacles(()))[0]
+            assert obstacles.clearance(flat, wish.own) <= clearance

@@ -18,7 +18,7 @@ def packed(sizes: Sequence[Point], gap: float) -> list[Point]:
     >>> packed([(1.0, 1.0), (4.0, 3.0)], 1.0)
     [(0.0, 4.0), (0.0, 0.0)]
     """
-    total = sum((width + gap) * (height + gap) for width, height in sizes)
+    total = math.fsum((width + gap) * (height + gap) for width, height in sizes)
     most = max([math.sqrt(1.3 * total), *(width for width, _ in sizes)])
     corners: list[Point] = [(0.0, 0.0)] * len(sizes)
     x = y = high = 0.0

@@ -25,8 +25,8 @@ def fit(free: Sequence[Point], pins: Mapping[int, Point]) -> tuple[list[Point], 
         return list(free), (0.0, 0.0), frozenset()
     count = len(pins)
     shift = (
-        snap(sum(x - free[i][0] for i, (x, _) in sorted(pins.items())) / count),
-        snap(sum(y - free[i][1] for i, (_, y) in sorted(pins.items())) / count),
+        snap(math.fsum(x - free[i][0] for i, (x, _) in sorted(pins.items())) / count),
+        snap(math.fsum(y - free[i][1] for i, (_, y) in sorted(pins.items())) / count),
     )
     cells = Cells()
     placed: dict[int, Point] = dict(pins)

@@ -66,7 +66,8 @@ def sampled(route: Route, step: float = 0.2) -> list[Point]:
     """Points along a route, about ``step`` apart, both ends included."""
     points = [route[0]]
     for piece in cubics(route):
-        length = sum(distance(piece[i], piece[i + 1]) for i in range(3))
+        # not by sum(), which rounds once at the end from Python 3.12 on
+        length = distance(piece[0], piece[1]) + distance(piece[1], piece[2]) + distance(piece[2], piece[3])
         parts = max(4, min(400, math.ceil(length / step)))
         points.extend(point_on(piece, i / parts) for i in range(1, parts + 1))
     return points

@@ -9,6 +9,7 @@ After Sander (1996), Layout of compound directed graphs.
 from __future__ import annotations
 
 import heapq
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
@@ -223,9 +224,9 @@ class Strips:
                     if np.isfinite(low) and np.isfinite(high):
                         x[n] = (low + high) / 2
                     continue
-                mass = sum(weight for _, _, weight in pulls.get(n, ()))
+                mass = math.fsum(weight for _, _, weight in pulls.get(n, ()))
                 if mass > 0:
-                    aim = sum(weight * (x[other] + far) for other, far, weight in pulls[n]) / mass
+                    aim = math.fsum(weight * (x[other] + far) for other, far, weight in pulls[n]) / mass
                     x[n] = min(max(aim, low), max(low, high))
         return x[: self._count]
 

@@ -49,7 +49,7 @@ def components_of(
 def packed(extents: Sequence[tuple[Point, Point]]) -> list[Point]:
     """Shifts that put boxes (low corner, high corner) side by side, in rows about as wide as the whole is high."""
     sizes = [(high[0] - low[0] + _APART, high[1] - low[1] + _APART) for low, high in extents]
-    area = sum((w + 0.6) * (h + 0.6) for w, h in sizes)
+    area = math.fsum((w + 0.6) * (h + 0.6) for w, h in sizes)
     limit = max([16.0, 1.3 * math.sqrt(area), *(w for w, _ in sizes)])
     shifts: list[Point] = []
     x = y = row = 0.0

@@ -7,6 +7,7 @@ becomes such a frame where neurons that are not its own would stand in it otherw
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
@@ -140,7 +141,7 @@ def _around_pins(drawing: Drawing, pins: Mapping[int, Point], inner: LayoutProbl
     if not inner.pins:
         return dict(sorted(pins.items()))
     apart = [(x - drawing.places[i][0], y - drawing.places[i][1]) for i, (x, y) in sorted(pins.items())]
-    origin = snap(sum(x for x, _ in apart) / len(apart)), snap(sum(y for _, y in apart) / len(apart))
+    origin = snap(math.fsum(x for x, _ in apart) / len(apart)), snap(math.fsum(y for _, y in apart) / len(apart))
     found = dict(pins)
     for i, (x, y) in inner.pins.items():
         place = (x + origin[0], y + origin[1])

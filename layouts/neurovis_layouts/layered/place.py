@@ -8,6 +8,7 @@ run flat over discs.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from itertools import pairwise
@@ -70,7 +71,7 @@ def placed(
 def _gaps(levels: Levels, order: Sequence[Sequence[int]], spacing: float) -> list[list[float]]:
     """Least distances between neighbours; a rank much narrower than its neighbours is stretched."""
     plain = [[_gap(levels, a, b, spacing) for a, b in pairwise(rank)] for rank in order]
-    widths = [sum(gaps) + _ends(levels, rank) for gaps, rank in zip(plain, order, strict=True)]
+    widths = [math.fsum(gaps) + _ends(levels, rank) for gaps, rank in zip(plain, order, strict=True)]
     result: list[list[float]] = []
     for r, gaps in enumerate(plain):
         beside = max((widths[i] for i in (r - 1, r + 1) if 0 <= i < len(widths)), default=0.0)

@@ -7,6 +7,7 @@ stays where the plan has it, moved as a whole, or gives way, images together, wh
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -77,8 +78,8 @@ def settled(
 def _shift(free: Sequence[Point], pins: Mapping[int, Point]) -> Point:
     """The least-squares fit of the free plan to the pins, on the grid."""
     return (
-        snap(sum(x - free[i][0] for i, (x, _) in sorted(pins.items())) / len(pins)),
-        snap(sum(y - free[i][1] for i, (_, y) in sorted(pins.items())) / len(pins)),
+        snap(math.fsum(x - free[i][0] for i, (x, _) in sorted(pins.items())) / len(pins)),
+        snap(math.fsum(y - free[i][1] for i, (_, y) in sorted(pins.items())) / len(pins)),
     )
 
 

@@ -5,7 +5,9 @@ In: two centres, the obstacles, how far the route should bow at least. Out: a ro
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
 
 from neurovis_layouts.routing.obstacles import REACH, Obstacles
 from neurovis_spec.layout.geometry import distance, straight
@@ -13,6 +15,8 @@ from neurovis_spec.layout.model import Point, Route
 
 #: Heights tried where every connection can be followed, and where they are many.
 MANY_TRIES, FEW_TRIES = 12, 2
+#: Clear enough.
+_ENOUGH = REACH - 0.03
 
 
 def bow(start: Point, end: Point, height: float, hold: float = 0.3) -> Route:
@@ -30,31 +34,49 @@ def bow(start: Point, end: Point, height: float, hold: float = 0.3) -> Route:
     )
 
 
-def clear_bow(
-    start: Point,
-    end: Point,
-    own: tuple[int, int],
-    obstacles: Obstacles,
-    least: float,
-    sided: bool,
-    tries: int = MANY_TRIES,
-) -> tuple[Route, float, float]:
-    """The flattest bow of at least ``least`` clear of foreign discs, else the clearest; its clearance and height.
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """A bow that is asked for: between which places and neurons, how high at least; ``sided`` keeps it on the side of
+    ``least`` (one of a reciprocal pair must not change over)."""
 
-    ``sided`` keeps it on the side of ``least`` (one of a reciprocal pair must not change over). ``tries`` is how many
-    heights are tried.
-    """
-    best: tuple[Route, float, float] | None = None
-    length = distance(start, end)
-    for height, hold in _candidates(least, length, sided, tries):
-        route = bow(start, end, height, hold)
-        clearance = obstacles.clearance(route, own)
-        if clearance >= REACH - 0.03:
-            return route, clearance, height
-        if best is None or clearance > best[1]:
-            best = route, clearance, height
-    assert best is not None
-    return best
+    start: Point
+    end: Point
+    own: tuple[int, int]
+    least: float
+    sided: bool
+
+
+def clear_bow(wish: Wish, obstacles: Obstacles) -> tuple[Route, float, float]:
+    """The flattest bow clear of foreign discs, else the clearest; its clearance and height."""
+    return clear_bows([wish], obstacles)[0]
+
+
+def clear_bows(
+    wishes: Sequence[Wish], obstacles: Obstacles, tries: int = MANY_TRIES
+) -> list[tuple[Route, float, float]]:
+    """For each wish the flattest bow clear of foreign discs, else the clearest; its clearance and height. ``tries`` is
+    how many heights are tried on a side."""
+    found: list[tuple[Route, float, float] | None] = [None] * len(wishes)
+    ways = [_candidates(w.least, distance(w.start, w.end), w.sided, tries) for w in wishes]
+    waiting = list(range(len(wishes)))
+    many = 1
+    while waiting:
+        # all of them at once, a few heights at a time, as most find their way soon
+        chosen = [(i, height, hold) for i in waiting for height, hold in islice(ways[i], many)]
+        bows = [bow(wishes[i].start, wishes[i].end, height, hold) for i, height, hold in chosen]
+        clearances = obstacles.clearances(bows, [wishes[i].own for i, _, _ in chosen])
+        tried: set[int] = set()
+        clear: set[int] = set()
+        for (i, height, _), route, clearance in zip(chosen, bows, clearances, strict=True):
+            tried.add(i)
+            best = found[i]
+            if i not in clear and (best is None or clearance > best[1] or clearance >= _ENOUGH):
+                found[i] = route, clearance, height
+                if clearance >= _ENOUGH:
+                    clear.add(i)
+        waiting = [i for i in waiting if i in tried and i not in clear]
+        many = 4
+    return [best for best in found if best is not None]
 
 
 def _candidates(least: float, length: float, sided: bool, tries: int) -> Iterator[tuple[float, float]]:

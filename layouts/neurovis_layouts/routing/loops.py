@@ -86,4 +86,4 @@ def _crowd(centre: Point, way: Point, near: Sequence[Point]) -> float:
 def _traffic(way: Point, tangents: Sequence[Point]) -> float:
     """How many edges would run through the loop or along its legs."""
     inside = [max(0.0, way[0] * x + way[1] * y - _LEGS) for x, y in tangents]
-    return min(1.5, 2.0 * sum(inside))
+    return min(1.5, 2.0 * math.fsum(inside))

@@ -5,10 +5,11 @@ In: the problem, centres in the engine's frame (x across, y along), waypoints. O
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 
-from neurovis_layouts.routing.bows import FEW_TRIES, MANY_TRIES, clear_bow
+from neurovis_layouts.routing.bows import FEW_TRIES, MANY_TRIES, Wish, clear_bow, clear_bows
 from neurovis_layouts.routing.curves import Waypoint, curve
 from neurovis_layouts.routing.detours import Detours
 from neurovis_layouts.routing.loops import best_loop
@@ -25,6 +26,8 @@ _NEAR = 3.0
 _MOST_CAREFULLY = 4000
 #: With more than this they do not go far out of their way, which would only move the crowd.
 _MOST_AT_LENGTH = 1000
+#: Nor where all of them together are longer than this by the heights tried.
+_MOST_LENGTH = 250_000.0
 _STEEP_ENOUGH = 0.75
 #: Handles, leanings and slopes for a curve that comes too close to a disc.
 _OTHERWISE = ((0.75, 1.0, 1.0), (0.95, 1.0, 1.0), (0.75, 0.4, 1.0), (0.95, 0.4, 1.0), (0.0, 1.0, 0.3), (0.5, 1.0, 0.0))
@@ -137,7 +140,7 @@ def _curves(
                 best, clearance = others[other], clearances[other]
         if clearance < TOUCH + 0.02:
             least = heights.get(owns[k], 0.0) + 0.3
-            bowed, found, height = clear_bow(start, end, owns[k], obstacles, least, owns[k] in shared)
+            bowed, found, height = clear_bow(Wish(start, end, owns[k], least, owns[k] in shared), obstacles)
             if found > clearance + 0.02:
                 best, heights[owns[k]] = bowed, height
         routes[chosen[k]] = best
@@ -187,25 +190,44 @@ def _bows(
     between: dict[tuple[int, int], list[int]] = {}
     for i in chosen:
         between.setdefault((edges[i].source, edges[i].target), []).append(i)
+    points = math.fsum(
+        distance(centres[source], centres[target]) * len(equal) for (source, target), equal in between.items()
+    )
     tries = MANY_TRIES if len(chosen) <= _MOST_AT_LENGTH else FEW_TRIES
+    tries = min(tries, int(_MOST_LENGTH / max(points, 1.0)))
     routes: dict[int, Route] = {}
-    for (source, target), equal in between.items():
-        start, end = centres[source], centres[target]
-        reciprocal = (target, source) in between
-        base = 0.13 + 0.035 * distance(start, end)
-        left = right = 0.0
-        for place, i in enumerate(equal):
-            # each further one outside those before it, wherever obstacles have sent these
-            if reciprocal:
-                least = left + 0.3 if place else base
-            else:
-                odd = len(equal) % 2
-                least = 0.0 if odd and place == 0 else left + 0.3 if (place + odd) % 2 == 0 else right - 0.3
-                least = least / 2 if not odd and place < 2 else least
-            sided = reciprocal or len(equal) > 1
-            routes[i], _, height = clear_bow(start, end, (source, target), obstacles, least, sided, tries)
-            left, right = max(left, height), min(right, height)
+    reach = dict.fromkeys(between, (0.0, 0.0))
+    for place in range(max((len(equal) for equal in between.values()), default=0)):
+        # each further one outside those before it, wherever obstacles have sent these
+        wishes = {
+            ends: Wish(
+                centres[ends[0]], centres[ends[1]], ends, *_least(place, len(equal), ends, between, reach, centres)
+            )
+            for ends, equal in between.items()
+            if place < len(equal)
+        }
+        for ends, (route, _, height) in zip(wishes, clear_bows(list(wishes.values()), obstacles, tries), strict=True):
+            routes[between[ends][place]] = route
+            reach[ends] = min(reach[ends][0], height), max(reach[ends][1], height)
     return routes
+
+
+def _least(
+    place: int,
+    count: int,
+    ends: tuple[int, int],
+    between: Mapping[tuple[int, int], object],
+    reach: Mapping[tuple[int, int], tuple[float, float]],
+    centres: Sequence[Point],
+) -> tuple[float, bool]:
+    """How high the bow of one of ``count`` equal edges is at least, and whether it must stay on that side; ``reach`` is
+    how far those before it go to either side."""
+    right, left = reach[ends]
+    if ends[::-1] in between:
+        return left + 0.3 if place else 0.13 + 0.035 * distance(centres[ends[0]], centres[ends[1]]), True
+    odd = count % 2
+    least = 0.0 if odd and place == 0 else left + 0.3 if (place + odd) % 2 == 0 else right - 0.3
+    return least / 2 if not odd and place < 2 else least, count > 1
 
 
 def _loops(
