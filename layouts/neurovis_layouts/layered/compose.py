@@ -217,7 +217,8 @@ def _joined(
     done = {frozenset(own) for own, _ in (*frames, *boxes)}
     boxes += [(own, _box(places, own)) for _, own in problem.boxes if frozenset(own) not in done]
     links = [i for i, key in enumerate(keys) if key not in routes]
-    routes.update(linked(problem, links, keys, plan, rests, units, frames, boxes, pair))
+    drawn = list(routes.values())
+    routes.update(linked(problem, links, keys, plan, rests, units, frames, boxes, pair, drawn))
     return Drawing(tuple(places), routes, tuple(frames), tuple(boxes), rests.axis if pair else None, bool(problem.pins))
 
 

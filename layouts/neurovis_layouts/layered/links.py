@@ -5,7 +5,7 @@ In: places, frames, the plan's waypoints. Out: a route for each; those of mirror
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from neurovis_layouts.layered.book import Key
 from neurovis_layouts.layered.drawing import Rect
@@ -28,14 +28,16 @@ def linked(
     frames: Sequence[tuple[tuple[int, ...], Rect]],
     boxes: Sequence[tuple[tuple[int, ...], Rect]],
     pair: Mapping[int, int],
+    drawn: Iterable[Route],
 ) -> dict[Key, Route]:
-    """Routes of these edges by key; ``boxes`` are drawn, though nothing had to make room for them."""
+    """Routes of these edges by key; ``boxes`` are drawn, though nothing had to make room for them; ``drawn`` are the
+    routes within the frames."""
     edges = [problem.edges[i] for i in links]
     framed = [(frozenset(members), rect) for members, rect in (*frames, *boxes)]
     if frames:
         planned = _passing(problem, plan, rests)
         gates = {k: planned[i] for k, i in enumerate(links) if i in planned}
-        ways, lateral = channels(dict(enumerate(edges)), rests.places, framed, gates)
+        ways, lateral = channels(dict(enumerate(edges)), rests.places, framed, gates, drawn)
         routes = route_all(edges, rests.places, ways, _bowed(edges, units), lateral, frames=framed)
     else:
         ways = _passing(problem, plan, rests)

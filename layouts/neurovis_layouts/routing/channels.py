@@ -10,15 +10,17 @@ from __future__ import annotations
 import math
 from bisect import bisect_left, bisect_right
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
 
 from neurovis_layouts.routing.curves import Waypoint
+from neurovis_layouts.routing.lines import crossed
 from neurovis_layouts.routing.rows import Own, Rows, Span
 from neurovis_layouts.routing.walls import FloatArray, Frame, IntArray
-from neurovis_spec.layout.model import LayoutEdge, Point
+from neurovis_spec.layout.geometry import sampled
+from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
 _FINE = 0.15
 _INSET = 0.25
@@ -35,6 +37,9 @@ _CHOICES, _NEAR, _MOST_NEAR, _KEPT = 24, 2.0, 8, 2
 _FARTHEST, _ASIDE, _BESIDE_WAY = 40, 0.6, 0.12
 #: With more edges than this nobody can follow one: they take the straight way.
 _MOST = 1500
+#: What it costs to cross a line; with more edges than this nobody counts.
+_CROSSING, _MOST_CROSSED = 3.0, 300
+_SAMPLED = 0.25
 
 
 def channels(
@@ -42,16 +47,27 @@ def channels(
     centres: Sequence[Point],
     frames: Sequence[Frame],
     gates: Mapping[int, Sequence[Waypoint]],
+    drawn: Iterable[Route] = (),
 ) -> tuple[dict[int, list[Waypoint]], dict[int, list[Waypoint]]]:
     """Waypoints of edges by index: of those along the direction, and (x and y exchanged) of those across it. Those with
-    ``gates`` run along it, through these, which lie in their order."""
+    ``gates`` run along it, through these, which lie in their order. ``drawn`` are routes that are there already, to be
+    crossed as little as the ways themselves."""
     along: dict[int, list[Waypoint]] = {}
     across: dict[int, list[Waypoint]] = {}
     if len(edges) > _MOST:
         return {i: [] for i in edges}, {}
     times = Counter(frozenset((edge.source, edge.target)) for edge in edges.values())
-    down = Rows(centres, frames, len(edges))
+    down = Rows(centres, frames, len(edges), True)
     side = Rows([(y, x) for x, y in centres], [(own, (r[1], r[0], r[3], r[2])) for own, r in frames], len(edges))
+    careful = len(edges) <= _MOST_CROSSED
+
+    def note(line: Sequence[Point], rows: Rows) -> None:
+        if careful:
+            rows.lines.add(line)
+            (side if rows is down else down).lines.add([(y, x) for x, y in line])
+
+    for route in drawn:
+        note(sampled(route, _SAMPLED), down)
     for i, edge in sorted(edges.items(), key=lambda item: (_length(item[1], centres), item[0])):
         if edge.source == edge.target:
             continue
@@ -61,6 +77,7 @@ def channels(
             path = _through(down, ends, gates[i])
             down.use(path[1:-1])
             along[i] = _knots(down, path, ends, alone)
+            note(path, down)
             continue
         cost, path = _way(down, ends)
         least = _straight(centres[ends[0]], centres[ends[1]]) * _ACROSS
@@ -70,10 +87,17 @@ def channels(
         if cost <= other * _ACROSS:
             down.use(path[1:-1])
             along[i] = _knots(down, path, ends, alone)
+            note(_bent(path, along[i]), down)
         else:
             side.use(aside[1:-1])
             across[i] = _knots(side, aside, ends, alone)
+            note(_bent(aside, across[i]), side)
     return along, across
+
+
+def _bent(path: Sequence[Point], knots: Sequence[Waypoint]) -> list[Point]:
+    """A way by its bends."""
+    return [path[0], *((knot.x, knot.y) for knot in knots), path[-1]]
 
 
 def _length(edge: LayoutEdge, centres: Sequence[Point]) -> float:
@@ -133,6 +157,9 @@ def _down(rows: Rows, start: Point, end: Point, own: Own) -> tuple[float, list[P
         walls = rows.walls(before, y, own, limits)
         if walls:
             ways = ways + _WALL * _sides(np.array(across), np.array(places), walls)
+        lines = rows.lines.between(before, y)
+        if len(lines[0]):
+            ways = ways + _CROSSING * crossed(np.array(across), np.array(places), lines)
         chosen = np.argmin(ways, axis=1)
         layers.append((places, chosen))
         cost, across, before = ways[np.arange(len(places)), chosen] + np.array(extra), places, y
@@ -153,6 +180,9 @@ def _open(rows: Rows, line: Sequence[Point], own: Own) -> bool:
             return False
     for (ax, top), (bx, bottom) in pairwise(line):
         if rows.walls(top, bottom, own, (min(ax, bx), max(ax, bx))):
+            return False
+        lines = rows.lines.between(top, bottom)
+        if len(lines[0]) and crossed(np.array([ax]), np.array([bx]), lines).any():
             return False
     return True
 

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
+from neurovis_layouts.routing.lines import Lines
 from neurovis_layouts.routing.walls import Frame
 from neurovis_spec.layout.model import Point
 
@@ -19,7 +20,7 @@ Span: TypeAlias = tuple[float, float]
 Own: TypeAlias = frozenset[int]
 
 _DISC, _ROW = 0.45, 0.42
-_BESIDE_FRAME = 0.2
+_BESIDE_FRAME, _ON_LINE = 0.2, 0.12
 #: Rows closer than this are one.
 _FINE = 0.15
 #: With more rows than this by ways only those are looked at that matter to a way.
@@ -39,9 +40,12 @@ class _Row:
 class Rows:
     """Discs and frames by rows, and where ways run already."""
 
-    def __init__(self, centres: Sequence[Point], frames: Sequence[Frame], ways: int) -> None:
-        """``ways`` is how many ways will be looked for."""
+    def __init__(self, centres: Sequence[Point], frames: Sequence[Frame], ways: int, lined: bool = False) -> None:
+        """``ways`` is how many ways will be looked for; with ``lined`` none runs along the sides of its own frames."""
         self.centres = centres
+        self._lined = lined
+        #: what is to be crossed as little as can be
+        self.lines = Lines()
         self._frames = frames
         self._sorted = sorted((y, x, i) for i, (x, y) in enumerate(centres))
         self._ys = [y for y, _, _ in self._sorted]
@@ -87,8 +91,18 @@ class Rows:
             row = self._rows[y] = _Row(sorted(blocked), frozenset(owner for _, _, owner in blocked))
         here = own & row.owners
         if here not in row.free:
-            row.free[here] = _gaps((low, high) for low, high, owner in row.blocked if owner not in here)
+            row.free[here] = _gaps(
+                span for low, high, owner in row.blocked for span in self._blocking(low, high, owner, here)
+            )
         return row.free[here]
+
+    def _blocking(self, low: float, high: float, owner: int, own: Own) -> Iterable[Span]:
+        """What is in the way of a disc or frame: all of it, nothing, or the sides of one that the way may enter."""
+        if owner not in own:
+            yield low, high
+        elif self._lined and owner < 0:
+            for side in (low + _BESIDE_FRAME, high - _BESIDE_FRAME):
+                yield side - _ON_LINE, side + _ON_LINE
 
     def walls(self, top: float, bottom: float, own: Own, within: Span) -> list[Span]:
         """The sides of foreign frames that stand between two heights, of those that lie within these limits."""
@@ -119,7 +133,7 @@ def _height(stop: tuple[float, Own]) -> float:
 def _gaps(blocked: Iterable[Span]) -> list[Span]:
     free: list[Span] = []
     edge = -math.inf
-    for low, high in blocked:
+    for low, high in sorted(blocked):
         if low > edge:
             free.append((edge, low))
         edge = max(edge, high)

@@ -1,0 +1,52 @@
+"""Lines that are drawn already, and ways that cross few of them."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from neurovis_layouts.routing.channels import channels
+from neurovis_layouts.routing.lines import Lines, crossed
+
+from neurovis_spec.layout import LayoutEdge
+
+points = st.tuples(st.integers(-9, 9), st.integers(-9, 9)).map(lambda p: (float(p[0]), float(p[1])))
+
+
+@given(st.lists(points, min_size=2, max_size=8), st.floats(-9, 9), st.floats(-9, 9))
+def test_lines_pass_heights_where_they_are(line: list[tuple[float, float]], one: float, other: float) -> None:
+    top, bottom = min(one, other), max(one, other)
+    lines = Lines()
+    lines.add(line)
+    above, below = lines.between(top, bottom)
+    # by hand: the line as runs that go one way, each of which passes both heights or not
+    runs: list[list[tuple[float, float]]] = [[line[0]]]
+    for before, point in pairwise(line):
+        rise = point[1] - before[1]
+        if rise and runs[-1][-1][1] != runs[-1][0][1] and (rise > 0) != (runs[-1][-1][1] > runs[-1][0][1]):
+            runs.append([before])
+        runs[-1].append(point)
+    heights = [sorted(y for _, y in run) for run in runs]
+    assert len(above) == sum(ys[0] <= top and bottom <= ys[-1] and ys[0] < ys[-1] for ys in heights)
+    xs = [x for x, _ in line]
+    for x in (*above.tolist(), *below.tolist()):
+        assert min(xs) <= x <= max(xs)
+
+
+def test_a_step_crosses_what_changes_sides() -> None:
+    lines = np.array([0.0, 1.0, 2.0]), np.array([0.0, 3.0, 2.0])
+    assert crossed(np.array([-1.0, 1.5]), np.array([-1.0, 2.5]), lines).tolist() == [[0, 2], [2, 2]]
+
+
+def test_a_way_takes_the_longer_side_of_a_disc_rather_than_cross_a_line() -> None:
+    centres = [(0.0, 0.0), (0.0, 8.0), (0.2, 4.0)]
+    edge = {0: LayoutEdge("a", 0, 1, 1)}
+    line = ((-3.0, -0.5), (-2.0, 1.0), (-1.0, 2.5), (-0.1, 4.0), (-1.0, 5.5), (-2.0, 7.0), (-3.0, 8.5))
+    plain = channels(edge, centres, [], {})[0][0]
+    wary = channels(edge, centres, [], {}, [line])[0][0]
+    assert plain
+    assert all(way.x < 0.2 for way in plain)
+    assert wary
+    assert all(way.x > 0.2 for way in wary)
