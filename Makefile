@@ -33,9 +33,11 @@ $(VENV)/made:
 	@$(PYTHON) -m venv $(VENV) || { echo "$(PYTHON) -m venv failed; on Debian: apt-get install python3-venv" >&2; exit 1; }
 	@touch $@
 
+# pip compiles what it copies; what is used in place is compiled here, so that commands start as quickly.
 $(VENV)/installed: $(VENV)/made pyproject.toml
 	@echo "installing into $(VENV) with $$($(BIN)/python --version) (a minute or so)"
 	@begun=$$(date +%s); $(PIP) --editable . && printf '%-26s%5s s   %s\n' install $$(($$(date +%s) - begun)) $(VENV)
+	@$(BIN)/python -m compileall -q neurovis_spec layouts renderers
 	@touch $@
 
 $(VENV)/tested: $(VENV)/installed

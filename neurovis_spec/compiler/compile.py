@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,7 +19,6 @@ from neurovis_spec.compiler.constants import Constants, parse_formula
 from neurovis_spec.compiler.crowds import crowded
 from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.entries import Bundle
-from neurovis_spec.compiler.events import EventReader, wires_of, with_phases
 from neurovis_spec.compiler.gaps import gaps_of
 from neurovis_spec.compiler.limits import MOST_SIGNALS, Limits, amount
 from neurovis_spec.compiler.lower import make_blocks, make_plasticity, make_program
@@ -38,6 +38,9 @@ from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.includes import Includes, read_includes
 from neurovis_spec.language.model import opening
 from neurovis_spec.language.spec import Spec
+
+if TYPE_CHECKING:
+    from neurovis_spec.compiler.events import Event
 
 
 @dataclass(frozen=True)
@@ -95,14 +98,14 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
     expansion.depend()
     if not made.complete or findings.errors > before or not _under_way(bundles, findings):
         _look_at_cycles(made, population, findings)
-        EventReader(wires_of(made), directory, constants).read(spec.events)
+        _read_events(spec, made, directory, constants)
         return None
     plasticity, rules = make_plasticity(bundles)
     connections = join(bundles, rules)
     level = levels(len(population.neurons), connections.sources, connections.targets, connections.delays)
     if isinstance(level, Cycle):
         _report_cycle(level, population, connections.entry, bundles, findings)
-        EventReader(wires_of(made), directory, constants).read(spec.events)
+        _read_events(spec, made, directory, constants)
         return None
     blocks = make_blocks(population, connections.sources, connections.targets, level)
     program = make_program(blocks, plasticity)
@@ -188,9 +191,11 @@ def _eventful(
     """The network with the phases that its events make; its hash says that they are there."""
     if not spec.events:
         return network
+    from neurovis_spec.compiler.events import with_phases
+
     findings = constants.findings
     before = findings.errors
-    events = EventReader(wires_of(connected), directory, constants).read(spec.events)
+    events = _read_events(spec, connected, directory, constants)
 
     def again(values: Mapping[str, float]) -> Network | None:
         parameters = {**request.parameters, **values}
@@ -202,6 +207,15 @@ def _eventful(
     entry = spec.source.entry("events")
     made = with_phases(network, events, again, constants, opening(spec.source) if entry is None else entry.key.span)
     return None if findings.errors > before else replace(made, hash=digest(network.hash, events))
+
+
+def _read_events(spec: Spec, connected: Connected, directory: Directory, constants: Constants) -> tuple[Event, ...]:
+    """The events of a spec. Most specs have none: nothing that reads them is imported then."""
+    if not spec.events:
+        return ()
+    from neurovis_spec.compiler.events import EventReader, wires_of
+
+    return EventReader(wires_of(connected), directory, constants).read(spec.events)
 
 
 def _report_no_neurons(spec: Spec, population: Population, findings: Findings) -> None:

@@ -7,6 +7,7 @@ matrix or pattern row by row), and for each plastic entry what it learns by.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,8 +22,7 @@ from neurovis_spec.language.located import Located, shown
 from neurovis_spec.language.sections import ConnectionModel
 
 
-@dataclass(frozen=True)
-class Connected:
+class Connected(NamedTuple):
     """The entries that are not at fault, and whether these are all."""
 
     bundles: tuple[Bundle, ...]

@@ -7,6 +7,7 @@ every part is still looked at, whatever is wrong with the others.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,8 +36,7 @@ _SHAPING = frozenset({"matrix", "edges", "pattern", "centre", "rows", "self"})
 _PAIR = ("i", "j", "n_from", "n_to", "distance")
 
 
-@dataclass(frozen=True)
-class Bundle:
+class Bundle(NamedTuple):
     """The connections of one entry: neuron indices and values, and the rule, if any."""
 
     name: str
@@ -52,8 +52,7 @@ class Bundle:
     description: str | None
 
 
-@dataclass(frozen=True)
-class _Shape:
+class _Shape(NamedTuple):
     """Which pairs of an entry exist (positions within its ends), and what its shape says of weights and delays."""
 
     i: IntArray
@@ -62,8 +61,7 @@ class _Shape:
     delays: IntArray | None = None
 
 
-@dataclass(frozen=True)
-class Place:
+class Place(NamedTuple):
     """Where an entry stands: its unit, what is called how there, how many connections it may make, whether the run has
     begun for which they are made."""
 
