@@ -126,7 +126,8 @@ PICTURES = (
         14364,
         "A leg that learns from reward alone",
         "An episode has just ended, and all connections to O change at once: by how much, reward and policy say "
-        "(dotted). L reaches B twice, at once and a step later, with opposite signs: B is the difference.",
+        "(dotted). L reaches B twice, at once and (the line with a bead) a step later, with opposite signs: B is "
+        "the difference.",
     ),
     Picture(
         "hexapod",
