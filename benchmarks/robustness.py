@@ -84,6 +84,20 @@ def _pair(body: str, sizes: str = "100000") -> str:
     return HEAD + f"neurons: {{A: {{count: {sizes}}}, B: {{count: {sizes}}}}}\nconnections: {{A -> B: {body}}}\n"
 
 
+def _instances(count: int, neurons: int) -> str:
+    module = f"modules: {{leg: {{neurons: {{A: {{count: {neurons}, bias: 1}}}}}}}}\n"
+    return HEAD + module + f"instances: {{left: {{module: leg, count: {count}}}}}\n"
+
+
+def _levels(depth: int, count: str, given: str) -> str:
+    """Modules within modules; in ``given``, what each is given, # is the level."""
+    text = HEAD + f"modules:\n  m{depth}: {{parameters: {{p: 1}}, neurons: {{A: {{count: p, bias: 1}}}}}}\n"
+    for level in range(depth):
+        inner = f'{{module: m{level + 1}, count: "{count}", set: {{p: {given.replace("#", str(level))}}}}}'
+        text += f"  m{level}: {{parameters: {{p: 1}}, instances: {{x: {inner}}}}}\n"
+    return text + "instances: {x: {module: m0}}\n"
+
+
 def _ends(key: str) -> str:
     """A connection with this key, which is too long for a plain one."""
     return HEAD + f"neurons: {{A: {{}}}}\nconnections:\n  ? {key}\n  : 1\n"
@@ -115,8 +129,12 @@ BOMBS: dict[str, Case] = {
     "a count of 9^9^9^9": Case(_group("count: 9^9^9^9")),
     "the largest first": Case(_group("count: 2, first: 9223372036854775807")),
     "a range of 1e18": Case(_group("count: 2") + "outputs: {y: A1..A999999999999999999}\n"),
-    "100,000 to 100,000": Case(_pair("{pattern: all_to_all}"), seconds=0.5, mib=60),
-    "random 100,000 to 100,000": Case(_pair("{pattern: {random: {probability: 1}}}"), seconds=0.5, mib=60),
+    "100,000 to 100,000": Case(_pair("{pattern: all_to_all}")),
+    "random 100,000 to 100,000": Case(_pair("{pattern: {random: {probability: 1}}}")),
+    "30,000 instances of 40 neurons": Case(_instances(30_000, 40)),
+    "10^18 instances": Case(_levels(60, "2", "p")),
+    "10^18 instances, each set differently": Case(_levels(60, "2", "p + i*2^#")),
+    "counts that are set at 12 levels": Case(_levels(12, "floor(min(p, 3)) + 3", "p + i/1000")),
     "an indegree of 1e18": Case(_pair("{pattern: {fixed_indegree: {count: 1000000000000000000}}}", "10")),
     "a band of 1e18": Case(_pair("{pattern: {band: {width: 1000000000000000000}}}", "10")),
     "the largest delay": Case(_pair("{pattern: one_to_one, delay: 9223372036854775807}", "10")),

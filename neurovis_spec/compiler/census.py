@@ -110,24 +110,29 @@ class Census:
         own = sum(float(size_of(group, constants, {}, 1)[0]) for group in section.neurons.values())
         if own > self._most:
             return Excess()
-        start = Tally(0, int(own))
-        tally = self._of(entries, constants, start)
-        if not self._excessive(tally):
-            assert tally is not None
-            return tally
-        some = range(1, len(entries) + 1)
-        first = bisect_left(some, True, key=lambda some: self._excessive(self._of(entries[:some], constants, start)))
-        name, model = entries[first]
-        span = key_span(section, "instances", name) if model.count is None else model.count.span
-        return self._excess(span, self._of(entries[: first + 1], constants, start))
+        tallies: dict[int, Tally | None] = {}
 
-    def _of(self, entries: tuple[tuple[str, InstanceModel], ...], constants: Constants, start: Tally) -> Tally | None:
+        def first(some: int) -> Tally | None:
+            """What that many entries make."""
+            if some not in tallies:
+                tallies[some] = self._of(entries[:some], constants, int(own))
+            return tallies[some]
+
+        tally = first(len(entries))
+        if tally is not None and not self._excessive(tally):
+            return tally
+        some = 1 + bisect_left(range(1, len(entries)), True, key=lambda some: self._excessive(first(some)))
+        name, model = entries[some - 1]
+        span = key_span(section, "instances", name) if model.count is None else model.count.span
+        return self._excess(span, first(some))
+
+    def _of(self, entries: tuple[tuple[str, InstanceModel], ...], constants: Constants, own: int) -> Tally | None:
         """What some entries make beside what there is; None where these are more than there may be, however many."""
         try:
             made = self.count([model for _, model in entries], constants)
         except TooManyError:
             return None
-        return Tally(made.instances, start.neurons + made.neurons, made.large)
+        return Tally(made.instances, own + made.neurons, made.large)
 
     def _excessive(self, tally: Tally | None) -> bool:
         return tally is None or tally.instances > MOST_INSTANCES or tally.neurons > self._most
