@@ -58,7 +58,8 @@ class Definitions:
 
 M = TypeVar("M", bound=LanguageModel)
 D = TypeVar("D")
-#: Keys of a definition that declare names.
+#: Keys of a definition that declare what is set where it is used, and those that declare names.
+_SET = frozenset({"parameters", "signals"})
 _DECLARING = frozenset({"parameters", "signals", "let", "state"})
 
 
@@ -115,10 +116,10 @@ class _Checker:
             tree = self._default(parameter.value, values)
             low, high = self._default(parameter.minimum, values), self._default(parameter.maximum, values)
             self.declare("parameters", name)
-            default = Default(name, tree or Number(0.0), low, high)
+            default = Default(name, Number(0.0)) if parameter.failed else Default(name, tree or Number(0.0), low, high)
             result.append(default)
             values[name] = evaluate_array(default.value, values)
-            if tree is not None:
+            if tree is not None and not parameter.failed:
                 check_bounds(values[name], default, values, parameter.value.span, self.findings)
         for name in lost_names(self.source, "parameters", dict(parameters)):
             self.known.setdefault(name, None)
@@ -274,6 +275,6 @@ def _defined(
     found = {
         name: definition
         for name, definition in made.items()
-        if definition is not None and models[name].lost_keys.isdisjoint(_DECLARING)
+        if definition is not None and models[name].lost_keys.isdisjoint(_SET)
     }
     return found, gaps.with_names(section, gaps.names[section] | (made.keys() - found.keys()))

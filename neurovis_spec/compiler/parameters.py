@@ -32,7 +32,7 @@ def _parameter(
     if name in RESERVED:
         message = f"a parameter may not be called '{name}': the language gives this name a meaning of its own"
         findings.error("reserved-name", span, message)
-    at_fault = name in constants.broken  # what is set is at fault
+    at_fault = name in constants.broken or parameter.failed  # or what is set is at fault
     tree = constants.tree(parameter.value, what="parameters before this one, and constants")
     constants.uses[name] = frozenset() if tree is None or name in given else names(tree)
     value = None if tree is None else constants.scalar(parameter.value)

@@ -13,8 +13,9 @@ from neurovis_spec.compiler.limits import PATIENCE, amount, plural
 from neurovis_spec.compiler.network import FloatArray, Input, frozen
 from neurovis_spec.compiler.references import Section, key_span
 from neurovis_spec.compiler.tables import Files
+from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.expressions.tree import Tree
-from neurovis_spec.language.located import Formula, formula_of
+from neurovis_spec.language.located import Formula, Located, formula_of
 from neurovis_spec.language.sections import InputModel
 from neurovis_spec.language.source import NULL, Packed, Sequence
 
@@ -26,35 +27,52 @@ def make_input(
 ) -> Input | None:
     """One input of a section, from ``start`` on in the vector of all inputs; None where it is at fault."""
     findings = constants.findings
-    if model.lost:
-        return None
-    given = [key for key in _SOURCES if getattr(model, key) is not None]
+    sources = {"expression": model.expression, "file": model.file, "values": model.values, "size": model.size}
+    given = [key for key in _SOURCES if sources[key] is not None]
+    made = [
+        None if model.expression is None else _by_expression(name, model.expression, start, constants),
+        None if model.file is None else _by_file(name, model.file, start, files, findings),
+        None if model.values is None else _by_values(name, model.values, start, constants),
+        None if given and model.size is None else _by_size(name, model, start, section, constants),
+    ]
     if len(given) > 1:
         entry = model.source.entry(given[1])
         span = model.source.span if entry is None else entry.key.span
         message = f"'{given[1]}' beside '{given[0]}': an input has one source"
         findings.error("conflicting-keys", span, message, f"keep '{given[0]}' or '{given[1]}'")
         return None
-    if model.expression is not None:
-        tree = _expression(model.expression, constants)
-        return None if tree is None else Input(name, start, 1, expression=tree)
-    if model.file is not None:
-        table = files.table_at(model.file)
-        if table is None:
-            return None
-        if not table.present.all():
-            row, column = divmod(int(np.argmin(table.present)), table.present.shape[1])
-            message = f"row {row + 1}, column {column + 1} of the file is empty; an input needs a number everywhere"
-            findings.error("file-format", model.file.span, message)
-            return None
-        return _tabled(name, start, np.array(table.values, dtype=np.float64))
-    if model.values is not None:
-        values = _inline(model.values, constants)
-        return None if values is None else _tabled(name, start, values)
+    if not model.lost_keys.isdisjoint(_SOURCES):
+        return None
+    return next((one for one in made if one is not None), None)
+
+
+def _by_expression(name: str, formula: Formula, start: int, constants: Constants) -> Input | None:
+    tree = _expression(formula, constants)
+    return None if tree is None else Input(name, start, 1, expression=tree)
+
+
+def _by_file(name: str, path: Located[str], start: int, files: Files, findings: Findings) -> Input | None:
+    table = files.table_at(path)
+    if table is None:
+        return None
+    if not table.present.all():
+        row, column = divmod(int(np.argmin(table.present)), table.present.shape[1])
+        message = f"row {row + 1}, column {column + 1} of the file is empty; an input needs a number everywhere"
+        findings.error("file-format", path.span, message)
+        return None
+    return _tabled(name, start, np.array(table.values, dtype=np.float64))
+
+
+def _by_values(name: str, node: Sequence | Packed, start: int, constants: Constants) -> Input | None:
+    values = _inline(node, constants)
+    return None if values is None else _tabled(name, start, values)
+
+
+def _by_size(name: str, model: InputModel, start: int, section: Section, constants: Constants) -> Input | None:
     size = 1 if model.size is None else constants.integer(model.size, "'size'", 1)
     if size is not None and size > 1_000_000:
         span = key_span(section, "inputs", name) if model.size is None else model.size.span
-        findings.error("too-many", span, "an input has at most 1,000,000 components")
+        constants.findings.error("too-many", span, "an input has at most 1,000,000 components")
         return None
     return None if size is None else Input(name, start, size)
 

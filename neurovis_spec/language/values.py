@@ -5,9 +5,12 @@ In: nodes. Out: one frozen value each, so that nobody behind this module asks ag
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple, TypeAlias
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Annotated, NamedTuple, TypeAlias, TypeVar
 
 from pydantic import ValidationInfo
+from pydantic_core import PydanticCustomError
 
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.keys import read_keys
@@ -27,6 +30,8 @@ from neurovis_spec.language.located import (
 )
 from neurovis_spec.language.model import opening
 from neurovis_spec.language.source import Entry, Mapping, Node, Packed, Scalar, Sequence
+
+T = TypeVar("T")
 
 #: The schema of a formula, or of a list with one for each neuron.
 FORMULAS = {"anyOf": [*FORMULA["anyOf"], {"type": "array", "items": FORMULA}]}
@@ -203,12 +208,14 @@ FormulasField = Annotated[Formula | FormulaList, Leaf(as_formulas, FORMULAS)]
 
 
 class Parameter(NamedTuple):
-    """A named constant: its value, and the bounds within which it may be set."""
+    """A named constant: its value, and the bounds within which it may be set. ``failed``: something of it is at fault;
+    a value of 0 stands in then."""
 
     value: Formula
     minimum: Formula | None
     maximum: Formula | None
     description: str | None
+    failed: bool = False
 
 
 def as_parameter(node: Node, info: ValidationInfo) -> Parameter:
@@ -222,12 +229,19 @@ def as_parameter(node: Node, info: ValidationInfo) -> Parameter:
         if "value" not in keys.perhaps:
             findings_of(info).error("missing-key", opening(node), "the key 'value' is missing")
         give_up()
-    return Parameter(
-        as_formula(value, info),
-        None if low is None else as_formula(low, info),
-        None if high is None else as_formula(high, info),
-        None if text is None else as_text(text, info).value,
-    )
+    before = findings_of(info).errors
+    formulas = [None if one is None else _tried(as_formula, one, info) for one in (value, low, high)]
+    description = None if text is None else _tried(as_text, text, info)
+    failed = findings_of(info).errors > before
+    first = formulas[0] or Located(0, Scalar(0, value.span))
+    return Parameter(first, formulas[1], formulas[2], None if description is None else description.value, failed)
+
+
+def _tried(check: Callable[[Node, ValidationInfo], T], node: Node, info: ValidationInfo) -> T | None:
+    """A value, None where it is at fault, which is noted."""
+    with suppress(PydanticCustomError):
+        return check(node, info)
+    return None
 
 
 ParameterField = Annotated[
