@@ -216,3 +216,19 @@ def test_a_box_that_foreign_neurons_stand_in_has_no_frame() -> None:
     for x, shown in ((1, False), (5, True)):
         scene = drawn(nv.compile_text(words + f"positions: {{A: [0, 0], B: [{x}, 0], C: [2, 0]}}}}\n")).scene
         assert bool([g for g in scene.groups if g.id == "box:both"]) == shown
+
+
+def test_a_title_does_not_stand_in_the_frame_of_another_box() -> None:
+    """Where frames stand close together there is room beside one only within the other."""
+    words = "neurovis: 1\nname: b\nneurons:\n  A: {count: 3, box: wide title}\n  B: {count: 3, box: other title}\n"
+    places = "{A1: [0, 0], A2: [0, 1], A3: [0, 2], B1: [1.3, 0], B2: [1.3, 1], B3: [1.3, 2]}"
+    scene = drawn(nv.compile_text(words + f"layout: {{engine: manual, positions: {places}}}\n")).scene
+    frames = {g.title: s for g in scene.groups if g.id.startswith("box:") for s in g.shapes}
+    titles = {g.id.removeprefix("title:"): s for g in scene.groups if g.id.startswith("title:") for s in g.shapes}
+    assert set(titles) == set(frames) == {"wide title", "other title"}
+    for name, title in titles.items():
+        (other,) = [frame for path, frame in frames.items() if path != name]
+        assert isinstance(title, Text)
+        assert isinstance(other, Rectangle)
+        (x, y), wide, high = other.corner, other.width, other.height
+        assert not overlap(text_rect(title), (x, y, x + wide, y + high))

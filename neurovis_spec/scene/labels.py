@@ -34,6 +34,8 @@ _MANY = 4
 _MOST_BESIDE = 150
 #: a disc smaller than this has no label
 _SMALLEST_DISC = 7.0
+#: one up to this size has its label almost from rim to rim
+_SMALL_DISC = 12.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +157,9 @@ def _on_disc(
 
 def _chord(radius: float, size: float) -> float:
     """How wide a text of this size may be on a disc."""
-    return float(2 * (max(radius * radius - (0.4 * size) ** 2, 0.0)) ** 0.5 - min(2.5, 0.2 * radius))
+    return float(
+        2 * (max(radius * radius - (0.4 * size) ** 2, 0.0)) ** 0.5 - (2.5 if radius > _SMALL_DISC else 0.1 * radius)
+    )
 
 
 def _beside(label: str, centre: Point, radius: float, obstacles: Obstacles, picture: Rect, level: bool) -> Label | None:

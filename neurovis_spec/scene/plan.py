@@ -237,7 +237,10 @@ def _box_frames(boxes: Sequence[Box], frame: Frame, theme: Theme) -> list[Group]
 def _box_titles(boxes: Sequence[Box], frame: Frame, obstacles: Obstacles, theme: Theme, picture: Rect) -> list[Group]:
     if frame.scale < 12:  # the boxes are smaller than their titles
         return []
-    items = [Titled(box, _mapped(box.rect, frame), _room(box, boxes, frame, picture)) for box in boxes]
+    items = [
+        Titled(box, _mapped(box.rect, frame), _room(box, boxes, frame, picture), _foreign(box, boxes, frame))
+        for box in boxes
+    ]
     found = titles_of(items, obstacles, theme)
     return [Group((text,), id=f"title:{box.path}") for box, text in zip(boxes, found, strict=True) if text is not None]
 
@@ -247,6 +250,12 @@ def _room(box: Box, boxes: Sequence[Box], frame: Frame, picture: Rect) -> Rect:
     around = [b for b in boxes if b.kind == "instance" and b is not box and set(box.members) <= set(b.members)]
     outer = [b for b in around if b.kind != box.kind or len(b.path) < len(box.path)]
     return _mapped(min(outer, key=lambda b: (len(b.members), -len(b.path))).rect, frame) if outer else picture
+
+
+def _foreign(box: Box, boxes: Sequence[Box], frame: Frame) -> tuple[Rect, ...]:
+    """The frames that do not hold a box."""
+    within = set(box.members)
+    return tuple(_mapped(other.rect, frame) for other in boxes if not within <= set(other.members))
 
 
 def _mapped(rect: Rect, frame: Frame) -> Rect:

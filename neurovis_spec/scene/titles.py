@@ -14,7 +14,7 @@ import numpy as np
 
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.boxes import Box
-from neurovis_spec.scene.geometry import FloatArray, Point, Rect
+from neurovis_spec.scene.geometry import FloatArray, Point, Rect, overlap
 from neurovis_spec.scene.model import Text, Theme
 from neurovis_spec.scene.obstacles import Obstacles
 
@@ -24,15 +24,19 @@ _SIZE, _SMALLER = 11.5, (10.0, 9.0)
 _WEIGHTS = {"box": 400, "instance": 600}
 #: more in the way than this, and there is no title
 _TOO_MUCH = 10_000
+#: how bad it is to stand in a frame that does not hold the box: worse than lines
+_FOREIGN = 2_000
 
 
 @dataclass(frozen=True, slots=True)
 class Titled:
-    """A box to be titled: its frame, and the room in which the title may stand."""
+    """A box to be titled: its frame, the room in which the title may stand, and the frames that do not hold the box, in
+    which it would be taken for theirs."""
 
     box: Box
     rect: Rect
     room: Rect
+    foreign: tuple[Rect, ...] = ()
 
 
 def titles_of(boxes: Sequence[Titled], obstacles: Obstacles, theme: Theme) -> list[Text | None]:
@@ -159,7 +163,7 @@ def _best(item: Titled, slot: int, width: float, size: float, obstacles: Obstacl
         taken = (x - 2, y - size, x + width + 2, y + 0.3 * size)
         if taken[1] < y0 or taken[3] > y1:
             continue
-        hits = obstacles.hits(taken)
+        hits = obstacles.hits(taken) + _FOREIGN * sum(overlap(taken, other) for other in item.foreign)
         if best is None or hits < best.hits:
             best = _Place((x, y), taken, hits)
     return best
