@@ -10,6 +10,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -145,7 +146,9 @@ def _settle(unit: Unit, start: int, limits: Limits, seed: int, kinds: dict[tuple
             models.append(model)
             continue
         built.append(group)
-        lost.update(mended for neuron in group.names if not IDENTIFIER.fullmatch(neuron) for mended in _mended(neuron))
+        for neuron in group.names if model.names is not None or not IDENTIFIER.fullmatch(name) else ():
+            if not IDENTIFIER.fullmatch(neuron):
+                lost.update(_mended(neuron))
         at += group.group.count
     return _Settled(unit, tuple(built), start, gaps.with_names("neurons", lost), tuple(models))
 
@@ -162,7 +165,11 @@ def _owners(unit: Unit, built: tuple[_Built, ...]) -> None:
     for item in built:
         name = item.name
         # A group of several may not be called like a neuron of another one either: what would the name refer to?
-        for neuron in dict.fromkeys((*item.names, name)):
+        own = dict.fromkeys((*item.names, name), name)
+        if owners.keys().isdisjoint(own) and section.inputs.keys().isdisjoint(own):
+            owners.update(own)
+            continue
+        for neuron in own:
             other = owners.setdefault(neuron, name)
             if other != name:
                 first = key_span(section, "neurons", other)
@@ -202,11 +209,14 @@ def _instances(unit: Unit, owners: Mapping[str, str]) -> None:
 
 def _join(settled: list[_Settled]) -> Population:
     built = [item for one in settled for item in one.built]
-    names = tuple(one.unit.called(name) for one in settled for item in one.built for name in item.names)
+    names: list[str] = []
+    for one in settled:
+        own = chain.from_iterable(item.names for item in one.built)
+        names.extend(map(one.unit.called, own) if one.unit.path else own)
     empty = np.zeros(0)
     neurons = Neurons(
-        names=names,
-        labels=tuple(label for item in built for label in item.labels),
+        names=tuple(names),
+        labels=tuple(chain.from_iterable(item.labels for item in built)),
         groups=tuple(item.group for item in built),
         bias=np.concatenate([item.bias for item in built] or [empty]),
         initial=np.concatenate([item.initial for item in built] or [empty]),
@@ -241,7 +251,7 @@ def _directories(settled: list[_Settled], total: int) -> tuple[Directory, ...]:
         stop = settled[after].start if after < len(settled) else total
         made[index] = Directory(
             {item.name: item.group for item in one.built},
-            {name: item.group.start + position for item in one.built for position, name in enumerate(item.names)},
+            dict(chain.from_iterable(zip(item.names, item.group.indices, strict=True) for item in one.built)),
             {item.name: item.first for item in one.built if item.first is not None},
             one.gaps,
             {name: tuple(made[place] for place in places) for name, places in one.unit.children.items()},
