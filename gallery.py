@@ -171,9 +171,10 @@ BESIDE = {
     "hebbian": "Much the same.",
     "reward": "As above, C2 stands below C1, and the kernels are out of order. G stands near what it drives; ours near"
     " what drives it.",
-    "hexapod": "What dot makes of six equal legs is six drawings: each has other ranks and another place for its parts,"
-    " and frames lie over each other. Here all legs are one drawing, the right ones mirror images of the left ones, so"
-    " that only colours differ; the lines from the upper row to the legs are longer for that.",
+    "hexapod": "dot draws six legs six times: each has other ranks and another place for its parts, left and right are"
+    " no mirror images, and the delay lines run down, one beside the other. Free of all that it needs less room and may"
+    " cross fewer lines. Here all legs are one drawing, so that only colours differ between them, and both delay lines"
+    " are rows above the legs that they move.",
 }
 
 
@@ -225,6 +226,11 @@ def draw_as_dot(picture: Picture, path: Path) -> None:
     title = f"{network.network.title or network.name}: by dot"
     settings = replace(network.network.render, title=title, size=None)
     scene = pipeline.picture(network.network, layout, snapshot, network.gains, settings)
+    size = network.network.render.size
+    if size is not None:  # as high as ours, and as wide as dot's then is
+        wide, high = scene.pixels
+        settings = replace(settings, size=(round(wide * size[1] / high), size[1]))
+        scene = pipeline.picture(network.network, layout, snapshot, network.gains, settings)
     groups = tuple(replace(group, data={}, title="") for group in scene.groups)
     drawn = pipeline.draw(replace(scene, groups=groups), ".svg")
     if not path.exists() or not alike(path.read_text(encoding="utf-8"), drawn.decode()):
