@@ -13,20 +13,21 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
+from neurovis_spec.compiler.bindings import Binding, bindings_of, shared_out
 from neurovis_spec.compiler.census import Census, Excess
 from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.definitions import Definitions
 from neurovis_spec.compiler.gaps import Gaps
-from neurovis_spec.compiler.limits import DEEPEST, MOST_INSTANCES, Limits, plural
+from neurovis_spec.compiler.limits import DEEPEST, MOST_INSTANCES, Limits
 from neurovis_spec.compiler.modules import Library, Module
 from neurovis_spec.compiler.network import Input
 from neurovis_spec.compiler.parameters import make_parameters
 from neurovis_spec.compiler.references import Section, key_of, key_span
 from neurovis_spec.compiler.signals import make_input
 from neurovis_spec.compiler.tables import Files
-from neurovis_spec.diagnostics import Findings, Span, suggest
+from neurovis_spec.diagnostics import Findings, suggest
 from neurovis_spec.language.expressions.tree import Number, names, substitute
-from neurovis_spec.language.located import NAME_RULE, Formula, Located, shown, too_long
+from neurovis_spec.language.located import NAME_RULE, Formula, shown, too_long
 from neurovis_spec.language.model import lost_names
 from neurovis_spec.language.modules import INCLUDED, InstanceModel
 
@@ -91,14 +92,6 @@ class _Place:
     count: int
 
 
-class _Binding(NamedTuple):
-    """What an instance says an input of its module is, where, and what it is; None where that is at fault."""
-
-    name: str
-    span: Span
-    input: Input | None
-
-
 class _StoppedError(Exception):
     """There are too many instances; the finding is noted."""
 
@@ -153,7 +146,7 @@ class Expander:
         folder: Path,
         place: _Place,
         way: tuple[int, ...],
-        bound: Mapping[str, _Binding] | None = None,
+        bound: Mapping[str, Binding] | None = None,
         module: str | None = None,
         settings: Mapping[str, frozenset[str]] | None = None,
     ) -> int:
@@ -244,7 +237,7 @@ class Expander:
         constants: Constants,
         files: Files,
         place: _Place,
-        bound: Mapping[str, _Binding],
+        bound: Mapping[str, Binding],
     ) -> dict[str, Input]:
         """The inputs of a unit by their names in it; those that are not bound are inputs of the network."""
         result: dict[str, Input] = {}
@@ -254,7 +247,7 @@ class Expander:
             if made is None:
                 continue
             if name in bound:
-                shared = self._share(made, bound[name], place)
+                shared = shared_out(made, bound[name], place.position, place.count, self.findings)
                 if shared is not None:
                     result[name] = shared
                 continue
@@ -267,21 +260,6 @@ class Expander:
             self.inputs.append(made)
             result[name] = made
         return result
-
-    def _share(self, made: Input, bound: _Binding, place: _Place) -> Input | None:
-        """What an instance gets of an input around it; None where the sizes do not fit, which is noted."""
-        outer = bound.input
-        if outer is None:
-            return None
-        if outer.size == made.size:
-            return Input(outer.name, outer.start, made.size)
-        if outer.size == place.count * made.size:
-            return Input(outer.name, outer.start + place.position * made.size, made.size)
-        wanted = f"{made.size}" if place.count == 1 else f"{made.size} or {place.count * made.size}"
-        message = f"the input '{bound.name}' has {plural(outer.size, 'component')}; {wanted} are wanted here"
-        hint = None if place.count == 1 else "one of count × size is shared out, one of the module's size goes to each"
-        self.findings.error("wrong-size", bound.span, message, hint)
-        return None
 
     def _instances(
         self, name: str, model: InstanceModel, unit: Unit, way: tuple[int, ...]
@@ -303,7 +281,7 @@ class Expander:
             return None
         self.used.add(module.name)
         self._check_keys(model, module)
-        bound = self._bound(model, unit)
+        bound = bindings_of(model, unit.section, unit.inputs, unit.gaps, self.findings)
         result: dict[str, tuple[int, ...]] = {}
         for position, own in enumerate(called):
             number = 0 if count is None else position + 1
@@ -329,7 +307,7 @@ class Expander:
         """What can be said of an instance whose module or count is not known."""
         for formula in model.set.values():
             unit.constants.tree(formula, COUNTED)
-        self._bound(model, unit)
+        bindings_of(model, unit.section, unit.inputs, unit.gaps, self.findings)
 
     def _check_keys(self, model: InstanceModel, module: Module) -> None:
         """What ``set`` and ``inputs`` name must be the module's."""
@@ -344,28 +322,6 @@ class Expander:
                     message = f"the module '{module.name}' has no {what} '{shown(name)}'"
                     hint = suggest(name, known, f"{what}s of '{module.name}'")
                     self.findings.error(f"unknown-{what}", key_of(model.source, part, name).span, message, hint)
-
-    def _bound(self, model: InstanceModel, unit: Unit) -> dict[str, _Binding]:
-        """The inputs of the unit around that an instance names; None for one that is at fault."""
-        result: dict[str, _Binding] = {}
-        for name, outer in model.inputs.items():
-            found = unit.inputs.get(outer.value)
-            if found is None and not unit.gaps.cover("inputs", outer.value):
-                self._unknown_input(outer, unit)
-            result[name] = _Binding(outer.value, outer.span, found)
-        for name in lost_names(model.source, "inputs", dict(model.inputs)):
-            result[name] = _Binding("", model.source.span, None)
-        return result
-
-    def _unknown_input(self, outer: Located[str], unit: Unit) -> None:
-        if outer.value.partition(".")[0] in unit.section.neurons:
-            message = f"'{shown(outer.value)}' is a group of neurons, not an input"
-            hint = "connect it to the neurons of the instance"
-        else:
-            message = f"there is no input '{shown(outer.value)}'"
-            known = suggest(outer.value, tuple(unit.section.inputs), "inputs")
-            hint = known or "no inputs are declared; add it under 'inputs'"
-        self.findings.error("unknown-input", outer.span, message, hint)
 
     def _constants(
         self, model: InstanceModel, module: Module, unit: Unit, place: _Place

@@ -1,0 +1,69 @@
+"""Bindings: which inputs around an instance are the inputs of its module.
+
+In: the entry of an instance, the unit around it. Out: Bindings by the names that the module knows, and the part of an
+input that one instance gets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from neurovis_spec.compiler.gaps import Gaps
+from neurovis_spec.compiler.limits import plural
+from neurovis_spec.compiler.network import Input
+from neurovis_spec.compiler.references import Section
+from neurovis_spec.diagnostics import Findings, Span, suggest
+from neurovis_spec.language.located import Located, shown
+from neurovis_spec.language.model import lost_names
+from neurovis_spec.language.modules import InstanceModel
+
+
+class Binding(NamedTuple):
+    """What an instance says an input of its module is, where, and what it is; None where that is at fault."""
+
+    name: str
+    span: Span
+    input: Input | None
+
+
+def bindings_of(
+    model: InstanceModel, section: Section, inputs: Mapping[str, Input], gaps: Gaps, findings: Findings
+) -> dict[str, Binding]:
+    """The inputs of the unit around that an instance names; None for one that is at fault."""
+    result: dict[str, Binding] = {}
+    for name, outer in model.inputs.items():
+        found = inputs.get(outer.value)
+        if found is None and not gaps.cover("inputs", outer.value):
+            _unknown(outer, section, findings)
+        result[name] = Binding(outer.value, outer.span, found)
+    for name in lost_names(model.source, "inputs", dict(model.inputs)):
+        result[name] = Binding("", model.source.span, None)
+    return result
+
+
+def _unknown(outer: Located[str], section: Section, findings: Findings) -> None:
+    if outer.value.partition(".")[0] in section.neurons:
+        message = f"'{shown(outer.value)}' is a group of neurons, not an input"
+        hint = "connect it to the neurons of the instance"
+    else:
+        message = f"there is no input '{shown(outer.value)}'"
+        known = suggest(outer.value, tuple(section.inputs), "inputs")
+        hint = known or "no inputs are declared; add it under 'inputs'"
+    findings.error("unknown-input", outer.span, message, hint)
+
+
+def shared_out(made: Input, bound: Binding, position: int, count: int, findings: Findings) -> Input | None:
+    """What one of ``count`` instances gets of an input around it; None where the sizes do not fit, which is noted."""
+    outer = bound.input
+    if outer is None:
+        return None
+    if outer.size == made.size:
+        return Input(outer.name, outer.start, made.size)
+    if outer.size == count * made.size:
+        return Input(outer.name, outer.start + position * made.size, made.size)
+    wanted = f"{made.size}" if count == 1 else f"{made.size} or {count * made.size}"
+    message = f"the input '{bound.name}' has {plural(outer.size, 'component')}; {wanted} are wanted here"
+    hint = None if count == 1 else "one of count × size is shared out, one of the module's size goes to each"
+    findings.error("wrong-size", bound.span, message, hint)
+    return None
