@@ -12,6 +12,7 @@ from bisect import bisect_left
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from graphlib import TopologicalSorter
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,8 +36,7 @@ class TooManyError(Exception):
     """There are more instances than there may be, however many."""
 
 
-@dataclass(frozen=True, slots=True)
-class Tally:
+class Tally(NamedTuple):
     """How many instances there are, and neurons in them; and the first group of which one alone has too many, if any,
     by its ``count``, with that number."""
 
@@ -45,8 +45,7 @@ class Tally:
     large: tuple[Formula, int] | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Excess:
+class Excess(NamedTuple):
     """What there is too much of, and where that is asked for; nothing where the finding is that of a group."""
 
     span: Span | None = None
@@ -54,8 +53,7 @@ class Excess:
     hint: str | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class _Alike:
+class _Alike(NamedTuple):
     """Instances of a module: a row for those that are alike, what is set in them, how many they are."""
 
     set: Mapping[str, FloatArray]
