@@ -5,8 +5,7 @@ In: a problem. Out: a ring wide enough that neighbours keep their spacing; conne
 
 from __future__ import annotations
 
-from neurovis_layouts.formations import offsets
-from neurovis_layouts.placed import boxes_together, place
+from neurovis_layouts.placed import place
 from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem
 
 
@@ -14,10 +13,12 @@ class CircularEngine:
     """Neurons on a ring."""
 
     name = "circular"
-    capabilities = Capabilities(pins=True, arrange=False, boxes=True, direction=True, memory=True, neurons=100_000)
+    capabilities = Capabilities(
+        pins=True, arrange=False, boxes=True, direction=True, modules=True, memory=True, neurons=100_000
+    )
 
     def lay_out(self, problem: LayoutProblem) -> Layout:
-        """Place the neurons round a circle, members of a box side by side, and route the edges."""
+        """Place the neurons round a circle, members of a box side by side, those of an instance round a circle
+        of their own, and route the edges."""
         spacing = max(1.2 * problem.neuron_spacing, 0.65)
-        places = offsets("ring", len(problem.neurons), spacing)
-        return place(problem, self.name, boxes_together(problem), places)
+        return place(problem, self.name, "ring", spacing)

@@ -5,8 +5,7 @@ In: a problem. Out: a grid, nearly square; connections go round the discs betwee
 
 from __future__ import annotations
 
-from neurovis_layouts.formations import offsets
-from neurovis_layouts.placed import boxes_together, place
+from neurovis_layouts.placed import place
 from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem
 
 
@@ -14,10 +13,12 @@ class GridEngine:
     """Neurons in rows and columns."""
 
     name = "grid"
-    capabilities = Capabilities(pins=True, arrange=False, boxes=True, direction=True, memory=True, neurons=100_000)
+    capabilities = Capabilities(
+        pins=True, arrange=False, boxes=True, direction=True, modules=True, memory=True, neurons=100_000
+    )
 
     def lay_out(self, problem: LayoutProblem) -> Layout:
-        """Place the neurons row by row, members of a box one after the other, and route the edges."""
+        """Place the neurons row by row, members of a box one after the other, those of an instance in a
+        grid of their own, and route the edges."""
         spacing = max(1.5 * problem.neuron_spacing, 0.65)
-        places = offsets("grid", len(problem.neurons), spacing)
-        return place(problem, self.name, boxes_together(problem), places)
+        return place(problem, self.name, "grid", spacing)

@@ -1,18 +1,18 @@
 """Engines whose neurons stand in a fixed formation, circular and grid: what they share.
 
-In: a problem and a place for every neuron. Out: a Layout: pins kept, direction turned, edges routed.
+In: a problem and a formation. Out: a Layout: instances as frames, pins kept, direction turned, edges routed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from neurovis_layouts.blocks import Blocks, Drawing, keys_of, routed
+from neurovis_layouts.formations import offsets
 from neurovis_layouts.frame import to_picture
 from neurovis_layouts.kept import kept
 from neurovis_layouts.pins import fit
-from neurovis_layouts.routing import route_all
-from neurovis_spec.layout.geometry import snap
-from neurovis_spec.layout.model import Layout, LayoutProblem, Point
+from neurovis_spec.layout.model import Arrangement, Layout, LayoutProblem, Point
 
 
 def boxes_together(problem: LayoutProblem) -> list[int]:
@@ -34,17 +34,49 @@ def boxes_together(problem: LayoutProblem) -> list[int]:
     return order
 
 
-def place(problem: LayoutProblem, engine: str, order: Sequence[int], places: Sequence[Point]) -> Layout:
-    """The layout in which neuron ``order[i]`` stands at ``places[i]`` (x across, y along)."""
-    free: list[Point] = [(0.0, 0.0)] * len(problem.neurons)
-    for neuron, (x, y) in zip(order, places, strict=True):
-        free[neuron] = to_picture((snap(x), snap(y)), problem.direction)
-    centres, _, _ = fit(free, problem.pins)
-    routes = route_all(problem.edges, centres)
+def place(problem: LayoutProblem, engine: str, how: Arrangement, spacing: float) -> Layout:
+    """The layout in which all neurons stand in one formation, those of an instance in one of their own."""
+    order = {neuron: i for i, neuron in enumerate(boxes_together(problem))}
+
+    def formation(neurons: Sequence[int]) -> list[Point]:
+        """Places for these, members of a box one after the other."""
+        found: dict[int, Point] = {}
+        for neuron, point in zip(
+            sorted(neurons, key=order.__getitem__), offsets(how, len(neurons), spacing), strict=True
+        ):
+            found[neuron] = to_picture(point, problem.direction)
+        return [found[neuron] for neuron in neurons]
+
+    if problem.modules:
+        drawing = Blocks(problem, formation).whole()
+    else:
+        drawing = Drawing(tuple(formation(range(len(problem.neurons)))), {}, ())
+    drawing = routed(_pinned(drawing, problem), problem.edges)
     fresh = Layout(
         problem.network,
         engine,
-        dict(zip(problem.neurons, centres, strict=True)),
-        {edge.name: route for edge, route in zip(problem.edges, routes, strict=True)},
+        dict(zip(problem.neurons, drawing.places, strict=True)),
+        {edge.name: drawing.routes[key] for edge, key in zip(problem.edges, keys_of(problem.edges), strict=True)},
     )
     return kept(problem, fresh)
+
+
+def _pinned(drawing: Drawing, problem: LayoutProblem) -> Drawing:
+    """The drawing moved to the pins; of what these bend no frame and no route is left."""
+    if not problem.pins:
+        return drawing
+    centres, (dx, dy), bent = fit(drawing.places, problem.pins)
+    broken = {m for own, _ in drawing.frames if bent.intersection(own) for m in own} | bent
+    return Drawing(
+        tuple(centres),
+        {
+            key: tuple((x + dx, y + dy) for x, y in route)
+            for key, route in drawing.routes.items()
+            if not (key[0] in broken or key[1] in broken)
+        },
+        tuple(
+            (own, (r[0] + dx, r[1] + dy, r[2] + dx, r[3] + dy))
+            for own, r in drawing.frames
+            if not bent.intersection(own)
+        ),
+    )

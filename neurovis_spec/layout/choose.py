@@ -37,7 +37,8 @@ def choose_engine(problem: LayoutProblem) -> tuple[str, str]:
             return "organic", why
         return "large", why
     if edges > _MOST_IN_RANKS and not _in_layers(problem):
-        return "large", f"its {edges} connections are too many to follow each: clusters say more"
+        shown = ", and instances show as such, not as frames drawn alike" if problem.modules else ""
+        return "large", f"its {edges} connections are too many to follow each: clusters say more{shown}"
     return "layered", "the default for networks whose positions are not all given"
 
 

@@ -1,0 +1,148 @@
+"""Blocks: instances of modules as frames, for engines whose neurons stand in a fixed formation.
+
+In: a problem with instances, and the formation. Out: a Drawing of the whole: the neurons of an instance that are in
+none within it stand in a formation of their own, beside the instances within it; each make is drawn once, routes
+included, and copied by steps of the grid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from neurovis_layouts.packing import packed
+from neurovis_layouts.pins import fit
+from neurovis_layouts.routing import route_all
+from neurovis_spec.layout.geometry import sampled, snap
+from neurovis_spec.layout.model import LayoutEdge, LayoutProblem, Point, Route
+
+#: x0, y0, x1, y1
+Rect: TypeAlias = tuple[float, float, float, float]
+#: A connection by its ends and its number among those that share them.
+Key: TypeAlias = tuple[int, int, int]
+#: Places for these neurons, around (0, 0).
+Formation: TypeAlias = Callable[[Sequence[int]], list[Point]]
+
+#: From centres, from routes and from frames within to the line of a frame; room for a title; between frames.
+_PAD, _PAD_ROUTE, _PAD_FRAME = 0.65, 0.2, 0.35
+_TITLE, _BETWEEN = 0.35, 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """Neurons by place in a list of members; routes within, by key; frames within, each with its members."""
+
+    places: tuple[Point, ...]
+    routes: Mapping[Key, Route]
+    frames: tuple[tuple[tuple[int, ...], Rect], ...]
+
+    def rect(self) -> Rect:
+        """The frame around all of it."""
+        lines = [point for route in self.routes.values() for point in sampled(route, 0.1)]
+        rects = [rect for _, rect in self.frames]
+        around = (
+            (self.places, _PAD),
+            (lines, _PAD_ROUTE),
+            ([r[:2] for r in rects] + [r[2:] for r in rects], _PAD_FRAME),
+        )
+        x0 = min(x - pad for points, pad in around for x, _ in points)
+        y0 = min(y - pad for points, pad in around for _, y in points)
+        x1 = max(x + pad for points, pad in around for x, _ in points)
+        y1 = max(y + pad for points, pad in around for _, y in points)
+        return snap(x0), snap(y0 - _TITLE), snap(x1), snap(y1)
+
+
+class Blocks:
+    """Draws a problem; each make of instance once."""
+
+    def __init__(self, problem: LayoutProblem, formation: Formation) -> None:
+        self._problem = problem
+        self._formation = formation
+        self._drawn: dict[str, Drawing] = {}
+        self._within: dict[int, list[int]] = {}
+        around: list[set[int]] = [set() for _ in problem.neurons]
+        for number, module in enumerate(problem.modules):
+            for member in module.members:
+                around[member].add(number)
+            if module.members:
+                self._within.setdefault(module.parent, []).append(number)
+        self._inside: dict[int, list[LayoutEdge]] = {}
+        for edge in problem.edges:
+            for number in around[edge.source] & around[edge.target]:
+                self._inside.setdefault(number, []).append(edge)
+
+    def whole(self) -> Drawing:
+        """The drawing of all, as it is without pins, and without routes between frames."""
+        return self._drawing(-1, range(len(self._problem.neurons)), (), {})
+
+    def _instance(self, number: int) -> Drawing:
+        module = self._problem.modules[number]
+        if module.template not in self._drawn:
+            self._drawn[module.template] = self._drawing(
+                number, module.members, self._inside.get(number, ()), module.pins
+            )
+        return self._drawn[module.template]
+
+    def _drawing(
+        self, number: int, members: Sequence[int], edges: Sequence[LayoutEdge], pins: Mapping[int, Point]
+    ) -> Drawing:
+        """What is in an instance (−1: in none), its outermost instances as blocks; pins are relative to its origin."""
+        place = {member: i for i, member in enumerate(members)}
+        within = self._within.get(number, [])
+        framed = {m for inner in within for m in self._problem.modules[inner].members}
+        loose = [m for m in members if m not in framed]
+        blocks: list[tuple[Sequence[int], Drawing]] = [
+            (self._problem.modules[inner].members, self._instance(inner)) for inner in within
+        ]
+        if loose:
+            blocks.insert(0, (loose, Drawing(tuple(self._formation(loose)), {}, ())))
+        rects = [drawing.rect() for _, drawing in blocks]
+        corners = packed([(r[2] - r[0], r[3] - r[1]) for r in rects], _BETWEEN) if blocks else []
+        free: list[Point] = [(0.0, 0.0)] * len(members)
+        shifts = [(snap(x - r[0]), snap(y - r[1])) for (x, y), r in zip(corners, rects, strict=True)]
+        for (own, drawing), shift in zip(blocks, shifts, strict=True):
+            for member, point in zip(own, drawing.places, strict=True):
+                free[place[member]] = _moved(point, shift)
+        places, whole, bent = fit(free, {place[m]: point for m, point in pins.items()})
+        routes: dict[Key, Route] = {}
+        frames: list[tuple[tuple[int, ...], Rect]] = []
+        for (own, drawing), shift in zip(blocks, shifts, strict=True):
+            here = [place[m] for m in own]
+            if bent.intersection(here):
+                continue
+            (sx, sy), rect = (shift[0] + whole[0], shift[1] + whole[1]), drawing.rect()
+            for (a, b, k), route in drawing.routes.items():
+                routes[here[a], here[b], k] = tuple((x + sx, y + sy) for x, y in route)
+            inner = [*drawing.frames] if own is loose else [(tuple(range(len(own))), rect), *drawing.frames]
+            frames += [
+                (tuple(here[m] for m in inside), (r[0] + sx, r[1] + sy, r[2] + sx, r[3] + sy)) for inside, r in inner
+            ]
+        local = [LayoutEdge(e.name, place[e.source], place[e.target], e.delay) for e in edges]
+        return routed(Drawing(tuple(places), routes, tuple(frames)), local)
+
+
+def routed(drawing: Drawing, edges: Sequence[LayoutEdge]) -> Drawing:
+    """The drawing with routes for those of these edges that have none."""
+    keys = keys_of(edges)
+    new = [i for i, key in enumerate(keys) if key not in drawing.routes]
+    walls = [(frozenset(own), rect) for own, rect in drawing.frames]
+    made = route_all([edges[i] for i in new], drawing.places, frames=walls)
+    routes = dict(drawing.routes)
+    for i, route in zip(new, made, strict=True):
+        routes[keys[i]] = (route[0], *((snap(x), snap(y)) for x, y in route[1:-1]), route[-1])
+    return Drawing(drawing.places, routes, drawing.frames)
+
+
+def keys_of(edges: Sequence[LayoutEdge]) -> list[Key]:
+    """The key of each edge."""
+    times: dict[tuple[int, int], int] = {}
+    keys: list[Key] = []
+    for edge in edges:
+        number = times[edge.source, edge.target] = times.get((edge.source, edge.target), -1) + 1
+        keys.append((edge.source, edge.target, number))
+    return keys
+
+
+def _moved(point: Point, shift: Point) -> Point:
+    return point[0] + shift[0], point[1] + shift[1]
