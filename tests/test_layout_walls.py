@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -54,6 +55,13 @@ def bodies(draw: st.DrawFn, pinned: bool = False) -> LayoutProblem:
     return canonical("body", names, groups, edges, pins, direction, boxes=boxes, modules=modules, mirrors=mirrors)
 
 
+def attempt(problem: LayoutProblem) -> tuple[Layout | None, str]:
+    try:
+        return lay_out_problem(problem, "layered"), ""
+    except LayoutRefusalError as refusal:
+        return None, refusal.code
+
+
 def check(layout: Layout, problem: LayoutProblem) -> None:
     assert suite.through_frames(layout, problem) == []
     assert metrics(layout, problem)["edges_over_neurons"] == 0
@@ -76,12 +84,27 @@ def test_no_route_runs_through_a_foreign_frame(problem: LayoutProblem) -> None:
 @settings(max_examples=60, deadline=None)
 @given(problem=bodies(pinned=True))
 def test_with_pins_only_what_pins_put_into_each_other_is_run_through(problem: LayoutProblem) -> None:
-    try:
-        layout = lay_out_problem(problem, "layered")
-    except LayoutRefusalError:
-        return
-    if not suite.frames_meet(layout, problem):
+    layout, _ = attempt(problem)
+    if layout is not None and not suite.frames_meet(layout, problem):
         assert suite.through_frames(layout, problem) == []
+
+
+@settings(max_examples=30, deadline=None)
+@given(problem=bodies(pinned=True), data=st.data())
+def test_pins_off_the_grid_and_their_mirror_images_are_exact(problem: LayoutProblem, data: st.DataObject) -> None:
+    fractions = st.integers(-700, 700).map(lambda n: n / 1024)
+    pins = {i: (x + data.draw(fractions), y + data.draw(fractions)) for i, (x, y) in problem.pins.items()}
+    problem = replace(problem, pins=pins)
+    layout, code = attempt(problem)
+    if layout is None:
+        assert code in {"mirror-pins", "pin-in-frame", "pins-too-close"}
+        return
+    suite.check_positions(problem, layout)
+    axis = 0 if problem.direction in ("down", "up") else 1
+    at = [layout.positions[name] for name in problem.neurons]
+    pairs = [pair for mirror in problem.mirrors for pair in mirror.pairs]
+    assert len({at[a][axis] + at[b][axis] for a, b in pairs}) <= 1
+    assert all(at[a][1 - axis] == at[b][1 - axis] for a, b in pairs)
 
 
 def test_frames_in_a_row_are_gone_round_above_or_below() -> None:
