@@ -11,6 +11,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Literal, NamedTuple
 
 Severity = Literal["error", "warning"]
@@ -124,12 +125,19 @@ def nearest(name: str, known: Iterable[str], most: int = 3) -> tuple[str, ...]:
     >>> nearest("kerel", ["kernel", "sigmoid", "keel"]), nearest("tahn", ["tanh", "sigmoid", "atan"])
     (('kernel', 'keel'), ('tanh',))
     """
+    return _alike(name, tuple(dict.fromkeys(known)))[:most]
+
+
+@lru_cache(maxsize=16)
+def _alike(name: str, known: tuple[str, ...]) -> tuple[str, ...]:
+    """All known names that are much like another, best first; kept, as who is answered with these may also be
+    understood by them."""
     from difflib import SequenceMatcher
 
     folded = name.casefold()
     letters = Counter(folded)
     scored: list[tuple[float, str]] = []
-    for candidate in dict.fromkeys(known):
+    for candidate in known:
         other = candidate.casefold()
         # a name of one letter begins too many others
         begins = bool(folded and other) and (other.startswith(folded) or (other[1:] != "" and folded.startswith(other)))
@@ -150,7 +158,7 @@ def nearest(name: str, known: Iterable[str], most: int = 3) -> tuple[str, ...]:
         if score >= 0.6:
             scored.append((-score, candidate))
     best = min(scored, default=(0.0, ""))[0]
-    return tuple(candidate for score, candidate in sorted(scored)[:most] if score <= best + 0.12)
+    return tuple(candidate for score, candidate in sorted(scored) if score <= best + 0.12)
 
 
 def meant(name: str, known: Iterable[str]) -> str | None:
@@ -163,7 +171,8 @@ def meant(name: str, known: Iterable[str]) -> str | None:
     ('from', None)
     """
     most = 1 if len(name) < 4 else 2
-    far = sorted((slips(name, other), other) for other in known if abs(len(name) - len(other)) <= most)
+    close = nearest(name, known, 6)  # few: a distance takes a while to find
+    far = sorted((slips(name, other), other) for other in close if abs(len(name) - len(other)) <= most)
     if not far or far[0][0] > most or (len(far) > 1 and far[1][0] == far[0][0]):
         return None
     right = far[0][1]
