@@ -26,7 +26,7 @@ _BESIDE = 0.52
 #: How close to frames and to centres a line may come: at best, and at all.
 _CLEAR = ((0.1, 0.44), (0.02, 0.34))
 #: Ways that look longer than the best by this factor are not followed up: a tenth of the work.
-_HASTE = 1.05
+_HASTE = 1.1
 #: What a bend costs, a lane that is taken already, and a corner that an edge between the same neurons has taken.
 _BEND, _TAKEN, _SAME = 0.2, 0.6, 1e6
 #: Directions round a disc.
