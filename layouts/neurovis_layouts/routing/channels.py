@@ -1,45 +1,31 @@
-"""Channels: ways between neurons of different frames, row by row through the gaps that discs and frames leave.
+"""Channels: ways between neurons of different frames, through the gaps that discs and frames leave.
 
 In: edges, centres, frames that nothing foreign may run through. Out: waypoints of the edges that run along the
-direction, and of those that run across it. A way is the shortest through the free places of every row of discs between
-its ends (dynamic programming over rows); ways that share a gap keep apart.
+direction, and of those that run across it. Ways are found one after the other, short ones first; where they are few
+each is found anew when all the others are known.
 """
 
 from __future__ import annotations
 
 import math
-from bisect import bisect_left, bisect_right
-from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import pairwise
-
-import numpy as np
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from neurovis_layouts.routing.curves import Waypoint
-from neurovis_layouts.routing.lines import crossed
-from neurovis_layouts.routing.rows import Own, Rows, Span
-from neurovis_layouts.routing.walls import FloatArray, Frame, IntArray
+from neurovis_layouts.routing.rows import Rows
+from neurovis_layouts.routing.walls import Frame
+from neurovis_layouts.routing.ways import knots, straight, through, way
 from neurovis_spec.layout.geometry import sampled
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
-_FINE = 0.15
-_INSET = 0.25
-_NARROW = 0.3
-_APART = 0.22
-#: What it costs to share a gap, to squeeze between two discs, and to run across rather than along.
-_SHARED, _SQUEEZED, _ACROSS = 1.5, 0.4, 1.25
-_LEAST = 0.75
-_WALL = 60.0
-#: Places tried in a row, about; ways closer than this to the straight line are kept apart from, but for so many on
-#: either side.
-_CHOICES, _NEAR, _MOST_NEAR, _KEPT = 24, 2.0, 8, 2
-#: Where a way is pulled straight: over how many rows, how far aside, and how close to another.
-_FARTHEST, _ASIDE, _BESIDE_WAY = 40, 0.6, 0.12
+#: What it costs to run across rather than along.
+_ACROSS = 1.25
 #: With more edges than this nobody can follow one: they take the straight way.
 _MOST = 1500
-#: What it costs to cross a line; with more edges than this nobody counts.
-_CROSSING, _MOST_CROSSED = 3.0, 300
+#: With more edges than this nobody counts how often they cross.
+_MOST_CROSSED = 300
 _SAMPLED = 0.25
+_ROUNDS = 3
 
 
 def channels(
@@ -52,52 +38,16 @@ def channels(
     """Waypoints of edges by index: of those along the direction, and (x and y exchanged) of those across it. Those with
     ``gates`` run along it, through these, which lie in their order. ``drawn`` are routes that are there already, to be
     crossed as little as the ways themselves."""
-    along: dict[int, list[Waypoint]] = {}
-    across: dict[int, list[Waypoint]] = {}
     if len(edges) > _MOST:
         return {i: [] for i in edges}, {}
-    times = Counter(frozenset((edge.source, edge.target)) for edge in edges.values())
-    down = Rows(centres, frames, len(edges), True)
-    side = Rows([(y, x) for x, y in centres], [(own, (r[1], r[0], r[3], r[2])) for own, r in frames], len(edges))
-    careful = len(edges) <= _MOST_CROSSED
-
-    def note(line: Sequence[Point], rows: Rows) -> None:
-        if careful:
-            rows.lines.add(line)
-            (side if rows is down else down).lines.add([(y, x) for x, y in line])
-
-    for route in drawn:
-        note(sampled(route, _SAMPLED), down)
-    for i, edge in sorted(edges.items(), key=lambda item: (_length(item[1], centres), item[0])):
-        if edge.source == edge.target:
-            continue
-        ends = edge.source, edge.target
-        alone = times[frozenset(ends)] == 1
-        if gates.get(i):
-            path = _through(down, ends, gates[i])
-            down.use(path[1:-1])
-            along[i] = _knots(down, path, ends, alone)
-            note(path, down)
-            continue
-        cost, path = _way(down, ends)
-        least = _straight(centres[ends[0]], centres[ends[1]]) * _ACROSS
-        other, aside = _way(side, ends) if cost > least else (math.inf, [])
-        if math.isinf(min(cost, other)):
-            continue
-        if cost <= other * _ACROSS:
-            down.use(path[1:-1])
-            along[i] = _knots(down, path, ends, alone)
-            note(_bent(path, along[i]), down)
-        else:
-            side.use(aside[1:-1])
-            across[i] = _knots(side, aside, ends, alone)
-            note(_bent(aside, across[i]), side)
-    return along, across
-
-
-def _bent(path: Sequence[Point], knots: Sequence[Waypoint]) -> list[Point]:
-    """A way by its bends."""
-    return [path[0], *((knot.x, knot.y) for knot in knots), path[-1]]
+    network = _Network(edges, centres, frames, gates)
+    if network.careful:
+        network.note(drawn)
+    for turn in range(_ROUNDS if network.careful else 1):
+        for i in sorted(edges, key=lambda i: (_length(edges[i], centres), i)):
+            if edges[i].source != edges[i].target:
+                network.find(i, turn > 0)
+    return network.found(along=True), network.found(along=False)
 
 
 def _length(edge: LayoutEdge, centres: Sequence[Point]) -> float:
@@ -105,241 +55,92 @@ def _length(edge: LayoutEdge, centres: Sequence[Point]) -> float:
     return abs(ax - bx) + abs(ay - by)
 
 
-def _straight(a: Point, b: Point) -> float:
-    """Hardly more than the least that a way between two points costs."""
-    return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2) * (1 - 1e-9)
+@dataclass(frozen=True, slots=True)
+class _Way:
+    """A way that was found: along the direction or across it, its points, where it bends, its line, and what is noted
+    of that."""
+
+    along: bool
+    path: Sequence[Point]
+    bends: list[Waypoint]
+    line: Sequence[Point]
+    notes: tuple[Sequence[int], Sequence[int]]
 
 
-def _way(rows: Rows, ends: tuple[int, int]) -> tuple[float, list[Point]]:
-    """The cost of the best way, infinite where the ends are level, and its points: both ends, one in each row."""
-    start, end = rows.centres[ends[0]], rows.centres[ends[1]]
-    if abs(end[1] - start[1]) < _LEAST:
-        return math.inf, []
-    own = rows.own(*ends)
-    if start[1] > end[1]:
-        cost, path = _down(rows, end, start, own)
-        return cost, path[::-1]
-    return _down(rows, start, end, own)
+class _Network:
+    """The rows along the direction and across it, and the ways through them."""
 
+    def __init__(
+        self,
+        edges: Mapping[int, LayoutEdge],
+        centres: Sequence[Point],
+        frames: Sequence[Frame],
+        gates: Mapping[int, Sequence[Waypoint]],
+    ) -> None:
+        self._edges, self._centres, self._gates = edges, centres, gates
+        across = [(own, (r[1], r[0], r[3], r[2])) for own, r in frames]
+        self._down = Rows(centres, frames, len(edges), True)
+        self._side = Rows([(y, x) for x, y in centres], across, len(edges))
+        self._ways: dict[int, _Way] = {}
+        self._between: dict[frozenset[int], list[int]] = {}
+        for i, edge in sorted(edges.items()):
+            self._between.setdefault(frozenset((edge.source, edge.target)), []).append(i)
+        self.careful = len(edges) <= _MOST_CROSSED
 
-def _through(rows: Rows, ends: tuple[int, int], gates: Sequence[Waypoint]) -> list[Point]:
-    """The points of the best way through these gates, from above to below or the other way round."""
-    start, end = rows.centres[ends[0]], rows.centres[ends[1]]
-    if start[1] > end[1]:
-        return _through(rows, ends[::-1], gates[::-1])[::-1]
-    own = rows.own(*ends)
-    path = [start]
-    for gate in gates:
-        top, bottom = (gate.x, gate.y - gate.half), (gate.x, gate.y + gate.half)
-        path += _down(rows, path[-1], top, own)[1][1:]
-        path += [(gate.x, y) for y in rows.between(top[1], bottom[1], own, _FINE)]
-        if gate.half > 0:
-            path.append(bottom)
-    return [*path, *_down(rows, path[-1], end, own)[1][1:]]
+    def found(self, along: bool) -> dict[int, list[Waypoint]]:
+        """The waypoints of the ways along the direction, or of those across it."""
+        return {i: found.bends for i, found in sorted(self._ways.items()) if found.along == along}
 
+    def note(self, drawn: Iterable[Route]) -> None:
+        """Note lines that are there already."""
+        for route in drawn:
+            self._note(sampled(route, _SAMPLED), True)
 
-def _down(rows: Rows, start: Point, end: Point, own: Own) -> tuple[float, list[Point]]:
-    """The cost of the best way down from one point to another, and its points: both ends, one in each row."""
-    heights = [*rows.between(start[1], end[1], own), end[1]]
-    line = [(_at(start, end, y), y) for y in heights]
-    if _open(rows, [start, *line], own):
-        # nothing is shorter
-        return _cost([start, *line]), [start, *line]
-    layers: list[tuple[list[float], IntArray]] = []
-    cost, across, before = np.zeros(1), [start[0]], start[1]
-    for middle, y in line:
-        places, extra = [end[0]], [0.0]
-        if y != end[1]:
-            kept = [across[k] for k in np.argsort(cost, kind="stable")[:_KEPT].tolist()]
-            places, extra = _places(rows.free(y, own), rows.used(y), middle, (start[0], end[0]), kept)
-        ways = cost[None, :] + _step(np.array(across), np.array(places), y - before)
-        limits = min(across[0], places[0]), max(across[-1], places[-1])
-        walls = rows.walls(before, y, own, limits)
-        if walls:
-            ways = ways + _WALL * _sides(np.array(across), np.array(places), walls)
-        lines = rows.lines.between(before, y)
-        if len(lines[0]):
-            ways = ways + _CROSSING * crossed(np.array(across), np.array(places), lines)
-        chosen = np.argmin(ways, axis=1)
-        layers.append((places, chosen))
-        cost, across, before = ways[np.arange(len(places)), chosen] + np.array(extra), places, y
-    path: list[Point] = []
-    k = 0
-    for (places, chosen), y in zip(layers[::-1], heights[::-1], strict=True):
-        path.append((places[k], y))
-        k = int(chosen[k])
-    return float(cost[0]), [start, *path[::-1]]
-
-
-def _open(rows: Rows, line: Sequence[Point], own: Own) -> bool:
-    """Whether a straight line runs through rows with room on both sides."""
-    for x, y in line[1:-1]:
-        free = rows.free(y, own)
-        low, high = free[bisect_left(free, x, key=_end)]
-        if not low + _INSET <= x <= high - _INSET or _crowd(rows.used(y), x):
-            return False
-    for (ax, top), (bx, bottom) in pairwise(line):
-        if rows.walls(top, bottom, own, (min(ax, bx), max(ax, bx))):
-            return False
-        lines = rows.lines.between(top, bottom)
-        if len(lines[0]) and crossed(np.array([ax]), np.array([bx]), lines).any():
-            return False
-    return True
-
-
-def _cost(path: Sequence[Point]) -> float:
-    """What a way costs where it has room."""
-    total = 0.0
-    for (ax, ay), (bx, by) in pairwise(path):
-        total += float(_step(np.array([ax]), np.array([bx]), by - ay)[0, 0])
-    return total
-
-
-def _end(span: Span) -> float:
-    return span[1]
-
-
-def _at(start: Point, end: Point, y: float) -> float:
-    """Where the straight line between two points is at a height."""
-    return start[0] + (end[0] - start[0]) * (y - start[1]) / (end[1] - start[1])
-
-
-def _sides(a: FloatArray, b: FloatArray, walls: Sequence[Span]) -> FloatArray:
-    """How many walls a step leads through, from one side to the other: (to b, from a)."""
-    low, high = np.minimum(a[None, :], b[:, None]), np.maximum(a[None, :], b[:, None])
-    total = np.zeros(low.shape)
-    for x0, x1 in walls:
-        total += (low <= x0) & (x1 <= high)
-    return total
-
-
-def _places(
-    free: Sequence[Span], used: Sequence[float], line: float, ends: Span, kept: Sequence[float]
-) -> tuple[list[float], list[float]]:
-    """Where a way may run through a row, in order, and what that costs: the places nearest to the straight line, and
-    straight on from the best ones before (``kept``)."""
-    at = bisect_left(used, line)
-    near = used[max(bisect_left(used, line - _NEAR), at - _MOST_NEAR) : at + _MOST_NEAR]
-    near = near[: bisect_left(near, line + _NEAR)]
-    wishes = sorted([line, *ends, *(x - _APART for x in near), *(x + _APART for x in near)])
-    found: dict[float, float] = {}
-    for number in _outward(free, line):
-        if len(found) > _CHOICES:
-            break
-        _try(free[number], wishes, kept, used, found)
-    for x in kept:
-        number = bisect_left(free, x, key=_end)
-        if number < len(free) and free[number][0] <= x:
-            _try(free[number], wishes, kept, used, found)
-    places = sorted(found)
-    return places, [found[x] for x in places]
-
-
-def _outward(free: Sequence[Span], line: float) -> Iterator[int]:
-    """The free spans of a row, the nearest to a place first, that to the left of two as near."""
-    right = bisect_left(free, line, key=_end)
-    left = right - 1
-    while left >= 0 or right < len(free):
-        if right == len(free) or (left >= 0 and line - free[left][1] <= max(free[right][0] - line, 0.0)):
-            yield left
-            left -= 1
+    def find(self, i: int, anew: bool) -> None:
+        """The way of an edge; ``anew`` without that which it has."""
+        edge = self._edges[i]
+        ends = edge.source, edge.target
+        # what has the same ends runs beside it, as the ends lean
+        beside = [mate for mate in self._between[frozenset(ends)] if mate != i]
+        if anew and i in self._ways:
+            self._leave(i)
+            del self._ways[i]
+        for mate in beside:
+            self._drop(mate)
+        if self._gates.get(i):
+            along, path = True, through(self._down, ends, self._gates[i])
         else:
-            yield right
-            right += 1
+            cost, path = way(self._down, ends)
+            least = straight(self._centres[ends[0]], self._centres[ends[1]]) * _ACROSS
+            other, aside = way(self._side, ends) if cost > least else (math.inf, [])
+            if math.isinf(min(cost, other)):
+                return  # and then so it is for those with the same ends
+            along = cost <= other * _ACROSS
+            path = path if along else aside
+        rows = self._down if along else self._side
+        rows.use(path[1:-1])
+        bends = knots(rows, path, ends, not beside)
+        line = path if self._gates.get(i) else [path[0], *((bend.x, bend.y) for bend in bends), path[-1]]
+        self._ways[i] = _Way(along, path, bends, line, ((), ()))
+        for one in (i, *beside):
+            if self.careful and one in self._ways:
+                found = self._ways[one]
+                self._ways[one] = replace(found, notes=self._note(found.line, found.along))
 
+    def _note(self, line: Sequence[Point], along: bool) -> tuple[Sequence[int], Sequence[int]]:
+        other = [(y, x) for x, y in line]
+        return self._down.lines.add(line if along else other), self._side.lines.add(other if along else line)
 
-def _try(
-    span: Span, wishes: Sequence[float], kept: Sequence[float], used: Sequence[float], found: dict[float, float]
-) -> None:
-    """Add the places in a span that are nearest to what is wished for, with their costs; ``wishes`` are in order."""
-    first, last = span
-    width = last - first
-    inset = width / 2 if width < 2 * _INSET else _INSET
-    low, high = first + inset, last - inset
-    squeezed = _SQUEEZED if width < _NARROW else 0.0
-    chosen = [low, high] if low <= high else [high]
-    for x in kept:
-        if first <= x <= last:
-            chosen.append(low if x < low else high if x > high else x)
-    if low < high:
-        chosen += wishes[bisect_right(wishes, low) : bisect_left(wishes, high)]
-    for x in chosen:
-        if x not in found and -math.inf < x < math.inf:
-            found[x] = squeezed + _SHARED * _crowd(used, x) if used else squeezed
+    def _leave(self, i: int) -> None:
+        """Give up the room that a way takes, and what is noted of it."""
+        self._drop(i)
+        gone = self._ways[i]
+        (self._down if gone.along else self._side).leave(gone.path[1:-1])
 
-
-def _crowd(used: Sequence[float], x: float) -> float:
-    """How many ways run closer to a place than they should, and how much."""
-    crowd = 0.0
-    for number in range(bisect_left(used, x - _APART), bisect_left(used, x + _APART)):
-        crowd += 1 - abs(x - used[number]) / _APART
-    return crowd
-
-
-def _step(a: FloatArray, b: FloatArray, dy: float) -> FloatArray:
-    """What it costs to get from one row to the next: its length, and more where it is flat: (to b, from a)."""
-    squared = (b[:, None] - a[None, :]) ** 2
-    result: FloatArray = np.sqrt(squared + dy * dy) + 0.12 * squared / max(dy, 0.1)
-    return result
-
-
-def _knots(rows: Rows, path: Sequence[Point], ends: tuple[int, int], alone: bool) -> list[Waypoint]:
-    """The points of a way at which it bends; what lies on a line that is free is left out. One that is not ``alone``
-    between its ends has two at least, so that it does not bulge across the others."""
-    own = rows.own(*ends)
-    spans = [_span(rows.free(y, own), x) for x, y in path]
-    limits = np.array(
-        [(max(low, x - _ASIDE), min(high, x + _ASIDE)) for (low, high), (x, _) in zip(spans, path, strict=True)]
-    )
-    line = np.array(path, dtype=np.float64)
-    knots: list[Waypoint] = []
-    at = _reach(rows, line, limits, 0)
-    while at < len(path) - 1:
-        low, high = spans[at]
-        knots.append(Waypoint(*path[at], 0.2 if 0 <= high - low < 1.2 else 0.0))
-        at = _reach(rows, line, limits, at)
-    if not knots and not alone and len(path) > 3:
-        knots = [Waypoint(*path[1]), Waypoint(*path[-2])]
-    return _spaced(knots)
-
-
-def _span(free: Sequence[Span], x: float) -> Span:
-    """The free span that a place is in; one that holds nothing where it is in none."""
-    number = bisect_left(free, x, key=_end)
-    return free[number] if free[number][0] <= x else (math.inf, -math.inf)
-
-
-def _reach(rows: Rows, path: FloatArray, limits: FloatArray, at: int) -> int:
-    """The farthest point of a way that can be reached straight from another: clear of what stands in the rows between,
-    of other ways, and close to the way."""
-    last = min(len(path) - 1, at + _FARTHEST)
-    if last == at + 1:
-        return last
-    (ax, ay), ends = path[at], path[at + 2 : last + 1]
-    y, low, high = path[at + 1 : last, 1], limits[at + 1 : last, 0], limits[at + 1 : last, 1]
-    x = ax + (ends[:, 0] - ax)[:, None] * (y - ay)[None, :] / (ends[:, 1] - ay)[:, None]
-    behind = np.arange(len(ends))[:, None] < np.arange(len(y))[None, :]
-    clear = (((low <= x) & (x <= high)) | behind).all(axis=1)
-    for number in np.flatnonzero(clear)[::-1].tolist():
-        line = zip(x[number, : number + 1].tolist(), path[at + 1 : at + 2 + number].tolist(), strict=True)
-        if not any(_beside(rows.used(height), place, own) for place, (own, height) in line):
-            return at + 2 + int(number)
-    return at + 1
-
-
-def _beside(used: Sequence[float], x: float, own: float) -> bool:
-    """Whether another way runs beside a place."""
-    beside = used[bisect_left(used, x - _BESIDE_WAY) : bisect_left(used, x + _BESIDE_WAY)]
-    return any(other != own for other in beside)
-
-
-def _spaced(knots: list[Waypoint]) -> list[Waypoint]:
-    """Knots are straight as far as there is room to their neighbours."""
-    result = list(knots)
-    for i, (a, b) in enumerate(pairwise(knots)):
-        room = abs(b.y - a.y) / 2 - 0.05
-        if a.half > room:
-            result[i] = Waypoint(a.x, a.y, 0.0)
-        if b.half > room:
-            result[i + 1] = Waypoint(b.x, b.y, 0.0)
-    return result
+    def _drop(self, i: int) -> None:
+        """Forget the line of a way."""
+        if i in self._ways:
+            gone = self._ways[i]
+            self._down.lines.drop(gone.notes[0])
+            self._side.lines.drop(gone.notes[1])
+            self._ways[i] = replace(gone, notes=((), ()))

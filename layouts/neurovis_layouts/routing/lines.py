@@ -5,13 +5,15 @@ In: lines as points. Out: for two heights, where every line that passes both pas
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
 import numpy as np
 
 from neurovis_layouts.routing.walls import FloatArray
 from neurovis_spec.layout.model import Point
+
+_NOWHERE = (np.array([np.inf, -np.inf]), np.zeros(2))
 
 
 class Lines:
@@ -21,8 +23,9 @@ class Lines:
         self._runs: list[tuple[FloatArray, FloatArray]] = []
         self._at: dict[float, FloatArray] = {}
 
-    def add(self, line: Sequence[Point]) -> None:
-        """Note a line."""
+    def add(self, line: Sequence[Point]) -> range:
+        """Note a line; the numbers of its runs, which go one way."""
+        first = len(self._runs)
         run: list[Point] = list(line[:1])
         for (_, before), point in pairwise(line):
             if len(run) > 1 and (point[1] - before) * (run[-1][1] - run[0][1]) < 0:
@@ -30,6 +33,14 @@ class Lines:
                 run = run[-1:]
             run.append(point)
         self._note(run)
+        return range(first, len(self._runs))
+
+    def drop(self, runs: Iterable[int]) -> None:
+        """Forget runs."""
+        for run in runs:
+            self._runs[run] = _NOWHERE
+            for known in self._at.values():
+                known[run : run + 1] = np.nan
 
     def _note(self, run: Sequence[Point]) -> None:
         found = np.array(run if run[0][1] <= run[-1][1] else run[::-1], dtype=np.float64)

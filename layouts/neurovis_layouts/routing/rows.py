@@ -125,6 +125,11 @@ class Rows:
         for x, y in path:
             insort(self._used.setdefault(y, []), x)
 
+    def leave(self, path: Iterable[Point]) -> None:
+        """Forget a way that was noted."""
+        for x, y in path:
+            self._used[y].remove(x)
+
 
 def _height(stop: tuple[float, Own]) -> float:
     return stop[0]
