@@ -105,7 +105,7 @@ def test_findings_follow_what_is_typed(tmp_path: Path) -> None:
 
 def test_an_unsaved_document_reads_the_data_files_of_its_folder(tmp_path: Path) -> None:
     (tmp_path / "w.csv").write_text("1,2\n3,4\n")
-    text = "neurovis: 1\nname: x\nneurons: {A: {count: 2}}\nconnections: {A -> A: {matrix: {file: w.csv}}}\n"
+    text = "neurovis: 1\nname: x\nneurons: {A: {count: 2, bias: 1}}\nconnections: {A -> A: {matrix: {file: w.csv}}}\n"
 
     async def scenario(editor: Editor) -> None:
         assert await editor.open(text) == []
