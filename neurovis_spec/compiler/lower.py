@@ -12,6 +12,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from neurovis_spec.compiler.entries import Bundle
+from neurovis_spec.compiler.groups import Kind
 from neurovis_spec.compiler.learning import Learning
 from neurovis_spec.compiler.network import (
     Block,
@@ -27,7 +28,7 @@ from neurovis_spec.compiler.network import (
     Update,
     frozen,
 )
-from neurovis_spec.compiler.populate import Kind, Population
+from neurovis_spec.compiler.populate import Population
 from neurovis_spec.diagnostics import Span
 
 #: What the neurons of a block have in common: level, activation, model, combination.

@@ -1,0 +1,289 @@
+"""Groups: one group of neurons, from what is written of it to its values.
+
+In: a Unit and the model of a group. Out: its neurons' names, what they are (Kind), and their values, one a neuron.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple, cast
+
+import numpy as np
+
+from neurovis_spec.compiler.constants import Constants
+from neurovis_spec.compiler.definitions import Defaults, Definitions
+from neurovis_spec.compiler.draws import Stream
+from neurovis_spec.compiler.limits import PATIENCE, Limits, amount, plural
+from neurovis_spec.compiler.network import (
+    Activation,
+    Combine,
+    FloatArray,
+    Group,
+    IntArray,
+    Model,
+    Role,
+)
+from neurovis_spec.compiler.positions import positions_of
+from neurovis_spec.compiler.references import key_span
+from neurovis_spec.compiler.settings import check_initials, choose, look_at_settings, parameters, spread
+from neurovis_spec.compiler.units import Unit
+from neurovis_spec.diagnostics import meant, suggest
+from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, shown, too_long
+from neurovis_spec.language.sections import GroupModel
+from neurovis_spec.language.source import Scalar
+from neurovis_spec.language.values import Choice, FormulaList
+
+
+class Kind(NamedTuple):
+    """What the neurons of a group are: definitions with parameters, one value a neuron."""
+
+    activation: Activation
+    activation_parameters: Mapping[str, FloatArray]
+    model: Model
+    model_parameters: Mapping[str, FloatArray]
+
+
+class Built(NamedTuple):
+    """One group, before its values are joined with those of the others. ``name`` and ``names`` are those that it and
+    its neurons have in their unit."""
+
+    name: str
+    group: Group
+    kind: Kind
+    model: GroupModel
+    names: tuple[str, ...]
+    labels: tuple[str, ...]
+    bias: FloatArray
+    initial: FloatArray
+    input: IntArray
+    position: FloatArray | None
+    first: int | None
+
+
+@dataclass(frozen=True)
+class Builder:
+    """What makes the groups of one unit."""
+
+    unit: Unit
+    limits: Limits
+    seed: int
+    #: what groups are that are the same in all instances of a module, by the group's model and its count
+    kinds: dict[tuple[int, int], Kind]
+
+    @property
+    def constants(self) -> Constants:
+        """What the unit's expressions may use."""
+        return self.unit.constants
+
+    @property
+    def definitions(self) -> Definitions:
+        """The definitions that the unit sees."""
+        return self.unit.definitions
+
+    def group(self, name: str, model: GroupModel, start: int) -> Built | None:
+        """One group; None where it is not known which neurons it has."""
+        findings = self.constants.findings
+        if name in self.unit.section.inputs and IDENTIFIER.fullmatch(name):
+            first = key_span(self.unit.section, "inputs", name)
+            message = f"'{name}' is an input already (line {first.line}); groups and inputs share their names"
+            findings.error("duplicate-name", key_span(self.unit.section, "neurons", name), message)
+        names, first_number = None, None
+        if name not in self.definitions.gaps.names["neurons"]:
+            names, first_number = self._names(name, model, start)
+        if names is None:
+            self._look(name, model)
+            return None
+        n = len(names)
+        kind = self._kind(model, n)
+        bias = None if model.bias is None else self._drawn(model.bias, n, "bias", name)
+        initial = None if model.initial is None else self._drawn(model.initial, n, "initial", name)
+        input_index = self._input(model, n)
+        position = positions_of(model.position, n, self.constants, self.unit.files)
+        labels = self._labels(model, names)
+        group = Group(
+            name=self.unit.called(name),
+            start=start,
+            count=n,
+            activation=kind.activation.name,
+            model=kind.model.name,
+            combine=cast(Combine, model.combine.value if model.combine else "sum"),
+            activation_parameters={k: tuple(v.tolist()) for k, v in kind.activation_parameters.items()},
+            model_parameters={k: tuple(v.tolist()) for k, v in kind.model_parameters.items()},
+            input=self._fed(model),
+            box=None if model.box is None else self.unit.called(model.box.value),
+            role=None if model.role is None else cast(Role, model.role.value),
+            description=None if model.description is None else model.description.value,
+            module=self.unit.module,
+        )
+        return Built(
+            name=name,
+            group=group,
+            kind=kind,
+            model=model,
+            names=names,
+            labels=labels or names,
+            bias=np.zeros(n) if bias is None else bias,
+            initial=np.full(n, np.nan) if initial is None else initial,
+            input=np.full(n, -1, dtype=np.int64) if input_index is None else input_index,
+            position=position,
+            first=first_number,
+        )
+
+    def _look(self, name: str, model: GroupModel) -> None:
+        """What can be said of a group of which it is not known which neurons it has."""
+        self._kind(model, None)
+        for formulas, purpose in ((model.bias, "bias"), (model.initial, "initial")):
+            if formulas is not None:
+                self._drawn(formulas, None, purpose, name)
+        self._input(model, None)
+        positions_of(model.position, None, self.constants, self.unit.files)
+
+    def _fed(self, model: GroupModel) -> str | None:
+        """The network's name of the input of a group."""
+        if model.input is None:
+            return None
+        found = self.unit.inputs.get(model.input.value)
+        return model.input.value if found is None else found.name
+
+    def _names(self, name: str, model: GroupModel, start: int) -> tuple[tuple[str, ...] | None, int | None]:
+        findings = self.constants.findings
+        count = None
+        if model.count is not None:
+            count = self.constants.integer(model.count, "'count'", 1)
+            if count is None:
+                return None, None
+        span = key_span(self.unit.section, "neurons", name) if model.count is None else model.count.span
+        total = start + (count or len(model.names or ()) or 1)
+        if total > self.limits.neurons:
+            message = f"this makes {amount(total)} neurons; the limit is {self.limits.neurons:,}"
+            findings.error("too-many", span, message, "raise it with --limit")
+            return None, None
+        if model.names is not None:
+            return self._listed(model, count), None
+        if model.first is not None and count is None:
+            findings.error("first-without-count", model.first.span, "'first' needs 'count'")
+            return None, None
+        if count is None:
+            return (name,), None
+        first = 1 if model.first is None else self.constants.integer(model.first, "'first'", 0)
+        if first is None:
+            return None, None
+        names = tuple(f"{name}{number}" for number in range(first, first + count))
+        if len(names[-1]) > 64:
+            findings.error("bad-name", key_span(self.unit.section, "neurons", name), too_long(names[-1]), NAME_RULE)
+            return None, None
+        return names, first
+
+    def _listed(self, model: GroupModel, count: int | None) -> tuple[str, ...] | None:
+        findings = self.constants.findings
+        assert model.names is not None
+        seen: dict[str, Located[str]] = {}
+        before = findings.errors
+        for item in model.names:
+            if not IDENTIFIER.fullmatch(item.value):
+                findings.error("bad-name", item.span, bad_name(item.value), NAME_RULE)
+            elif item.value in seen:
+                line = seen[item.value].span.line
+                findings.error("duplicate-neuron", item.span, f"'{item.value}' is named before (line {line})")
+            seen[item.value] = item
+            if findings.errors - before >= PATIENCE:
+                break
+        if findings.errors > before:  # how many they are is known
+            return tuple(item.value for item in model.names)
+        if not seen or (count is not None and count != len(seen)):
+            wanted = "at least one is wanted" if count is None else f"'count' says {count}"
+            node = model.source.get("names")
+            span = model.names[0].span if model.names else model.source.span if node is None else node.span
+            findings.error("wrong-size", span, f"'names' has {plural(len(seen), 'name')}, {wanted}")
+            return None
+        return tuple(seen)
+
+    def _choices(self, model: GroupModel) -> tuple[tuple[Activation, Defaults] | None, tuple[Model, Defaults] | None]:
+        """The definitions that a group names."""
+        known, findings = self.definitions, self.constants.findings
+        activation = model.activation or _default("identity", model)
+        neuron = model.model or _default("static", model)
+        return (
+            choose(activation, known.activations, "activation", known, findings),
+            choose(neuron, known.models, "model", known, findings),
+        )
+
+    def _kind(self, model: GroupModel, n: int | None) -> Kind:
+        """What the neurons are; identity and static in the place of what is at fault."""
+        if n is None or not (_fixed(model.activation) and _fixed(model.model)):
+            return self._made(model, n)
+        key = id(model), n
+        if key not in self.kinds:
+            self.kinds[key] = self._made(model, n)
+        return self.kinds[key]
+
+    def _made(self, model: GroupModel, n: int | None) -> Kind:
+        activation, neuron = self._choices(model)
+        activity: dict[str, FloatArray] | None = None
+        settings: dict[str, FloatArray] | None = None
+        if activation is not None:
+            activity = parameters(model.activation or _default("identity", model), activation[1], n, self.constants)
+        elif model.activation is not None:
+            look_at_settings(model.activation, self.constants, ("i", "n"))
+        if neuron is None and model.model is not None:
+            look_at_settings(model.model, self.constants, ("i", "n"))
+        if neuron is not None:
+            choice = model.model or _default("static", model)
+            settings = parameters(choice, neuron[1], n, self.constants)
+            if settings is not None:
+                check_initials(neuron[0].state, settings, choice, self.constants)
+        if activation is None or activity is None:
+            activation, activity = self.definitions.activations["identity"], {}
+        if neuron is None or settings is None:
+            neuron, settings = self.definitions.models["static"], {}
+        return Kind(activation[0], activity, neuron[0], settings)
+
+    def _drawn(self, formulas: Formula | FormulaList, n: int | None, purpose: str, name: str) -> FloatArray | None:
+        return spread(formulas, n, self.constants, f"'{purpose}'", Stream(self.seed, purpose, self.unit.called(name)))
+
+    def _input(self, model: GroupModel, n: int | None) -> IntArray | None:
+        if model.input is None:
+            return None
+        name = model.input.value
+        found = self.unit.inputs.get(name)
+        findings = self.constants.findings
+        if found is None:
+            known = tuple(self.unit.section.inputs)
+            if name not in known and not self.definitions.gaps.cover("inputs", name):
+                hint = suggest(name, known, "inputs") or "no inputs are declared; add it under 'inputs'"
+                findings.error("unknown-input", model.input.span, f"there is no input '{shown(name)}'", hint)
+                found = self.unit.inputs.get(meant(name, known) or "")
+        if found is None or n is None:
+            return None
+        if found.size == 1:
+            return np.full(n, found.start, dtype=np.int64)
+        if found.size == n:
+            return np.arange(found.start, found.start + n, dtype=np.int64)
+        message = f"the input '{name}' has {found.size} components, the group has {plural(n, 'neuron')}"
+        findings.error("wrong-size", model.input.span, message, "an input has one component, or one for each neuron")
+        return None
+
+    def _labels(self, model: GroupModel, names: tuple[str, ...]) -> tuple[str, ...] | None:
+        if model.label is None:
+            return None
+        node = model.source.get("label")
+        labels = tuple(item.value for item in model.label)
+        if node is None or isinstance(node, Scalar):
+            return labels * len(names)
+        if len(labels) == len(names):
+            return labels
+        message = f"'label' has {plural(len(labels), 'text')} for {plural(len(names), 'neuron')}"
+        self.constants.findings.error("wrong-size", model.label[0].span if model.label else node.span, message)
+        return None
+
+
+def _default(name: str, model: GroupModel) -> Choice:
+    return Choice(Located(name, Scalar(name, model.source.span)), ())
+
+
+def _fixed(choice: Choice | None) -> bool:
+    """Whether a choice means the same wherever it stands: what is set in it are numbers."""
+    return choice is None or not any(
+        not isinstance(entry.value, Scalar) or isinstance(entry.value.value, str) for entry in choice.settings
+    )
