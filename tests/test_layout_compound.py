@@ -99,7 +99,7 @@ def check_frames(layout: Layout, problem: LayoutProblem) -> None:
 
 
 def check_mirror(layout: Layout, problem: LayoutProblem) -> None:
-    """Images to the last bit, those of routes as well."""
+    """Images to the last bit, those of routes as well (to the own image and back: each its own)."""
     axis = across(problem)
     image = {a: b for mirror in problem.mirrors for pair in mirror.pairs for a, b in (pair, pair[::-1])}
     at = [layout.positions[name] for name in problem.neurons]
@@ -118,6 +118,13 @@ def check_mirror(layout: Layout, problem: LayoutProblem) -> None:
         ends = [image.get(n, n if 2 * at[n][axis] == twice else -1) for n in (a, b)]
         other = keys.get((ends[0], ends[1], number))
         if other is None or other == name:
+            continue
+        if (ends[0], ends[1]) == (b, a) != (a, b):
+            # to the image and back: reflections of each other would share a line, so each is one of itself
+            route = layout.routes[name]
+            half = len(route) // 2
+            mates = tuple((twice - x, y) if axis == 0 else (x, twice - y) for x, y in route[:half])
+            assert route[: -half - 1 : -1] == mates, name
             continue
         expected = tuple((twice - x, y) if axis == 0 else (x, twice - y) for x, y in layout.routes[name])
         assert layout.routes[other] == expected, name

@@ -71,15 +71,16 @@ def _passing(problem: LayoutProblem, plan: Plan, rests: Settled) -> dict[int, li
 
 
 def _reflected(routes: dict[Key, Route], rests: Settled, pair: Mapping[int, int]) -> dict[Key, Route]:
-    """For every two routes that are mirror images the second as the reflection of the first."""
+    """For every two routes that are mirror images the second as the reflection of the first; of two neurons that are
+    images of each other and drive each other, both ways as their own reflections, else they would share a line. There
+    and back are taken from the same side: the sides that they bow to are exchanged on the other."""
     twice = 2 * rests.axis
     result: dict[Key, Route] = {}
-    for key, route in sorted(routes.items()):
+    for key, route in sorted(routes.items(), key=lambda item: (sorted(item[0][:2]), item[0])):
         source, target, number = key
         image = _image(source, rests, pair), _image(target, rests, pair), number
         if pair.get(source) == target and (target, source, 0) in routes:
-            ends = rests.places[source], rests.places[target]
-            route = _swerving(routes[(*min(key, image)[:2], 0)], ends, rests.axis, number)
+            result[key] = _even(route, twice)
         if key in result or image == key or image not in routes:
             result.setdefault(key, route)
             continue
@@ -94,13 +95,12 @@ def _image(neuron: int, rests: Settled, pair: Mapping[int, int]) -> int:
     return pair.get(neuron, neuron if rests.places[neuron][0] == rests.axis else -1)
 
 
-def _swerving(route: Route, ends: tuple[Point, Point], axis: float, number: int) -> Route:
-    """From a neuron to its mirror image, where another connection comes back: sunk by a little before the axis and
-    raised behind it, so that the two cross on the axis, since they would share a line that is symmetric."""
-    line = route[1:-1] if route[0] == ends[0] else route[-2:0:-1]
-    mates = zip(line, line[::-1], strict=True)
-    middle = [(snap(axis + (x - other) / 2), snap((y + height) / 2)) for (x, y), (other, height) in mates]
-    far = abs(ends[1][0] - ends[0][0])
-    sway = snap(max(0.14, min(0.4, 0.12 * far)) if len(middle) == 2 else 0.14) * (number + 1)
-    swayed = [(x, y + (sway if 2 * i < len(middle) - 1 else -sway)) for i, (x, y) in enumerate(middle)]
-    return ends[0], *swayed, ends[1]
+def _even(route: Route, twice: float) -> Route:
+    """A route from a neuron to its mirror image, as it would be on both sides of the axis (at half of ``twice``)."""
+    half = len(route) // 2
+    before = [
+        (snap((x + twice - other) / 2), snap((y + height) / 2))
+        for (x, y), (other, height) in zip(route[1:half], route[-2 : -half - 1 : -1], strict=True)
+    ]
+    middle = [(twice / 2, before[-1][1])] if len(route) % 2 else []
+    return route[0], *before, *middle, *((twice - x, y) for x, y in before[::-1]), route[-1]

@@ -1,0 +1,54 @@
+"""Connections there and back are two lines, apart where they can be seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import combinations
+
+import neurovis_spec as nv
+from neurovis_spec.layout.geometry import distance, sampled
+from neurovis_spec.layout.model import Route
+
+HEAD = "neurovis: 1\nname: pair\nneurons: {L: {count: 2, bias: 1}, R: {count: 2}, M: {}}\n"
+
+
+def between_discs(route: Route, step: float) -> list[tuple[float, float]]:
+    return [point for point in sampled(route, step) if min(distance(point, route[0]), distance(point, route[-1])) > 0.4]
+
+
+def together(one: Route, other: Route, near: float) -> float:
+    """Share of the one, between the discs, that is closer to the other than this."""
+    line, points = sampled(other, 0.03), between_discs(one, 0.03)
+    return sum(min(distance(p, q) for q in line) < near for p in points) / max(1, len(points))
+
+
+def pairs(routes: Iterable[str]) -> list[tuple[str, str]]:
+    """Names of connections that share both ends, in either direction."""
+
+    def ends(name: str) -> frozenset[str]:
+        return frozenset(name.split(" (")[0].split(" -> "))
+
+    return [(a, b) for a, b in combinations(sorted(routes), 2) if ends(a) == ends(b) and len(ends(a)) == 2]
+
+
+def test_a_half_centre_has_an_arc_above_and_one_below() -> None:
+    for extra in ("", ", L1 -> L2: 1, R1 -> R2: 1, L2 -> M: 1, R2 -> M: 1"):
+        text = (
+            HEAD + f"connections: {{L1 -> R1: 1, R1 -> L1: -1{extra}}}\nlayout: {{engine: layered, mirror: [[L, R]]}}"
+        )
+        layout = nv.compile_text(text).layout()
+        there, back = layout.routes["L1 -> R1"], layout.routes["R1 -> L1"]
+        level = layout.positions["L1"][1]
+        assert all((y - level) * (h - level) < 0 for (_, y), (_, h) in zip(there[1:-1], back[1:-1], strict=True))
+        assert together(there, back, 0.15) == 0.0
+        for route in (there, back):
+            assert [y for _, y in route] == [y for _, y in route[::-1]]
+
+
+def test_pairs_crosswise_over_the_axis_do_not_lie_on_each_other() -> None:
+    pair = "L1 -> R2: 1, R2 -> L1: -1, L2 -> R1: 1, R1 -> L2: -1"
+    for extra in ("", ", L1 -> L2: 1, R1 -> R2: 1, L2 -> M: 1, R2 -> M: 1"):
+        layout = nv.compile_text(HEAD + f"connections: {{{pair}{extra}}}\nlayout: {{mirror: [[L, R]]}}").layout()
+        assert pairs(layout.routes)
+        for one, other in pairs(layout.routes):
+            assert together(layout.routes[one], layout.routes[other], 0.08) <= 0.4, (one, other)
