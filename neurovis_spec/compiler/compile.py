@@ -191,7 +191,7 @@ def _eventful(
     """The network with the phases that its events make; its hash says that they are there."""
     if not spec.events:
         return network
-    from neurovis_spec.compiler.events import with_phases
+    from neurovis_spec.compiler.phases import with_phases
 
     findings = constants.findings
     before = findings.errors

@@ -1,21 +1,19 @@
-"""Events: what changes during a run (§9), as a series of networks.
+"""Events: what changes during a run (§9).
 
-In: the ``events`` section and the network as it begins. Out: the same network with ``phases``: for each step at which
-something changes, the network that runs from then on. A phase has the neurons, the connections and the weights'
-places of the first network; what is lesioned is left out of its blocks and rules, what is clamped is listed, what is
-set is compiled in.
+In: the ``events`` section, the neurons and connections that it names. Out: the events, resolved. What becomes of the
+network is for ``phases``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from neurovis_spec.compiler.connect import Connected
 from neurovis_spec.compiler.constants import Constants
-from neurovis_spec.compiler.network import Block, IntArray, Learn, Network, Plasticity, frozen
+from neurovis_spec.compiler.network import IntArray
 from neurovis_spec.compiler.references import (
     Directory,
     few,
@@ -25,17 +23,12 @@ from neurovis_spec.compiler.references import (
     resolve_end,
     resolve_ends,
 )
-from neurovis_spec.diagnostics import Findings, Span, suggest
+from neurovis_spec.diagnostics import Findings, suggest
 from neurovis_spec.language.located import Formula, Located, shown
 from neurovis_spec.language.model import lost_names
 from neurovis_spec.language.sections import EventModel
 
-#: Compiles the network anew with other parameters, without its events; None where that is at fault.
-Recompile = Callable[[Mapping[str, float]], Network | None]
-
 _KEYS = ("at", "from", "to", "set", "clamp", "lesion")
-#: Most steps at which something changes: each is a network of its own.
-MOST = 10_000
 
 
 @dataclass(frozen=True)
@@ -176,79 +169,3 @@ class EventReader:
         names = self.wires.names
         near = [name for name in names if source in name.split(" -> ")[0] or target in name.split(" -> ")[-1]]
         return suggest(f"{source} -> {target}", few(text.value, near or names), "connections")
-
-
-def with_phases(
-    network: Network, events: tuple[Event, ...], recompile: Recompile, constants: Constants, place: Span
-) -> Network:
-    """The network with a phase for each step at which something changes. An expression that is set sees the values that
-    the parameters have by then, not those of the other parameters that are set in the same step."""
-    ends = {event.to for event in events if event.clamp and event.to is not None}
-    steps = sorted({event.at for event in events} | ends)
-    if len(steps) > MOST:
-        constants.findings.error(
-            "too-many", place, f"the events change something at {len(steps):,} steps; {MOST:,} are possible"
-        )
-        return network
-    phases: list[tuple[int, Network]] = []
-    base, chosen = network, dict[str, float]()
-    for step in steps:
-        due = {name: formula for event in events if event.at == step for name, formula in event.set.items()}
-        if due:
-            now = replace(constants, parameters=dict(base.parameters))
-            values = {name: now.scalar(formula) for name, formula in due.items()}
-            chosen = chosen | {name: value for name, value in values.items() if value is not None}
-            made = recompile(chosen)
-            if made is None:
-                return network
-            # the parameter that is set does not reach back to the activity at step 0
-            base = replace(made, neurons=replace(made.neurons, initial=network.neurons.initial))
-        phases.append((step, _altered(base, events, step)))
-    return replace(network, phases=tuple(phases))
-
-
-def _altered(base: Network, events: tuple[Event, ...], step: int) -> Network:
-    """A network as it is at a step: without what is lesioned by then, with the clamps that hold."""
-    begun = [event for event in events if event.at <= step]
-    neurons = np.array(sorted({neuron for event in begun for neuron in event.neurons}), dtype=np.int64)
-    wires = base.connections
-    gone = np.isin(wires.sources, neurons) | np.isin(wires.targets, neurons)
-    for event in begun:
-        gone[list(event.connections)] = True
-    clamps = {neuron: value for event in begun if event.to is None or step < event.to for neuron, value in event.clamp}
-    clamps.update(dict.fromkeys(neurons.tolist(), 0.0))
-    plasticity = tuple(_kept_rule(entry, gone) for entry in base.plasticity)
-    idle = {number for number, entry in enumerate(plasticity) if not len(entry.members)}
-    return replace(
-        base,
-        blocks=tuple(_kept_block(block, gone) for block in base.blocks),
-        plasticity=plasticity,
-        program=tuple(op for op in base.program if not (isinstance(op, Learn) and op.plasticity in idle)),
-        clamped=tuple(sorted(clamps.items())),
-        phases=(),
-    )
-
-
-def _kept(array: IntArray, keep: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> IntArray:
-    result = array[keep]
-    frozen(result)
-    return result
-
-
-def _kept_block(block: Block, gone: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> Block:
-    keep = ~gone[block.incoming]
-    if keep.all():
-        return block
-    return replace(block, incoming=_kept(block.incoming, keep), slots=_kept(block.slots, keep))
-
-
-def _kept_rule(entry: Plasticity, gone: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> Plasticity:
-    keep = ~gone[entry.members]
-    if keep.all():
-        return entry
-    return replace(
-        entry,
-        members=_kept(entry.members, keep),
-        parameters={name: values[keep] for name, values in entry.parameters.items()},
-        signals={name: _kept(values, keep) for name, values in entry.signals.items()},
-    )

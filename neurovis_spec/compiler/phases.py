@@ -1,0 +1,193 @@
+"""Phases: what events make of a network, as a series of networks (§9).
+
+In: the network as it begins, its events. Out: the same network with ``phases``: for each step at which something
+changes, the network that runs from then on. A phase has the neurons, the connections and the weights' places of the
+first network; what is lesioned is left out of its blocks and rules, what is clamped is listed, what is set is compiled
+in. What holds by a step is carried on to the next, so that many events take a time in proportion to their number.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from heapq import heappop, heappush
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.compiler.constants import Constants
+from neurovis_spec.compiler.events import Event
+from neurovis_spec.compiler.network import Block, IntArray, Learn, Network, Plasticity, frozen
+from neurovis_spec.diagnostics import Span
+
+#: Compiles the network anew with other parameters, without its events; None where that is at fault.
+Recompile = Callable[[Mapping[str, float]], Network | None]
+Mask = npt.NDArray[np.bool_]
+
+#: Most steps at which something changes: each is a network of its own.
+MOST = 10_000
+
+
+def with_phases(
+    network: Network, events: tuple[Event, ...], recompile: Recompile, constants: Constants, place: Span
+) -> Network:
+    """The network with a phase for each step at which something changes. An expression that is set sees the values that
+    the parameters have by then, not those of the other parameters that are set in the same step."""
+    begun, over = defaultdict[int, list[int]](list), defaultdict[int, list[int]](list)
+    for number, event in enumerate(events):
+        begun[event.at].append(number)
+        if event.clamp and event.to is not None:
+            over[event.to].append(number)
+    steps = sorted({*begun, *over})
+    if len(steps) > MOST:
+        constants.findings.error(
+            "too-many", place, f"the events change something at {len(steps):,} steps; {MOST:,} are possible"
+        )
+        return network
+    phases: list[tuple[int, Network]] = []
+    base, chosen = network, dict[str, float]()
+    known: dict[tuple[tuple[str, str], ...], Network] = {}
+    clamps, lesions = _Clamps(), _Lesions()
+    for step in steps:
+        new = [(number, events[number]) for number in begun.get(step, ())]
+        due = {name: formula for _, event in new for name, formula in event.set.items()}
+        if due:
+            now = replace(constants, parameters=dict(base.parameters))
+            values = {name: now.scalar(formula) for name, formula in due.items()}
+            chosen = chosen | {name: value for name, value in values.items() if value is not None}
+            key = tuple((name, chosen[name].hex()) for name in sorted(chosen))  # -0.0 is another one than 0.0
+            if key not in known:
+                made = recompile(chosen)
+                if made is None:
+                    return network
+                # the parameter that is set does not reach back to the activity at step 0
+                known[key] = replace(made, neurons=replace(made.neurons, initial=network.neurons.initial))
+            base = known[key]
+        silent = lesions.add(event for _, event in new)
+        clamps.go_on(new, over.get(step, ()), silent)
+        phases.append((step, clamps.on(lesions.without(base))))
+    return replace(network, phases=tuple(phases))
+
+
+class _Lesions:
+    """What is lesioned by a step, and a network without it."""
+
+    def __init__(self) -> None:
+        self._neurons, self._connections = set[int](), set[int]()
+        self._base: Network | None = None
+        self._result: Network | None = None
+        self._done = (0, 0)
+
+    def add(self, events: Iterable[Event]) -> list[int]:
+        """Lesion what further events name. Returns the neurons that were not lesioned before."""
+        new: list[int] = []
+        for event in events:
+            new.extend(set(event.neurons) - self._neurons)
+            self._neurons.update(event.neurons)
+            self._connections.update(event.connections)
+        return new
+
+    def without(self, base: Network) -> Network:
+        """A network without what is lesioned; the one before is gone on from where it is of the same base."""
+        done = len(self._neurons), len(self._connections)
+        if base is not self._base or self._result is None:
+            self._base, self._result = base, _cut(base, self._gone(base))
+        elif done != self._done:
+            self._result = _cut(self._result, self._gone(base))
+        self._done = done
+        return self._result
+
+    def _gone(self, base: Network) -> Mask:
+        """Which connections are lesioned, by name or with one of their ends."""
+        silent = np.zeros(len(base.neurons), dtype=np.bool_)
+        silent[list(self._neurons)] = True
+        gone: Mask = silent[base.connections.sources] | silent[base.connections.targets]
+        gone[list(self._connections)] = True
+        return gone
+
+
+class _Clamps:
+    """The clamps that hold at a step: of several of a neuron the one that is written last; a lesion holds for good."""
+
+    def __init__(self) -> None:
+        self._held: list[tuple[int, float]] = []
+        self._network: Network | None = None
+        self._result: Network | None = None
+        #: by neuron: the clamps that hold and some that are over, that of the last event first
+        self._of = defaultdict[int, list[tuple[int, float]]](list)
+        self._over = set[int]()
+        self._silent = set[int]()
+        self._neurons_of: dict[int, Iterable[int]] = {}
+
+    def go_on(self, new: Iterable[tuple[int, Event]], over: Iterable[int], silent: Iterable[int]) -> None:
+        """Begin the clamps of events with their numbers, end those of others, and hold lesioned neurons at 0."""
+        touched = set[int]()
+        for number, event in new:
+            clamps = dict(event.clamp)
+            self._neurons_of[number] = clamps
+            touched |= clamps.keys()
+            for neuron, value in clamps.items():
+                heappush(self._of[neuron], (-number, value))
+        for number in over:
+            self._over.add(number)
+            touched.update(self._neurons_of.pop(number))
+        for neuron in silent:
+            self._silent.add(neuron)
+            self._put(neuron, 0.0)
+        for neuron in touched - self._silent:
+            heap = self._of[neuron]
+            while heap and -heap[0][0] in self._over:
+                heappop(heap)
+            self._put(neuron, heap[0][1] if heap else None)
+
+    def on(self, network: Network) -> Network:
+        """A network with what is clamped; the same one while nothing changes."""
+        if self._result is None or network is not self._network:
+            self._network, self._result = network, replace(network, clamped=tuple(self._held), phases=())
+        return self._result
+
+    def _put(self, neuron: int, value: float | None) -> None:
+        """Note what a neuron is held at, if at anything."""
+        begin = bisect_left(self._held, (neuron,))
+        end = begin + (begin < len(self._held) and self._held[begin][0] == neuron)
+        self._held[begin:end] = [] if value is None else [(neuron, value)]
+        self._result = None
+
+
+def _cut(network: Network, gone: Mask) -> Network:
+    """A network without some of its connections in blocks and rules."""
+    plasticity = tuple(_kept_rule(entry, gone) for entry in network.plasticity)
+    idle = {number for number, entry in enumerate(plasticity) if not len(entry.members)}
+    return replace(
+        network,
+        blocks=tuple(_kept_block(block, gone) for block in network.blocks),
+        plasticity=plasticity,
+        program=tuple(op for op in network.program if not (isinstance(op, Learn) and op.plasticity in idle)),
+    )
+
+
+def _kept(array: IntArray, keep: Mask) -> IntArray:
+    result = array[keep]
+    frozen(result)
+    return result
+
+
+def _kept_block(block: Block, gone: Mask) -> Block:
+    keep = ~gone[block.incoming]
+    if keep.all():
+        return block
+    return replace(block, incoming=_kept(block.incoming, keep), slots=_kept(block.slots, keep))
+
+
+def _kept_rule(entry: Plasticity, gone: Mask) -> Plasticity:
+    keep = ~gone[entry.members]
+    if keep.all():
+        return entry
+    return replace(
+        entry,
+        members=_kept(entry.members, keep),
+        parameters={name: values[keep] for name, values in entry.parameters.items()},
+        signals={name: _kept(values, keep) for name, values in entry.signals.items()},
+    )
