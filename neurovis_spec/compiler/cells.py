@@ -51,14 +51,15 @@ class Cells:
         return np.arange(len(self.kinds)) - np.repeat(self.starts[:-1], self.widths)
 
 
-def cells_of(node: Sequence | Packed, findings: Findings, row: str) -> Cells | None:
+def cells_of(node: Sequence | Packed, findings: Findings, row: str, *, named: bool = False) -> Cells | None:
     """The cells of a list of rows; findings where one is no number, text or null, or a row is no list. None where there
     are many such.
 
-    ``row`` is what a row is, for a finding; with "" a bare cell is a row of one.
+    ``row`` is what a row is, for a finding; with "" a bare cell is a row of one. ``named``: some cells are names, so
+    that the caller has to say what an empty text is.
     """
     cells = _packed(node, row) if isinstance(node, Packed) else None
-    cells = cells or _written(node, findings, row)
+    cells = cells or _written(node, findings, row, named)
     if cells is None:
         return None
     wild = np.flatnonzero((cells.kinds == NUMBER) & ~np.isfinite(cells.numbers))
@@ -80,7 +81,7 @@ def _row_span(node: Packed, row: int) -> Span:
     return node.cell(row).span if node.rows is None else node.row(row).span
 
 
-def _written(node: Sequence | Packed, findings: Findings, row: str) -> Cells | None:
+def _written(node: Sequence | Packed, findings: Findings, row: str, named: bool) -> Cells | None:
     before = findings.errors
     nodes: list[Node] = []
     starts = [0]
@@ -101,7 +102,7 @@ def _written(node: Sequence | Packed, findings: Findings, row: str) -> Cells | N
     for place, cell in enumerate(nodes):
         if isinstance(cell, Scalar) and cell.value is None:
             continue
-        if not isinstance(cell, Scalar) or isinstance(cell.value, bool) or cell.value == "":
+        if not isinstance(cell, Scalar) or isinstance(cell.value, bool) or (cell.value == "" and not named):
             formula_of(cell, findings)
             if findings.errors - before >= PATIENCE:
                 return None

@@ -19,7 +19,7 @@ from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import Directory, resolve_each
 from neurovis_spec.compiler.units import Unit
 from neurovis_spec.language.located import Located, shown
-from neurovis_spec.language.sections import ConnectionModel
+from neurovis_spec.language.sections import ConnectionModel, written
 
 
 class Connected(NamedTuple):
@@ -89,7 +89,12 @@ class Connector:
                 continue
             total += len(bundle.sources)
             result.append(bundle)
-        return Connected(tuple(result), not failed)
+        return Connected(tuple(result), not failed and not self._left_out())
+
+    def _left_out(self) -> bool:
+        """Whether there are entries that could not be read at all."""
+        section = self.unit.section
+        return "connections" in section.lost_keys or written(section.source) > len(section.connections)
 
     def _entry(self, key: Located[str], body: ConnectionModel, seen: dict[str, int], total: int) -> Bundle | None:
         """One entry; None where it is at fault, and then all that does not depend on that is still looked at."""

@@ -182,8 +182,8 @@ class Constants:
         values = {name: self._known(name, extra) for name in names(tree)}
         drawing = None if randomness is None else _Drawing(randomness)
         result = evaluate_array(tree, values, draw=drawing)
-        if drawing is not None and drawing.negative is not None and np.isnan(result).any():
-            self.refuse_deviation(formula, *drawing.negative)
+        if drawing is not None and drawing.wrong is not None and np.isnan(result).any():
+            self.refuse_draw(formula, *drawing.wrong)
             return None
         return float(result) if np.ndim(result) == 0 else np.asarray(result, dtype=np.float64)
 
@@ -194,11 +194,16 @@ class Constants:
             return self.dt
         return extra[name] if name in extra else self.parameters[name]
 
-    def refuse_deviation(self, formula: Formula, draw: Draw, deviation: float) -> None:
-        """The finding about a draw from ``normal`` whose deviation is negative."""
+    def refuse_draw(self, formula: Formula, draw: Draw, second: float) -> None:
+        """The finding about a draw from ``normal`` whose deviation is negative, or from ``uniform`` whose upper end is
+        below the lower one by ``second``."""
         place = formula.node.at(draw.second.start, draw.second.end)
-        message = f"the deviation of a normal distribution must be at least 0, this is {deviation:.15g}"
-        self.findings.error("out-of-range", place, message, "normal(mean, deviation): the mean comes first")
+        message = f"the deviation of a normal distribution must be at least 0, this is {second:.15g}"
+        hint = "normal(mean, deviation): the mean comes first"
+        if draw.kind == "uniform":
+            message = f"the upper end of a uniform distribution is {-second:.15g} below the lower one"
+            hint = "uniform(low, high): the lower end comes first"
+        self.findings.error("out-of-range", place, message, hint)
 
     def value(
         self,
@@ -250,18 +255,26 @@ class Constants:
 
 
 class _Drawing:
-    """Draws the numbers of one formula, and keeps the first draw with a negative deviation and the least of that.
+    """Draws the numbers of one formula, and keeps the first draw of which no number can be drawn, and by how much.
 
-    What is drawn with it is NaN, so that it counts only where the formula's value depends on it: a branch that is not
-    taken may have one.
+    What is drawn so is NaN, so that it counts only where the formula's value depends on it: a branch that is not taken
+    may have such a draw.
     """
 
     def __init__(self, randomness: Randomness) -> None:
         self.randomness = randomness
-        self.negative: tuple[Draw, float] | None = None
+        self.wrong: tuple[Draw, float] | None = None
 
     def __call__(self, node: Draw, first: Value, second: Value) -> Value:
-        if node.kind == "normal" and self.negative is None and np.less(second, 0).any():
-            self.negative = node, float(np.nanmin(second))
+        width = width_of(node, first, second)
+        wrong = np.less(width, 0)
+        if self.wrong is None and wrong.any():
+            self.wrong = node, float(np.nanmin(width))
         at = self.randomness
-        return at.stream.drawn(node.kind, first, second, at.i, at.j, 0, node.index)
+        drawn = at.stream.drawn(node.kind, first, second, at.i, at.j, 0, node.index)
+        return np.where(wrong, np.nan, drawn) if wrong.any() else drawn
+
+
+def width_of(draw: Draw, first: Value, second: Value) -> Value:
+    """How wide a distribution is, which must not be negative: the deviation, or from the lower end to the upper."""
+    return second if draw.kind == "normal" else second - first

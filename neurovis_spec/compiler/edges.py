@@ -69,7 +69,7 @@ class EdgeReader:
         if len(edges.node) == 0:
             self.constants.findings.error("wrong-size", edges.node.span, "there is no edge in this list")
             return None
-        cells = cells_of(edges.node, self.constants.findings, _AN_EDGE)
+        cells = cells_of(edges.node, self.constants.findings, _AN_EDGE, named=True)
         return None if cells is None else self._written(cells)
 
     def _written(self, cells: Cells) -> EdgeList | None:
@@ -135,6 +135,10 @@ class EdgeReader:
         return None if None in found.values() else result
 
     def _outside(self, name: str, span: Span, end: End, what: str, where: str = "") -> None:
+        if not name.strip():
+            message = f"the {what} of an edge is the name of a neuron, this is empty"
+            self.constants.findings.error("wrong-type", span, message)
+            return
         hint = suggest(name, few(name, end.positions), f"{what}s of this entry" if end.perhaps is None else "neurons")
         message = f"'{shown(name)}'{where} is not among the {what}s of this entry"
         self.constants.findings.error("edge-outside", span, message, hint)

@@ -50,6 +50,8 @@ class Bundle(NamedTuple):
     high: float
     learning: Learning | None
     description: str | None
+    #: whether no neuron is in both ends of the entry
+    apart: bool
 
 
 class _Shape(NamedTuple):
@@ -139,6 +141,7 @@ class EntryBuilder:
             bounds[1],
             learning,
             None if body.description is None else body.description.value,
+            not np.isin(self.sources, self.targets).any(),
         )
 
     def _conflicts(self) -> None:
@@ -161,7 +164,7 @@ class EntryBuilder:
                 message = f"'{second}' beside '{first}': the {first} says it already"
                 findings.error("conflicting-keys", later.key.span, message, f"remove '{second}'")
         rows = body.source.entry("rows")
-        if rows is not None and body.matrix is None and not table:
+        if rows is not None and body.matrix is None and not table and self._kept("matrix", "centre"):
             message = "'rows' says how a matrix is read; there is no matrix"
             findings.error("useless-key", rows.key.span, message)
         loops = body.source.entry("self")

@@ -76,7 +76,8 @@ def library_of(spec: Spec, includes: Includes, folder: Path, dt: float, findings
 def _check_filled(module: Module, findings: Findings) -> None:
     """A module has neurons, or instances of modules that have some."""
     model = module.model
-    if not model.neurons and not model.instances and not model.lost:
+    lost = module.gaps.names["neurons"] or module.gaps.names["instances"]  # there are some, which are at fault
+    if not model.neurons and not model.instances and not model.lost and not lost:
         message = f"the module '{module.name}' has no neurons"
         findings.error("no-neurons", opening(model.source), message, "add a group under its 'neurons'")
 

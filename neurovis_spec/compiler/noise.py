@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from neurovis_spec.compiler.constants import Constants, Value
+from neurovis_spec.compiler.constants import Constants, Value, width_of
 from neurovis_spec.compiler.network import Noise, frozen
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.units import Unit
@@ -52,15 +52,17 @@ def _tree(formula: Formula, constants: Constants) -> Tree | None:
 
 
 def _check_deviations(tree: Tree, formula: Formula, count: int, constants: Constants) -> None:
-    """A finding where a deviation is known before the run and negative for any neuron. One that depends on the step,
-    or a draw in a branch, which may not be taken, gives NaN in the run, and its warning."""
+    """A finding where a deviation, or what ``uniform`` draws from, is known before the run and negative for any neuron.
+    A deviation that depends on the step, or a draw in a branch, which may not be taken, gives NaN in the run, and its
+    warning."""
     known: dict[str, Value] = {**constants.parameters, **CONSTANTS, "dt": constants.dt}
     known |= {"i": np.arange(count, dtype=np.float64), "n": float(count)}
     for draw in _always_drawn(tree):
-        if draw.kind == "normal" and names(draw.second) <= known.keys() and not draws(draw.second):
-            deviation = evaluate_array(draw.second, known)
-            if np.less(deviation, 0).any():
-                constants.refuse_deviation(formula, draw, float(np.min(deviation)))
+        parts = (draw.first, draw.second) if draw.kind == "uniform" else (draw.second,)
+        if all(names(part) <= known.keys() and not draws(part) for part in parts):
+            width = width_of(draw, *(evaluate_array(part, known) for part in (parts[0], draw.second)))
+            if np.less(width, 0).any():
+                constants.refuse_draw(formula, draw, float(np.min(width)))
 
 
 def _always_drawn(tree: Tree) -> Iterator[Draw]:

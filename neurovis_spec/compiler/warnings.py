@@ -61,6 +61,7 @@ def warn(compiled: Compiled, findings: Findings) -> None:
     _modules(compiled, findings)
     _neurons(compiled, findings)
     _rates(compiled, findings)
+    _vain(compiled, findings)
 
 
 def _inputs(compiled: Compiled, findings: Findings) -> None:
@@ -178,6 +179,25 @@ def _rates(compiled: Compiled, findings: Findings) -> None:
         if constant:
             message = f"the rate of '{learning.rule.name}' is 0: no weight will change"
             findings.warning("zero-rate", span, message, "give it a rate, or leave the plasticity out")
+
+
+def _vain(compiled: Compiled, findings: Findings) -> None:
+    """What an entry of connections says and what makes no difference to it, or all weights 0."""
+    apart: dict[Span, bool] = {}
+    for bundle in compiled.bundles:
+        apart[bundle.key] = bundle.apart and apart.get(bundle.key, True)
+    for section, _ in compiled.sections():
+        for key, body in section.connections:
+            if body.self is not None and body.self.value and apart.get(key.span, False):
+                message = "'self: true' changes nothing: no neuron is in both ends of this connection"
+                findings.warning("no-effect", body.self.span, message, "remove it")
+            scale = body.scale
+            if scale is not None and scale.indegree is not None and not scale.indegree.value:
+                findings.warning("no-effect", scale.indegree.span, "'indegree: false' scales nothing", "remove it")
+            for formula in () if scale is None else (scale.norm, scale.spectral_radius):
+                if formula is not None and formula.value == 0:
+                    message = "scaled to 0, all weights of this entry are 0"
+                    findings.warning("no-effect", formula.span, message, "give it another number, or 'weight: 0'")
 
 
 def _rate(body: ConnectionModel) -> tuple[Span, bool]:

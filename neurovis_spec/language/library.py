@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar
 
-from pydantic import Field, ValidationInfo
+from pydantic import ConfigDict, Field, ValidationInfo
 
 from neurovis_spec.language.located import (
     FormulaField,
@@ -69,6 +69,8 @@ class ModelModel(Model):
 
 class WeightModel(Model):
     """How a rule changes the weight."""
+
+    model_config = ConfigDict(json_schema_extra={"minProperties": 1})
 
     each_step: FormulaField | None = Field(None, description="w[t+1], an expression of weight, pre, post, ….")
     each_episode: FormulaField | None = Field(None, description="The weight after an episode.")

@@ -19,6 +19,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import PydanticCustomError, core_schema
 
 from neurovis_spec.diagnostics import Findings, Span, meant, nearest, suggest
+from neurovis_spec.language.scalars import INTEGER_HIGH, INTEGER_LOW
 from neurovis_spec.language.source import Node, Packed, Scalar, Sequence, describe
 
 T = TypeVar("T")
@@ -173,7 +174,11 @@ def as_integer(node: Node, info: ValidationInfo) -> Located[int]:
     if number.value != int(number.value):
         refuse(info, node, "an integer")
     whole = number.node.value
-    return Located(whole if isinstance(whole, int) else int(number.value), number.node)
+    result = whole if isinstance(whole, int) else int(number.value)
+    if not INTEGER_LOW <= result <= INTEGER_HIGH:
+        findings_of(info).error("integer-range", node.span, f"the integer {number.value:g} is beyond signed 64 bits")
+        give_up()
+    return Located(result, number.node)
 
 
 def as_texts(node: Node, info: ValidationInfo) -> tuple[Located[str], ...]:
@@ -239,5 +244,7 @@ IdentifierField = Annotated[
     Leaf(as_identifier, {"type": "string", "pattern": "^[A-Za-z_][A-Za-z0-9_]{0,63}$"}),
 ]
 BoolField = Annotated[Located[bool], Leaf(as_bool, {"type": "boolean"})]
-IntegerField = Annotated[Located[int], Leaf(as_integer, {"type": "integer"})]
+IntegerField = Annotated[
+    Located[int], Leaf(as_integer, {"type": "integer", "minimum": INTEGER_LOW, "maximum": INTEGER_HIGH})
+]
 FormulaField = Annotated[Formula, Leaf(as_formula, FORMULA)]

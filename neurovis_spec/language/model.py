@@ -17,6 +17,7 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
+    GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     ValidationError,
     ValidationInfo,
@@ -30,7 +31,7 @@ from pydantic_core import core_schema
 from neurovis_spec.diagnostics import Findings, Span, nearest
 from neurovis_spec.language.keys import Words, read_keys
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Leaf, bad_name, findings_of, give_up, refuse
-from neurovis_spec.language.source import Entry, Mapping, Node, Scalar, ScalarValue
+from neurovis_spec.language.source import Entry, Mapping, Node, Scalar, ScalarValue, Sequence
 
 V = TypeVar("V")
 
@@ -211,6 +212,31 @@ class KeysAreNames:
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
         return {**handler(schema), "propertyNames": {"pattern": f"^{IDENTIFIER.pattern}$"}}
+
+
+@dataclass(frozen=True, slots=True)
+class Filled:
+    """Says of a field that may be left out that it is not empty where it stands: it would do nothing. ``wanted`` is
+    what it holds, for the finding."""
+
+    wanted: str
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        """The value is looked at before anything is made of it."""
+        return core_schema.with_info_before_validator_function(self._check, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """The schema of the value, of one entry at least."""
+        return {**handler(schema), "minProperties": 1, "minItems": 1}
+
+    def _check(self, node: Node, info: ValidationInfo) -> Node:
+        if (isinstance(node, Sequence) and not node.items) or (isinstance(node, Mapping) and not node.entries):
+            message = f"expected {self.wanted}, found nothing"
+            findings_of(info).error("no-value", node.span, message, "leave the key out, or give it a value")
+            give_up()
+        return node
 
 
 #: A mapping whose keys are names of the author's: ``Named[Group]``.

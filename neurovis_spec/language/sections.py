@@ -26,7 +26,7 @@ from neurovis_spec.language.located import (
     shown,
     words,
 )
-from neurovis_spec.language.model import Keyed, KeysAreNames, Model
+from neurovis_spec.language.model import Filled, Keyed, KeysAreNames, Model
 from neurovis_spec.language.source import Entry, Mapping, Node, Packed, Scalar, Sequence
 from neurovis_spec.language.values import (
     FILE,
@@ -182,11 +182,15 @@ class EventModel(Model):
     at: FormulaField | None = Field(None, description="The step from which on it applies (set, lesion).")
     from_: FormulaField | None = Field(None, alias="from", description="The first step of a clamp.")
     to: FormulaField | None = Field(None, description="The step before which a clamp ends; without it, it lasts.")
-    set: Annotated[Keyed[FormulaField], KeysAreNames()] = Field(
+    set: Annotated[Keyed[FormulaField], KeysAreNames(), Filled("{parameter: value}")] = Field(
         default_factory=dict, description="{parameter: value} from this step on."
     )
-    clamp: Keyed[FormulaField] = Field(default_factory=dict, description="{neurons: activity}.")
-    lesion: PartsField = Field(default=(), description="Neurons and connections (FROM -> TO) that are removed.")
+    clamp: Annotated[Keyed[FormulaField], Filled("{neurons: activity}")] = Field(
+        default_factory=dict, description="{neurons: activity}."
+    )
+    lesion: Annotated[PartsField, Filled("a neuron or a connection")] = Field(
+        default=(), description="Neurons and connections (FROM -> TO) that are removed."
+    )
 
 
 #: Findings of one list, after which the rest of it is not looked at.
@@ -231,6 +235,15 @@ def _connections(node: Node, info: ValidationInfo) -> list[tuple[Located[str], o
             with suppress(PydanticCustomError):
                 result.append((Located(entry.name, entry.key), _body(entry, info)))
     return result
+
+
+def written(section: Mapping) -> int:
+    """How many entries the connections of a spec or a module have as they are written; what is none counts as one."""
+    node = section.get("connections")
+    if node is None:
+        return 0
+    parts = node.items if isinstance(node, (Sequence, Packed)) else (node,)
+    return sum(len(part.entries) if isinstance(part, Mapping) else 1 for part in parts)
 
 
 def _body(entry: Entry, info: ValidationInfo) -> Mapping:

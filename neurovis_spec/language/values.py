@@ -146,7 +146,7 @@ FILE = {
 }
 _EDGE = {
     "type": "array",
-    "prefixItems": [{"type": "string"}, {"type": "string"}, FORMULA, FORMULA],
+    "prefixItems": [{"type": "string", "minLength": 1}, {"type": "string", "minLength": 1}, FORMULA, FORMULA],
     "minItems": 2,
     "maxItems": 4,
 }
