@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 
 from neurovis_layouts.layered.drawing import Drawing, Move, Piece, Rect
@@ -58,8 +59,10 @@ def settled(
             shift = (axis if pair else _shift(free, pins)[0], _shift(free, pins)[1])
             held, moves = _held(problem, pieces, pins, shift, axis, redraw)
             bodies = [*_frames(held, moves), *_neurons(problem, held, free, pins, shift)]
+            wishes = [body.wish for body in bodies]
             bodies = _on_lines(problem, bodies, pins)
-            placed = _arranged(problem, bodies, pair, axis)
+            shifted = {b for b, body in enumerate(bodies) if body.wish != wishes[b]}
+            placed = _arranged(problem, bodies, pair, axis, shifted)
             break
         except LayoutRefusalError:
             if last:
@@ -198,8 +201,11 @@ def _on_lines(problem: LayoutProblem, bodies: list[Body], pins: Mapping[int, Poi
     return result
 
 
-def _arranged(problem: LayoutProblem, bodies: Sequence[Body], pair: Mapping[int, int], axis: float) -> list[Point]:
-    """Where each body stands: pinned ones first, then those whose wish is free, then the others."""
+def _arranged(
+    problem: LayoutProblem, bodies: Sequence[Body], pair: Mapping[int, int], axis: float, shifted: AbstractSet[int]
+) -> list[Point]:
+    """Where each body stands: pinned ones first, then those whose wish is free, then the others. The wishes of free
+    bodies are clear of each other, except for those ``shifted`` to the lines that pins give."""
     owner = {m: b for b, body in enumerate(bodies) for m in body.members}
     image = [owner[pair[body.members[0]]] if body.members[0] in pair else -1 for body in bodies]
     ground = Ground()
@@ -213,7 +219,8 @@ def _arranged(problem: LayoutProblem, bodies: Sequence[Body], pair: Mapping[int,
     for b, body in enumerate(bodies):
         if b not in at and not (0 <= image[b] < b):
             places = _both(body, body.wish, image[b], b, bodies, axis)
-            if all(ground.takes(bodies[k], place, 2 * RADIUS) for k, place in places):
+            moved = any(k in shifted for k, _ in places)
+            if not moved and all(ground.takes(bodies[k], place, 2 * RADIUS) for k, place in places):
                 at.update(places)
             else:
                 waiting.append(b)

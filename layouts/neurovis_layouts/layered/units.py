@@ -1,13 +1,14 @@
 """Units: neurons that share a rank, and blocks: units that are placed as one piece.
 
 In: a LayoutProblem. Out: units in canonical order, each neuron in exactly one. A group shares a rank, unless
-connections within it run forward (a chain): then each of its neurons finds its own. Neurons that drive each other in
+connections within it run forward (a chain), or only some of its neurons are on a line with others: then each of its
+neurons finds its own. Neurons that drive each other in
 a loop (a half-centre oscillator, a ring, a reservoir) are one block: a row where they are a line, else a ring.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 
@@ -60,7 +61,8 @@ def units_of(
             found += _of_group(problem, members)
     lone += [i for i in range(len(problem.neurons)) if i not in taken]
     found += _of_lone(problem, sorted(lone))
-    found = _without_needless_loops(problem, found)
+    lines = _lines(problem)
+    found = _without_needless_loops(problem, _off_lines(problem, found, lines), lines)
     return tuple(sorted(found, key=lambda unit: min(unit.members)))
 
 
@@ -167,19 +169,67 @@ def _on_its_side(places: Sequence[Point]) -> list[Point]:
     return [(snap(x * cosine + y * sine), snap(y * cosine - x * sine)) for x, y in places]
 
 
-def _without_needless_loops(problem: LayoutProblem, found: list[Unit]) -> list[Unit]:
+def _lines(problem: LayoutProblem) -> dict[int, int]:
+    """For each neuron on a line the smallest of all that lines tie to it; a mirror image stands for its original."""
+    original = {b: a for mirror in problem.mirrors for a, b in mirror.pairs}
+    ties: nx.Graph[int] = nx.Graph()
+    for line in problem.align:
+        nx.add_path(ties, [original.get(member, member) for member in line])
+    found = {member: min(tied) for tied in nx.connected_components(ties) for member in tied}
+    found.update({b: found[a] for b, a in original.items() if a in found})
+    return found
+
+
+def _off_lines(problem: LayoutProblem, found: Sequence[Unit], lines: Mapping[int, int]) -> list[Unit]:
+    """Split groups of which only a part is on a line with others: the line binds those that it names, not the rest."""
+    if not lines:
+        return list(found)
+    owner = {member: i for i, unit in enumerate(found) for member in unit.members}
+    reach: dict[int, set[int]] = {}
+    for member, line in lines.items():
+        if member in owner:
+            reach.setdefault(line, set()).add(owner[member])
+    wired = {end for edge in problem.edges if edge.source != edge.target for end in (edge.source, edge.target)}
+    result: list[Unit] = []
+    for unit in found:
+        bound = {lines[member] for member in unit.members if member in lines}
+        whole = len(bound) == 1 and all(member in lines for member in unit.members)
+        if unit.places is not None or whole or all(len(reach[line]) == 1 for line in bound):
+            result.append(unit)
+            continue
+        together: dict[int, list[int]] = {}
+        for member in unit.members:
+            # what nothing is connected to has no rank to find, and stays together
+            key = lines.get(member, -2 - member if member in wired else -1)
+            together.setdefault(key, []).append(member)
+        result += [Unit(tuple(members)) for members in together.values()]
+    return result
+
+
+def _without_needless_loops(problem: LayoutProblem, found: list[Unit], lines: Mapping[int, int]) -> list[Unit]:
     """Split groups that would make a loop of ranks only because their neurons share one."""
     owner = {member: i for i, unit in enumerate(found) for member in unit.members}
+    # units on one line are one, too
+    tied: nx.Graph[int] = nx.Graph()
+    tied.add_nodes_from(range(len(found)))
+    tied.add_edges_from((owner[line], owner[m]) for m, line in lines.items() if m in owner and line in owner)
+    row = {i: min(part) for part in nx.connected_components(tied) for i in part}
     quotient: nx.DiGraph[int] = nx.DiGraph()
-    quotient.add_nodes_from(range(len(found)))
+    quotient.add_nodes_from(row.values())
     for edge in problem.edges:
-        if edge.source in owner and edge.target in owner and owner[edge.source] != owner[edge.target]:
-            quotient.add_edge(owner[edge.source], owner[edge.target])
+        if edge.source in owner and edge.target in owner:
+            source, target = row[owner[edge.source]], row[owner[edge.target]]
+            if source != target:
+                quotient.add_edge(source, target)
+    in_row: dict[int, list[int]] = {}
+    for i, first in row.items():
+        in_row.setdefault(first, []).append(i)
     split: set[int] = set()
     for loop in nx.strongly_connected_components(quotient):
-        loose = [i for i in loop if found[i].places is None and len(found[i].members) > 1]
+        units = sorted(i for first in loop for i in in_row[first])
+        loose = [i for i in units if found[i].places is None and len(found[i].members) > 1]
         if len(loop) > 1 and loose:
-            members = [member for i in loop for member in found[i].members]
+            members = [member for i in units for member in found[i].members]
             if nx.is_directed_acyclic_graph(_graph(problem, members)):
                 split.update(loose)
     result: list[Unit] = []
