@@ -519,6 +519,15 @@ def test_python_m_is_the_command() -> None:
     assert (done.returncode, done.stdout.decode(), done.stderr) == (0, f"neurovis {__version__}\n", b"")
 
 
+@pytest.mark.parametrize("arguments", [("validate", "-"), ("run", "-"), ("fmt", "-"), ("lsp",)])
+def test_a_closed_standard_input_is_one_message(arguments: tuple[str, ...]) -> None:
+    command = [sys.executable, "-m", "neurovis_spec", *arguments]
+    done = subprocess.run(["sh", "-c", 'exec "$@" <&-', "sh", *command], capture_output=True, check=False)
+    assert (done.returncode, done.stdout) == (2, b"")
+    assert b"Error: standard input is closed: " in done.stderr
+    assert b"Traceback" not in done.stderr
+
+
 def test_a_closed_pipe_ends_it_without_noise() -> None:
     process = start("inspect", SPECS / "ring.yaml", "--format", "json", stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert process.stdout is not None

@@ -56,9 +56,11 @@ def network_of(spec: str, parameters: Mapping[str, float] | None = None) -> Comp
 
 
 def standard_input() -> str:
-    """The text of standard input. Raises SpecError where it is not UTF-8."""
+    """The text of standard input. Raises SpecError where it is not UTF-8, UsageError where it is closed."""
     from neurovis_spec.diagnostics import Diagnostic, Span, SpecError
 
+    if sys.stdin is None:
+        raise click.UsageError("standard input is closed: give a path for SPEC, or send a spec to '-'")
     data = sys.stdin.buffer.read(_LARGEST)
     try:
         return data.decode("utf-8")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from importlib.util import find_spec
 
 import click
@@ -22,4 +23,6 @@ def command(stdio: bool) -> None:
         raise fault("the language server needs pygls; in a clone of the repository: pip install '.[lsp]'")
     from neurovis_spec.lsp.server import serve
 
+    if sys.stdin is None:
+        raise click.UsageError("standard input is closed: an editor sends its questions there")
     serve()
