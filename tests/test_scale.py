@@ -52,6 +52,37 @@ def test_it_follows_when_a_parameter_is_set() -> None:
     assert simulation.weight("A1 -> A2") == pytest.approx(2 * before, rel=1e-12)
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("size", [1e-320, 1e-300, 1.0, 1e154, 1e300, 1e308])
+@pytest.mark.parametrize("norm", [1e-300, 1.0, 1e300])
+def test_weights_of_any_size_have_the_norm(size: float, norm: float) -> None:
+    """Their squares alone would overflow or vanish."""
+    text = HEAD + f"  A1 + A2 + A3 + A4 -> B1: {{weight: {size!r}, pattern: all_to_all, scale: {{norm: {norm!r}}}}}"
+    weights = nv.compile_text(text).network.connections.weights
+    np.testing.assert_allclose(weights, norm / 2, rtol=1e-15)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("size", [1e-320, 1e-300, 1.0, 1e154, 1e300, 1e308])
+@pytest.mark.parametrize("radius", [1e-300, 1.0, 1e300])
+def test_weights_of_any_size_have_the_radius(size: float, radius: float) -> None:
+    body = f"{{weight: {size!r}, pattern: all_to_all, scale: {{spectral_radius: {radius!r}}}}}"
+    weights = nv.compile_text(HEAD + f"  B1 + B2 -> B1 + B2: {body}").network.connections.weights
+    np.testing.assert_allclose(weights, radius, rtol=1e-14)  # there and back
+
+
+def test_small_weights_beside_large_ones_stay() -> None:
+    text = HEAD + "  A1 -> B: {matrix: [[1e200, 1e-200, 0]], scale: {norm: 1e201}}"
+    assert nv.compile_text(text).network.connections.weights.tolist() == pytest.approx([1e201, 1e-199, 0], rel=1e-15)
+
+
+def test_a_factor_is_what_it_would_be_in_one_multiplication() -> None:
+    body = "{weight: 'normal(0, 1)', pattern: all_to_all%s}"
+    plain = nv.compile_text(HEAD + "  A -> B: " + body % "").network.connections.weights
+    scaled = nv.compile_text(HEAD + "  A -> B: " + body % ", scale: {norm: 0.7}").network.connections.weights
+    assert scaled.tolist() == (plain * (0.7 / float(np.linalg.norm(plain)))).tolist()
+
+
 @pytest.mark.parametrize(
     ("entry", "code", "column"),
     [
@@ -63,6 +94,11 @@ def test_it_follows_when_a_parameter_is_set() -> None:
         ("A -> A: {pattern: all_to_all, scale: {norm: -1}}", "out-of-range", 47),
         ("A -> A: {weight: 0, pattern: all_to_all, scale: {norm: 1}}", "out-of-range", 58),
         ("A -> A: {pattern: all_to_all, scale: 0.9}", "wrong-type", 40),
+        (
+            "B1..B2 -> B1..B2: {matrix: [[0.001, 1], [0, 0.001]], scale: {spectral_radius: 1e308}}",
+            "not-finite",
+            81,
+        ),
     ],
 )
 def test_findings(entry: str, code: str, column: int) -> None:

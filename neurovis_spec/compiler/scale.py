@@ -6,6 +6,8 @@ matrix of an entry has its sources as rows and its targets as columns; parallel 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from neurovis_spec.compiler.constants import Constants
@@ -34,15 +36,19 @@ def scaled(
     i, j = pairs
     if model.indegree is not None and wanted is not None:
         return weights / np.bincount(j)[j] if wanted else weights
+    exponent = _exponent(weights)
+    units = _times(weights, -exponent)
     if model.norm is not None and wanted is not None:
         cells = i * len(ends[1]) + j
         _, place = np.unique(cells, return_inverse=True)
-        norm = float(np.linalg.norm(np.bincount(place, weights)))
-        return _to(model.norm, wanted, weights, norm, "norm", constants)
+        norm = float(np.linalg.norm(np.bincount(place, units)))
+        return _to(model.norm, wanted, weights, (norm, exponent), "norm", constants)
     if model.spectral_radius is None or wanted is None:
         return None
-    radius = _radius(model.spectral_radius, weights, ends, pairs, constants)
-    return None if radius is None else _to(model.spectral_radius, wanted, weights, radius, "spectral radius", constants)
+    radius = _radius(model.spectral_radius, units, ends, pairs, constants)
+    if radius is None:
+        return None
+    return _to(model.spectral_radius, wanted, weights, (radius, exponent), "spectral radius", constants)
 
 
 def look_at_scale(model: ScaleModel, constants: Constants) -> float | None:
@@ -68,15 +74,36 @@ def look_at_scale(model: ScaleModel, constants: Constants) -> float | None:
     return result[0]
 
 
+def _exponent(weights: FloatArray) -> int:
+    """The power of two that brings all weights to 1 at most: sums and squares of such neither overflow nor vanish."""
+    return int(np.frexp(np.abs(weights).max(initial=0.0))[1])
+
+
+def _times(weights: FloatArray, exponent: int) -> FloatArray:
+    """Weights times a power of two, which leaves their digits as they are."""
+    result: FloatArray = np.ldexp(weights, exponent)
+    return result
+
+
 def _to(
-    wanted: Formula, value: float, weights: FloatArray, found: float, what: str, constants: Constants
+    wanted: Formula, value: float, weights: FloatArray, found: tuple[float, int], what: str, constants: Constants
 ) -> FloatArray | None:
-    """The weights times what makes a measure of theirs the wanted one."""
-    if found <= _NOTHING * float(np.abs(weights).sum()):
+    """The weights times what makes a measure of theirs the wanted one; ``found`` is that of the weights times
+    2^-exponent, and the exponent. Digits and exponents are computed apart, so that only the result may overflow."""
+    measure, exponent = found
+    if measure <= _NOTHING * float(np.abs(_times(weights, -exponent)).sum()):
         message = f"the {what} of these weights is 0: there is nothing to scale"
         constants.findings.error("out-of-range", wanted.span, message)
         return None
-    return weights * (value / found)
+    (digits, power), (least, shift) = math.frexp(value), math.frexp(measure)
+    mantissas, exponents = np.frexp(weights)
+    with np.errstate(over="ignore", under="ignore"):
+        result: FloatArray = np.ldexp(mantissas * (digits / least), exponents - exponent + power - shift)
+    if not np.isfinite(result).all():
+        message = f"with a {what} of {value:g} some of these weights are larger than any number"
+        constants.findings.error("not-finite", wanted.span, message)
+        return None
+    return result
 
 
 def _radius(
