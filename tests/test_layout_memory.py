@@ -8,6 +8,7 @@ from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
+import layout_conformance as suite
 import pytest
 from click.testing import CliRunner, Result
 from hypothesis import given, settings
@@ -19,8 +20,9 @@ from neurovis_spec.diagnostics import Findings
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.file import parse
 from neurovis_spec.layout.geometry import distance
+from neurovis_spec.layout.metrics import metrics
 from neurovis_spec.layout.model import Layout, LayoutProblem, Point
-from neurovis_spec.layout.problem import canonical
+from neurovis_spec.layout.problem import canonical, problem_of
 
 ENGINES = ("layered", "organic", "large", "circular", "grid")
 LEG = """
@@ -103,6 +105,126 @@ def test_a_new_instance_is_drawn_like_the_others_and_its_frame_is_its_own() -> N
             relative(now.positions, "right1"),
             {name: (-x, y) for name, (x, y) in relative(now.positions, "left1").items()},
         )
+
+
+HEXAPOD = """
+neurovis: 1
+name: hexapod
+modules:
+  joint:
+    neurons: {A: {bias: 1}, B: {}}
+    connections: {A -> B: 1, B -> A: -1, A -> A: 0.5}
+  leg:
+    INSIDE
+instances: {left: {module: leg, count: COUNT}, right: {module: leg, count: COUNT}}
+neurons: {C: {count: 2}}
+connections:
+  C1 -> left.FIRST: 1
+  C2 -> right.FIRST: 1
+  C1 -> C2: -1
+  C2 -> C1: -1
+  left1.M -> left2.FIRST: 1
+  right1.M -> right2.FIRST: 1
+layout: {mirror: [[left, right], [C1, C2]], direction: DIRECTION}
+"""
+CHAIN = "{neurons: {S: {bias: 1}, K: {}, M: {}}, connections: {S -> K: 1, K -> M: 1, M -> S: 0.2, K -> K: 0.5}}"
+NESTED = """{instances: {u: {module: joint, count: 2}}, neurons: {M: {}},
+      connections: {u1.B -> u2.A: 1, u2.B -> M: 1, u1.B -> M: 1}}"""
+
+
+def hexapod(count: int, inside: str = CHAIN, direction: str = "down", first: str = "S") -> nv.CompiledNetwork:
+    text = HEXAPOD.replace("  leg:\n    INSIDE", f"  leg: {inside}")
+    for key, value in (("COUNT", str(count)), ("DIRECTION", direction), ("FIRST", first)):
+        text = text.replace(key, value)
+    return nv.compile_text(text)
+
+
+def in_order(network: nv.CompiledNetwork, layout: Layout) -> None:
+    problem = problem_of(network.network)
+    assert not suite.frames_meet(layout, problem)
+    assert suite.through_frames(layout, problem) == []
+    measured = metrics(layout, problem)
+    assert (measured["edges_over_neurons"], measured["overlaps"], measured["symmetry"]) == (0, 0, 1)
+
+
+@pytest.mark.parametrize("direction", ["down", "right", "up", "left"])
+@pytest.mark.parametrize(("inside", "first"), [(CHAIN, "S"), (NESTED, "u1.A")])
+def test_legs_grow_from_two_to_five_a_side_in_frames_of_their_own(inside: str, first: str, direction: str) -> None:
+    before = hexapod(2, inside, direction, first).layout("layered").value
+    across = 0 if direction in ("down", "up") else 1
+    for count in (3, 4, 5):
+        network = hexapod(count, inside, direction, first)
+        now = network.layout("layered", earlier=before).value
+        assert all(now.positions[name] == point for name, point in before.positions.items())
+        in_order(network, now)
+        sides = {name[:4]: now.positions[name][across] for name in now.positions if name.endswith(".M")}
+        middle = (now.positions["C1"][across] + now.positions["C2"][across]) / 2
+        assert all(
+            (point[across] < middle) == ((sides["left"] < middle) == name.startswith("left"))
+            for name, point in now.positions.items()
+            if name.endswith(".M")
+        )
+        before = now
+
+
+def test_legs_grow_from_one_to_five_in_frames_of_their_own() -> None:
+    before: Layout | None = None
+    for count in range(1, 6):
+        network = legs(count, inner=", K1 -> K1: 0.5")
+        now = network.layout("layered", earlier=before).value
+        for name, point in ({} if before is None else before.positions).items():
+            assert now.positions[name] == point
+        in_order(network, now)
+        before = now
+
+
+def test_a_new_neuron_beside_instances_stands_in_no_frame() -> None:
+    network = legs(new=", N: {count: 4}", more="M -> N: 1\n  left1.K1 -> N1: 0.1")
+    in_order(network, after(legs(), network)[1])
+
+
+def test_new_connections_and_boxes_keep_off_each_other() -> None:
+    text = """
+neurovis: 1
+name: boxes
+neurons: {A: {count: SIZE, bias: 0.1}, B: {count: SIZE}, O: {}, P: {count: SIZE}}
+connections:
+  A -> B: {weight: 0.5, pattern: one_to_one}
+  B -> O: 1
+  O -> P: 1
+  MORE
+layout: {boxes: {a: [A], b: [B]}}
+"""
+    before = nv.compile_text(text.replace("SIZE", "3").replace("MORE", "")).layout("layered").value
+    network = nv.compile_text(text.replace("SIZE", "5").replace("MORE", "P1 -> A3: 1\n  O -> A2: 0.1"))
+    now = network.layout("layered", earlier=before).value
+    assert all(now.positions[name] == point for name, point in before.positions.items())
+    problem = problem_of(network.network)
+    assert not suite.frames_meet(now, problem)
+    assert suite.through_frames(now, problem) == []
+
+
+@pytest.mark.parametrize("moved", ["left2.S", "right1.K", "right3.M", "C2"])
+def test_the_template_and_the_mirror_go_before_a_place_edited_by_hand(moved: str) -> None:
+    network = hexapod(3)
+    before = network.layout("layered").value
+    x, y = before.positions[moved]
+    edited = replace(before, positions={**before.positions, moved: (x - 0.5, y + 9)})
+    now = network.layout("layered", earlier=edited).value
+    assert now.positions == before.positions
+    in_order(network, now)
+
+
+def test_what_follows_a_place_edited_by_hand_follows_the_first() -> None:
+    network = hexapod(3)
+    before = network.layout("layered").value
+    x, y = before.positions["left1.M"]
+    edited = replace(before, positions={**before.positions, "left1.M": (x - 0.25, y + 0.25)})
+    now = network.layout("layered", earlier=edited).value
+    assert now.positions["left1.M"] == (x - 0.25, y + 0.25)
+    assert relative(now.positions, "left1") == relative(now.positions, "left2") == relative(now.positions, "left3")
+    in_order(network, now)
+    assert network.layout("layered", earlier=now).positions == now.positions
 
 
 def relative(positions: Mapping[str, Point], path: str) -> dict[str, Point]:

@@ -6,13 +6,17 @@ was, routes included; what is new, or runs into something new, is routed anew, a
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
-from neurovis_layouts.alike import Alike
+import numpy as np
+
+from neurovis_layouts.alike import Alike, Move
 from neurovis_layouts.frame import from_picture, to_picture
+from neurovis_layouts.frames import Frames, bounds
 from neurovis_layouts.memory import remembered
 from neurovis_layouts.routing import route_all
 from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
+from neurovis_layouts.routing.walls import Frame, Walls
 from neurovis_spec.layout.model import Layout, LayoutProblem, Point, Route
 
 
@@ -21,16 +25,22 @@ def kept(problem: LayoutProblem, fresh: Layout) -> Layout:
     memory = problem.memory
     if memory is None:
         return fresh
-    centres = remembered(problem, [fresh.positions[name] for name in problem.neurons])
-    routes = _old_routes(problem, memory, centres)
+    there = {i: fresh.routes[edge.name] for i, edge in enumerate(problem.edges)}
+    centres = remembered(problem, [fresh.positions[name] for name in problem.neurons], there)
+    ways = _Ways(problem, centres)
+    routes = _old_routes(problem, memory, ways)
     new = [i for i in range(len(problem.edges)) if i not in routes]
-    routes.update(_moved_routes(problem, fresh, centres, routes))
-    rest = [i for i in range(len(problem.edges)) if i not in routes]
-    flat = [from_picture(point, problem.direction) for point in centres]
-    made = route_all([problem.edges[i] for i in rest], flat, {})
-    for i, route in zip(rest, made, strict=True):
-        routes[i] = tuple(to_picture(point, problem.direction) for point in route)
-    _draw_alike(problem, centres, new, routes)
+    twins = _Twins(problem, centres) if problem.modules or problem.mirrors else None
+    if twins is not None:
+        _copied(problem, ways, twins, new, routes)
+    _moved_routes(problem, fresh, ways, routes)
+    # what is within a frame first, since the frame is around it
+    within = [i for i in range(len(problem.edges)) if i not in routes and ways.within(i)]
+    for chosen in (within, None):
+        rest = [i for i in range(len(problem.edges)) if i not in routes] if chosen is None else chosen
+        routes.update(_found(problem, ways, rest, routes))
+    if twins is not None:
+        _draw_alike(problem, ways, twins, new, routes)
     return Layout(
         fresh.network,
         fresh.engine,
@@ -39,59 +49,159 @@ def kept(problem: LayoutProblem, fresh: Layout) -> Layout:
     )
 
 
-def _old_routes(problem: LayoutProblem, memory: Layout, centres: Sequence[Point]) -> dict[int, Route]:
-    """Earlier routes that still lead from centre to centre and run over nobody who was not there."""
-    new = [point for name, point in zip(problem.neurons, centres, strict=True) if memory.positions.get(name) != point]
-    obstacles = Obstacles(new)
+class _Ways:
+    """Where the neurons are and what is in the way between them."""
+
+    def __init__(self, problem: LayoutProblem, centres: Sequence[Point]) -> None:
+        self.problem, self.centres = problem, centres
+        self.frames = Frames(problem)
+        self._obstacles = Obstacles(centres)
+
+    def within(self, edge: int) -> bool:
+        """Whether an edge runs within an instance."""
+        ends = self.problem.edges[edge]
+        around = self.frames.around
+        return not set(around.get(ends.source, ())).isdisjoint(around.get(ends.target, ()))
+
+    def walls(self, routes: Mapping[int, Route]) -> list[Frame]:
+        """The frames as they are drawn with these routes; what somebody foreign stands in is not drawn."""
+        x, y = np.array(self.centres, dtype=np.float64).reshape(-1, 2).T
+        rects = self.frames.rects(dict(enumerate(self.centres)), routes)
+        found: list[Frame] = []
+        for own, rect in zip(self.frames.members, rects, strict=True):
+            if rect is not None:
+                inside = (x > rect[0]) & (x < rect[2]) & (y > rect[1]) & (y < rect[3])
+                if int(inside.sum()) <= len(own):
+                    found.append((own, rect))
+        return found
+
+    def clear(self, chosen: Sequence[int], routes: Sequence[Route], walls: Sequence[Frame]) -> list[bool]:
+        """For each of these edges whether it has a clear way on this route."""
+        ends = [(self.problem.edges[i].source, self.problem.edges[i].target) for i in chosen]
+        over = self._obstacles.crowded(routes, ends, TOUCH)
+        through = Walls(walls, len(self.centres)).entered(routes, ends)
+        return [not (a or b) for a, b in zip(over, through, strict=True)]
+
+
+def _found(problem: LayoutProblem, ways: _Ways, rest: Sequence[int], routes: Mapping[int, Route]) -> dict[int, Route]:
+    """Routes found anew for these edges, beside those between the same neurons, which have theirs."""
+    if not rest:
+        return {}
+
+    def flat(point: Point) -> Point:
+        return from_picture(point, problem.direction)
+
+    ends = {frozenset((problem.edges[i].source, problem.edges[i].target)) for i in rest}
+    shown = [i for i, e in enumerate(problem.edges) if frozenset((e.source, e.target)) in ends]
+    walls = [(own, bounds([flat(rect[:2]), flat(rect[2:])])) for own, rect in ways.walls(routes)]
+    made = route_all([problem.edges[i] for i in shown], [flat(point) for point in ways.centres], {}, frames=walls)
+    wanted = set(rest)
+    return {
+        i: tuple(to_picture(point, problem.direction) for point in route)
+        for i, route in zip(shown, made, strict=True)
+        if i in wanted
+    }
+
+
+def _old_routes(problem: LayoutProblem, memory: Layout, ways: _Ways) -> dict[int, Route]:
+    """Earlier routes that still lead from centre to centre, run over nobody who was not there, and through no frame
+    that was not there."""
+    there = [memory.positions.get(name) == point for name, point in zip(problem.neurons, ways.centres, strict=True)]
     routes: dict[int, Route] = {}
     for i, edge in enumerate(problem.edges):
         route = memory.routes.get(edge.name)
-        if route is None or (route[0], route[-1]) != (centres[edge.source], centres[edge.target]):
-            continue
-        if not new or obstacles.clearance(route, (-1, -1)) >= TOUCH:
+        if route is not None and (route[0], route[-1]) == (ways.centres[edge.source], ways.centres[edge.target]):
             routes[i] = route
-    return routes
+    chosen = list(routes)
+    ends = [(problem.edges[i].source, problem.edges[i].target) for i in chosen]
+    new = [k for k, known in enumerate(there) if not known]
+    place = {neuron: k for k, neuron in enumerate(new)}
+    over = Obstacles([ways.centres[k] for k in new]).crowded(
+        [routes[i] for i in chosen], [(place.get(a, -1), place.get(b, -1)) for a, b in ends], TOUCH
+    )
+    before = ways.frames.rects({i: ways.centres[i] for i, known in enumerate(there) if known}, routes)
+    changed = [wall for wall in ways.walls(routes) if wall[1] not in before]
+    through = Walls(changed, len(ways.centres)).entered([routes[i] for i in chosen], ends)
+    return {i: routes[i] for i, a, b in zip(chosen, over, through, strict=True) if not (a or b)}
 
 
-def _moved_routes(
-    problem: LayoutProblem, fresh: Layout, centres: Sequence[Point], known: Mapping[int, Route]
-) -> dict[int, Route]:
+def _moved_routes(problem: LayoutProblem, fresh: Layout, ways: _Ways, routes: dict[int, Route]) -> None:
     """Fresh routes between neurons that went the same way together, such as those of a new instance."""
-    obstacles = Obstacles(centres)
-    routes: dict[int, Route] = {}
+    found: dict[int, Route] = {}
     for i, edge in enumerate(problem.edges):
-        if i in known:
+        if i in routes:
             continue
-        ends = [(fresh.positions[problem.neurons[n]], centres[n]) for n in (edge.source, edge.target)]
+        ends = [(fresh.positions[problem.neurons[n]], ways.centres[n]) for n in (edge.source, edge.target)]
         moves = {(b[0] - a[0], b[1] - a[1]) for a, b in ends}
         if len(moves) == 1:
             dx, dy = moves.pop()
-            route = tuple((x + dx, y + dy) for x, y in fresh.routes[edge.name])
-            if obstacles.clearance(route, (edge.source, edge.target)) >= TOUCH:
-                routes[i] = route
-    return routes
+            found[i] = tuple((x + dx, y + dy) for x, y in fresh.routes[edge.name])
+    chosen = list(found)
+    clear = ways.clear(chosen, [found[i] for i in chosen], ways.walls({**routes, **found}))
+    routes.update({i: found[i] for i, free in zip(chosen, clear, strict=True) if free})
 
 
-def _draw_alike(problem: LayoutProblem, centres: Sequence[Point], new: Sequence[int], routes: dict[int, Route]) -> None:
-    """The routes found anew, those between neurons drawn alike copied from the first of them."""
-    if not (problem.modules or problem.mirrors):
-        return
-    alike = Alike(problem, dict(enumerate(centres)))
-    between: dict[tuple[int, int], list[int]] = {}
-    for i, edge in enumerate(problem.edges):
-        between.setdefault((edge.source, edge.target), []).append(i)
+class _Twins:
+    """Which edges are drawn alike: those between neurons that are."""
+
+    def __init__(self, problem: LayoutProblem, centres: Sequence[Point]) -> None:
+        self._edges = problem.edges
+        self._alike = Alike(problem, dict(enumerate(centres)))
+        self._between: dict[tuple[int, int], list[int]] = {}
+        for i, edge in enumerate(problem.edges):
+            self._between.setdefault((edge.source, edge.target), []).append(i)
+
+    def of(self, edge: int) -> Iterator[tuple[int, Move]]:
+        """The edges drawn like this one, itself first, each with the move from its route."""
+        source, target = self._edges[edge].source, self._edges[edge].target
+        place = self._between[source, target].index(edge)
+        targets = dict(self._alike.of(target))
+        by_move: dict[Move, list[int]] = {}
+        for mate, move in targets.items():
+            by_move.setdefault(move, []).append(mate)
+        for mate, move in self._alike.of(source):
+            for other in by_move.get(move, ()):
+                equal = self._between.get((mate, other), [])
+                if place < len(equal):
+                    yield equal[place], move
+
+
+def _moved(route: Route, move: Move, start: Point, end: Point) -> Route:
+    """A route moved, from centre to centre exactly."""
+    (fx, fy), (dx, dy) = move.flip, move.shift
+    return (start, *((dx + fx * x, dy + fy * y) for x, y in route[1:-1]), end)
+
+
+def _copied(problem: LayoutProblem, ways: _Ways, twins: _Twins, new: Sequence[int], routes: dict[int, Route]) -> None:
+    """Routes of new edges as old ones are that are drawn alike, such as those within other instances of the make."""
+    found: dict[int, Route] = {}
+    for i in new:
+        for twin, move in twins.of(i):
+            if twin in routes:
+                ends = ways.centres[problem.edges[i].source], ways.centres[problem.edges[i].target]
+                (fx, fy), (x, y) = move.flip, move.shift
+                found[i] = _moved(routes[twin], Move(move.flip, (-fx * x, -fy * y)), *ends)
+                break
+    chosen = list(found)
+    clear = ways.clear(chosen, [found[i] for i in chosen], ways.walls({**routes, **found}))
+    routes.update({i: found[i] for i, free in zip(chosen, clear, strict=True) if free})
+
+
+def _draw_alike(
+    problem: LayoutProblem, ways: _Ways, twins: _Twins, new: Sequence[int], routes: dict[int, Route]
+) -> None:
+    """The routes found anew, those between neurons drawn alike copied from the first of them, where their way is
+    clear."""
     open_ones = set(new)
+    found: dict[int, Route] = {}
     for i in new:
         if i not in open_ones:
             continue
-        edge = problem.edges[i]
-        place = between[edge.source, edge.target].index(i)
-        targets = alike.of(edge.target)
-        for source, move in alike.of(edge.source):
-            for target in [mate for mate, other in targets if other == move]:
-                others = between.get((source, target), [])
-                if place < len(others) and others[place] in open_ones:
-                    open_ones.discard(others[place])
-                    routes[others[place]] = tuple(
-                        (move.shift[0] + move.flip[0] * x, move.shift[1] + move.flip[1] * y) for x, y in routes[i]
-                    )
+        for twin, move in twins.of(i):
+            if twin in open_ones and twin != i:
+                ends = ways.centres[problem.edges[twin].source], ways.centres[problem.edges[twin].target]
+                found[twin] = _moved(routes[i], move, *ends)
+            open_ones.discard(twin)
+    chosen = list(found)
+    clear = ways.clear(chosen, [found[i] for i in chosen], ways.walls({**routes, **found}))
+    routes.update({i: found[i] for i, free in zip(chosen, clear, strict=True) if free})

@@ -1,0 +1,112 @@
+"""Frames: the rectangles that instances of modules and boxes are drawn as, in the picture's coordinates.
+
+In: a problem, where its neurons stand, routes. Out: by number, those of the instances first, then those of the boxes,
+who is in a frame, which frames hold which, and the rectangles of what is placed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TypeAlias
+
+from neurovis_spec.layout.geometry import sampled
+from neurovis_spec.layout.model import LayoutProblem, Point, Route
+
+#: x0, y0, x1, y1
+Rect: TypeAlias = tuple[float, float, float, float]
+
+#: From centres, routes and frames within to the line of an instance's frame, and room for its title.
+_PAD, _PAD_ROUTE, _PAD_FRAME, _TITLE = 0.65, 0.2, 0.35, 0.35
+#: The same for boxes: centres, loops, frames.
+_BOX, _BOX_LOOP, _BOX_FRAME = 0.62, 0.15, 0.3
+
+
+class Frames:
+    """Who is in which frame: ``members`` by number; an instance has its number among the problem's."""
+
+    def __init__(self, problem: LayoutProblem) -> None:
+        self._problem = problem
+        self.instances = len(problem.modules)
+        self.members: list[frozenset[int]] = [frozenset(module.members) for module in problem.modules]
+        self.members += [frozenset(own) for _, own in problem.boxes]
+        self.around: dict[int, list[int]] = {}
+        for number, own in enumerate(self.members):
+            for neuron in own:
+                self.around.setdefault(neuron, []).append(number)
+        self._inner: dict[int, list[int]] = {}
+        for i, edge in enumerate(problem.edges):
+            for number in self.around.get(edge.source, ()):
+                if edge.target in self.members[number] and (number < self.instances or edge.source == edge.target):
+                    self._inner.setdefault(number, []).append(i)
+        self._held: dict[int, list[int]] = {}
+        for number, module in enumerate(problem.modules):
+            if module.parent >= 0:
+                self._held.setdefault(module.parent, []).append(number)
+        for box in range(self.instances, len(self.members)):
+            inside = {n for neuron in self.members[box] for n in self.around[neuron] if n < self.instances}
+            self._held[box] = [n for n in sorted(inside) if self.members[n] <= self.members[box]]
+
+    def rects(self, placed: Mapping[int, Point], routes: Mapping[int, Route]) -> list[Rect | None]:
+        """The rectangles, titles included, around those members that are placed; None around none."""
+        found: list[Rect | None] = [None] * len(self.members)
+        order = [*reversed(range(self.instances)), *range(self.instances, len(self.members))]
+        for number in order:
+            instance = number < self.instances
+            at = [placed[i] for i in self.members[number] if i in placed]
+            if not at:
+                continue
+            lines = [p for i in self._inner.get(number, ()) if i in routes for p in sampled(routes[i], 0.1)]
+            held = [rect for n in self._held.get(number, ()) if (rect := found[n]) is not None]
+            parts = [padded(bounds(at), _PAD if instance else _BOX)]
+            parts += [padded(bounds(lines), _PAD_ROUTE if instance else _BOX_LOOP)] if lines else []
+            parts += [padded(rect, _PAD_FRAME if instance else _BOX_FRAME) for rect in held]
+            found[number] = titled(united(parts)) if instance else united(parts)
+        return found
+
+    def grown(self, number: int, rect: Rect) -> Rect:
+        """What a frame is at least when it holds this frame."""
+        instance = number < self.instances
+        wider = padded(rect, _PAD_FRAME if instance else _BOX_FRAME)
+        return titled(wider) if instance else wider
+
+    def single(self, number: int, point: Point) -> Rect:
+        """What a frame is at least when it holds a neuron in no frame within it."""
+        instance = number < self.instances
+        wider = padded((*point, *point), _PAD if instance else _BOX)
+        return titled(wider) if instance else wider
+
+    def related(self, one: int, other: int) -> bool:
+        """Whether frames have neurons in common, so that they cannot keep off each other."""
+        return not self.members[one].isdisjoint(self.members[other])
+
+
+def bounds(points: Iterable[Point]) -> Rect:
+    """The rectangle around points."""
+    xs, ys = zip(*points, strict=True)
+    return min(xs), min(ys), max(xs), max(ys)
+
+
+def padded(rect: Rect, by: float) -> Rect:
+    """A rectangle wider on all sides."""
+    return rect[0] - by, rect[1] - by, rect[2] + by, rect[3] + by
+
+
+def united(rects: Iterable[Rect]) -> Rect:
+    """The rectangle around rectangles."""
+    x0, y0, x1, y1 = zip(*rects, strict=True)
+    return min(x0), min(y0), max(x1), max(y1)
+
+
+def titled(rect: Rect) -> Rect:
+    """With room for a title on top."""
+    return rect[0], rect[1] - _TITLE, rect[2], rect[3]
+
+
+def untitled(rect: Rect) -> Rect:
+    """Without the room for a title."""
+    return rect[0], rect[1] + _TITLE, rect[2], rect[3]
+
+
+def meet(one: Rect, other: Rect, gap: float = 0.0) -> bool:
+    """Whether rectangles come closer than ``gap``."""
+    return one[0] < other[2] + gap and other[0] < one[2] + gap and one[1] < other[3] + gap and other[1] < one[3] + gap
