@@ -61,10 +61,15 @@ class Findings:
     _items: list[Diagnostic] = field(default_factory=list)
     _errors: int = 0
     _faults: set[Span] = field(default_factory=set)
+    _several: dict[Diagnostic, int] = field(default_factory=dict)
 
-    def error(self, code: str, span: Span, message: str, hint: str | None = None) -> None:
-        """Note a mistake."""
-        self._items.append(Diagnostic(code, message, span, "error", hint))
+    def error(self, code: str, span: Span, message: str, hint: str | None = None, *, several: bool = False) -> None:
+        """Note a mistake. ``several``: it is one of a data file that the stretch names, which may have several; they
+        are told in the order in which they are noted."""
+        found = Diagnostic(code, message, span, "error", hint)
+        self._items.append(found)
+        if several:
+            self._several.setdefault(found, len(self._several))
         self._errors += 1
         self._faults.add(span)
 
@@ -102,9 +107,15 @@ class Findings:
                 first.setdefault(item.span, item.code)
         told: dict[tuple[Span, str, str], Diagnostic] = {}
         for item in self._items:
-            if first.get(item.span, item.code) == item.code:
+            if item in self._several:
+                told[item.span, item.code, item.message] = item
+            elif first.get(item.span, item.code) == item.code:
                 told.setdefault((item.span, item.code, _NUMBER.sub("0", item.message)), item)
-        return tuple(sorted(told.values(), key=lambda d: (d.span, d.severity, d.code, d.message)))
+        return tuple(sorted(told.values(), key=self._place))
+
+    def _place(self, item: Diagnostic) -> tuple[Span, Severity, int, str, str]:
+        """By what findings are ordered."""
+        return (item.span, item.severity, self._several.get(item, -1), item.code, item.message)
 
     def check(self) -> None:
         """Raise SpecError if there is an error."""

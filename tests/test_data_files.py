@@ -251,10 +251,80 @@ def test_edges_without_delays(tmp_path: Path) -> None:
 )
 def test_faults_of_edges(tmp_path: Path, data: str, code: str, words: str, hint: str | None) -> None:
     got, findings = edges(tmp_path, data)
-    assert got is None
+    assert got is None or got.fault is not None
     assert [finding.code for finding in findings] == [code]
     assert words in findings[0].message
     assert (hint or "") in (findings[0].hint or "")
+
+
+def told(name: str, data: str, folder: Path) -> list[str]:
+    """What is said of a table, in order, without the name of the file."""
+    (folder / name).write_text(data)
+    findings = Findings()
+    assert read_table(name, folder, folder, HERE, findings) is None
+    return [finding.message.partition(": ")[2] for finding in findings.sorted()]
+
+
+@pytest.mark.parametrize("mark", ["", '"'])
+@pytest.mark.parametrize("stretch", [1, 4, 1 << 18])
+def test_all_faults_of_a_csv_are_told_in_their_order(
+    tmp_path: Path, mark: str, stretch: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("neurovis_spec.language.data_files_csv._STRETCH", stretch)
+    data = f"{mark}1{mark},x,nan\n4,y\n1,2,3\n1,2,3,4\n5,6,nan\n\nz,1,inf\n"
+    assert told("a.csv", data, tmp_path) == [
+        "row 1, column 2: 'x' is no number",
+        "row 1, column 3: 'nan' is not finite",
+        "row 2 has 2 cells, the first row 3",
+        "row 4 has 4 cells, the first row 3",
+        "row 5, column 3: 'nan' is not finite",
+        "row 6 has 1 cell, the first row 3",
+        "row 7, column 1: 'z' is no number",
+        "row 7, column 3: 'inf' is not finite",
+    ]
+
+
+def test_no_more_than_twenty_faults_of_a_file_are_told(tmp_path: Path) -> None:
+    many = "\n".join(["1,2", *["x,nan"] * 15, *["1"] * 100])
+    assert len(told("a.csv", many, tmp_path)) == 20
+    assert len(told("a.csv", many.replace("1,2", '"1",2'), tmp_path)) == 20
+    got, findings = edges(tmp_path, "from,to,weight\n" + ",B,x\n" * 100)
+    assert got is not None
+    assert not got.sources
+    assert len(findings) == 20
+
+
+def test_all_faults_of_edges_are_told_and_those_in_order_are_kept(tmp_path: Path) -> None:
+    got, findings = edges(tmp_path, "from,to,weight,delay\nA,B,x,-1\nA,B\n,,1,\nA,C,2,\nA,B,nan,0.5\n")
+    assert [finding.message.partition(": ")[2] for finding in findings] == [
+        "row 2, column 3: 'x' is no number",
+        "row 2, column 4: '-1' is no delay (0, 1, 2, … steps)",
+        "row 3 has 2 cells, the header 4",
+        "row 4, column 1: the name of a neuron is wanted",
+        "row 4, column 2: the name of a neuron is wanted",
+        "row 6, column 3: 'nan' is not finite",
+        "row 6, column 4: '0.5' is no delay (0, 1, 2, … steps)",
+    ]
+    assert got is not None
+    assert got.targets == ("B", "C", "B")
+    assert got.rows.tolist() == [2, 5, 6]
+
+
+def test_all_faults_of_an_mtx_are_told_by_line(tmp_path: Path) -> None:
+    head = "%%MatrixMarket matrix coordinate integer general\n"
+    assert told("a.mtx", head + "2 2 4\n3 9 0.5\n1 1 x\n% remark\n1 2 1e999\n\n1 1\n2 2 1", tmp_path) == [
+        "line 3: 0.5 is no integer, which line 1 promises",
+        "line 3: there is no row 3, only 1 to 2",
+        "line 3: there is no column 9, only 1 to 2",
+        "line 4: 'x' is no number",
+        "line 6: the value is beyond double precision",
+        "line 8: 3 numbers are wanted, not 2",
+    ]
+    assert told("a.mtx", head + "2 2 2\n1 1 1\n1 1 2\n1 2 1\n", tmp_path) == [
+        "line 2 promises 2 entries, there are more",
+        "line 4: row 1, column 1 is given on line 3 already",
+    ]
+    assert len(told("a.mtx", head + "9 9 81\n" + "1 1 x\n" * 81, tmp_path)) == 20
 
 
 def refused(path: str, root: Path, base: Path) -> Diagnostic:

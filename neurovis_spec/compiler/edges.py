@@ -141,25 +141,23 @@ class EdgeReader:
             return
         hint = suggest(name, few(name, end.positions), f"{what}s of this entry" if end.perhaps is None else "neurons")
         message = f"'{shown(name)}'{where} is not among the {what}s of this entry"
-        self.constants.findings.error("edge-outside", span, message, hint)
+        self.constants.findings.error("edge-outside", span, message, hint, several=bool(where))
 
     def _from_file(self, reference: FileReference) -> EdgeList | None:
         table = self.files.edges(reference, self.most)
         if table is None:
             return None
         span = reference.path.span
-        if not table.sources:
+        if not table.sources and table.fault is None:
             self.constants.findings.error("wrong-size", span, "there is no edge in this file")
             return None
         i = self._named(table.sources, table.rows, self.sources, "source", span)
         j = self._named(table.targets, table.rows, self.targets, "target", span)
-        if i is None or j is None:
-            return None
-        if table.delays.max() > LONGEST_DELAY:
-            message = (
-                f"row {table.rows[int(table.delays.argmax())]} of the file: a delay must be at most {LONGEST_DELAY:,}"
-            )
-            self.constants.findings.error("out-of-range", span, message)
+        long = np.flatnonzero(table.delays > LONGEST_DELAY).tolist()
+        for place in long[:PATIENCE]:
+            message = f"row {table.rows[place]} of the file: a delay must be at most {LONGEST_DELAY:,}"
+            self.constants.findings.error("out-of-range", span, message, several=True)
+        if i is None or j is None or long or table.fault is not None:
             return None
         return EdgeList(i, j, table.weights, table.delays)
 

@@ -143,8 +143,8 @@ def read_edges(
     """A list of edges from a ``.csv`` file whose header names the columns from, to, weight and perhaps delay.
 
     An empty weight is 1, an empty delay −1; a ``key`` is refused; ``room`` may refuse so many edges before they are
-    made. Codes: those of ``read_data`` and of ``room``, and ``file-format``, ``invalid-utf8``, ``not-finite``,
-    ``useless-key``.
+    made. Where rows are at fault, these are noted, and the table has a ``fault``. Codes: those of ``read_data`` and of
+    ``room``, and ``file-format``, ``invalid-utf8``, ``not-finite``, ``useless-key``.
     """
     if Path(path_text).suffix.lower() != ".csv":
         findings.error("file-format", span, f"edges are read from a .csv file, not from '{_short(path_text)}'")
@@ -158,10 +158,13 @@ def read_edges(
     from neurovis_spec.language.data_files_edges import parse_edges
 
     try:
-        return parse_edges(data, room)
+        table = parse_edges(data, room)
     except CellError as error:
         _refuse(error, path_text, span, findings)
         return None
+    if table.fault is not None:
+        _refuse(table.fault, path_text, span, findings)
+    return table
 
 
 def _refuse_key(key: Located[str], findings: Findings) -> None:
@@ -169,7 +172,8 @@ def _refuse_key(key: Located[str], findings: Findings) -> None:
 
 
 def _refuse(error: CellError, path_text: str, span: Span, findings: Findings) -> None:
-    findings.error(error.code, span, f"the file '{_short(path_text)}': {error}", error.hint)
+    for one in (error, *error.others):
+        findings.error(one.code, span, f"the file '{_short(path_text)}': {one}", one.hint, several=True)
 
 
 def _neighbours(path: Path) -> str | None:

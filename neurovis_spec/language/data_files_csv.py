@@ -1,8 +1,8 @@
 """Tables of numbers from the bytes of a ``.csv`` file, and its rows.
 
 In: bytes. Out: numbers in rows, or rows of texts. A fault is a CellError that names row and column as an editor or a
-spreadsheet counts them (from 1, the header included). Cells are turned into numbers many at a time; they are looked at
-one by one only among the few where something is wrong.
+spreadsheet counts them (from 1, the header included), and holds those behind it. Cells are turned into numbers many at
+a time; they are looked at one by one only among the few where something is wrong.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from neurovis_spec.language.data_files_cells import (
     numbers_in,
     numbers_of,
 )
-from neurovis_spec.language.data_files_table import CellError, Room, Table, check_cells
+from neurovis_spec.language.data_files_table import CellError, Faults, Room, Table, check_cells
 
 #: bytes, and cells, that are made numbers of together; and cells among which one that is at fault is looked for
 _STRETCH: Final = 1 << 18
@@ -101,9 +101,16 @@ def parse_numbers(data: bytes, room: Room | None = None) -> Table:
     rows = read_rows(data)
     first = next(rows)
     header, width = _header(first), len(first.cells) or 1
-    numbers = array("d")
-    for batch in batches(rows if header is not None else chain((first,), rows)):
-        numbers.frombytes(_numbers(batch, width).tobytes())
+    numbers, faults = array("d"), Faults()
+    try:
+        for batch in batches(rows if header is not None else chain((first,), rows)):
+            numbers.frombytes(_numbers(batch, width, faults).tobytes())
+            if faults.many:
+                break
+    except CellError as error:
+        if not faults.many:
+            faults.note(len(data), error)  # there is nothing behind it
+    faults.check()
     return _table(np.frombuffer(numbers, dtype=np.float64), width, header)
 
 
@@ -124,18 +131,21 @@ def _header(row: Row) -> tuple[str, ...] | None:
     return tuple(row.stripped().cells) if filled else None
 
 
-def _numbers(batch: list[Row], width: int) -> NDArray[np.float64]:
-    """The numbers of some rows, one behind the other, NaN for an empty cell. Raises CellError."""
+def _numbers(batch: list[Row], width: int, faults: Faults) -> NDArray[np.float64]:
+    """The numbers of some rows, one behind the other, NaN for an empty cell; what is wrong with them is noted."""
     rows = [row.cells or [""] for row in batch]  # an empty line of a file with one column is an empty cell
     if all(len(cells) == width for cells in rows):
         quick = numbers_of(list(chain.from_iterable(rows)))
         if quick is not None:
             return quick
-    parts: list[NDArray[np.float64]] = []
+    parts = [np.zeros(0)]
     for (number, _), cells in zip(batch, rows, strict=True):
+        if faults.many:
+            break
         if len(cells) != width:
-            raise _ragged(number, len(cells), width)
-        parts.append(_one_by_one(cells, number, 0, width))
+            faults.note(number, _ragged(number, len(cells), width))
+        else:
+            parts.append(_one_by_one(cells, number, 0, width, faults))
     return np.concatenate(parts)
 
 
@@ -147,14 +157,22 @@ def _unquoted(data: bytes, cells: int) -> Table:
     header = _header(Row(1, data[:end].decode("utf-8").split(","))) if data[:end].strip(b", \t") else None
     above, start = (0, 0) if header is None else (1, end + 1)
     values = np.empty(cells)
-    filled = 0
-    while start <= len(data):
+    filled, faults = 0, Faults()
+    while start <= len(data) and not faults.many:
         stop = _stop(data, start)
         row, column = divmod(filled, width)
-        made = _stretch(data, start, stop, 1 + above + row, column, width)
-        values[filled : filled + len(made)] = made
+        made, wrong = _stretch(data, start, stop, (1 + above + row, column), width, faults)
+        if not faults:
+            values[filled : filled + len(made)] = made
         filled += len(made)
         start = stop + 1
+        if wrong is not None and not faults.many:
+            place, number = wrong
+            end = data.find(b"\n", place) % (len(data) + 1)
+            found = 1 + data.count(b",", data.rfind(b"\n", 0, place) + 1, end)
+            faults.note(number, _ragged(number, found, width))
+            filled, start = (number - above) * width, end + 1  # as if the row were even
+    faults.check()
     return _table(values[:filled], width, header)
 
 
@@ -165,8 +183,12 @@ def _stop(data: bytes, start: int) -> int:
     return min((place for place in found if place >= 0), default=len(data))
 
 
-def _stretch(data: bytes, start: int, stop: int, row: int, column: int, width: int) -> NDArray[np.float64]:
-    """The numbers of a stretch, whose first cell stands in this row (from 1) and column (from 0). Raises CellError."""
+def _stretch(
+    data: bytes, start: int, stop: int, at: tuple[int, int], width: int, faults: Faults
+) -> tuple[NDArray[np.float64], tuple[int, int] | None]:
+    """The numbers of a stretch, whose first cell stands ``at`` a row (from 1) and column (from 0), up to the first row
+    that is uneven, if there is one: then also a place in that row, and its number."""
+    row, column = at
     text = data[start:stop] + (data[stop : stop + 1] or b"\n")
     marks = np.frombuffer(text, dtype=np.uint8)
     ends = np.flatnonzero((marks == ord(",")) | (marks == ord("\n")))
@@ -179,29 +201,29 @@ def _stretch(data: bytes, start: int, stop: int, row: int, column: int, width: i
     if good:
         text = text[: ends[good - 1]].replace(b"\n", b",")
         quick = numbers_in(text, np.diff(ends[:good], prepend=-1) == 1)
-        numbers = _one_by_one(text.decode("utf-8").split(","), row, column, width) if quick is None else quick
-    if wrong is not None:
-        place = start + int(ends[wrong])
-        end = data.find(b"\n", place) % (len(data) + 1)
-        found = 1 + data.count(b",", data.rfind(b"\n", 0, place) + 1, end)
-        raise _ragged(row + (column + wrong) // width, found, width)
-    return numbers
+        numbers = _one_by_one(text.decode("utf-8").split(","), row, column, width, faults) if quick is None else quick
+    return numbers, None if wrong is None else (start + int(ends[wrong]), row + (column + wrong) // width)
 
 
-def _one_by_one(cells: list[str], row: int, column: int, width: int) -> NDArray[np.float64]:
-    """The numbers of cells of which one may be at fault, the first in this row and column. Raises CellError."""
+def _one_by_one(cells: list[str], row: int, column: int, width: int, faults: Faults) -> NDArray[np.float64]:
+    """The numbers of cells of which some may be at fault, which is noted; the first is in this row and column."""
     parts: list[NDArray[np.float64]] = []
     for start in range(0, len(cells), _FEW):
         few = cells[start : start + _FEW]
         quick = numbers_of(few)
         if quick is None:
-            places = (divmod(column + start + at, width) for at in range(len(few)))
-            slow = [
-                number_of(cell.strip(), row + down, 1 + across)
-                for cell, (down, across) in zip(few, places, strict=True)
-            ]
-            quick = np.array(slow, dtype=np.float64)
+            quick = np.full(len(few), np.nan)
+            for at, cell in enumerate(few):
+                down, across = divmod(column + start + at, width)
+                try:
+                    quick[at] = number_of(cell.strip(), row + down, 1 + across)
+                except CellError as error:
+                    faults.note(row + down, error)
+                    if faults.many:
+                        break
         parts.append(quick)
+        if faults.many:
+            break
     return np.concatenate(parts)
 
 

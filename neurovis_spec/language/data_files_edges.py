@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from neurovis_spec.diagnostics import nearest
 from neurovis_spec.language.data_files_cells import counted, number_of, numbers_of
 from neurovis_spec.language.data_files_csv import Row, batches, plain_lines, read_rows
-from neurovis_spec.language.data_files_table import CellError, Room, quoted
+from neurovis_spec.language.data_files_table import CellError, Faults, Room, quoted
 
+T = TypeVar("T")
 _COLUMNS: Final = ("from", "to", "weight", "delay")
 _LARGEST_DELAY: Final = 2**31 - 1
 #: separators in the first line; a header has three at most, and a few more may be a mistake to be named
@@ -31,18 +32,20 @@ _STRETCH: Final = 1 << 18
 @dataclass(frozen=True, slots=True, eq=False)
 class EdgeTable:
     """A list of edges, one an index. ``rows`` are the rows of the file in which they stand, from 1; a delay is −1
-    where the file gives none."""
+    where the file gives none. ``fault`` is the first that is wrong with its rows, and holds the others: then edges are
+    missing, and a weight or delay at fault is as if it were not given."""
 
     sources: tuple[str, ...]
     targets: tuple[str, ...]
     weights: NDArray[np.float64]
     delays: NDArray[np.int64]
     rows: NDArray[np.int64]
+    fault: CellError | None = None
 
 
 def parse_edges(data: bytes, room: Room | None = None) -> EdgeTable:
     """EdgeTable from rows whose first one names the columns, in any order. ``room`` is asked with the number of edges
-    before any is made. Raises CellError."""
+    before any is made. Raises CellError where not a row is at fault but the header, or the file as a whole."""
     data = data.rstrip(b"\r\n")
     if room is not None:
         room(max(data.count(b"\n"), data.count(b"\r")))
@@ -52,14 +55,19 @@ def parse_edges(data: bytes, room: Room | None = None) -> EdgeTable:
     if b'"' in data:
         rows = read_rows(data)
         reader = _Reader(next(rows))
-        for batch in batches(rows):
-            reader.take(batch)
+        try:
+            for batch in batches(rows):
+                reader.take(batch)
+        except CellError as error:  # there is nothing behind it
+            reader.faults.note(len(data), error)
     else:
         lines = _lines(plain_lines(data))
         number, first = next(lines)
         reader = _Reader(Row(number, first.split(",")))
         for number, text in lines:
             reader.take_lines(text, number)
+            if reader.faults.many:
+                break
     return reader.table()
 
 
@@ -94,9 +102,10 @@ def _columns(header: Row) -> dict[str, int]:
 
 
 class _Reader:
-    """Takes the rows after the header, and gives the table of all of them. Raises CellError."""
+    """Takes the rows after the header, and gives the table of all of them; what is wrong with them is noted."""
 
     def __init__(self, header: Row) -> None:
+        self.faults = Faults()
         self._places = _columns(header)
         self._known: dict[str, str] = {}
         self._sources: list[str] = []
@@ -111,10 +120,11 @@ class _Reader:
             np.array(self._weights, dtype=np.float64),
             np.array(self._delays, dtype=np.int64),
             np.array(self._rows, dtype=np.int64),
+            self.faults.first(),
         )
 
     def take(self, batch: list[Row]) -> None:
-        """Take some rows. Raises CellError."""
+        """Take some rows."""
         if all(len(row.cells) == len(self._places) for row in batch):
             columns = list(zip(*(row.cells for row in batch), strict=True))
             if not batch or self._quickly(columns, [row.number for row in batch]):
@@ -123,7 +133,7 @@ class _Reader:
             self._one(row)
 
     def take_lines(self, text: str, number: int) -> None:
-        """Take lines without quotes, of which the first has this number. Raises CellError."""
+        """Take lines without quotes, of which the first has this number."""
         width, lines = len(self._places), text.split("\n")
         if all(line.count(",") == width - 1 for line in lines):
             cells = text.replace("\n", ",").split(",")
@@ -152,20 +162,41 @@ class _Reader:
         return True
 
     def _one(self, row: Row) -> None:
-        """Take one row. Raises CellError."""
+        """Take one row, or what of it is in order."""
+        if self.faults.many:
+            return
         number, cells = row.stripped()
         if len(cells) != len(self._places):
-            raise CellError("file-format", f"row {number} has {counted(len(cells))}, the header {len(self._places)}")
-        for end, called in (("from", self._sources), ("to", self._targets)):
-            column = self._places[end]
+            message = f"row {number} has {counted(len(cells))}, the header {len(self._places)}"
+            self.faults.note(number, CellError("file-format", message))
+            return
+        named = True
+        for column in (self._places["from"], self._places["to"]):
             if not cells[column]:
-                raise CellError("file-format", f"row {number}, column {column + 1}: the name of a neuron is wanted")
-            called.append(self._known.setdefault(cells[column], cells[column]))
+                message = f"row {number}, column {column + 1}: the name of a neuron is wanted"
+                self.faults.note(number, CellError("file-format", message))
+                named = False
         column = self._places["weight"]
-        weight = number_of(cells[column], number, column + 1)
+        weight = self._noted(number, lambda: number_of(cells[column], number, column + 1), math.nan)
+        delay = -1
+        if "delay" in self._places:
+            delay = self._noted(number, lambda: _delay(cells, number, self._places["delay"]), -1)
+        if not named:
+            return
+        for end, called in (("from", self._sources), ("to", self._targets)):
+            name = cells[self._places[end]]
+            called.append(self._known.setdefault(name, name))
         self._weights.append(1.0 if math.isnan(weight) else weight)
-        self._delays.append(_delay(cells, number, self._places["delay"]) if "delay" in self._places else -1)
+        self._delays.append(delay)
         self._rows.append(number)
+
+    def _noted(self, row: int, read: Callable[[], T], otherwise: T) -> T:
+        """What a cell holds; something else where it is at fault, which is noted."""
+        try:
+            return read()
+        except CellError as error:
+            self.faults.note(row, error)
+            return otherwise
 
 
 def _delay(cells: list[str], row: int, column: int) -> int:

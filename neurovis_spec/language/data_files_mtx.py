@@ -1,16 +1,17 @@
 """A matrix from the bytes of an ``.mtx`` file: Matrix Market, coordinate or array.
 
 In: bytes. Out: Table; a cell that a coordinate file leaves out is absent, and so is the diagonal of a skew-symmetric
-matrix, which no file states. A fault is a CellError that names the line, from 1. Numbers are read in one go; lines are
-counted only for a fault. Source: R. Boisvert, R. Pozo, K. Remington, The Matrix Market exchange formats (1996).
+matrix, which no file states. A fault is a CellError that names the line, from 1, and holds those behind it. Numbers are
+read in one go; lines are counted only for a fault. Source: R. Boisvert, R. Pozo, K. Remington, The Matrix Market
+exchange formats (1996).
 """
 
 from __future__ import annotations
 
 import io
-import math
 import re
 import warnings
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Final
 
@@ -19,8 +20,10 @@ from numpy.typing import NDArray
 
 from neurovis_spec.diagnostics import nearest
 from neurovis_spec.language.data_files_table import (
+    MOST_FAULTS,
     SPARSER,
     CellError,
+    Faults,
     Room,
     Table,
     check_cells,
@@ -85,14 +88,18 @@ class _Body:
             number = self.line + self.data.count(b"\n", 0, match.end())
             raise CellError("file-format", f"line {number} is longer than {_LONGEST_LINE} bytes")
 
-    def line_of(self, entry: int) -> int:
-        """The line of an entry, counted from 0."""
+    def lines_of(self, entries: Collection[int]) -> dict[int, int]:
+        """The lines of entries, which are counted from 0."""
+        found: dict[int, int] = {}
+        wanted, entry = set(entries), 0
         for number, text in enumerate(io.BytesIO(self.data), self.line):
+            if len(found) == len(wanted):
+                break
             if text.strip():
-                if not entry:
-                    return number
-                entry -= 1
-        raise AssertionError("there are as many lines as entries")
+                if entry in wanted:
+                    found[entry] = number
+                entry += 1
+        return found
 
 
 def parse_mtx(data: bytes, room: Room | None = None) -> Table:
@@ -109,7 +116,10 @@ def parse_mtx(data: bytes, room: Room | None = None) -> Table:
         room(head.rows * head.columns)
     body = _Body(_COMMENT.sub(b"", rest) if b"%" in rest else rest, line + 1)
     body.check()
-    i, j, values = _entries(head, body, _numbers(head, body, line))
+    faults = Faults()
+    body, table = _numbers(head, body, line, faults)
+    i, j, values = _entries(head, body, table, faults)
+    faults.check()
     if head.symmetry != "general":
         other = i != j
         mirrored = -values[other] if head.symmetry == "skew-symmetric" else values[other]
@@ -164,70 +174,108 @@ def _sizes(words: tuple[str, ...], text: bytes, line: int) -> _Head:
     return _Head(sparse, field, symmetry, rows, columns, entries)
 
 
-def _numbers(head: _Head, body: _Body, line: int) -> NDArray[np.float64]:
-    """The numbers of all lines: (entries, width). Raises CellError."""
-    if not body.data.strip():
-        table = np.zeros((0, head.width))
-    elif body.data.translate(None, _PLAIN):
-        raise _bad_line(head, body)
-    else:
-        try:
-            # one line more than is promised, and no more than that
-            most = head.entries + 1
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # which would say that empty lines are not counted
-                table = np.loadtxt(io.BytesIO(body.data), ndmin=2, comments=None, dtype=np.float64, max_rows=most)
-        except (ValueError, OverflowError):
-            raise _bad_line(head, body) from None
-        if table.shape[1] != head.width:
-            raise _bad_line(head, body)
-    if len(table) != head.entries:
+def _numbers(head: _Head, body: _Body, line: int, faults: Faults) -> tuple[_Body, NDArray[np.float64]]:
+    """The numbers of all lines, (entries, width), and the lines, those at fault blanked out, which is noted."""
+    table = _loaded(head, body)
+    if table is None:
+        body = _without_bad_lines(head, body, faults)
+        table = _loaded(head, body)
+    if table is None:  # loadtxt and we do not agree on what is a number
+        raise CellError("file-format", f"the lines from {body.line} on hold something else than numbers")
+    if len(table) != head.entries and not faults:
         there = "there are more" if len(table) > head.entries else f"there are {len(table)}"
-        raise CellError("file-format", f"line {line} promises {head.entries} entries, {there}")
-    return table
+        faults.note(line, CellError("file-format", f"line {line} promises {head.entries} entries, {there}"))
+    return body, table
 
 
-def _bad_line(head: _Head, body: _Body) -> CellError:
-    """The first line that does not hold as many numbers as it should."""
-    good = rb"(?:[ \t\r]*+(?:%b(?:[ \t]++%b){%d}[ \t\r]*+)?+\n)*+" % (_NUMBER, _NUMBER, head.width - 1)
-    match = re.match(good, body.data)
-    assert match is not None
-    number = body.line + body.data.count(b"\n", 0, match.end())
-    words = body.data[match.end() : match.end() + _LONGEST_LINE].partition(b"\n")[0].split()
+def _loaded(head: _Head, body: _Body) -> NDArray[np.float64] | None:
+    """The numbers of all lines, one line more than is promised at most; None where lines are at fault."""
+    if not body.data.strip():
+        return np.zeros((0, head.width))
+    if body.data.translate(None, _PLAIN):
+        return None
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # which would say that empty lines are not counted
+            most = head.entries + 1
+            table = np.loadtxt(io.BytesIO(body.data), ndmin=2, comments=None, dtype=np.float64, max_rows=most)
+    except (ValueError, OverflowError):
+        return None
+    return table if table.shape[1] == head.width else None
+
+
+def _without_bad_lines(head: _Head, body: _Body, faults: Faults) -> _Body:
+    """The lines without those that do not hold as many numbers as they should, which are noted, and without what is
+    behind the last one that is."""
+    good = re.compile(
+        rb"(?:[ \t\r]*+(?:%b(?:[ \t]++%b){%d}[ \t\r]*+)?+(?:\n|\Z))*+" % (_NUMBER, _NUMBER, head.width - 1)
+    )
+    parts: list[bytes] = []
+    start, number = 0, body.line
+    while start < len(body.data) and not faults.many:
+        match = good.match(body.data, start)
+        assert match is not None
+        parts.append(match[0])
+        number += match[0].count(b"\n")
+        start = match.end()
+        if start < len(body.data):
+            end = body.data.find(b"\n", start) % (len(body.data) + 1)
+            faults.note(number, _bad_line(head, body.data[start : min(end, start + _LONGEST_LINE)], number))
+            parts.append(b"\n")
+            start, number = end + 1, number + 1
+    return _Body(b"".join(parts), body.line)
+
+
+def _bad_line(head: _Head, text: bytes, number: int) -> CellError:
+    """What is wrong with a line that does not hold as many numbers as it should."""
+    words = text.split()
     for word in words:
         if not re.fullmatch(_NUMBER, word):
-            text = quoted(word.decode("utf-8", "replace"))
+            shown = quoted(word.decode("utf-8", "replace"))
             if _NOT_FINITE.fullmatch(word):
-                return CellError("not-finite", f"line {number}: {text} is not finite")
-            return CellError("file-format", f"line {number}: {text} is no number")
+                return CellError("not-finite", f"line {number}: {shown} is not finite")
+            return CellError("file-format", f"line {number}: {shown} is no number")
     wanted = "1 number is" if head.width == 1 else f"{head.width} numbers are"
     return CellError("file-format", f"line {number}: {wanted} wanted, not {len(words)}")
 
 
 def _entries(
-    head: _Head, body: _Body, table: NDArray[np.float64]
+    head: _Head, body: _Body, table: NDArray[np.float64], faults: Faults
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-    """Table and columns (from 0) and values, as the file states them. Raises CellError."""
+    """Rows and columns (from 0) and values, as the file states them; what is wrong with them is noted."""
     values = np.ones(len(table)) if head.field == "pattern" else table[:, -1]
-    whole = np.isfinite(values) & ((values == np.rint(values)) if head.field == "integer" else True)
-    if not whole.all():
-        entry = int(np.argmin(whole))
-        line = body.line_of(entry)
-        if not math.isfinite(values[entry]):
-            raise CellError("not-finite", f"line {line}: the value is beyond double precision")
-        raise CellError("file-format", f"line {line}: {values[entry]:g} is no integer, which line 1 promises")
+    finite = np.isfinite(values)
+    wrong = [(entry, _BEYOND) for entry in _few(~finite)]
+    if head.field == "integer":
+        wrong += [
+            (entry, f"{values[entry]:g} is no integer, which line 1 promises")
+            for entry in _few(finite & (values != np.rint(values)))
+        ]
+    if head.sparse:
+        for column, size, what in ((0, head.rows, "row"), (1, head.columns, "column")):
+            given = table[:, column]
+            outside = ~((given >= 1) & (given <= size) & (given == np.rint(given)))
+            wrong += [(entry, f"there is no {what} {given[entry]:g}, only 1 to {size}") for entry in _few(outside)]
+    lines = body.lines_of({entry for entry, _ in wrong})
+    for entry, message in wrong:
+        code = "not-finite" if message is _BEYOND else "file-format"
+        faults.note(lines[entry], CellError(code, f"line {lines[entry]}: {message}"))
     if not head.sparse:
+        faults.check()  # what is missing moves all that is behind it
         return (*_dense_places(head), values)
-    for column, size, what in ((0, head.rows, "row"), (1, head.columns, "column")):
-        given = table[:, column]
-        fits = (given >= 1) & (given <= size) & (given == np.rint(given))
-        if not fits.all():
-            entry = int(np.argmin(fits))
-            message = f"line {body.line_of(entry)}: there is no {what} {given[entry]:g}, only 1 to {size}"
-            raise CellError("file-format", message)
+    if wrong:
+        faults.check()
     i, j = table[:, 0].astype(np.int64) - 1, table[:, 1].astype(np.int64) - 1
-    _check_once(head, body, i, j)
+    _check_once(head, body, (i, j), faults)
     return i, j, values
+
+
+_BEYOND: Final = "the value is beyond double precision"
+
+
+def _few(wrong: NDArray[np.bool_]) -> list[int]:
+    """The first entries that are wrong."""
+    return [int(entry) for entry in np.flatnonzero(wrong)[:MOST_FAULTS]]
 
 
 def _dense_places(head: _Head) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -239,15 +287,19 @@ def _dense_places(head: _Head) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return i, j
 
 
-def _check_once(head: _Head, body: _Body, i: NDArray[np.int64], j: NDArray[np.int64]) -> None:
-    """No cell is given twice, not even by way of the symmetry."""
-    if head.symmetry == "skew-symmetric" and (i == j).any():
-        line = body.line_of(int(np.argmax(i == j)))
-        raise CellError("file-format", f"line {line}: the diagonal of a skew-symmetric matrix is not given")
+def _check_once(head: _Head, body: _Body, cells: tuple[NDArray[np.int64], NDArray[np.int64]], faults: Faults) -> None:
+    """No cell is given twice, not even by way of the symmetry; else that is noted."""
+    i, j = cells
+    if head.symmetry == "skew-symmetric":
+        for line in body.lines_of(set(_few(i == j))).values():
+            message = f"line {line}: the diagonal of a skew-symmetric matrix is not given"
+            faults.note(line, CellError("file-format", message))
     low, high = (np.minimum(i, j), np.maximum(i, j)) if head.symmetry != "general" else (i, j)
     twice = repeated(low, high, head.columns)
     if twice is not None:
-        first, second = (body.line_of(entry) for entry in twice)
+        lines = body.lines_of(set(twice))
+        first, second = (lines[entry] for entry in twice)
         cell = f"row {i[twice[1]] + 1}, column {j[twice[1]] + 1}"
         by = "" if (i[twice[0]], j[twice[0]]) == (i[twice[1]], j[twice[1]]) else " by way of the symmetry"
-        raise CellError("file-format", f"line {second}: {cell} is given on line {first} already{by}")
+        message = f"line {second}: {cell} is given on line {first} already{by}"
+        faults.note(second, CellError("file-format", message))

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 #: a table has at most this many cells: 256 MiB in double precision
 MOST_CELLS: Final = 1 << 25
+#: faults of one file that are told
+MOST_FAULTS: Final = 20
 #: Is told how many cells a table has (or edges a list) before these are made, and refuses too many by a CellError. The
 #: header of a table may be counted among its cells.
 Room: TypeAlias = Callable[[int], None]
@@ -29,6 +31,41 @@ class CellError(ValueError):
         super().__init__(message)
         self.code = code
         self.hint = hint
+        #: what else is wrong with the file, in its order
+        self.others: tuple[CellError, ...] = ()
+
+
+class Faults:
+    """What is wrong with a file, as long as reading can go on; with MOST_FAULTS it does not."""
+
+    def __init__(self) -> None:
+        self._found: list[tuple[int, CellError]] = []
+
+    def __bool__(self) -> bool:
+        return bool(self._found)
+
+    @property
+    def many(self) -> bool:
+        """Whether these are enough for one file."""
+        return len(self._found) >= MOST_FAULTS
+
+    def note(self, row: int, error: CellError) -> None:
+        """Note what is wrong in a row or a line."""
+        self._found.append((row, error))
+
+    def first(self) -> CellError | None:
+        """The first in the file, which holds the others; None where nothing is wrong."""
+        found = [error for _, error in sorted(self._found, key=lambda one: one[0])][:MOST_FAULTS]
+        if not found:
+            return None
+        found[0].others = (*found[1:],)
+        return found[0]
+
+    def check(self) -> None:
+        """Raise the first in the file, if there is any. Raises CellError."""
+        error = self.first()
+        if error is not None:
+            raise error
 
 
 @dataclass(frozen=True, slots=True, eq=False)
