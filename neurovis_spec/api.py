@@ -232,8 +232,8 @@ class CompiledNetwork:
         progress: Progress | None = None,
     ) -> None:
         """Run as ``run`` does and write the recording to a file while it is made, in memory that does not grow with the
-        steps. What was there stays until the end. Raises what ``run`` and ``Recording.save`` raise, and
-        RecordingError where the disk has not the room."""
+        steps. What was there stays until the end. Raises what ``run`` and ``Recording.save`` raise, RecordingError
+        where the disk has not the room, and after Ctrl-C a KeyboardInterrupt; the file holds the steps until then."""
         from neurovis_spec.runtime.record import Course
 
         steps = self.network.steps if steps is None else steps
@@ -243,12 +243,26 @@ class CompiledNetwork:
         self, engine: str | None = None, *, earlier: Layout | None = None, progress: Progress | None = None
     ) -> NetworkLayout:
         """Where everything is. What an ``earlier`` layout knew (default: that of ``layout.file``) stays where it was.
-        Raises LayoutRefusalError where an engine cannot do what is asked."""
-        return NetworkLayout(self, pipeline.arrange(self.network, engine, earlier or self.memory, progress))
+        Raises LayoutRefusalError where an engine cannot do what is asked; its ``diagnostic`` says where the spec asks
+        for it."""
+        return NetworkLayout(self, self._arranged(engine, earlier, progress))
+
+    def _arranged(
+        self, engine: str | None = None, earlier: Layout | None = None, progress: Progress | None = None
+    ) -> Layout:
+        from neurovis_spec.layout.model import LayoutRefusalError
+
+        try:
+            return pipeline.arrange(self.network, engine, earlier or self.memory, progress)
+        except LayoutRefusalError as refusal:
+            span = pipeline.locate(refusal, self.spec, self.request, self.network, engine)
+            if span is not None:
+                refusal.locate(span, self.sources)
+            raise
 
     @cached_property
     def _layout(self) -> Layout:
-        return pipeline.arrange(self.network, memory=self.memory)
+        return self._arranged()
 
     @cached_property
     def gains(self) -> Gains:
@@ -296,7 +310,7 @@ class CompiledNetwork:
 
         suffix = Path(path).suffix
         renderer_for(suffix, moving=False)
-        layout = self._layout if engine is None else pipeline.arrange(self.network, engine, self.memory)
+        layout = self._layout if engine is None else self._arranged(engine)
         snapshot = self._snapshot(step, recording, progress)
         scene = pipeline.picture(self.network, layout, snapshot, self.gains, self._settings(theme))
         content = pipeline.draw(scene, suffix)

@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from neurovis_spec.compiler.compile import Request, compile_spec
 from neurovis_spec.compiler.network import Network, RenderSettings
-from neurovis_spec.diagnostics import Findings
+from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.includes import read_includes
 from neurovis_spec.language.reader import read_file, read_text
 from neurovis_spec.language.shape import read_spec
@@ -31,7 +31,7 @@ from neurovis_spec.language.spec import Spec
 from neurovis_spec.progress import Progress
 
 if TYPE_CHECKING:  # what only some stages need is imported there: a spec is validated without all of it
-    from neurovis_spec.layout.model import Layout
+    from neurovis_spec.layout.model import Layout, LayoutRefusalError
     from neurovis_spec.runtime.record import Course
     from neurovis_spec.runtime.recording import Recording, Snapshot
     from neurovis_spec.scene import Film, Scene
@@ -120,6 +120,16 @@ def arrange(
     from neurovis_spec.layout.arrange import lay_out
 
     return lay_out(network, engine, memory, progress)
+
+
+def locate(
+    refusal: LayoutRefusalError, spec: Spec, request: Request, network: Network, engine: str | None = None
+) -> Span | None:
+    """Where the spec says what an engine refuses; ``engine`` is the one that was chosen in place of the spec's."""
+
+    from neurovis_spec.layout.where import where
+
+    return where(refusal, spec, request, network, engine)
 
 
 def measure(network: Network, progress: Progress | None = None) -> Gains:

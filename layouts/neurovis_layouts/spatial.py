@@ -62,6 +62,7 @@ def _data(problem: LayoutProblem) -> FloatArray:
             f"the engine 'spatial' draws neurons where their 'position' says; {shown}{more} "
             f"{'has' if len(lost) == 1 else 'have'} none",
             "give them a position, or pin them under layout.positions",
+            tuple(lost),
         )
     return np.array([from_picture(point, problem.direction) for point in given], dtype=np.float64).reshape(-1, 2)
 

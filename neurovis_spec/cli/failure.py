@@ -42,6 +42,8 @@ def explain(error: Exception) -> Failure | None:
     from neurovis_spec.layout.model import LayoutRefusalError
 
     if isinstance(error, LayoutRefusalError):
+        if error.diagnostic is not None:
+            return Failure(show_text((error.diagnostic,), error.sources))
         return fault(str(error), error.hint, error.code)
     if isinstance(error, _input_errors()):
         hint = getattr(error, "hint", None)

@@ -102,6 +102,7 @@ def refuse_what_it_cannot(problem: LayoutProblem, name: str, can: Capabilities) 
             "position-missing",
             f"the engine '{name}' needs a position for every neuron; '{free[0]}'{more} has none",
             "give it one in layout.positions, or choose the layered engine, which arranges the rest around the pins",
+            tuple(free),
         )
     asked: Mapping[str, tuple[bool, bool, str]] = {
         "layout-pins-unsupported": (bool(problem.pins), can.pins, "keep pinned positions (layout.positions)"),
@@ -122,7 +123,8 @@ def _refuse_close_pins(problem: LayoutProblem) -> None:
     cells: dict[tuple[int, int], list[int]] = {}
     for index, (x, y) in sorted(problem.pins.items()):
         if not (math.isfinite(x) and math.isfinite(y)):
-            raise LayoutRefusalError("pin-not-finite", f"the pin of '{problem.neurons[index]}' is not finite")
+            name = problem.neurons[index]
+            raise LayoutRefusalError("pin-not-finite", f"the pin of '{name}' is not finite", about=(name,))
         column, row = math.floor(x / (2 * RADIUS)), math.floor(y / (2 * RADIUS))
         for near in ((column + i, row + j) for i in (-1, 0, 1) for j in (-1, 0, 1)):
             for other in cells.get(near, ()):
@@ -131,6 +133,7 @@ def _refuse_close_pins(problem: LayoutProblem) -> None:
                         "pins-too-close",
                         f"the pins of '{problem.neurons[other]}' and '{problem.neurons[index]}' are closer than "
                         f"{2 * RADIUS:g}: their discs would overlap",
+                        about=(problem.neurons[other], problem.neurons[index]),
                     )
         cells.setdefault((column, row), []).append(index)
 

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, Protocol, TypeAlias, runtime_checkable
 
+from neurovis_spec.diagnostics import Diagnostic, Span
 from neurovis_spec.progress import Progress
 
 Point: TypeAlias = tuple[float, float]
@@ -162,9 +163,18 @@ class ReportingEngine(LayoutEngine, Protocol):
 
 
 class LayoutRefusalError(Exception):
-    """An engine cannot do what is asked. ``code`` is a finding's code, the text is for the author."""
+    """An engine cannot do what is asked. ``code`` is a finding's code, the text is for the author; ``about`` are the
+    neurons that it speaks of. Who knows the spec adds the finding, with its place, and the texts read."""
 
-    def __init__(self, code: str, message: str, hint: str | None = None) -> None:
+    def __init__(self, code: str, message: str, hint: str | None = None, about: tuple[str, ...] = ()) -> None:
         self.code = code
         self.hint = hint
+        self.about = about
+        self.diagnostic: Diagnostic | None = None
+        self.sources: Mapping[str, str] = {}
         super().__init__(message)
+
+    def locate(self, span: Span, sources: Mapping[str, str]) -> None:
+        """Say where the spec asks for what is refused."""
+        self.diagnostic = Diagnostic(self.code, str(self), span, "error", self.hint)
+        self.sources = sources

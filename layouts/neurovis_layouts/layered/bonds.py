@@ -68,6 +68,7 @@ def bonded(
                     "align-conflict",
                     f"'{names[line[0]]}' and '{names[member]}' cannot stand on one line: what they belong to holds "
                     "them apart",
+                    about=(names[line[0]], names[member]),
                 )
     for a, b in sorted(pair.items()):
         lines.join(owner[a], owner[b], 0.0)

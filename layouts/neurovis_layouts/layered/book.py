@@ -115,6 +115,7 @@ class Book:
                     f"'{names[a]}' and '{names[b]}' cannot be mirror images: they do not stand in the same place of "
                     "instances of equal make",
                     "mirror the instances, or neurons outside of all instances",
+                    (names[a], names[b]),
                 )
             self._join(one, other)
         self._pairs.setdefault(scope, []).append((a, b))

@@ -103,4 +103,5 @@ def _within(name: str, mate: str) -> LayoutRefusalError:
         "pin-in-frame",
         f"pins put '{name}' into the frame that '{mate}' is in; nothing foreign may stand there",
         "move one of the pins",
+        (name, mate),
     )

@@ -83,6 +83,7 @@ def _arranged(
             "mirror-arrange",
             f"'{names[members[0]]}' and those arranged with it as {how} cannot be mirror images of each other in it",
             "arrange each side by itself",
+            tuple(names[m] for m in members),
         )
     places: dict[int, Point] = dict(zip(lone, middle, strict=True))
     for one, (x, y) in zip(leads, left, strict=True):

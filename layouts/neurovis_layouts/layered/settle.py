@@ -55,7 +55,7 @@ def settled(
         return Settled(places, [], shift, moved)
     for last, axis in _axes(problem, free, pair):
         try:
-            pins = _imaged(problem.pins, pair, axis)
+            pins = _imaged(problem, pair, axis)
             shift = (axis if pair else _shift(free, pins)[0], _shift(free, pins)[1])
             held, moves = _held(problem, pieces, pins, shift, axis, redraw)
             bodies = [*_frames(held, moves), *_neurons(problem, held, free, pins, shift)]
@@ -96,7 +96,8 @@ def _axes(problem: LayoutProblem, free: Sequence[Point], pair: Mapping[int, int]
         apart = pins[a][0] + pins[b][0] - pins[first[0]][0] - pins[first[1]][0]
         if abs(apart) > _SLACK or abs(pins[a][1] - pins[b][1]) > _SLACK:
             names = problem.neurons[a], problem.neurons[b]
-            raise LayoutRefusalError("mirror-pins", f"the pins of '{names[0]}' and '{names[1]}' are not mirror images")
+            message = f"the pins of '{names[0]}' and '{names[1]}' are not mirror images"
+            raise LayoutRefusalError("mirror-pins", message, about=names)
     if both or not pair:
         yield True, (pins[both[0][0]][0] + pins[both[0][1]][0]) / 2 if both else 0.0
         return
@@ -105,17 +106,25 @@ def _axes(problem: LayoutProblem, free: Sequence[Point], pair: Mapping[int, int]
         yield number == _TRIES - 1, start + (number + 1) // 2 * (_STEP if number % 2 else -_STEP)
 
 
-def _imaged(pins: Mapping[int, Point], pair: Mapping[int, int], axis: float) -> dict[int, Point]:
-    images = {pair[i]: (2 * axis - x, y) for i, (x, y) in pins.items() if i in pair}
-    found = dict(sorted({**images, **pins}.items()))
-    _refuse_close(found, [i for i in found if i not in pins])
+def _imaged(problem: LayoutProblem, pair: Mapping[int, int], axis: float) -> dict[int, Point]:
+    images = {pair[i]: (2 * axis - x, y) for i, (x, y) in problem.pins.items() if i in pair}
+    found = dict(sorted({**images, **problem.pins}.items()))
+    for i in images:
+        if i not in problem.pins:
+            _refuse_close(problem, found, i, pair[i])
     return found
 
 
-def _refuse_close(pins: Mapping[int, Point], images: Sequence[int]) -> None:
-    for i in images:
-        if any(j != i and distance(pins[i], other) < 2 * RADIUS - _SLACK for j, other in pins.items()):
-            raise LayoutRefusalError("mirror-pins", "no axis keeps the mirror images of pins off other pins")
+def _refuse_close(problem: LayoutProblem, pins: Mapping[int, Point], image: int, pinned: int) -> None:
+    for j, other in pins.items():
+        if j != image and distance(pins[image], other) < 2 * RADIUS - _SLACK:
+            names = problem.neurons[pinned], problem.neurons[j]
+            raise LayoutRefusalError(
+                "mirror-pins",
+                f"no axis keeps the mirror images of pins off other pins: that of '{names[0]}' stands on '{names[1]}'",
+                "move one of the pins, or leave one out",
+                names,
+            )
 
 
 def _held(
@@ -193,7 +202,9 @@ def _on_lines(problem: LayoutProblem, bodies: list[Body], pins: Mapping[int, Poi
                 if body.pinned or body.level:
                     if abs(target - y) > _SLACK + 1 / 1024:
                         raise LayoutRefusalError(
-                            "align-pins", f"'{problem.neurons[member]}' is on one line with a pin that is not on it"
+                            "align-pins",
+                            f"'{problem.neurons[member]}' is on one line with a pin that is not on it",
+                            about=(problem.neurons[member],),
                         )
                 else:
                     y = target
@@ -229,6 +240,9 @@ def _arranged(
             ground.put(bodies[b], place)
     for b in waiting:
         found = _search(ground, bodies, b, image[b], axis)
+        if not found:
+            about = tuple(problem.neurons[m] for m in bodies[b].members)
+            raise LayoutRefusalError("pin-in-frame", "pins leave no room on a line", "move one of the pins", about)
         for k, place in found:
             ground.put(bodies[k], place)
             at[k] = place
@@ -245,7 +259,8 @@ def _both(
 
 
 def _search(ground: Ground, bodies: Sequence[Body], own: int, image: int, axis: float) -> list[tuple[int, Point]]:
-    """The free place nearest to the wish; sideways first. What is on the axis stays on it if that can be."""
+    """The free place nearest to the wish, sideways first; none where a line has no room. What is on the axis stays
+    on it if that can be."""
     body = bodies[own]
     x, y = body.wish
     on_axis = image == own or (image < 0 and x == axis)
@@ -264,7 +279,7 @@ def _search(ground: Ground, bodies: Sequence[Body], own: int, image: int, axis: 
         if reach > 64 and on_axis and image != own:
             on_axis = False
         elif reach > 4096:
-            raise LayoutRefusalError("pin-in-frame", "pins leave no room on a line", "move one of the pins")
+            return []
         reach *= 2
 
 

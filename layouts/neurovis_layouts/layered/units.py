@@ -77,7 +77,7 @@ def _arranged(problem: LayoutProblem, framed: AbstractSet[int]) -> list[Unit]:
         twice = [m for m in members if m in taken]
         if twice:
             name = problem.neurons[twice[0]]
-            raise LayoutRefusalError("arranged-twice", f"'{name}' is arranged twice", "arrange it once")
+            raise LayoutRefusalError("arranged-twice", f"'{name}' is arranged twice", "arrange it once", (name,))
         taken.update(members)
         wide = spacing * (1.5 if _graph(problem, members).size() else 1.0)
         places = offsets(how, len(members), wide)

@@ -1,0 +1,174 @@
+"""Where the spec says what a layout engine refuses.
+
+In: a LayoutRefusalError, the spec and the network that it became. Out: the place of the pin, the line, the mirror, the
+arrangement or the group that the refusal is about, None where the spec says nothing of the kind. It is looked for when
+something is refused, so that no network has to know where it was written.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final, NamedTuple
+
+from neurovis_spec.compiler.compile import Request
+from neurovis_spec.compiler.modules import library_of
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.references import Section, key_of, key_span
+from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.language.spec import Spec
+from neurovis_spec.layout.model import LayoutRefusalError
+
+#: What a refusal may be about: parts of ``layout`` (and ``neurons``), the likeliest first.
+_PARTS: Final[Mapping[str, Sequence[str]]] = {
+    "position-missing": ("neurons", "engine"),
+    "arranged-twice": ("arrange",),
+    "align-conflict": ("align",),
+    "align-pins": ("positions", "align"),
+    "mirror-pins": ("positions", "mirror"),
+    "mirror-frames": ("mirror",),
+    "mirror-arrange": ("arrange", "mirror"),
+    "pin-in-frame": ("positions", "mirror", "align"),
+    "pins-too-close": ("positions",),
+    "pin-not-finite": ("positions",),
+    "layout-pins-unsupported": ("positions",),
+    "layout-arrange-unsupported": ("arrange",),
+    "layout-boxes-unsupported": ("boxes",),
+    "layout-mirror-unsupported": ("mirror",),
+    "layout-align-unsupported": ("align",),
+    "layout-memory-unsupported": ("file",),
+    "layout-direction-unsupported": ("direction",),
+}
+#: These speak of all of a part, not of neurons.
+_WHOLE: Final = "-unsupported"
+_NUMBER: Final = re.compile(r"(?P<stem>.*?)(?P<number>\d+)")
+
+
+class _Entry(NamedTuple):
+    """Something that the spec says, where, and the references in it."""
+
+    span: Span
+    texts: tuple[str, ...]
+
+
+class _Sections:
+    """The spec, and the modules of a network's instances by their paths."""
+
+    def __init__(self, spec: Spec, request: Request, network: Network) -> None:
+        self._spec = spec
+        self._modules: Mapping[str, Section] = {}
+        self._paths = {instance.path: instance.module for instance in network.instances}
+        if self._paths and request.includes is not None:
+            library = library_of(spec, request.includes, request.base, network.dt, Findings())
+            self._modules = {name: module.model for name, module in library.modules.items()}
+
+    def around(self, name: str) -> Iterator[tuple[Section, str]]:
+        """The sections that may speak of a neuron, outer ones first, and how each calls it."""
+        yield self._spec, name
+        steps = name.split(".")
+        for depth in range(1, len(steps)):
+            section = self._modules.get(self._paths.get(".".join(steps[:depth]), ""))
+            if section is not None:
+                yield section, ".".join(steps[depth:])
+
+    def all(self) -> Iterator[Section]:
+        """The spec, then every module in use."""
+        yield self._spec
+        for module in dict.fromkeys(self._paths.values()):
+            if module in self._modules:
+                yield self._modules[module]
+
+
+def where(
+    refusal: LayoutRefusalError, spec: Spec, request: Request, network: Network, chosen: str | None = None
+) -> Span | None:
+    """The place in the spec that a refusal is about. ``chosen`` is the engine, where it was not the spec's choice."""
+    sections = _Sections(spec, request, network)
+    for part in _PARTS.get(refusal.code, ("engine",)):
+        if part in ("engine", "file", "direction"):
+            written = None if spec.layout is None else getattr(spec.layout, part)
+            if written is not None and (part != "engine" or chosen is None):
+                return Span(*written.span)
+            continue
+        if refusal.code.endswith(_WHOLE):
+            said = (entry.span for section in sections.all() for entry in _entries(section, part))
+            found = next(said, None)
+        else:
+            found = _about(refusal.about, sections, part) or _beside(refusal.about, sections, part)
+        if found is not None:
+            return found
+    return None
+
+
+def _about(about: Sequence[str], sections: _Sections, part: str) -> Span | None:
+    """What names one of these neurons; of several entries the most exact one."""
+    for name in about:
+        for section, own in sections.around(name):
+            found = [
+                (text.count("."), len(text), entry.span)
+                for entry in _entries(section, part)
+                for text in entry.texts
+                if _names(text, own)
+            ]
+            if found:
+                return max(found)[2]
+    return None
+
+
+def _beside(about: Sequence[str], sections: _Sections, part: str) -> Span | None:
+    """What names a neuron in the same outermost instance: it holds the whole of it."""
+    if part != "positions":
+        return None
+    for name in about:
+        outermost, dot, _ = name.partition(".")
+        for section, _ in sections.around(name) if dot else ():
+            for entry in _entries(section, part):
+                if any(_names(text.partition(".")[0], outermost) for text in entry.texts):
+                    return entry.span
+    return None
+
+
+def _entries(section: Section, part: str) -> Iterator[_Entry]:
+    """What a section says in one of its parts."""
+    if part == "neurons":
+        for name in section.neurons:
+            yield _Entry(key_span(section, "neurons", name), (name,))
+    layout = section.layout
+    if layout is None:
+        return
+    if part == "positions":
+        for name, point in layout.positions.items():
+            yield _Entry(point.span, (name,))
+    elif part == "arrange":
+        for name in layout.arrange:
+            yield _Entry(key_of(layout.source, part, name).span, (name,))
+    elif part in ("mirror", "align"):
+        for reference in layout.mirror if part == "mirror" else layout.align:
+            yield _Entry(reference.span, tuple(text.value for text in reference.parts))
+    elif part == "boxes":
+        for reference in layout.boxes.values():
+            yield _Entry(reference.span, tuple(text.value for text in reference.parts))
+
+
+def _names(text: str, name: str) -> bool:
+    """Whether a reference means a neuron: by its name, its group, a range, or an instance around it.
+
+    >>> _names("left", "left2.K1"), _names("left.K", "left2.K1"), _names("K1..K3", "K2"), _names("K1", "K12")
+    (True, True, True, False)
+    """
+    for one in text.replace("'", "").split("+"):
+        low, _, high = (side.strip() for side in one.partition(".."))
+        if high:
+            ends = [_NUMBER.fullmatch(side) for side in (low, high, name)]
+            if all(ends) and len({end["stem"] for end in ends if end}) == 1:
+                first, last, number = (int(end["number"]) for end in ends if end)
+                if first <= number <= last:
+                    return True
+            continue
+        steps, own = low.split("."), name.split(".")
+        if len(steps) <= len(own) and all(
+            step == mine or (not step[-1:].isdigit() and step == mine.rstrip("0123456789"))
+            for step, mine in zip(steps, own, strict=False)
+        ):
+            return True
+    return False

@@ -1,0 +1,92 @@
+"""What an engine refuses is shown where the spec asks for it, as every other finding is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+import neurovis_spec as nv
+from neurovis_spec.cli.commands import neurovis
+from neurovis_spec.layout import LayoutRefusalError
+
+LEGS = """\
+neurovis: 1
+name: legs
+modules:
+  leg:
+    neurons: {S: {bias: 1}, K: {}}
+    connections: {S -> K: 1}
+instances: {left: {module: leg, count: 2}, right: {module: leg, count: 2}}
+connections: {left1.K -> right1.S: 1}
+layout:
+"""
+GROUPS = """\
+neurovis: 1
+name: groups
+neurons:
+  A: {count: 4, bias: 1, position: [i, 0]}
+  B: {}
+connections: {A -> B: 1}
+layout:
+"""
+PINS = "{left1: [0, 0], left2: [0.2, 0], left1.K: [4, 4]}"
+
+REFUSED = [
+    (f"{LEGS}  positions: {PINS}\n", "pin-in-frame", "[0.2, 0]"),
+    (f"{LEGS}  mirror: [[left, right]]\n  positions: {PINS}\n", "mirror-pins", "[0, 0]"),
+    (f"{LEGS}  mirror: [[left1.S, right1.K]]\n", "mirror-frames", "[left1.S, right1.K]"),
+    (f"{GROUPS}  arrange: {{A: row, A1..A2: column}}\n", "arranged-twice", "A1..A2"),
+    (f"{GROUPS}  arrange: {{A: column}}\n  align: [[A3, B], [A1, A2]]\n", "align-conflict", "[A1, A2]"),
+    (f"{GROUPS}  arrange: {{A: row}}\n  mirror: [[A1, B], [A2, A3]]\n", "mirror-arrange", "A"),
+    (f"{GROUPS}  engine: spatial\n", "position-missing", "B"),
+    (f"{GROUPS}  engine: manual\n", "position-missing", "A"),
+    (f"{GROUPS}  engine: circular\n  align: [[A1, B]]\n", "layout-align-unsupported", "[A1, B]"),
+    (LEGS.replace("    conn", "    layout: {mirror: [[S, K]]}\n    conn") + "  engine: grid\n",
+     "layout-mirror-unsupported", "[S, K]"),
+    (LEGS.replace("{bias: 1}, K: {}}", "{count: 1}, K: {}}\n    layout: {arrange: {S: row, S1: row}}")
+     + "  direction: down\n", "arranged-twice", "S1"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "code", "marked"), REFUSED, ids=[f"{code}-{at}" for _, code, at in REFUSED])
+def test_a_refusal_is_a_finding_with_its_place(text: str, code: str, marked: str, tmp_path: Path) -> None:
+    with pytest.raises(LayoutRefusalError) as caught:
+        nv.compile_text(text).layout()
+    found = caught.value.diagnostic
+    assert caught.value.code == code
+    assert found is not None
+    assert (found.code, found.message, found.hint) == (code, str(caught.value), caught.value.hint)
+    line = text.split("\n")[found.span.line - 1]
+    assert line[found.span.column - 1 : found.span.end_column - 1] == marked
+    spec = tmp_path / "spec.yaml"
+    spec.write_text(text, encoding="utf-8")
+    for command in (["layout", str(spec)], ["render", str(spec), "-o", str(tmp_path / "x.svg")]):
+        result = CliRunner().invoke(neurovis, command)
+        assert result.exit_code == 1
+        at = f"{spec}:{found.span.line}:{found.span.column}: error[{code}]: {found.message}"
+        assert at in result.stderr
+        assert "^" * len(marked) in result.stderr
+
+
+def test_an_engine_that_the_caller_names_is_no_fault_of_the_spec() -> None:
+    for said in ("engine: circular", "direction: up"):
+        network = nv.compile_text(f"{GROUPS}  {said}\n")
+        with pytest.raises(LayoutRefusalError) as caught:
+            network.layout("nobody")
+        assert caught.value.code == "unknown-engine"
+        assert caught.value.diagnostic is None
+
+
+def test_what_an_included_module_says_is_marked_in_its_file(tmp_path: Path) -> None:
+    legs, head = "modules:\n  leg:\n    neurons: {K: {count: 3, bias: 1}}\n", "neurovis: 1\n"
+    (tmp_path / "legs.yaml").write_text(f"{head}{legs}    layout: {{arrange: {{K: row, K2: row}}}}\n", encoding="utf-8")
+    spec = tmp_path / "spec.yaml"
+    spec.write_text(f"{head}name: two\ninclude: [legs.yaml]\ninstances: {{l: {{module: leg}}}}\n", encoding="utf-8")
+    with pytest.raises(LayoutRefusalError) as caught:
+        nv.compile(spec).layout()
+    found = caught.value.diagnostic
+    assert found is not None
+    assert (Path(found.span.file).name, found.span.line, found.span.column) == ("legs.yaml", 5, 32)
+    assert found.span.file in caught.value.sources
