@@ -167,6 +167,18 @@ def test_legs_grow_from_two_to_five_a_side_in_frames_of_their_own(inside: str, f
         before = now
 
 
+def test_what_narrow_legs_get_new_is_mirrored_too() -> None:
+    """All of a leg stands in one column, so that only the mirror tells which way it is turned."""
+    column = "{neurons: {S: {bias: 1}, KNEW: {}, M: {}}, connections: {S -> M: 1MORE}}"
+    earlier = hexapod(2, column.replace("KNEW: {}, ", "").replace("MORE", ""))
+    before = earlier.layout("layered").value
+    network = hexapod(2, column.replace("KNEW", "K").replace("MORE", ", S -> K: 1"))
+    now = network.layout("layered", earlier=before).value
+    assert all(now.positions[name] == point for name, point in before.positions.items())
+    in_order(network, now)
+    assert network.layout("layered", earlier=now).positions == now.positions
+
+
 def test_legs_grow_from_one_to_five_in_frames_of_their_own() -> None:
     before: Layout | None = None
     for count in range(1, 6):

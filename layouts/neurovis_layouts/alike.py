@@ -7,7 +7,7 @@ off what is placed already.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from neurovis_spec.layout.model import LayoutMirror, LayoutModule, LayoutProblem, Point
@@ -47,14 +47,30 @@ class Alike:
 
     def of(self, neuron: int) -> list[tuple[int, Move]]:
         """The neurons drawn like this one, itself first, each with the move from its place."""
-        found: dict[int, Move] = {neuron: Move()}
-        waiting = [neuron]
-        while waiting:
-            one = waiting.pop(0)
-            for mate, move in self._next(one):
-                if mate not in found:
-                    found[mate] = found[one].then(move)
-                    waiting.append(mate)
+        found: dict[int, Move] = {}
+        waiting: list[tuple[int, str]] = []
+
+        def add(mate: int, move: Move, by: str) -> None:
+            found[mate] = move
+            waiting.append((mate, by))
+
+        def reach(mate: int, move: Move, by: str) -> None:
+            add(mate, move, by)
+            # its image at once: instances too narrow to show whether they are reflected follow their images
+            image = self._images.get(mate)
+            if image is not None and image[0] not in found:
+                add(image[0], move.then(image[1]), "")
+
+        reach(neuron, Move(), "")
+        for one, by in waiting:
+            for module, place in self._around.get(one, ()):
+                if module.template == by:  # all that are drawn like it have been found from where it was
+                    continue
+                for other in self._makes[module.template]:
+                    mate = other.members[place]
+                    move = None if mate in found else self._move(module, other)
+                    if move is not None:
+                        reach(mate, found[one].then(move), module.template)
         return list(found.items())
 
     def image(self, module: LayoutModule) -> tuple[tuple[int, ...], Move] | None:
@@ -65,15 +81,6 @@ class Alike:
             return None
         mates = tuple(mate for mate, _ in known)
         return None if set(mates) & set(module.members) else (mates, known[0][1])
-
-    def _next(self, neuron: int) -> Iterator[tuple[int, Move]]:
-        for module, place in self._around.get(neuron, ()):
-            for other in self._makes[module.template]:
-                move = None if other is module else self._move(module, other)
-                if move is not None:
-                    yield other.members[place], move
-        if neuron in self._images:
-            yield self._images[neuron]
 
     def _move(self, one: LayoutModule, other: LayoutModule) -> Move | None:
         """What takes one instance to the other, where neurons of both are placed; None where they are not drawn
