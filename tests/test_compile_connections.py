@@ -190,6 +190,14 @@ def test_edges() -> None:
     ]
 
 
+def test_a_weight_of_null_is_1() -> None:
+    assert of("{A -> B: {edges: [[A1, B1, null], [A2, B1, 2], [A1, B2, null, 3]]}}") == [
+        ("A1", "B1", 1, 1),
+        ("A2", "B1", 2, 1),
+        ("A1", "B2", 1, 3),
+    ]
+
+
 def test_equal_edges_are_parallel_connections() -> None:
     network = network_of(AB + "{A -> B: {edges: [[A1, B1, 2], [A1, B1, 2], [A1, B1, 1, 3], [A1, B1, 1]]}}")
     assert wires(network)[0] == wires(network)[1]
@@ -220,7 +228,8 @@ def test_edge_files(tmp_path: Path) -> None:
         ("[A1, B1]", ["wrong-type", "wrong-type"]),
         ("[[A1, 3]]", ["wrong-type"]),
         ("[[A1, O], [A3, B1]]", ["edge-outside", "edge-outside"]),
-        ("[[A1, B1, null]]", ["wrong-type"]),
+        ("[[A1, B1, 1, null]]", ["wrong-type"]),
+        ("[[null, B1]]", ["wrong-type"]),
         ("[[A1, B1, 1, -1]]", ["out-of-range"]),
         ("[[A1, B1, 1, 0.5]]", ["not-an-integer"]),
         ("[[A1, B1, 1, 1e7]]", ["out-of-range"]),

@@ -109,6 +109,13 @@ def test_a_table_of_too_many_cells_is_refused_before_they_are_made(tmp_path: Pat
         assert "33,554,432 cells" in finding.message
 
 
+def test_a_comment_is_explained(tmp_path: Path) -> None:
+    assert "all rows of a .csv are read" in str(fault(tmp_path, "a.csv", "# made by hand\n1,2\n3,4\n").hint)
+    assert "all rows of a .csv are read" in str(fault(tmp_path, "a.csv", '# made by hand\n"1",2\n').hint)
+    _, findings = edges(tmp_path, "# made by hand\nfrom,to\nA,B\n")
+    assert "all rows of a .csv are read" in str(findings[0].hint)
+
+
 def test_semicolons_are_explained(tmp_path: Path) -> None:
     finding = fault(tmp_path, "b.csv", "x\n1;2\n")
     assert finding.hint == "columns are separated by commas"
@@ -233,12 +240,20 @@ def test_edges_without_delays(tmp_path: Path) -> None:
     assert (got.weights.tolist(), got.delays.tolist()) == ([-2.0], [-1])
 
 
+def test_edges_without_weights_have_weight_1(tmp_path: Path) -> None:
+    for data in ("to,from\nO1,K1\nO1,K2\n", 'from,to\n"K1",O1\nK2,O1\n'):
+        got, _ = edges(tmp_path, data)
+        assert got is not None
+        assert got.weights.tolist() == [1, 1]
+        assert (got.sources, got.fault) == (("K1", "K2"), None)
+
+
 @pytest.mark.parametrize(
     ("data", "code", "words", "hint"),
     [
         ("K1,O1,0.5\n", "file-format", "row 1, column 1: no column is called 'k1'", "the columns are"),
         ("from,to,wieght\n", "file-format", "row 1, column 3", "did you mean 'weight'?"),
-        ("from,to\nA,B\n", "file-format", "no column 'weight'", "from,to,weight"),
+        ("from,weight\nA,1\n", "file-format", "no column 'to'", "from,to,weight"),
         ("from,to,to,weight\n", "file-format", "'to' is there twice", None),
         ("from,to,weight\nA,B\n", "file-format", "row 2 has 2 cells, the header 3", None),
         ("from,to,weight\nA,,1\n", "file-format", "row 2, column 2: the name", None),

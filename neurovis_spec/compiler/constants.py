@@ -77,10 +77,12 @@ def parse_formula(
     functions: Mapping[str, int] | None = None,
     what: str = "known here",
     incomplete: bool = False,
+    later: Collection[str] = (),
 ) -> Tree | None:
     """The tree of a formula whose names are all known; else findings at the characters at fault.
 
-    ``incomplete``: not all known names could be read, so that an unknown one is no finding; the tree is None.
+    ``incomplete``: not all known names could be read, so that an unknown one is no finding; the tree is None. ``later``
+    are names that are declared behind the formula.
     """
     if not isinstance(formula.value, str):
         return Number(float(formula.value))
@@ -101,6 +103,8 @@ def parse_formula(
     for name, start, end in () if incomplete else used:
         few = known if findings.errors < MOST_HINTS else ()
         message, hint = _unknown(name, few, functions or {}, what)
+        if name in later:
+            message, hint = f"'{name}' comes later", "a parameter sees those that are declared before it"
         findings.error("unknown-name", formula.node.at(start, end), message, hint)
     return None
 
@@ -156,11 +160,19 @@ class Constants:
     incomplete: bool = False
 
     def tree(
-        self, formula: Formula, extra: Iterable[str] = (), random: bool = False, what: str = "known here"
+        self,
+        formula: Formula,
+        extra: Iterable[str] = (),
+        random: bool = False,
+        what: str = "known here",
+        later: Collection[str] = (),
     ) -> Tree | None:
-        """The tree of a formula over the parameters and ``extra``, for a caller that evaluates it; else findings."""
+        """The tree of a formula over the parameters and ``extra``, for a caller that evaluates it; else findings.
+        ``later`` are parameters that it does not see."""
         known = Scope((tuple(extra), self.parameters, self.broken, ALWAYS))
-        tree = parse_formula(formula, known, self.findings, random=random, what=what, incomplete=self.incomplete)
+        tree = parse_formula(
+            formula, known, self.findings, random=random, what=what, incomplete=self.incomplete, later=later
+        )
         return None if tree is None or names(tree) & self.broken else tree
 
     def unchecked(

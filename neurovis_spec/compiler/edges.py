@@ -113,14 +113,11 @@ class EdgeReader:
         return None if len(unknown) or len(no_names) or end.perhaps is not None else positions
 
     def _given(self, cells: Cells, which: IntArray, ends: tuple[IntArray, IntArray] | None) -> FloatArray | None:
-        """The weights in these cells; they are looked at even if their ends are at fault."""
-        missing = which[cells.kinds[which] == NULL]
-        for cell in missing[:PATIENCE].tolist():
-            formula_of(cells.node(cell), self.constants.findings)
+        """The weights in these cells, 1 for a null; they are looked at even if their ends are at fault."""
         sizes = {"n_from": float(len(self.sources.positions)), "n_to": float(len(self.targets.positions))}
         i, j = ends or (which, which)
         values = values_of(cells, which, self.constants, Pairs(i, j, sizes, self.stream, vague=ends is None))
-        return None if len(missing) else values
+        return None if values is None else np.where(cells.kinds[which] == NULL, 1.0, values)
 
     def _delays(self, cells: Cells, which: IntArray) -> IntArray | None:
         """The delays in these cells: few distinct ones, each looked at once."""

@@ -6,7 +6,7 @@ In: a section's ``parameters``, in the order written, and what is set from outsi
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from neurovis_spec.compiler.constants import RESERVED, Constants
 from neurovis_spec.compiler.references import Section, key_span
@@ -20,20 +20,28 @@ def make_parameters(
 ) -> None:
     """The parameters in the order written; what is given replaces the value, within its bounds. ``places`` say where
     it is given."""
+    later = dict.fromkeys(section.parameters)
     for name, parameter in section.parameters.items():
+        del later[name]
         span = key_span(section, "parameters", name)
-        _parameter(name, parameter, span, (places or {}).get(name, span), constants, given)
+        _parameter(name, parameter, (span, (places or {}).get(name, span)), constants, given, later)
 
 
 def _parameter(
-    name: str, parameter: Parameter, span: Span, place: Span, constants: Constants, given: Mapping[str, float]
+    name: str,
+    parameter: Parameter,
+    spans: tuple[Span, Span],
+    constants: Constants,
+    given: Mapping[str, float],
+    later: Collection[str],
 ) -> None:
-    findings = constants.findings
+    """One parameter; ``spans`` are where it is declared and where its value is given, ``later`` those behind."""
+    (span, place), findings = spans, constants.findings
     if name in RESERVED:
         message = f"a parameter may not be called '{name}': the language gives this name a meaning of its own"
         findings.error("reserved-name", span, message)
     at_fault = name in constants.broken or parameter.failed  # or what is set is at fault
-    tree = constants.tree(parameter.value, what="parameters before this one, and constants")
+    tree = constants.tree(parameter.value, what="parameters before this one, and constants", later=later)
     constants.uses[name] = frozenset() if tree is None or name in given else names(tree)
     value = None if tree is None else constants.scalar(parameter.value)
     low = None if parameter.minimum is None else constants.scalar(parameter.minimum)
@@ -47,6 +55,10 @@ def _parameter(
         constants.broken.add(name)
         return
     constants.parameters[name] = value
+    if low is not None and high is not None and low > high and parameter.minimum is not None:
+        message = f"the least value of '{name}', {low:g}, is above the greatest, {high:g}"
+        findings.error("out-of-range", parameter.minimum.span, message, "swap min and max")
+        return
     if (low is not None and value < low) or (high is not None and value > high):
         bounds = f"{'-∞' if low is None else f'{low:g}'} to {'∞' if high is None else f'{high:g}'}"
         where = place if name in given else parameter.value.span

@@ -135,7 +135,8 @@ def _owners(unit: Unit, built: tuple[Built, ...]) -> None:
             if other != name:
                 first = key_span(section, "neurons", other)
                 message = f"'{name}' and '{other}' (line {first.line}) both make the name '{neuron}'"
-                findings.error("duplicate-neuron", key_span(section, "neurons", name), message)
+                hint = "rename one of them, or count it from another number (first)"
+                findings.error("duplicate-neuron", key_span(section, "neurons", name), message, hint)
                 break
             if neuron in section.inputs and neuron != name:
                 first = key_span(section, "inputs", neuron)

@@ -24,6 +24,7 @@ __all__ = ["KINDS", "CellError", "Room", "Table", "locate", "read_data", "read_e
 LARGEST: Final = 256 << 20  # bytes; ten million connections in double precision are 80 MB
 #: characters of a path: what common systems take
 LONGEST_PATH: Final = 4096
+_FROM: Final = "paths are relative to the file that names them"
 #: files that hold a table of numbers
 KINDS: Final = (".csv", ".npy", ".npz", ".mtx")
 
@@ -42,8 +43,7 @@ def locate(path_text: str, root: Path, base: Path, span: Span, findings: Finding
         findings.error("file-missing", span, message)
         return None
     if Path(path_text).is_absolute() or PureWindowsPath(path_text).drive or path_text.startswith(("/", "\\")):
-        hint = "paths are relative to the file that names them"
-        findings.error("path-outside", span, f"the path '{shown}' is absolute", hint)
+        findings.error("path-outside", span, f"the path '{shown}' is absolute", _FROM)
         return None
     try:
         inside = root.resolve()
@@ -65,7 +65,7 @@ def read_data(path_text: str, root: Path, base: Path, span: Span, findings: Find
         return None
     data = read_bytes(path, LARGEST)
     if isinstance(data, FileFault):
-        hint = _neighbours(path) if data.code == "file-missing" else None
+        hint = (_neighbours(path) or _FROM) if data.code == "file-missing" else None
         findings.error(data.code, span, f"the file '{_short(path_text)}' {data.reason}", hint)
         return None
     return data

@@ -33,6 +33,8 @@ from neurovis_spec.language.data_files_table import CellError, Faults, Room, Tab
 _STRETCH: Final = 1 << 18
 _BATCH: Final = 1 << 14
 _FEW: Final = 1 << 10
+#: what is said of a file that begins with a comment
+NO_COMMENT: Final = "row 1 is no comment: all rows of a .csv are read"
 _MARK: Final = b"\xef\xbb\xbf"
 
 
@@ -104,7 +106,7 @@ def parse_numbers(data: bytes, room: Room | None = None) -> Table:
     numbers, faults = array("d"), Faults()
     try:
         for batch in batches(rows if header is not None else chain((first,), rows)):
-            numbers.frombytes(_numbers(batch, width, faults).tobytes())
+            numbers.frombytes(_numbers(batch, width, header, faults).tobytes())
             if faults.many:
                 break
     except CellError as error:
@@ -131,7 +133,7 @@ def _header(row: Row) -> tuple[str, ...] | None:
     return tuple(row.stripped().cells) if filled else None
 
 
-def _numbers(batch: list[Row], width: int, faults: Faults) -> NDArray[np.float64]:
+def _numbers(batch: list[Row], width: int, header: tuple[str, ...] | None, faults: Faults) -> NDArray[np.float64]:
     """The numbers of some rows, one behind the other, NaN for an empty cell; what is wrong with them is noted."""
     rows = [row.cells or [""] for row in batch]  # an empty line of a file with one column is an empty cell
     if all(len(cells) == width for cells in rows):
@@ -143,7 +145,7 @@ def _numbers(batch: list[Row], width: int, faults: Faults) -> NDArray[np.float64
         if faults.many:
             break
         if len(cells) != width:
-            faults.note(number, _ragged(number, len(cells), width))
+            faults.note(number, _ragged(number, len(cells), width, header))
         else:
             parts.append(_one_by_one(cells, number, 0, width, faults))
     return np.concatenate(parts)
@@ -170,7 +172,9 @@ def _unquoted(data: bytes, cells: int) -> Table:
             place, number = wrong
             end = data.find(b"\n", place) % (len(data) + 1)
             found = 1 + data.count(b",", data.rfind(b"\n", 0, place) + 1, end)
-            faults.note(number, _ragged(number, found, width))
+            faults.note(number, _ragged(number, found, width, header))
+            if _comment(header):  # the width of all rows is taken from it
+                break
             filled, start = (number - above) * width, end + 1  # as if the row were even
     faults.check()
     return _table(values[:filled], width, header)
@@ -227,9 +231,14 @@ def _one_by_one(cells: list[str], row: int, column: int, width: int, faults: Fau
     return np.concatenate(parts)
 
 
-def _ragged(row: int, cells: int, width: int) -> CellError:
+def _ragged(row: int, cells: int, width: int, header: tuple[str, ...] | None) -> CellError:
     message = f"row {row} has {counted(cells)}, the first row {width}"
-    return CellError("file-format", message, "rows of a table are equally long")
+    return CellError("file-format", message, NO_COMMENT if _comment(header) else "rows of a table are equally long")
+
+
+def _comment(header: tuple[str, ...] | None) -> bool:
+    """Whether the first row was meant as a comment."""
+    return header is not None and header[0].startswith("#")
 
 
 def empty() -> CellError:

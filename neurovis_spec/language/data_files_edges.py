@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from neurovis_spec.diagnostics import nearest
 from neurovis_spec.language.data_files_cells import counted, number_of, numbers_of
-from neurovis_spec.language.data_files_csv import Row, batches, plain_lines, read_rows
+from neurovis_spec.language.data_files_csv import NO_COMMENT, Row, batches, plain_lines, read_rows
 from neurovis_spec.language.data_files_table import CellError, Faults, Room, quoted
 
 T = TypeVar("T")
@@ -82,7 +82,7 @@ def _lines(data: bytes) -> Iterator[tuple[int, str]]:
 
 
 def _hint() -> str:
-    return "the first row is 'from,to,weight' or 'from,to,weight,delay'"
+    return "the first row is 'from,to', 'from,to,weight' or 'from,to,weight,delay'"
 
 
 def _columns(header: Row) -> dict[str, int]:
@@ -92,10 +92,12 @@ def _columns(header: Row) -> dict[str, int]:
         if name not in _COLUMNS:
             close = nearest(name, _COLUMNS, 1)
             hint = f"did you mean '{close[0]}'?" if close else "the columns are from, to, weight and perhaps delay"
+            if name.startswith("#"):
+                hint = NO_COMMENT
             raise CellError("file-format", f"row 1, column {column}: no column is called {quoted(name)}", hint)
         if names.index(name) != column - 1:
             raise CellError("file-format", f"row 1, column {column}: '{name}' is there twice")
-    missing = [name for name in _COLUMNS[:3] if name not in names]
+    missing = [name for name in _COLUMNS[:2] if name not in names]
     if missing:
         raise CellError("file-format", f"there is no column '{missing[0]}'", _hint())
     return {name: column for column, name in enumerate(names)}
@@ -145,7 +147,9 @@ class _Reader:
     def _quickly(self, columns: Sequence[Sequence[str]], numbers: Sequence[int]) -> bool:
         """Take rows, column by column; False, and none is taken, where one of them is at fault or may be."""
         sources, targets = (list(map(str.strip, columns[self._places[end]])) for end in ("from", "to"))
-        weights = numbers_of(list(columns[self._places["weight"]]))
+        weights: NDArray[np.float64] | None = np.full(len(numbers), math.nan)
+        if "weight" in self._places:
+            weights = numbers_of(list(columns[self._places["weight"]]))
         delays = np.full(len(numbers), math.nan)
         if "delay" in self._places:
             given = numbers_of(list(columns[self._places["delay"]]))
@@ -176,9 +180,10 @@ class _Reader:
                 message = f"row {number}, column {column + 1}: the name of a neuron is wanted"
                 self.faults.note(number, CellError("file-format", message))
                 named = False
-        column = self._places["weight"]
-        weight = self._noted(number, lambda: number_of(cells[column], number, column + 1), math.nan)
-        delay = -1
+        weight, delay = math.nan, -1
+        if "weight" in self._places:
+            column = self._places["weight"]
+            weight = self._noted(number, lambda: number_of(cells[column], number, column + 1), math.nan)
         if "delay" in self._places:
             delay = self._noted(number, lambda: _delay(cells, number, self._places["delay"]), -1)
         if not named:

@@ -18,9 +18,10 @@ from neurovis_spec.language.located import (
     as_integer,
     findings_of,
     give_up,
+    refuse,
 )
 from neurovis_spec.language.model import Model, Named, StandIns
-from neurovis_spec.language.source import Node
+from neurovis_spec.language.source import Mapping, Node, Scalar
 from neurovis_spec.language.values import ParameterField
 
 LANGUAGE_VERSION = 1
@@ -28,6 +29,8 @@ LANGUAGE_VERSION = 1
 
 def version_field(node: Node, info: ValidationInfo) -> Located[int]:
     """The version of the language, which must be the one that this program reads."""
+    if isinstance(node, Scalar) and isinstance(node.value, (str, bool)):
+        refuse(info, node, "the version of the language", f"write neurovis: {LANGUAGE_VERSION}")
     version = as_integer(node, info)
     if version.value != LANGUAGE_VERSION:
         message = f"this is written in version {version.value:g} of the language; this program reads version 1"
@@ -87,6 +90,10 @@ class RuleModel(Model):
     state: Named[StateModel] = Field(default_factory=dict, description="States, one for each connection.")
     weight: WeightModel = Field(description="How the weight changes.")
     description: TextField | None = Field(None, description="What it is, its equation and its source.")
+
+    @classmethod
+    def _without(cls, name: str, data: Mapping) -> str | None:
+        return "a rule says how the weight changes: add weight: {each_step: …}, or {each_episode: …}"
 
 
 class Library(Model):

@@ -144,13 +144,13 @@ FILE = {
     "required": ["file"],
     "additionalProperties": False,
 }
+_CELL = {"anyOf": [*FORMULA["anyOf"], {"type": "null"}]}
 _EDGE = {
     "type": "array",
-    "prefixItems": [{"type": "string", "minLength": 1}, {"type": "string", "minLength": 1}, FORMULA, FORMULA],
+    "prefixItems": [{"type": "string", "minLength": 1}, {"type": "string", "minLength": 1}, _CELL, FORMULA],
     "minItems": 2,
     "maxItems": 4,
 }
-_CELL = {"anyOf": [*FORMULA["anyOf"], {"type": "null"}]}
 _ROWS = {"type": "array", "items": {"type": "array", "items": _CELL}}
 
 MatrixField = Annotated[Matrix, Leaf(as_matrix, {"anyOf": [_ROWS, FILE]})]
