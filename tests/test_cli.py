@@ -564,9 +564,25 @@ def test_a_long_run_shows_a_bar_and_ends_cleanly_on_ctrl_c(folder: Path) -> None
     shown += rest(terminal)
     output, _ = process.communicate(timeout=60)
     assert (process.returncode, output) == (130, b"")
-    assert b"stopped" in shown
+    assert b"; x.npz holds step 0\r\n" in shown
+    assert b"stopped at step " in shown
     assert b"Traceback" not in shown
-    assert sorted(folder.iterdir()) == [folder / "small.yaml"], "nothing half-written is left"
+    assert nv.load(folder / "x.npz").step.tolist() == [0]
+    assert sorted(folder.iterdir()) == [folder / "small.yaml", folder / "x.npz"], "nothing half-written is left"
+
+
+@pytest.mark.parametrize("suffix", ["npz", "csv"])
+def test_a_disk_that_becomes_full_leaves_the_recording_that_was_there(folder: Path, suffix: str) -> None:
+    """The system refuses files beyond a size as it refuses them on a full disk."""
+    good("run", "small.yaml", "--steps", 9, "-o", f"x.{suffix}")
+    before = Path(f"x.{suffix}").read_bytes()
+    command = [sys.executable, "-m", "neurovis_spec", "run", "small.yaml", "--steps", "100000", "-o", f"x.{suffix}"]
+    limited = ["sh", "-c", 'ulimit -f 64; exec "$@"', "sh", *command]
+    done = subprocess.run(limited, capture_output=True, check=False)
+    assert (done.returncode, done.stdout) == (1, b"")
+    assert done.stderr.decode() == f"error: x.{suffix} cannot be written: File too large\n"
+    assert Path(f"x.{suffix}").read_bytes() == before
+    assert sorted(folder.iterdir()) == [folder / "small.yaml", folder / f"x.{suffix}"]
 
 
 def rest(terminal: int) -> bytes:

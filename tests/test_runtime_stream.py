@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 import tracemalloc
 import zipfile
 from pathlib import Path
@@ -12,8 +14,12 @@ from small_specs import compiled
 
 import neurovis_spec as nv
 from neurovis_spec.api import CompiledNetwork
+from neurovis_spec.runtime.files import uninterrupted
 from neurovis_spec.runtime.memory import TooLargeError
 from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.state import State
+from neurovis_spec.runtime.stream import StoppedError
+from neurovis_spec.runtime.watch import Watch
 
 SPEC = """
 parameters: {gain: 1}
@@ -91,27 +97,100 @@ def test_memory_does_not_grow_with_the_steps(tmp_path: Path, suffix: str, steps:
     assert peak < 16_000_000
 
 
-class _StoppedError(Exception):
+class _FailedError(Exception):
     pass
 
 
 @pytest.mark.parametrize("suffix", ["npz", "csv"])
-@pytest.mark.parametrize("error", [KeyboardInterrupt, _StoppedError])
-def test_what_is_stopped_leaves_what_was_there(
-    network: CompiledNetwork, tmp_path: Path, suffix: str, error: type[BaseException]
-) -> None:
+def test_what_fails_leaves_what_was_there(network: CompiledNetwork, tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"x.{suffix}"
     network.run_to(path, 10)
     before = path.read_bytes()
 
     def stop(done: int, total: int) -> None:
         if done >= 512:
-            raise error
+            raise _FailedError
 
-    with pytest.raises(error):
+    with pytest.raises(_FailedError):
         network.run_to(path, 2000, progress=stop)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(("every", "rows"), [(1, 600), (7, 86), (1000, 1)])
+@pytest.mark.parametrize("suffix", ["npz", "csv"])
+def test_ctrl_c_keeps_the_steps_until_then(
+    network: CompiledNetwork, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str, every: int, rows: int
+) -> None:
+    """Also those of a stretch that is not full; an older recording gives way to what can be read."""
+    path = tmp_path / f"x.{suffix}"
+    network.run_to(path, 10)
+    network.run(600, every=every).save(tmp_path / f"whole.{suffix}")
+    interrupt(monkeypatch, 600)
+    with pytest.raises(StoppedError) as stopped:
+        network.run_to(path, 2000, every=every)
+    kept, whole = nv.load(path), nv.load(tmp_path / f"whole.{suffix}")
+    assert len(kept) == stopped.value.rows == rows
+    if suffix == "npz":
+        with zipfile.ZipFile(path) as archive:
+            assert archive.testzip() is None
+    assert_equal(kept, whole)
+    held = {1: "steps 0 to 599", 7: "steps 0 to 595, one in 7", 1000: "step 0"}[every]
+    assert str(stopped.value) == f"stopped at step 600; {path} holds {held}"
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == [f"whole.{suffix}", f"x.{suffix}"]
+
+
+def interrupt(monkeypatch: pytest.MonkeyPatch, at: int) -> None:
+    """Have Ctrl-C come while a step is computed."""
+
+    def look(self: Watch, state: State) -> None:
+        if state.k > at:
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr("neurovis_spec.runtime.watch.Watch.look", look)
+
+
+def test_ctrl_c_before_the_first_step_leaves_what_was_there(
+    network: CompiledNetwork, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "x.npz"
+    network.run_to(path, 10)
+    before = path.read_bytes()
+    interrupt(monkeypatch, 0)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        network.run_to(path, 2000)
+    assert not isinstance(caught.value, StoppedError)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_ctrl_c_waits_for_the_end_of_a_block() -> None:
+    done = []
+
+    def work() -> None:
+        with uninterrupted():
+            signal.raise_signal(signal.SIGINT)
+            done.append("written")
+        done.append("never reached")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert done == ["written"]
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_elsewhere_than_in_the_main_thread_nothing_waits() -> None:
+    done = []
+
+    def work() -> None:
+        with uninterrupted():
+            done.append(signal.getsignal(signal.SIGINT))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert done == [signal.default_int_handler]
 
 
 def test_a_disk_that_is_too_small_is_said_beforehand(

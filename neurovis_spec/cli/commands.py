@@ -117,9 +117,9 @@ class Commands(click.Group):
         except click.ClickException as error:
             status = error.exit_code
             _show(error)
-        except click.Abort:
+        except click.Abort as error:
             status = INTERRUPTED
-            click.echo("stopped", err=True)
+            click.echo(str(error.__cause__ or "") or "stopped", err=True)
         sys.exit(_flushed(status))
 
 

@@ -60,7 +60,8 @@ def command(
     """Run a network and write a recording.
 
     A recording holds the activity of every neuron and every weight that can change, at every step. Without -o
-    nothing is written, and the last step's values are printed.
+    nothing is written, and the last step's values are printed. Ctrl-C ends a run; its recording holds the steps until
+    then, a second Ctrl-C leaves the file that was there before.
     """
     if backend == "list":
         _list_backends()

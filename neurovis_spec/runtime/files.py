@@ -7,7 +7,9 @@ file, and an interrupted run leaves what was there before.
 from __future__ import annotations
 
 import os
+import signal
 import stat
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,7 +19,7 @@ from uuid import uuid4
 
 @contextmanager
 def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
-    """A file to write that replaces ``path`` at the end; after an exception nothing has changed.
+    """A file to write (and to read) that replaces ``path`` at the end; after an exception nothing has changed.
 
     A link is followed. Raises OSError where the folder cannot be written or the path is no regular file.
     """
@@ -26,7 +28,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         raise OSError(f"{path} is not a regular file")
     beside = target.with_name(f".{target.name[:100]}.{uuid4().hex[:12]}.part")
     try:
-        with beside.open("xb") as file:
+        with beside.open("x+b") as file:
             yield file
             file.flush()
             os.fsync(file.fileno())
@@ -34,6 +36,23 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     except BaseException:
         beside.unlink(missing_ok=True)
         raise
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """A block in which Ctrl-C waits for its end, so that nothing in it is half done."""
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(before):
+        yield  # nothing that Ctrl-C raises comes here
+        return
+    waiting: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, frame: waiting.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if waiting:
+        before(waiting[0], None)
 
 
 def regular_size(path: str | os.PathLike[str]) -> int:

@@ -16,7 +16,7 @@ import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import IO, TypeAlias
 
@@ -27,6 +27,7 @@ from neurovis_spec.compiler.network import FloatArray, IntArray
 from neurovis_spec.language.data_files_npy import LONGEST_HEADER, read_header
 from neurovis_spec.language.data_files_table import CellError
 from neurovis_spec.runtime.files import regular_size, replacing
+from neurovis_spec.runtime.npz_member import GrowingMember, npy_header
 from neurovis_spec.runtime.recording import Recording, RecordingError
 from neurovis_spec.runtime.rows import RowWriter, Steps
 
@@ -69,7 +70,8 @@ def npz_size(frame: Recording, steps: Steps) -> int:
 @contextmanager
 def stream_npz(path: Path, frame: Recording, steps: Steps) -> Iterator[RowWriter]:
     """A writer for rows: activities go into the archive as they come; the weights, which must lie together, into a file
-    without a name beside it, and into the archive at the end. What was there stays until all is written."""
+    without a name beside it, and into the archive at the end. What was there stays until all is written. There may be
+    fewer rows in the end than steps were to be."""
     n, p = len(frame.neurons), len(frame.plastic)
     with (
         replacing(path) as file,
@@ -77,29 +79,32 @@ def stream_npz(path: Path, frame: Recording, steps: Steps) -> Iterator[RowWriter
         tempfile.TemporaryFile(dir=path.resolve().parent) as spool,
     ):
         _put(archive, _small(frame))
+        growing = GrowingMember(archive, file, "activity.npy", len(steps), n)
+        rows = _NpzRows(growing, spool)
+        yield rows
+        growing.finish(rows.count)
+        kept = replace(steps, total=min(steps.total, rows.count * steps.every))
         with archive.open("step.npy", "w", force_zip64=True) as member:
-            _begin(member, "<i8", (len(steps),))
-            for part in steps.parts():
+            member.write(npy_header("<i8", (rows.count,)))
+            for part in kept.parts():
                 member.write(part.astype("<i8").tobytes())
-        with archive.open("activity.npy", "w", force_zip64=True) as member:
-            _begin(member, "<f8", (len(steps), n))
-            yield _NpzRows(member, spool)
         with archive.open("weights.npy", "w", force_zip64=True) as member:
-            _begin(member, "<f8", (len(steps), p))
+            member.write(npy_header("<f8", (rows.count, p)))
             spool.seek(0)
             shutil.copyfileobj(spool, member, _CHUNK)
 
 
-@dataclass(frozen=True)
 class _NpzRows:
-    """Writes rows into two files."""
+    """Writes rows into two files, and counts them."""
 
-    activity: IO[bytes]
-    weights: IO[bytes]
+    def __init__(self, activity: GrowingMember, weights: IO[bytes]) -> None:
+        self._activity, self._weights = activity, weights
+        self.count = 0
 
     def write(self, activity: FloatArray, weights: FloatArray) -> None:
-        self.activity.write(activity.astype("<f8").tobytes())
-        self.weights.write(weights.astype("<f8").tobytes())
+        self._activity.write(activity.astype("<f8").tobytes())
+        self._weights.write(weights.astype("<f8").tobytes())
+        self.count += len(activity)
 
 
 def _put(archive: zipfile.ZipFile, arrays: Mapping[str, Array]) -> None:
@@ -107,11 +112,6 @@ def _put(archive: zipfile.ZipFile, arrays: Mapping[str, Array]) -> None:
     for name, array in arrays.items():
         with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
             np.lib.format.write_array(member, array, allow_pickle=False)
-
-
-def _begin(member: IO[bytes], descr: str, shape: tuple[int, ...]) -> None:
-    """The header of an array whose numbers follow."""
-    np.lib.format.write_array_header_1_0(member, {"descr": descr, "fortran_order": False, "shape": shape})
 
 
 def _small(recording: Recording) -> dict[str, Array]:

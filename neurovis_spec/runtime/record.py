@@ -55,8 +55,8 @@ class Rows(Protocol):
         """Arrays for the next ``count`` rows: activities (count, n), changing weights (count, p)."""
         ...
 
-    def end(self) -> None:
-        """The arrays are filled."""
+    def end(self, count: int) -> None:
+        """So many rows of the arrays are filled: all, or fewer where the run ends here."""
         ...
 
 
@@ -73,7 +73,7 @@ class _InMemory:
         self._filled += count
         return self.activity[first : first + count], self.weights[first : first + count]
 
-    def end(self) -> None:
+    def end(self, count: int) -> None:
         return
 
 
@@ -108,16 +108,18 @@ def go(network: Network, state: State, course: Course, rows: Rows, progress: Pro
             for first, stop in _stretches(begin, end):
                 activity, weights = rows.begin((stop - 1) // every - (first - 1) // every)
                 row = 0
-                for k, vector in enumerate(reader.rows(first, stop), first):
-                    keep = k % every == 0
-                    if keep and changing is not None:
-                        weights[row] = state.weights[changing]
-                    step(state, vector)
-                    look(state)
-                    if keep:
-                        activity[row] = state.activity
-                        row += 1
-                rows.end()
+                try:
+                    for k, vector in enumerate(reader.rows(first, stop), first):
+                        keep = k % every == 0
+                        if keep and changing is not None:
+                            weights[row] = state.weights[changing]
+                        step(state, vector)
+                        look(state)
+                        if keep:
+                            activity[row] = state.activity
+                            row += 1
+                finally:  # after Ctrl-C, too
+                    rows.end(row)
                 if progress is not None:
                     progress(stop, steps)
 

@@ -1,7 +1,8 @@
 """Recordings that are written while the network runs: a stretch of rows at a time, so that no run is too long.
 
-In: a Network, a path, how to run. Out: a file, which is there when the run has come to its end; else what was there
-before. A format that writes in streams says so by having ``stream``; of the others the whole recording is saved.
+In: a Network, a path, how to run. Out: a file, which is there when the run has come to its end, or when Ctrl-C has
+ended it, with the steps until then; after any other exception there is what was there before. A format that writes in
+streams says so by having ``stream``; of the others the whole recording is saved.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 
 from neurovis_spec.compiler.network import FloatArray, Network
 from neurovis_spec.progress import Progress
+from neurovis_spec.runtime.files import uninterrupted
 from neurovis_spec.runtime.formats import for_path
 from neurovis_spec.runtime.inputs import STRETCH
 from neurovis_spec.runtime.memory import check_disk
@@ -30,7 +32,8 @@ class StreamingFormat(Protocol):
 
     def stream(self, path: Path, frame: Recording, steps: Steps) -> AbstractContextManager[RowWriter]:
         """A writer for the rows of these steps; ``frame`` is the recording without them. The file is there when the
-        block ends; after an exception nothing has changed. Raises OSError."""
+        block ends, with as many rows as came, which are fewer where a run was stopped; after an exception nothing has
+        changed. Raises OSError."""
         ...
 
     def size(self, frame: Recording, steps: Steps) -> int:
@@ -38,10 +41,21 @@ class StreamingFormat(Protocol):
         ...
 
 
+class StoppedError(KeyboardInterrupt):
+    """Ctrl-C has ended a run; what was recorded by then is in the file. ``rows`` says how many steps these are."""
+
+    def __init__(self, path: Path, step: int, rows: int, every: int) -> None:
+        last = (rows - 1) * every
+        held = "step 0" if rows == 1 else f"steps 0 to {last}{'' if every == 1 else f', one in {every}'}"
+        super().__init__(f"stopped at step {max(step, last + 1)}; {path} holds {held}")
+        self.rows = rows
+
+
 def record_to(
     network: Network, path: Path, course: Course, start: Recording | None = None, progress: Progress | None = None
 ) -> None:
-    """Run a network and write what ``record`` returns to a file. Raises what ``record`` and ``formats.save`` raise."""
+    """Run a network and write what ``record`` returns to a file. Raises what ``record`` and ``formats.save`` raise, and
+    StoppedError after Ctrl-C, when the steps until then are in the file; KeyboardInterrupt where there are none."""
     format_ = for_path(path)
     if not isinstance(format_, StreamingFormat):
         format_.save(record(network, course.steps, course.inputs, course.backend, course.every, start, progress), path)
@@ -51,8 +65,17 @@ def record_to(
     none = np.zeros((0, len(network.neurons))), np.zeros((0, len(network.changing)))
     frame = recording_of(network, np.zeros(0, dtype=np.int64), *none, state.weights)
     check_disk(path, steps.total, steps.every, format_.size(frame, steps))
+    stopped = False
     with format_.stream(path, frame, steps) as writer:
-        go(network, state, course, _Handed(network, writer), progress)
+        rows = _Handed(network, writer)
+        try:
+            go(network, state, course, rows, progress)
+        except KeyboardInterrupt:
+            if not rows.handed:
+                raise
+            stopped = True
+    if stopped:
+        raise StoppedError(path, state.k - 1, rows.handed, steps.every)
 
 
 class _Handed:
@@ -62,12 +85,13 @@ class _Handed:
         self._activity = np.empty((STRETCH, len(network.neurons)))
         self._weights = np.empty((STRETCH, len(network.changing)))
         self._writer = writer
-        self._count = 0
+        self.handed = 0
 
     def begin(self, count: int) -> tuple[FloatArray, FloatArray]:
-        self._count = count
         return self._activity[:count], self._weights[:count]
 
-    def end(self) -> None:
-        if self._count:
-            self._writer.write(self._activity[: self._count], self._weights[: self._count])
+    def end(self, count: int) -> None:
+        if count:
+            with uninterrupted():
+                self._writer.write(self._activity[:count], self._weights[:count])
+                self.handed += count
