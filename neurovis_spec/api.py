@@ -153,6 +153,8 @@ def _finish(document: SourceDocument | None, request: Request, findings: Finding
     request = request if spec is None else pipeline.include(spec, request, findings)
     network = None if spec is None else pipeline.build(spec, request, findings)
     memory = None if spec is None or network is None else pipeline.remember(spec, request, network, findings)
+    if spec is not None and network is not None:
+        pipeline.foresee(spec, network, findings)
     pipeline.allow(findings)
     findings.check()
     if spec is None or network is None:

@@ -112,6 +112,16 @@ def remember(spec: Spec, request: Request, network: Network, findings: Findings)
     return read_memory(spec.layout.file, request.base, request.root, network, findings)
 
 
+def foresee(spec: Spec, network: Network, findings: Findings) -> None:
+    """What the layout will surely not be as it is meant."""
+
+    if spec.layout is None or spec.layout.engine is None or not network.instances:
+        return
+    from neurovis_spec.layout.framing import look_at_engine
+
+    look_at_engine(spec.layout.engine, network, findings)
+
+
 def arrange(
     network: Network, engine: str | None = None, memory: Layout | None = None, progress: Progress | None = None
 ) -> Layout:
