@@ -5,7 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import combinations
 
+import layout_conformance as suite
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_layout_compound import attempt, walkers
+
 import neurovis_spec as nv
+from neurovis_spec.layout import LayoutProblem
 from neurovis_spec.layout.geometry import distance, sampled
 from neurovis_spec.layout.model import Route
 
@@ -52,3 +58,46 @@ def test_pairs_crosswise_over_the_axis_do_not_lie_on_each_other() -> None:
         assert pairs(layout.routes)
         for one, other in pairs(layout.routes):
             assert together(layout.routes[one], layout.routes[other], 0.08) <= 0.4, (one, other)
+
+
+def test_connections_there_and_back_are_apart_where_they_could_run_on_each_other() -> None:
+    """Parallel to a curve that a disc has pushed aside, and on detours round frames."""
+    rings = "A -> A: {weight: 1, pattern: ring}, A -> B: {weight: 1, pattern: one_to_one}"
+    back = "B -> A: {weight: 1, delay: 3, pattern: one_to_one}"
+    text = f"""neurovis: 1
+name: pushed
+neurons: {{A: {{count: 6}}, B: {{count: 6}}, S: {{}}}}
+connections: [{{{rings}}}, {{{back}}}, B -> S: 1, A1 -> B1: {{weight: 1, delay: 2}}]
+"""
+    leg = "{neurons: {m0: {}, m1: {}}, connections: {m0 -> m1: 1, m1 -> m0: 1}}"
+    ways = "C1 -> D1: 1, C1 -> r1.m0: 1, C1 -> r1.m1: 1, D1 -> C1: 1, D2 -> D3: 1, D3 -> r1.m0: 1, l1.m0 -> C1: 1"
+    more = "l1.m1 -> D3: 1, r1.m0 -> C1: 1, r1.m0 -> l1.m0: 1, r1.m1 -> C1: 1"
+    framed = f"""neurovis: 1
+name: framed
+modules: {{leg: {leg}}}
+instances: {{l: {{module: leg, count: 1}}, r: {{module: leg, count: 1}}}}
+neurons: {{C: {{count: 2}}, D: {{count: 3}}}}
+connections: {{{ways}, {more}}}
+layout: {{mirror: [[l, r], [C1, C2]], boxes: {{q: [D]}}}}
+"""
+    for spec in (text, framed):
+        routes = nv.compile_text(spec).layout(engine="layered").routes
+        assert len(pairs(routes)) > 4
+        for one, other in pairs(routes):
+            assert together(routes[one], routes[other], 0.11) <= 0.2, (one, other)
+
+
+@settings(max_examples=60, deadline=None)
+@given(problem=st.one_of(suite.problems(), walkers(pinned=True, mirrored=False), walkers(mirrored=True)))
+def test_connections_that_share_both_ends_are_apart(problem: LayoutProblem) -> None:
+    """Up to three; a sheaf of more has no room everywhere."""
+    layout, _ = attempt(problem)
+    if layout is None:
+        return
+    between: dict[frozenset[int], list[str]] = {}
+    for edge in problem.edges:
+        between.setdefault(frozenset((edge.source, edge.target)), []).append(edge.name)
+    for ends, names in between.items():
+        if len(ends) == 2 and len(names) <= 3:
+            for one, other in combinations(names, 2):
+                assert together(layout.routes[one], layout.routes[other], 0.08) <= 0.4, (one, other)

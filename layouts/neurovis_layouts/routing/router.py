@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 
+from neurovis_layouts.routing.apart import apart
 from neurovis_layouts.routing.bows import FEW_TRIES, MANY_TRIES, Wish, clear_bow, clear_bows
 from neurovis_layouts.routing.curves import Waypoint, curve
 from neurovis_layouts.routing.detours import Detours
@@ -29,6 +30,8 @@ _MOST_AT_LENGTH = 1000
 #: Nor where all of them together are longer than this by the heights tried.
 _MOST_LENGTH = 250_000.0
 _STEEP_ENOUGH = 0.75
+#: How far off a foreign frame one stays that makes room for another between the same ends.
+_OFF = 0.06
 #: Handles, leanings and slopes for a curve that comes too close to a disc.
 _OTHERWISE = ((0.75, 1.0, 1.0), (0.95, 1.0, 1.0), (0.75, 0.4, 1.0), (0.95, 0.4, 1.0), (0.0, 1.0, 0.3), (0.5, 1.0, 0.0))
 
@@ -64,8 +67,12 @@ def route_all(
     rest = [i for i, edge in enumerate(edges) if i not in routes and edge.source != edge.target]
     routes.update(_bows(edges, centres, rest, obstacles))
     walls = Walls(frames, len(centres)) if frames else None
-    if walls is not None:
-        routes.update(_round_frames(edges, centres, routes, walls))
+    detoured = {} if walls is None else _round_frames(edges, centres, routes, walls)
+    routes.update(detoured)
+    if len(edges) <= min(careful, _MOST_AT_LENGTH):
+        wide = [(own, (x0 - _OFF, y0 - _OFF, x1 + _OFF, y1 + _OFF)) for own, (x0, y0, x1, y1) in frames]
+        bows = frozenset(rest) - detoured.keys()
+        routes.update(apart(edges, routes, bows, near, Walls(wide, len(centres)) if wide else None))
     routes.update(_loops(edges, centres, routes, near, walls))
     return [routes[i] for i in range(len(edges))]
 
