@@ -19,6 +19,9 @@ from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
 from neurovis_layouts.routing.walls import Frame, Walls
 from neurovis_spec.layout.model import Layout, LayoutProblem, Point, Route
 
+#: With more new connections than this nobody can follow one: they do not go round frames.
+_CAREFULLY = 1000
+
 
 def kept(problem: LayoutProblem, fresh: Layout) -> Layout:
     """The fresh layout as it is without memory; with it, what the earlier one knew exactly where it was."""
@@ -93,7 +96,8 @@ def _found(problem: LayoutProblem, ways: _Ways, rest: Sequence[int], routes: Map
 
     ends = {frozenset((problem.edges[i].source, problem.edges[i].target)) for i in rest}
     shown = [i for i, e in enumerate(problem.edges) if frozenset((e.source, e.target)) in ends]
-    walls = [(own, bounds([flat(rect[:2]), flat(rect[2:])])) for own, rect in ways.walls(routes)]
+    walls = ways.walls(routes) if len(shown) <= _CAREFULLY else []
+    walls = [(own, bounds([flat(rect[:2]), flat(rect[2:])])) for own, rect in walls]
     made = route_all([problem.edges[i] for i in shown], [flat(point) for point in ways.centres], {}, frames=walls)
     wanted = set(rest)
     return {
