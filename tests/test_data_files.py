@@ -420,3 +420,17 @@ def test_a_huge_file_is_refused_by_its_size(tmp_path: Path) -> None:
     with (tmp_path / "huge.csv").open("wb") as stream:
         stream.truncate(1 << 40)
     assert refused("huge.csv", tmp_path, tmp_path).code == "too-large"
+
+
+def test_of_a_large_edge_file_rows_of_the_wrong_length_are_told_before_their_cells_are_read() -> None:
+    head, row = b"from,to,weight\n", b"A,B,1\n"
+    large = head + b"A,B,x\n" + row * 200_000 + b"A\nA,B,1,2,3,4\n"
+    found = parse_edges(large)
+    assert found.fault is not None
+    assert [str(fault) for fault in (found.fault, *found.fault.others)] == [
+        "row 200003 has 1 cell, the header 3",
+        "row 200004 has 6 cells, the header 3",
+    ]
+    small = parse_edges(head + b"A,B,x\n" + row * 10 + b"A\n").fault
+    assert small is not None
+    assert len(small.others) == 1

@@ -25,6 +25,8 @@ _COLUMNS: Final = ("from", "to", "weight", "delay")
 _LARGEST_DELAY: Final = 2**31 - 1
 #: separators in the first line; a header has three at most, and a few more may be a mistake to be named
 _MOST_SEPARATORS: Final = 100
+#: bytes above which rows of the wrong length are told alone
+_LARGE: Final = 1 << 20
 #: bytes of rows that are taken together
 _STRETCH: Final = 1 << 18
 
@@ -61,11 +63,15 @@ def parse_edges(data: bytes, room: Room | None = None) -> EdgeTable:
         except CellError as error:  # there is nothing behind it
             reader.faults.note(len(data), error)
     else:
-        lines = _lines(plain_lines(data))
+        plain = plain_lines(data)
+        lines = _lines(plain)
         number, first = next(lines)
         reader = _Reader(Row(number, first.split(",")))
+        even = plain.count(b",") == reader.separators * (plain.count(b"\n") + 1)
+        # a large file that some row of spoils is not read to where that is
+        take = reader.take_lines if even or len(data) <= _LARGE else reader.take_odd
         for number, text in lines:
-            reader.take_lines(text, number)
+            take(text, number)
             if reader.faults.many:
                 break
     return reader.table()
@@ -114,6 +120,11 @@ class _Reader:
         self._targets: list[str] = []
         self._weights, self._delays, self._rows = array("d"), array("q"), array("q")
 
+    @property
+    def separators(self) -> int:
+        """How many a row has."""
+        return len(self._places) - 1
+
     def table(self) -> EdgeTable:
         """What was taken."""
         return EdgeTable(
@@ -143,6 +154,15 @@ class _Reader:
                 return
         for below, line in enumerate(lines):
             self._one(Row(number + below, line.split(",")))
+
+    def take_odd(self, text: str, number: int) -> None:
+        """Take only the lines that have not as many cells as the header."""
+        if text.count(",") == self.separators * (text.count("\n") + 1):
+            # a line with too many may make up for one with too few, but not in the file as a whole
+            return
+        for below, line in enumerate(text.split("\n")):
+            if line.count(",") != self.separators:
+                self._one(Row(number + below, line.split(",")))
 
     def _quickly(self, columns: Sequence[Sequence[str]], numbers: Sequence[int]) -> bool:
         """Take rows, column by column; False, and none is taken, where one of them is at fault or may be."""
