@@ -207,22 +207,22 @@ def _loaded(head: _Head, body: _Body) -> NDArray[np.float64] | None:
 def _without_bad_lines(head: _Head, body: _Body, faults: Faults) -> _Body:
     """The lines without those that do not hold as many numbers as they should, which are noted, and without what is
     behind the last one that is."""
-    good = re.compile(
-        rb"(?:[ \t\r]*+(?:%b(?:[ \t]++%b){%d}[ \t\r]*+)?+(?:\n|\Z))*+" % (_NUMBER, _NUMBER, head.width - 1)
-    )
+    line = rb"[ \t\r]*(?:%b(?:[ \t]+%b){%d}[ \t\r]*)?(?:\n|\Z)" % (_NUMBER, _NUMBER, head.width - 1)
+    good = re.compile(rb"(?:%b){0,%d}" % (line, _TOGETHER))
     parts: list[bytes] = []
     start, number = 0, body.line
     while start < len(body.data) and not faults.many:
         match = good.match(body.data, start)
         assert match is not None
-        parts.append(match[0])
-        number += match[0].count(b"\n")
-        start = match.end()
-        if start < len(body.data):
-            end = body.data.find(b"\n", start) % (len(body.data) + 1)
-            faults.note(number, _bad_line(head, body.data[start : min(end, start + _LONGEST_LINE)], number))
-            parts.append(b"\n")
-            start, number = end + 1, number + 1
+        if match.end() > start:
+            parts.append(match[0])
+            number += match[0].count(b"\n")
+            start = match.end()
+            continue
+        end = body.data.find(b"\n", start) % (len(body.data) + 1)
+        faults.note(number, _bad_line(head, body.data[start : min(end, start + _LONGEST_LINE)], number))
+        parts.append(b"\n")
+        start, number = end + 1, number + 1
     return _Body(b"".join(parts), body.line)
 
 
@@ -270,6 +270,9 @@ def _entries(
     return i, j, values
 
 
+#: Lines that are looked at together; no more, since a match remembers each. (Not possessively: alternatives at the end
+#: of such a group are at fault in Python before 3.11.5.)
+_TOGETHER: Final = 500
 _BEYOND: Final = "the value is beyond double precision"
 
 

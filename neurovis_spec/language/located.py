@@ -145,7 +145,7 @@ def formula_of(node: Node, findings: Findings) -> Formula | None:
         if isinstance(value, (int, float)) and not isinstance(value, bool):
             if math.isfinite(value):
                 return Located(value, node)
-            hint = "'.inf' and '.nan' are no values of a spec; a bound that there is not is left out"
+            hint = "a spec has finite numbers alone; a bound that there is not is left out"
             findings.error("not-finite", node.span, "a finite number is wanted here", hint)
             return None
     message = f"expected a number or an expression, found {describe(node)}"
