@@ -213,7 +213,8 @@ class Constants:
         message = f"the deviation of a normal distribution must be at least 0, this is {second:.15g}"
         hint = "normal(mean, deviation): the mean comes first"
         if draw.kind == "uniform":
-            message = f"the upper end of a uniform distribution is {-second:.15g} below the lower one"
+            below = f"{-second:.15g}" if second > -math.inf else "far"
+            message = f"the upper end of a uniform distribution is {below} below the lower one"
             hint = "uniform(low, high): the lower end comes first"
         self.findings.error("out-of-range", place, message, hint)
 
