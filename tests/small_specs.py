@@ -53,3 +53,20 @@ def pairs(text: str) -> list[str]:
 def weights(text: str) -> list[float]:
     """The weights of a spec, in order."""
     return [weight for _, _, weight, _ in wires(network_of(text))]
+
+
+#: Every kind of thing that commands show: an input with a source and one without, a delay, a rule, outputs.
+SMALL = """\
+neurovis: 1
+name: small
+time: {dt: 0.5, steps: 10}
+parameters: {gain: {value: 0.5, min: 0}}
+inputs: {push: {expression: 1}, pull: {size: 2}}
+neurons:
+  A: {input: push, bias: 0.25}
+  B: {count: 2, input: pull}
+connections:
+  A -> B: {weight: gain, delay: 2}
+  B -> B: {weight: 0.1, pattern: ring, plasticity: {hebbian: {rate: 0.01}}, bounds: [-1, 1]}
+outputs: {last: B2, both: B}
+"""

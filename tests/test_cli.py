@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from small_specs import SMALL
 
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import COMMANDS, neurovis
@@ -24,20 +25,6 @@ ROOT = Path(__file__).parents[1]
 SPECS = ROOT / "specs"
 HEXAPOD = SPECS / "hexapod" / "hexapod.yaml"
 ERRORS = sorted((ROOT / "tests" / "errors").glob("*.yaml"))
-SMALL = """\
-neurovis: 1
-name: small
-time: {dt: 0.5, steps: 10}
-parameters: {gain: {value: 0.5, min: 0}}
-inputs: {push: {expression: 1}, pull: {size: 2}}
-neurons:
-  A: {input: push, bias: 0.25}
-  B: {count: 2, input: pull}
-connections:
-  A -> B: {weight: gain, delay: 2}
-  B -> B: {weight: 0.1, pattern: ring, plasticity: {hebbian: {rate: 0.01}}, bounds: [-1, 1]}
-outputs: {last: B2, both: B}
-"""
 PULL = np.array([[1.0, 2.0], [3.0, 4.0]])
 
 

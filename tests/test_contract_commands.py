@@ -10,32 +10,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from small_specs import SMALL
 
 import neurovis_spec as nv
 from neurovis_spec.cli import progress
 from neurovis_spec.cli.commands import COMMANDS, neurovis
-
-SPEC = """\
-neurovis: 1
-name: small
-time: {dt: 0.5, steps: 10}
-parameters: {gain: {value: 0.5, min: 0}}
-inputs: {push: {expression: 1}, pull: {size: 2}}
-neurons:
-  A: {input: push, bias: 0.25}
-  B: {count: 2, input: pull}
-connections:
-  A -> B: {weight: gain, delay: 2}
-  B -> B: {weight: 0.1, pattern: ring, plasticity: {hebbian: {rate: 0.01}}, bounds: [-1, 1]}
-outputs: {last: B2, both: B}
-"""
 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A working folder with ``small.yaml``."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "small.yaml").write_text(SPEC, encoding="utf-8")
+    (tmp_path / "small.yaml").write_text(SMALL, encoding="utf-8")
     return tmp_path
 
 
@@ -82,7 +68,7 @@ def test_a_spec_is_a_path_or_standard_input(folder: Path, name: str) -> None:
     """A dash is standard input; the results are the same."""
     by_path = good(f"{name} small.yaml {READS[name]}")
     written = {path.name: path.read_bytes() for path in folder.iterdir()}
-    piped = good(f"{name} - {READS[name]}", SPEC)
+    piped = good(f"{name} - {READS[name]}", SMALL)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == written
     if name != "fmt":  # which rewrites a file, and prints what it reads from standard input
         assert re.sub(r"in [\d.]+ s", "", by_path) == re.sub(r"in [\d.]+ s", "", piped).replace("<stdin>", "small.yaml")
@@ -91,7 +77,7 @@ def test_a_spec_is_a_path_or_standard_input(folder: Path, name: str) -> None:
 @pytest.mark.parametrize("name", READS)
 def test_results_go_to_standard_output_and_diagnostics_to_standard_error(folder: Path, name: str) -> None:
     """A warning does not mix with a result, and an error leaves none."""
-    (folder / "odd.yaml").write_text(SPEC.replace("gain: {", "spare: 1, gain: {"), encoding="utf-8")
+    (folder / "odd.yaml").write_text(SMALL.replace("gain: {", "spare: 1, gain: {"), encoding="utf-8")
     if name != "fmt":  # to which unused things are fine
         plain, odd = call(f"{name} small.yaml {READS[name]}"), call(f"{name} odd.yaml {READS[name]}")
         assert odd.exit_code == 0
@@ -329,7 +315,7 @@ def test_a_frame_is_a_step_and_frames_a_second_default_to_one_over_dt(folder: Pa
     """At most 60, and 25 where no dt is written."""
 
     def seconds(time: str, options: str = "") -> float:
-        (folder / "x.yaml").write_text(SPEC.replace("time: {dt: 0.5, steps: 10}", f"time: {time}"), encoding="utf-8")
+        (folder / "x.yaml").write_text(SMALL.replace("time: {dt: 0.5, steps: 10}", f"time: {time}"), encoding="utf-8")
         good(f"animate x.yaml -o x.svg {options}")
         found = re.findall(r'dur="([\d.]+)s"', (folder / "x.svg").read_text(encoding="utf-8"))
         assert len(set(found)) == 1
@@ -394,7 +380,7 @@ def test_new_writes_a_starter_spec_with_comments_and_from_an_example(folder: Pat
 
 def test_fmt_is_idempotent_keeps_comments_and_says_what_it_would_do(folder: Path) -> None:
     """``--check`` and ``--diff`` write nothing."""
-    rough = SPEC.replace("parameters: {gain:", "parameters: {   gain:").replace(
+    rough = SMALL.replace("parameters: {gain:", "parameters: {   gain:").replace(
         "\nneurons:\n", "   # why\n\n\n\nneurons:  # what\n"
     )
     (folder / "small.yaml").write_text(rough, encoding="utf-8")

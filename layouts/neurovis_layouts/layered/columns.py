@@ -20,6 +20,7 @@ import numpy as np
 from neurovis_layouts.layered.crossings import Segments
 from neurovis_layouts.layered.exchange import Exchange
 from neurovis_layouts.layered.levels import Levels, Node, Segment
+from neurovis_layouts.layered.order import places
 from neurovis_spec.layout.model import LayoutProblem
 
 #: From the line of a strip to centres and to lines, within and outside; between two strips.
@@ -65,11 +66,9 @@ def straightened(levels: Levels, order: Sequence[Sequence[int]], columns: Abstra
             segments = Segments(levels)
             boxes = np.array([node.box for node in levels.nodes], dtype=np.int64)
             kin = np.array([node.kin for node in levels.nodes], dtype=np.int64)
-            place = np.zeros(len(levels.nodes), dtype=np.int64)
-            for rank in found:
-                place[rank] = np.arange(len(rank), dtype=np.int64)
             arrays = [np.array(rank, dtype=np.int64) for rank in found]
-            better = Exchange(segments, (boxes, kin)).improved(segments.count(place), arrays)[1]
+            crossings = segments.count(places(len(levels.nodes), arrays))
+            better = Exchange(segments, (boxes, kin)).improved(crossings, arrays)[1]
             return [rank.tolist() for rank in better]
     return None
 

@@ -52,10 +52,11 @@ def ordered(levels: Levels) -> Order:
 
 def crossings(levels: Levels, order: Order) -> int:
     """How many segments cross in this order."""
-    return Segments(levels).count(_places(len(levels.nodes), [np.array(rank, dtype=np.int64) for rank in order]))
+    return Segments(levels).count(places(len(levels.nodes), [np.array(rank, dtype=np.int64) for rank in order]))
 
 
-def _places(count: int, order: Sequence[Ints]) -> Ints:
+def places(count: int, order: Sequence[Ints]) -> Ints:
+    """The place of each of ``count`` nodes in its rank."""
     place = np.zeros(count, dtype=np.int64)
     for rank in order:
         place[rank] = np.arange(len(rank), dtype=np.int64)
@@ -123,7 +124,7 @@ class _State:
 
     def __init__(self, search: _Search, order: list[Ints]) -> None:
         self.search, self.order = search, order
-        self.place = _places(len(search.levels.nodes), order)
+        self.place = places(len(search.levels.nodes), order)
 
     def copy(self) -> _State:
         return _State(self.search, list(self.order))
