@@ -134,6 +134,23 @@ def test_a_link_is_followed_and_a_folder_refused(tmp_path: Path) -> None:
         raise AssertionError("never reached")
 
 
+def test_a_character_device_is_written_as_it_is(tmp_path: Path) -> None:
+    terminal, child = os.openpty()
+    with files.replacing(os.ttyname(child)) as file:
+        file.write(b"all")
+        file.seek(0)
+        file.write(b"A")
+    assert os.read(terminal, 10) == b"All"
+    os.close(terminal)
+    os.close(child)
+    (tmp_path / "x.npz").symlink_to(os.devnull)
+    with files.replacing(tmp_path / "x.npz") as file:
+        file.write(b"gone")
+    assert (tmp_path / "x.npz").is_char_device()
+    with pytest.raises(RecordingError, match="not a regular file"):
+        formats.load(tmp_path / "x.npz")
+
+
 # ---- reading with suspicion --------------------------------------------------------------------------------------
 
 

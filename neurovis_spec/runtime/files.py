@@ -1,14 +1,17 @@
 """Files written as a whole or not at all.
 
 In: a path. Out: an open file beside it, which takes its place when all is written. So a reader never sees half a
-file, and an interrupted run leaves what was there before.
+file, and an interrupted run leaves what was there before. A character device (``/dev/null``, a terminal) has no place
+to take: it gets all at the end.
 """
 
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import stat
+import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -21,9 +24,17 @@ from uuid import uuid4
 def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     """A file to write (and to read) that replaces ``path`` at the end; after an exception nothing has changed.
 
-    A link is followed. Raises OSError where the folder cannot be written or the path is no regular file.
+    A link is followed. Raises OSError where the folder cannot be written or the path is neither a regular file nor a
+    character device.
     """
     target = Path(os.path.realpath(path))
+    if target.is_char_device():
+        with tempfile.TemporaryFile() as file:
+            yield file
+            file.seek(0)
+            with target.open("wb") as device:
+                shutil.copyfileobj(file, device)
+        return
     if target.exists() and not target.is_file():
         raise OSError(f"{path} is not a regular file")
     beside = target.with_name(f".{target.name[:100]}.{uuid4().hex[:12]}.part")
