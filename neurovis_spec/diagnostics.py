@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import islice
 from typing import Literal, NamedTuple
 
 Severity = Literal["error", "warning"]
@@ -130,6 +131,23 @@ def headline(diagnostic: Diagnostic) -> str:
     return f"{place}: {diagnostic.severity}[{diagnostic.code}]: {diagnostic.message}"
 
 
+def shown(text: str, most: int = 40) -> str:
+    """A piece of the author's text in a finding: the beginning of a long one."""
+    return text if len(text) <= most else text[: most - 3] + "…"
+
+
+def listed(names: Collection[str]) -> str:
+    """Known names in a help line: the first few, as far as they fit.
+
+    >>> listed(["kernel", "sigmoid"]), listed(["x" * 300, *(f"C{number}" for number in range(100))])[37:]
+    ('kernel, sigmoid', '…, C0, C1, C2, C3, C4, C5, C6, C7, C8, C9, C10, …')
+    """
+    words = [shown(name) for name in islice(names, 12)]
+    while len(words) > 1 and sum(map(len, words)) > 240:
+        words.pop()
+    return ", ".join(words) + (", …" if len(words) < len(names) else "")
+
+
 def nearest(name: str, known: Iterable[str], most: int = 3) -> tuple[str, ...]:
     """The known names that are most like ``name``, best first; none that is too far off.
 
@@ -230,8 +248,7 @@ def suggest(name: str, known: Iterable[str], what: str = "known") -> str | None:
         return did_you_mean(close)
     if not names:
         return None
-    shown = ", ".join(names[:12]) + (", …" if len(names) > 12 else "")
-    return f"{what}: {shown}"
+    return f"{what}: {listed(names)}"
 
 
 def did_you_mean(names: Iterable[str]) -> str:

@@ -223,6 +223,24 @@ def test_an_empty_value_stands_behind_its_colon(pure: bool) -> None:
     assert [(span.line, span.column, span.end_column) for span in spans] == [(1, 3, 3), (2, 7, 7), (2, 12, 12)]
 
 
+@both_parsers
+@pytest.mark.parametrize(
+    ("text", "places"),
+    [
+        ("? a\n: ? b", [(2, 6)]),
+        ("? a\n: ? b   # no colon:\n     # here either\n", [(2, 6)]),
+        ("? a\n:\n  ? b\n  ? c\n", [(3, 6), (4, 6)]),
+        ("? a\n:\n  ? b\n  : # nothing\n", [(4, 4)]),
+    ],
+)
+def test_a_value_without_a_colon_stands_behind_its_key(text: str, places: list[tuple[int, int]], pure: bool) -> None:
+    inner = root(text, pure).get("a")
+    assert isinstance(inner, Mapping)
+    spans = [entry.value.span for entry in inner.entries]
+    assert [(span.line, span.column) for span in spans] == places
+    assert [(span.end_line, span.end_column) for span in spans] == places
+
+
 REFUSALS = [
     ("a: 1\nb: 2\na: 3\nb: 4\n", ["3:1 duplicate-key", "4:1 duplicate-key"]),
     ("x: {a: 1, 'a': 2}\n", ["1:11 duplicate-key"]),

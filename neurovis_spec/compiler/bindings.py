@@ -13,8 +13,8 @@ from neurovis_spec.compiler.gaps import Gaps
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Input
 from neurovis_spec.compiler.references import Section
-from neurovis_spec.diagnostics import Findings, Span, suggest
-from neurovis_spec.language.located import Located, shown
+from neurovis_spec.diagnostics import Findings, Span, shown, suggest
+from neurovis_spec.language.located import Located
 from neurovis_spec.language.model import lost_names
 from neurovis_spec.language.modules import InstanceModel
 

@@ -18,12 +18,12 @@ import numpy as np
 from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.limits import MOST_HINTS
 from neurovis_spec.compiler.network import FloatArray, IntArray
-from neurovis_spec.diagnostics import Findings, suggest
+from neurovis_spec.diagnostics import Findings, shown, suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS, FUNCTIONS
 from neurovis_spec.language.expressions.parser import DRAWS, ExpressionError, parse, unknown_names
 from neurovis_spec.language.expressions.tree import Draw, Number, Tree, draws, names
-from neurovis_spec.language.located import Formula, shown
+from neurovis_spec.language.located import Formula
 
 Value: TypeAlias = float | FloatArray
 

@@ -19,8 +19,8 @@ from neurovis_spec.compiler.limits import LONGEST_DELAY, PATIENCE
 from neurovis_spec.compiler.network import FloatArray, IntArray
 from neurovis_spec.compiler.references import few
 from neurovis_spec.compiler.tables import Files
-from neurovis_spec.diagnostics import Span, suggest
-from neurovis_spec.language.located import Formula, formula_of, shown
+from neurovis_spec.diagnostics import Span, shown, suggest
+from neurovis_spec.language.located import Formula, formula_of
 from neurovis_spec.language.source import NULL, TEXT
 from neurovis_spec.language.values import EdgeRows, FileReference
 

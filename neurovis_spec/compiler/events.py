@@ -23,8 +23,8 @@ from neurovis_spec.compiler.references import (
     resolve_end,
     resolve_ends,
 )
-from neurovis_spec.diagnostics import Findings, suggest
-from neurovis_spec.language.located import Formula, Located, shown
+from neurovis_spec.diagnostics import Findings, shown, suggest
+from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.model import lost_names
 from neurovis_spec.language.sections import EventModel
 

@@ -28,8 +28,8 @@ from neurovis_spec.compiler.positions import positions_of
 from neurovis_spec.compiler.references import key_span
 from neurovis_spec.compiler.settings import check_initials, choose, look_at_settings, parameters, spread
 from neurovis_spec.compiler.units import Unit
-from neurovis_spec.diagnostics import meant, suggest
-from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, shown, too_long
+from neurovis_spec.diagnostics import meant, shown, suggest
+from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, too_long
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.source import Scalar
 from neurovis_spec.language.values import Choice, FormulaList

@@ -15,8 +15,8 @@ from neurovis_spec.compiler.network import FloatArray, IntArray, Rule
 from neurovis_spec.compiler.references import Directory, few, resolve_end
 from neurovis_spec.compiler.settings import check_initials, choose, look_at_settings, parameters, settle
 from neurovis_spec.compiler.units import Unit
-from neurovis_spec.diagnostics import suggest
-from neurovis_spec.language.located import Located, shown
+from neurovis_spec.diagnostics import shown, suggest
+from neurovis_spec.language.located import Located
 from neurovis_spec.language.source import Entry, Scalar
 from neurovis_spec.language.values import Choice
 

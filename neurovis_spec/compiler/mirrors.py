@@ -16,8 +16,8 @@ from neurovis_spec.compiler.pins import Pins
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import Directory, resolve, resolve_end
 from neurovis_spec.compiler.units import Unit
-from neurovis_spec.diagnostics import Findings
-from neurovis_spec.language.located import Located, shown
+from neurovis_spec.diagnostics import Findings, shown
+from neurovis_spec.language.located import Located
 from neurovis_spec.language.values import Reference
 
 #: Coordinates of pins that differ by less are the same.

@@ -18,9 +18,9 @@ from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.patterns_drawn import fixed_indegree, fixed_outdegree, small_world
 from neurovis_spec.compiler.patterns_near import band, in_band, nearest
 from neurovis_spec.compiler.settings import look_at_settings
-from neurovis_spec.diagnostics import Findings, Span, meant, suggest
+from neurovis_spec.diagnostics import Findings, Span, meant, shown, suggest
 from neurovis_spec.diagnostics import nearest as nearest_names
-from neurovis_spec.language.located import Formula, formula_of, shown
+from neurovis_spec.language.located import Formula, formula_of
 from neurovis_spec.language.values import Choice
 
 

@@ -15,9 +15,9 @@ from typing import Final, NamedTuple, TypeAlias
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import Directory, key_of, look_at_keys, resolve_end
 from neurovis_spec.compiler.units import Unit
-from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.diagnostics import Findings, Span, shown
 from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel
-from neurovis_spec.language.located import Located, shown
+from neurovis_spec.language.located import Located
 from neurovis_spec.language.values import Point
 
 Place: TypeAlias = tuple[float, float]

@@ -15,8 +15,8 @@ from typing import TypeAlias
 from neurovis_spec.compiler.gaps import Gaps
 from neurovis_spec.compiler.limits import MOST_HINTS, PATIENCE
 from neurovis_spec.compiler.network import Group
-from neurovis_spec.diagnostics import Findings, Span, did_you_mean, meant, nearest, suggest
-from neurovis_spec.language.located import Located, shown
+from neurovis_spec.diagnostics import Findings, Span, did_you_mean, listed, meant, nearest, shown, suggest
+from neurovis_spec.language.located import Located
 from neurovis_spec.language.modules import ModuleModel
 from neurovis_spec.language.source import Mapping as SourceMapping
 from neurovis_spec.language.source import Scalar
@@ -162,7 +162,7 @@ def few(name: str, known: Collection[str]) -> Collection[str]:
 
 def other_parameter(name: str, known: Collection[str]) -> str:
     """A help line for a parameter that cannot be set as there is none of that name; ``known`` are the spec's own."""
-    there = "the spec has no parameters" if not known else f"parameters of the spec: {', '.join(islice(known, 12))}"
+    there = "the spec has no parameters" if not known else f"parameters of the spec: {listed(known)}"
     if "." in name:
         instance, _, own = name.partition(".")
         where = f"{instance}: {{set: {{{own}: …}}}}"

@@ -18,9 +18,9 @@ from neurovis_spec.compiler.pins import DIAMETER, FARTHEST, pins_of
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import Directory, key_of, look_at_keys, resolve, resolve_end
 from neurovis_spec.compiler.units import Unit
-from neurovis_spec.diagnostics import Findings, Span, suggest
+from neurovis_spec.diagnostics import Findings, Span, shown, suggest
 from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel, RenderModel
-from neurovis_spec.language.located import Formula, Located, shown
+from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.source import Mapping as SourceMapping
 from neurovis_spec.language.spec import RosModel, Spec
 

@@ -16,11 +16,11 @@ from neurovis_spec.compiler.definitions import Default, Defaults, Definitions, c
 from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.limits import PATIENCE, plural
 from neurovis_spec.compiler.network import FloatArray, Quantity
-from neurovis_spec.diagnostics import Findings, meant, nearest, suggest
+from neurovis_spec.diagnostics import Findings, meant, nearest, shown, suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.tree import names
-from neurovis_spec.language.located import IDENTIFIER, Formula, formula_of, shown
+from neurovis_spec.language.located import IDENTIFIER, Formula, formula_of
 from neurovis_spec.language.source import Entry, Packed, Scalar, Sequence
 from neurovis_spec.language.values import Choice, FormulaList
 

@@ -25,9 +25,9 @@ from neurovis_spec.compiler.parameters import make_parameters
 from neurovis_spec.compiler.references import Section, key_of, key_span
 from neurovis_spec.compiler.signals import make_input
 from neurovis_spec.compiler.tables import Files
-from neurovis_spec.diagnostics import Findings, suggest
+from neurovis_spec.diagnostics import Findings, shown, suggest
 from neurovis_spec.language.expressions.tree import Number, names, substitute
-from neurovis_spec.language.located import NAME_RULE, Formula, shown, too_long
+from neurovis_spec.language.located import NAME_RULE, Formula, too_long
 from neurovis_spec.language.model import lost_names
 from neurovis_spec.language.modules import INCLUDED, InstanceModel
 

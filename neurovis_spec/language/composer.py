@@ -213,8 +213,11 @@ class Composer:
             if commas is None or not commas.cut(key_event, key_node, value_event):
                 key = self._key(key_event, key_node)
                 value = self._node(value_event, depth + 1)
-                if commas is not None and isinstance(value, Scalar):
-                    value = self._behind_colon(key_event, value_event, value)
+                if isinstance(value, Scalar):
+                    if commas is not None:
+                        value = self._behind_colon(key_event, value_event, value)
+                    elif value.span.line > key_node.span.end_line:
+                        value = self._behind_lone_key(key_node, value_event, value)
                 last = _end_of(value)
                 name = None if key is None else str(key.value)
                 if key is not None and name is not None:
@@ -238,6 +241,15 @@ class Composer:
         if match is None:
             return value
         line, column = key_end.line + 1, key_end.column + 1 + match.end()
+        return Scalar(value.value, Span(self._file, line, column, line, column), value.inner)
+
+    def _behind_lone_key(self, key: Node, value_event: Event, value: Scalar) -> Scalar:
+        """A value that is not there, behind a ``? key`` without a colon, stands behind its key: where the parser says
+        that it is may be past the end of the text."""
+        end = marks.end(value_event).index
+        if marks.begin(value_event).index < end or self._text[end - 1 : end] == ":":
+            return value
+        line, column = _end_of(key)
         return Scalar(value.value, Span(self._file, line, column, line, column), value.inner)
 
     def _key(self, event: Event, node: Node) -> Scalar | None:

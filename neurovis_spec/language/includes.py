@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, NamedTuple, TypeAlias
 
-from neurovis_spec.diagnostics import Findings
+from neurovis_spec.diagnostics import Findings, shown
 from neurovis_spec.language.data_files import locate
-from neurovis_spec.language.located import Located, shown
+from neurovis_spec.language.located import Located
 from neurovis_spec.language.modules import IncludedModel
 from neurovis_spec.language.reader import LARGEST, read_content
 from neurovis_spec.language.reader_files import FileFault, read_bytes

@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator
 from typing import Final, NamedTuple
 
-from neurovis_spec.diagnostics import Findings, did_you_mean, meant, nearest, suggest
-from neurovis_spec.language.located import shown
+from neurovis_spec.diagnostics import Findings, did_you_mean, meant, nearest, shown, suggest
 from neurovis_spec.language.source import Entry, Mapping
 
 #: Errors after which unknown keys are no longer compared with the known ones.

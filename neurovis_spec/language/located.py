@@ -18,7 +18,7 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import PydanticCustomError, core_schema
 
-from neurovis_spec.diagnostics import Findings, Span, meant, nearest, suggest
+from neurovis_spec.diagnostics import Findings, Span, meant, nearest, shown, suggest
 from neurovis_spec.language.scalars import INTEGER_HIGH, INTEGER_LOW
 from neurovis_spec.language.source import Node, Packed, Scalar, Sequence, describe
 
@@ -108,11 +108,6 @@ def as_identifier(node: Node, info: ValidationInfo) -> Located[str]:
 
 
 NAME_RULE = "a name is a letter or underscore, then letters, digits and underscores, 64 at most"
-
-
-def shown(text: str) -> str:
-    """A text of the author's in a finding: the beginning of a long one."""
-    return text if len(text) <= 40 else text[:37] + "…"
 
 
 def too_long(name: str) -> str:

@@ -12,6 +12,7 @@ from typing import Annotated, ClassVar
 from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
+from neurovis_spec.diagnostics import shown
 from neurovis_spec.language.located import (
     FORMULA,
     BoolField,
@@ -23,7 +24,6 @@ from neurovis_spec.language.located import (
     TextsField,
     findings_of,
     refuse,
-    shown,
     words,
 )
 from neurovis_spec.language.model import Filled, Keyed, KeysAreNames, Model

@@ -12,7 +12,7 @@ from typing import Annotated, NamedTuple, TypeAlias, TypeVar
 from pydantic import ValidationInfo
 from pydantic_core import PydanticCustomError
 
-from neurovis_spec.diagnostics import Span
+from neurovis_spec.diagnostics import Span, shown
 from neurovis_spec.language.keys import read_keys
 from neurovis_spec.language.located import (
     FORMULA,
@@ -26,7 +26,6 @@ from neurovis_spec.language.located import (
     findings_of,
     give_up,
     refuse,
-    shown,
 )
 from neurovis_spec.language.model import opening
 from neurovis_spec.language.source import Entry, Mapping, Node, Packed, Scalar, Sequence

@@ -9,9 +9,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.diagnostics import Findings, Span, shown
 from neurovis_spec.language.data_files import locate
-from neurovis_spec.language.located import Located, shown
+from neurovis_spec.language.located import Located
 from neurovis_spec.language.reader import LARGEST
 from neurovis_spec.language.reader_files import FileFault, read_bytes
 from neurovis_spec.layout.file import parse_bytes

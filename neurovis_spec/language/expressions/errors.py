@@ -21,8 +21,3 @@ class ExpressionError(Exception):
         self.others: tuple[ExpressionError, ...] = ()
         self.used: tuple[tuple[str, int, int], ...] = ()
         super().__init__(message)
-
-
-def shortened(text: str, most: int = 40) -> str:
-    """A piece of the author's text in a message: the beginning of a long one."""
-    return text if len(text) <= most else text[: most - 3] + "…"

@@ -13,7 +13,8 @@ import unicodedata
 from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
-from neurovis_spec.language.expressions.errors import ExpressionError, shortened
+from neurovis_spec.diagnostics import shown
+from neurovis_spec.language.expressions.errors import ExpressionError
 
 Kind = Literal["number", "name", "operator", "end"]
 
@@ -120,13 +121,13 @@ def _number(text: str, number: re.Match[str]) -> Token:
         written = text[start : tail.end()]
         raise ExpressionError(
             "malformed-number",
-            f"'{shortened(written)}' is no number",
+            f"'{shown(written)}' is no number",
             start,
             tail.end(),
             _number_hint(number.group(), tail.group()),
         )
     if math.isinf(float(number.group())):
-        message = f"{shortened(number.group(), 20)} is beyond the range of numbers, which ends near 1.8e308"
+        message = f"{shown(number.group(), 20)} is beyond the range of numbers, which ends near 1.8e308"
         raise ExpressionError("number-overflow", message, start, end)
     return Token("number", number.group(), start, end)
 
@@ -137,9 +138,9 @@ def _number_hint(number: str, tail: str) -> str | None:
     if number == "0" and re.fullmatch(r"[xXoObB][0-9a-fA-F]+", tail):
         return "numbers are decimal here"
     if re.fullmatch(r"[eE]", tail):
-        return f"an exponent needs digits, as in {shortened(number)}e-3"
+        return f"an exponent needs digits, as in {shown(number)}e-3"
     if _NAME.fullmatch(tail):
-        return f"for a product write {shortened(number)} * {shortened(tail)}"
+        return f"for a product write {shown(number)} * {shown(tail)}"
     return None
 
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from neurovis_spec.diagnostics import nearest
-from neurovis_spec.language.expressions.errors import ExpressionError, shortened
+from neurovis_spec.diagnostics import nearest, shown
+from neurovis_spec.language.expressions.errors import ExpressionError
 from neurovis_spec.language.expressions.lexer import Token, is_operand
 
 _INSTEAD: Mapping[str, str] = {
@@ -79,9 +79,9 @@ def unexpected(previous: Token | None, token: Token) -> ExpressionError:
         return _at("unexpected-comma", message, token, "write decimals with a point, as in 0.5")
     if token.text == "else":
         return _at("missing-if", "'else' without 'if'", token, "write 'a if condition else b'")
-    before = "" if previous is None else shortened(previous.text)
-    product = f"{before} * {shortened(token.text)}" if is_operand(token) else "*"
-    message = f"an operator is missing between '{before}' and '{shortened(token.text)}'"
+    before = "" if previous is None else shown(previous.text)
+    product = f"{before} * {shown(token.text)}" if is_operand(token) else "*"
+    message = f"an operator is missing between '{before}' and '{shown(token.text)}'"
     return _at("missing-operator", message, token, f"for a product write '{product}'")
 
 
@@ -95,8 +95,8 @@ def unknown_function(name: Token, functions: Sequence[str], fitting: Sequence[st
     elif close:
         hint = "did you mean " + " or ".join(f"'{other}'" for other in close) + "?"
     else:
-        hint = f"for a product write '{shortened(name.text)} * (…)'; the functions are {', '.join(functions)}"
-    return _at("unknown-function", f"unknown function '{shortened(name.text)}'", name, hint)
+        hint = f"for a product write '{shown(name.text)} * (…)'; the functions are {', '.join(functions)}"
+    return _at("unknown-function", f"unknown function '{shown(name.text)}'", name, hint)
 
 
 def wrong_arguments(
