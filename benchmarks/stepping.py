@@ -19,7 +19,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
 from networks_by_hand import TANH, Link, Unit, build, cpg_rbf
 
-from neurovis_spec.compiler.network import Block, Network
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Block
 from neurovis_spec.runtime.backend import load
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.record import record

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING
 from neurovis_spec.version import __version__
 
 if TYPE_CHECKING:
-    from neurovis_spec.api import CompiledNetwork, compile, compile_text, load
+    from neurovis_spec.api import compile, compile_text, load
+    from neurovis_spec.compiled import CompiledNetwork
     from neurovis_spec.diagnostics import Diagnostic, SpecError
 
 __all__ = ["CompiledNetwork", "Diagnostic", "SpecError", "__version__", "compile", "compile_text", "load"]
 
 _HOMES = {
-    "CompiledNetwork": "neurovis_spec.api",
+    "CompiledNetwork": "neurovis_spec.compiled",
     "compile": "neurovis_spec.api",
     "compile_text": "neurovis_spec.api",
     "load": "neurovis_spec.api",

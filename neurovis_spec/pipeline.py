@@ -21,7 +21,8 @@ from typing import TYPE_CHECKING
 import numpy.typing as npt
 
 from neurovis_spec.compiler.compile import Request, compile_spec
-from neurovis_spec.compiler.network import Network, RenderSettings
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.includes import read_includes
 from neurovis_spec.language.reader import read_file, read_text

@@ -23,8 +23,8 @@ from typing import TYPE_CHECKING
 import fuzz_expressions
 
 import neurovis_spec as nv
-from neurovis_spec.api import CompiledNetwork
 from neurovis_spec.codes import catalogue
+from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError
 from neurovis_spec.findings import show_text, to_json
 from neurovis_spec.language.expressions.arrays import evaluate_array

@@ -12,18 +12,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from neurovis_spec.compiler.network import (
-    Connections,
-    FloatArray,
-    Group,
-    IntArray,
-    LayoutSettings,
-    Network,
-    Neurons,
-    Plasticity,
-    RenderSettings,
-    Rule,
-)
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.network import Connections, Group, Network, Neurons
+from neurovis_spec.compiler.program import Plasticity, Rule
+from neurovis_spec.compiler.wishes import LayoutSettings, RenderSettings
 from neurovis_spec.layout.model import Layout, Point, Route
 from neurovis_spec.runtime.recording import Snapshot
 

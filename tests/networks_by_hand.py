@@ -11,30 +11,24 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from neurovis_spec.compiler.network import (
+from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.network import Connections, Group, Input, Network, Neurons, Output
+from neurovis_spec.compiler.program import (
     Activation,
     Block,
     Combine,
-    Connections,
-    FloatArray,
     Gather,
-    Group,
-    Input,
-    LayoutSettings,
     Learn,
     Model,
-    Network,
-    Neurons,
     Operation,
-    Output,
     Plasticity,
     Quantity,
     ReadInputs,
-    RenderSettings,
     Rule,
     Send,
     Update,
 )
+from neurovis_spec.compiler.wishes import LayoutSettings, RenderSettings
 from neurovis_spec.language.expressions.parser import parse
 from neurovis_spec.language.expressions.tree import Tree
 

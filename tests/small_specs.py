@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import neurovis_spec as nv
-from neurovis_spec.api import CompiledNetwork
+from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.network import Network
 
 HEAD = "neurovis: 1\nname: x\n"

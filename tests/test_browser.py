@@ -26,7 +26,7 @@ from neurovis_renderers.raster import PillowRenderer
 from neurovis_renderers.svg import SvgRenderer
 from PIL import Image
 
-from neurovis_spec.compiler.network import RenderSettings
+from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.scene import Film, Scene, channels, colours, still
 from neurovis_spec.scene.encode import encode
 from neurovis_spec.scene.film import film

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.ends import Ends
-from neurovis_spec.compiler.network import FloatArray
 from neurovis_spec.compiler.patterns_near import nearest
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from small_specs import codes, compiled
 
-from neurovis_spec.api import CompiledNetwork
+from neurovis_spec.compiled import CompiledNetwork
 
 HEAD = "parameters: {two: 2, half: two/4}\n"
 ONE = "neurons: {A: {bias: 1}}\n"

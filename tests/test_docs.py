@@ -11,8 +11,8 @@ import pytest
 import yaml
 
 import neurovis_spec as nv
-from neurovis_spec.api import CompiledNetwork
 from neurovis_spec.cli.topics import contents, text_of
+from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.patterns import PATTERNS
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.manual.builtins import builtins

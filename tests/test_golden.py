@@ -21,7 +21,7 @@ import pytest
 
 import neurovis_spec as nv
 from neurovis_spec import pipeline
-from neurovis_spec.api import CompiledNetwork
+from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.scene import Scene
 
 HERE = Path(__file__).parent

@@ -15,8 +15,8 @@ from random_specs import Plain, Spec, section, specs
 from small_specs import HEAD, codes, compiled, network_of, wires
 
 import neurovis_spec as nv
-from neurovis_spec.api import CompiledNetwork
 from neurovis_spec.cli.commands import neurovis
+from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.limits import DEEPEST, MOST_INSTANCES
 from neurovis_spec.runtime.recording import Recording

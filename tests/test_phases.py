@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import neurovis_spec as nv
-from neurovis_spec.compiler.network import Learn, Network
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Learn
 
 HEAD = """
 neurovis: 1

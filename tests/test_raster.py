@@ -15,7 +15,7 @@ from neurovis_renderers.lettering import lettering
 from neurovis_renderers.raster import Canvas, PillowRenderer
 from PIL import Image
 
-from neurovis_spec.compiler.network import RenderSettings
+from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.scene import Disc, Film, Scene, Text, channels, still, texts
 from neurovis_spec.scene.encode import encode
 from neurovis_spec.scene.film import film

@@ -26,7 +26,9 @@ from networks_by_hand import (
     tree,
 )
 
-from neurovis_spec.compiler.network import Activation, Combine, FloatArray, Input, Model, Network
+from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.network import Input, Network
+from neurovis_spec.compiler.program import Activation, Combine, Model
 from neurovis_spec.runtime.backend import BackendError, Capabilities, choose_backend, listing, load, prepare
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.numpy_backend import NumpyBackend

@@ -13,7 +13,7 @@ import pytest
 from small_specs import compiled
 
 import neurovis_spec as nv
-from neurovis_spec.api import CompiledNetwork
+from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.runtime.files import uninterrupted
 from neurovis_spec.runtime.memory import TooLargeError
 from neurovis_spec.runtime.recording import Recording, RecordingError

@@ -10,7 +10,7 @@ from hand_networks import C, G, network, numbered, use_case_1
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from neurovis_spec.compiler.network import RenderSettings
+from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.scene.gains import choose_gains
 
 CASE = use_case_1(700)

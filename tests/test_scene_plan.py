@@ -10,7 +10,8 @@ import numpy.typing as npt
 import pytest
 from hand_networks import C, Case, G, loop, network, numbered, straight, straight_layout, use_case_1
 
-from neurovis_spec.compiler.network import Network, RenderSettings
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.layout.model import Layout, Point
 from neurovis_spec.scene import Arrowhead, Disc, Group, Rectangle, Scene, Spline, Text, still, texts
 from neurovis_spec.scene.encode import encode

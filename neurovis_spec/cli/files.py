@@ -18,8 +18,9 @@ from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.progress import progress
 
 if TYPE_CHECKING:
-    from neurovis_spec.api import CompiledNetwork
-    from neurovis_spec.compiler.network import FloatArray, Network
+    from neurovis_spec.compiled import CompiledNetwork
+    from neurovis_spec.compiler.arrays import FloatArray
+    from neurovis_spec.compiler.network import Network
     from neurovis_spec.layout import Layout
     from neurovis_spec.runtime.recording import Recording
 

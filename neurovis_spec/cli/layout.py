@@ -14,7 +14,7 @@ from neurovis_spec.cli.options import engine_option, examples, output_option, se
 from neurovis_spec.cli.progress import progress
 
 if TYPE_CHECKING:
-    from neurovis_spec.api import NetworkLayout
+    from neurovis_spec.compiled import NetworkLayout
     from neurovis_spec.layout import Layout
 
 

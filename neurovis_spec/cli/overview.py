@@ -16,8 +16,9 @@ from neurovis_spec.cli.tables import number, spread, table
 from neurovis_spec.findings import printable
 
 if TYPE_CHECKING:
-    from neurovis_spec.api import CompiledNetwork
-    from neurovis_spec.compiler.network import Group, Input, IntArray, Network
+    from neurovis_spec.compiled import CompiledNetwork
+    from neurovis_spec.compiler.arrays import IntArray
+    from neurovis_spec.compiler.network import Group, Input, Network
 
 #: The largest network whose connection matrix is shown, in neurons.
 _MATRIX = 24

@@ -13,7 +13,7 @@ from neurovis_spec.cli.options import backend_option, compile_options, examples,
 from neurovis_spec.cli.progress import progress
 
 if TYPE_CHECKING:
-    from neurovis_spec.api import CompiledNetwork
+    from neurovis_spec.compiled import CompiledNetwork
     from neurovis_spec.runtime.recording import Recording
 
 #: activities shown where nothing is written to a file

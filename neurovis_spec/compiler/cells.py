@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.constants import Constants, Randomness, Value, check_finite
 from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.limits import PATIENCE
-from neurovis_spec.compiler.network import FloatArray, IntArray
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.located import Located, formula_of
 from neurovis_spec.language.source import NULL, NUMBER, TEXT, Node, Packed, Scalar, Sequence

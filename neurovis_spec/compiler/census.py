@@ -16,10 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.constants import Constants, Value
 from neurovis_spec.compiler.limits import MOST_INSTANCES, amount
 from neurovis_spec.compiler.modules import Module
-from neurovis_spec.compiler.network import FloatArray
 from neurovis_spec.compiler.references import Section, key_span
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.parser import ExpressionError, parse

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from neurovis_spec.compiler.arrays import IntArray
 from neurovis_spec.compiler.connect import Connected, connect, join
 from neurovis_spec.compiler.constants import Constants, parse_formula
 from neurovis_spec.compiler.crowds import crowded
@@ -23,7 +24,7 @@ from neurovis_spec.compiler.gaps import gaps_of
 from neurovis_spec.compiler.limits import MOST_SIGNALS, Limits, amount
 from neurovis_spec.compiler.lower import make_blocks, make_plasticity, make_program
 from neurovis_spec.compiler.modules import library_of
-from neurovis_spec.compiler.network import Instance, IntArray, Network
+from neurovis_spec.compiler.network import Instance, Network
 from neurovis_spec.compiler.noise import make_noises
 from neurovis_spec.compiler.order import Cycle, levels
 from neurovis_spec.compiler.parameters import make_parameters

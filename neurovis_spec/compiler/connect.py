@@ -11,10 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from neurovis_spec.compiler.arrays import IntArray, frozen
 from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.entries import Bundle, EntryBuilder, Place
 from neurovis_spec.compiler.limits import Limits
-from neurovis_spec.compiler.network import Connections, IntArray, frozen
+from neurovis_spec.compiler.network import Connections
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import Directory, resolve_each
 from neurovis_spec.compiler.units import Unit

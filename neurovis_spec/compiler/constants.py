@@ -15,9 +15,9 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.limits import MOST_HINTS
-from neurovis_spec.compiler.network import FloatArray, IntArray
 from neurovis_spec.diagnostics import Findings, shown, suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS, FUNCTIONS

@@ -16,7 +16,7 @@ import numpy as np
 from neurovis_spec.compiler.constants import ALWAYS, Value, check_finite, is_constant, parse_formula
 from neurovis_spec.compiler.gaps import Gaps, gaps_of
 from neurovis_spec.compiler.limits import PATIENCE
-from neurovis_spec.compiler.network import Activation, Model, Quantity, Rule
+from neurovis_spec.compiler.program import Activation, Model, Quantity, Rule
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.errors import ExpressionError

@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.cells import Cells, Pairs, cells_of, values_of
 from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.limits import LONGEST_DELAY, PATIENCE
-from neurovis_spec.compiler.network import FloatArray, IntArray
 from neurovis_spec.compiler.references import few
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.diagnostics import Span, shown, suggest

@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from neurovis_spec.compiler.network import FloatArray, IntArray
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
 
 #: Positions within the two ends, one pair an index.
 Pairs: TypeAlias = tuple[IntArray, IntArray]

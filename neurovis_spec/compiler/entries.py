@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.constants import Constants, Randomness
 from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.edges import EdgeReader, End, delay_of
@@ -18,7 +19,6 @@ from neurovis_spec.compiler.ends import Ends
 from neurovis_spec.compiler.learning import Learning, learning_of
 from neurovis_spec.compiler.limits import Limits, amount
 from neurovis_spec.compiler.matrices import Grid, grid_of
-from neurovis_spec.compiler.network import FloatArray, IntArray
 from neurovis_spec.compiler.patterns import all_to_all, pairs_of
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import Directory

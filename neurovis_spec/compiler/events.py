@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from neurovis_spec.compiler.arrays import IntArray
 from neurovis_spec.compiler.connect import Connected
 from neurovis_spec.compiler.constants import Constants
-from neurovis_spec.compiler.network import IntArray
 from neurovis_spec.compiler.references import (
     Directory,
     few,

@@ -11,20 +11,14 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.definitions import Defaults, Definitions
 from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.limits import PATIENCE, Limits, amount, plural
-from neurovis_spec.compiler.network import (
-    Activation,
-    Combine,
-    FloatArray,
-    Group,
-    IntArray,
-    Model,
-    Role,
-)
+from neurovis_spec.compiler.network import Group, Role
 from neurovis_spec.compiler.positions import positions_of
+from neurovis_spec.compiler.program import Activation, Combine, Model
 from neurovis_spec.compiler.references import key_span
 from neurovis_spec.compiler.settings import check_initials, choose, look_at_settings, parameters, spread
 from neurovis_spec.compiler.units import Unit

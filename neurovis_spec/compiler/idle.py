@@ -14,7 +14,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.network import Block, Group, IntArray, Network
+from neurovis_spec.compiler.arrays import IntArray
+from neurovis_spec.compiler.network import Group, Network
+from neurovis_spec.compiler.program import Block
 from neurovis_spec.language.expressions.arrays import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 

@@ -10,7 +10,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from neurovis_spec.compiler.network import FloatArray, Rule
+from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.program import Rule
 from neurovis_spec.language.expressions.arrays import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 

@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.compiler.network import FloatArray, IntArray, Rule
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.program import Rule
 from neurovis_spec.compiler.references import Directory, few, resolve_end
 from neurovis_spec.compiler.settings import check_initials, choose, look_at_settings, parameters, settle
 from neurovis_spec.compiler.units import Unit

@@ -11,24 +11,22 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from neurovis_spec.compiler.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.entries import Bundle
 from neurovis_spec.compiler.groups import Kind
 from neurovis_spec.compiler.learning import Learning
-from neurovis_spec.compiler.network import (
+from neurovis_spec.compiler.populate import Population
+from neurovis_spec.compiler.program import (
     Block,
     Combine,
-    FloatArray,
     Gather,
-    IntArray,
     Learn,
     Operation,
     Plasticity,
     ReadInputs,
     Send,
     Update,
-    frozen,
 )
-from neurovis_spec.compiler.populate import Population
 from neurovis_spec.diagnostics import Span
 
 #: What the neurons of a block have in common: level, activation, model, combination.

@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.cells import Pairs, cells_of, values_of
 from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.limits import PATIENCE, plural
-from neurovis_spec.compiler.network import FloatArray
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.source import NULL

@@ -9,8 +9,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from neurovis_spec.compiler.arrays import frozen
 from neurovis_spec.compiler.constants import Constants, Value, width_of
-from neurovis_spec.compiler.network import Noise, frozen
+from neurovis_spec.compiler.network import Noise
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.units import Unit
 from neurovis_spec.language.expressions.arrays import evaluate_array

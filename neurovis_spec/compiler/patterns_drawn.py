@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.ends import Ends, Pairs
-from neurovis_spec.compiler.network import FloatArray, IntArray
 
 #: Cells of the table of slots, which bounds the memory; the result does not depend on it.
 _CELLS = 1 << 24

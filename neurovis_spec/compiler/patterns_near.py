@@ -10,8 +10,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.ends import Ends, Pairs
-from neurovis_spec.compiler.network import FloatArray, IntArray
 
 #: Distances held at once.
 _CELLS = 1 << 22

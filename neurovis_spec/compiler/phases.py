@@ -17,9 +17,11 @@ from heapq import heappop, heappush
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec.compiler.arrays import IntArray, frozen
 from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.events import Event
-from neurovis_spec.compiler.network import Block, IntArray, Learn, Network, Plasticity, frozen
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Block, Learn, Plasticity
 from neurovis_spec.diagnostics import Span
 
 #: Compiles the network anew with other parameters, without its events; None where that is at fault.

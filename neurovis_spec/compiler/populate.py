@@ -16,14 +16,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec.compiler.arrays import FloatArray, frozen
 from neurovis_spec.compiler.gaps import Gaps
 from neurovis_spec.compiler.groups import Builder, Built, Kind
 from neurovis_spec.compiler.limits import Limits
-from neurovis_spec.compiler.network import (
-    FloatArray,
-    Neurons,
-    frozen,
-)
+from neurovis_spec.compiler.network import Neurons
 from neurovis_spec.compiler.references import Directory, key_span
 from neurovis_spec.compiler.units import Unit
 from neurovis_spec.language.located import IDENTIFIER

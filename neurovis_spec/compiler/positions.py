@@ -11,9 +11,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.constants import Constants, Value
 from neurovis_spec.compiler.limits import plural
-from neurovis_spec.compiler.network import FloatArray
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.language.located import formula_of
 from neurovis_spec.language.source import Node, Packed, Scalar, Sequence

@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.constants import Constants
-from neurovis_spec.compiler.network import FloatArray, IntArray
 from neurovis_spec.language.located import Formula
 from neurovis_spec.language.sections import ScaleModel
 

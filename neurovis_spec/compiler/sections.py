@@ -11,13 +11,15 @@ from typing import Literal, cast
 import numpy as np
 
 from neurovis_spec import plugins
+from neurovis_spec.compiler.arrays import frozen
 from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.mirrors import check_pins, lines_of, mirrors_of
-from neurovis_spec.compiler.network import LayoutSettings, Output, RenderSettings, frozen
+from neurovis_spec.compiler.network import Output
 from neurovis_spec.compiler.pins import DIAMETER, FARTHEST, pins_of
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import Directory, key_of, look_at_keys, resolve, resolve_end
 from neurovis_spec.compiler.units import Unit
+from neurovis_spec.compiler.wishes import LayoutSettings, RenderSettings
 from neurovis_spec.diagnostics import Findings, Span, shown, suggest
 from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel, RenderModel
 from neurovis_spec.language.located import Formula, Located

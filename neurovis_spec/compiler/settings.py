@@ -11,11 +11,12 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.constants import Constants, Randomness, Value
 from neurovis_spec.compiler.definitions import Default, Defaults, Definitions, check_bounds
 from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.limits import PATIENCE, plural
-from neurovis_spec.compiler.network import FloatArray, Quantity
+from neurovis_spec.compiler.program import Quantity
 from neurovis_spec.diagnostics import Findings, meant, nearest, shown, suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from neurovis_spec.compiler.arrays import FloatArray, frozen
 from neurovis_spec.compiler.cells import cells_of, values_of
 from neurovis_spec.compiler.constants import ALWAYS, Constants, is_constant
 from neurovis_spec.compiler.limits import PATIENCE, amount, plural
-from neurovis_spec.compiler.network import FloatArray, Input, frozen
+from neurovis_spec.compiler.network import Input
 from neurovis_spec.compiler.references import Section, key_span
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.diagnostics import Findings

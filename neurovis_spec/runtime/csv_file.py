@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from neurovis_spec.compiler.network import FloatArray, IntArray
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.runtime.files import regular_size, replacing
 from neurovis_spec.runtime.recording import Recording, RecordingError
 from neurovis_spec.runtime.rows import RowWriter, Steps

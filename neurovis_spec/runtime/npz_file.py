@@ -23,7 +23,7 @@ from typing import IO, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.network import FloatArray, IntArray
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.language.data_files_npy import LONGEST_HEADER, read_header
 from neurovis_spec.language.data_files_table import CellError
 from neurovis_spec.runtime.files import regular_size, replacing

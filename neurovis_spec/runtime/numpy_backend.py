@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from neurovis_spec.compiler.network import FloatArray, Gather, Learn, Network, ReadInputs, Send, Update
+from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Gather, Learn, ReadInputs, Send, Update
 from neurovis_spec.runtime.backend import Availability, Capabilities
 from neurovis_spec.runtime.numpy_blocks import emit_gather, emit_send, emit_update
 from neurovis_spec.runtime.numpy_code import Code

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from neurovis_spec.compiler.network import Block, Gather, IntArray, Network, Update
+from neurovis_spec.compiler.arrays import IntArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Block, Gather, Update
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.runtime.numpy_code import Code, all_names, any_given
 from neurovis_spec.runtime.signals import SignalLayout

@@ -9,7 +9,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from neurovis_spec.compiler.network import IntArray, Network, Plasticity
+from neurovis_spec.compiler.arrays import IntArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Plasticity
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.runtime.numpy_blocks import emit_let
 from neurovis_spec.runtime.numpy_code import Code

@@ -10,7 +10,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from neurovis_spec.compiler.network import FloatArray, Network
+from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.state import State, history_depth
 
 

@@ -13,7 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
-from neurovis_spec.compiler.network import FloatArray, IntArray, Network, frozen
+from neurovis_spec.compiler.arrays import FloatArray, IntArray, frozen
+from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import suggest
 
 

@@ -9,17 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from neurovis_spec.compiler.network import (
-    Block,
-    FloatArray,
-    Gather,
-    Learn,
-    Network,
-    Plasticity,
-    ReadInputs,
-    Send,
-    Update,
-)
+from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Block, Gather, Learn, Plasticity, ReadInputs, Send, Update
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.runtime.backend import Availability, Capabilities

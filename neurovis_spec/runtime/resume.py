@@ -15,7 +15,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from neurovis_spec.compiler.network import FloatArray, IntArray, Network
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.runtime.recording import Recording, RecordingError
 from neurovis_spec.runtime.signals import signal_layout

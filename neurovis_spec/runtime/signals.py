@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neurovis_spec.compiler.network import IntArray, Network
+from neurovis_spec.compiler.arrays import IntArray
+from neurovis_spec.compiler.network import Network
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,8 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.network import FloatArray, Network
+from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.runtime.backend import Backend, prepare
 from neurovis_spec.runtime.inputs import InputReader

@@ -12,7 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from neurovis_spec.compiler.network import FloatArray, Network, Plasticity, Quantity, Rule
+from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Plasticity, Quantity, Rule
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.runtime.signals import signal_layout

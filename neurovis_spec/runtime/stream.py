@@ -13,7 +13,8 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from neurovis_spec.compiler.network import FloatArray, Network
+from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.network import Network
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.files import uninterrupted
 from neurovis_spec.runtime.formats import for_path

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.network import Network, RenderSettings
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.scene.caption import caption
 from neurovis_spec.scene.encode import CAPTION, lesions_by_id, looks, paint, tooltips

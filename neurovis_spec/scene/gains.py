@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.network import Network, RenderSettings
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.wishes import RenderSettings
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neurovis_spec.compiler.network import Network, RenderSettings
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.layout.model import RADIUS, Layout
 from neurovis_spec.scene import delays, encoding, legend, texts
 from neurovis_spec.scene.boxes import Box, boxes_of

@@ -10,7 +10,8 @@ import warnings
 
 import numpy as np
 
-from neurovis_spec.compiler.network import FloatArray, Network
+from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.network import Network
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.record import record
 from neurovis_spec.runtime.recording import Recording

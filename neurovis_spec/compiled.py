@@ -1,0 +1,292 @@
+"""A compiled network, as users hold it: ``.run``, ``.layout``, ``.render``.
+
+In: what the compiler made of a spec. Out: recordings, layouts, files. What runs, lays out and draws is imported by who
+does so: a spec is compiled, and thereby checked, without it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec import pipeline
+from neurovis_spec.compiler.compile import Request, rebind
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.wishes import RenderSettings
+from neurovis_spec.diagnostics import Diagnostic, suggest
+from neurovis_spec.language.spec import Spec
+from neurovis_spec.progress import Progress
+from neurovis_spec.runtime.files import replacing
+
+if TYPE_CHECKING:
+    from neurovis_spec.layout import Layout, Point, Route
+    from neurovis_spec.runtime.recording import Recording, Snapshot
+    from neurovis_spec.runtime.simulation import Simulation
+    from neurovis_spec.scene.gains import Gains
+
+#: Frames a second where the spec writes no dt, and the most there are.
+DEFAULT_FPS, MOST_FPS = 25.0, 60.0
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledNetwork:
+    """A compiled network: run it, lay it out, draw it. ``network`` holds its arrays, ``warnings`` what was noticed."""
+
+    network: Network
+    spec: Spec
+    request: Request
+    warnings: tuple[Diagnostic, ...]
+    sources: Mapping[str, str]
+    #: the earlier layout that the spec names (``layout.file``)
+    memory: Layout | None = None
+
+    @property
+    def name(self) -> str:
+        """The name that the spec gives it."""
+        return self.network.name
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of the canonical network."""
+        return self.network.hash
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """The values of its parameters."""
+        return self.network.parameters
+
+    def __repr__(self) -> str:
+        network = self.network
+        return (
+            f"<network {network.name}: {len(network.neurons)} neurons, {len(network.connections)} connections, "
+            f"{int((network.connections.rules >= 0).sum())} plastic>"
+        )
+
+    def simulator(self, backend: str | None = None, *, start: Recording | None = None) -> Simulation:
+        """Step by step, for a control loop; ``start`` is a recording to go on from."""
+        from neurovis_spec.runtime.simulation import Simulation
+
+        return Simulation(
+            self.network, backend, start, lambda values: rebind(self.spec, self.request, self.network, values)
+        )
+
+    def run(
+        self,
+        steps: int | None = None,
+        inputs: Mapping[str, npt.ArrayLike] | None = None,
+        *,
+        backend: str | None = None,
+        every: int = 1,
+        start: Recording | None = None,
+        progress: Progress | None = None,
+    ) -> Recording:
+        """Run ``steps`` steps (default ``time.steps``) and record every ``every``-th.
+
+        ``inputs`` replace the sources of inputs: arrays of (steps,) or (steps, size). Raises InputError, BackendError,
+        RecordingError.
+        """
+        return pipeline.simulate(self.network, steps, inputs, backend, every, start, progress)
+
+    def run_to(
+        self,
+        path: str | Path,
+        steps: int | None = None,
+        inputs: Mapping[str, npt.ArrayLike] | None = None,
+        *,
+        backend: str | None = None,
+        every: int = 1,
+        start: Recording | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        """Run as ``run`` does and write the recording to a file while it is made, in memory that does not grow with the
+        steps. What was there stays until the end. Raises what ``run`` and ``Recording.save`` raise, RecordingError
+        where the disk has not the room, and after Ctrl-C a KeyboardInterrupt; the file holds the steps until then."""
+        from neurovis_spec.runtime.record import Course
+
+        steps = self.network.steps if steps is None else steps
+        pipeline.simulate_to(self.network, Path(path), Course(steps, every, inputs, backend), start, progress)
+
+    def layout(
+        self, engine: str | None = None, *, earlier: Layout | None = None, progress: Progress | None = None
+    ) -> NetworkLayout:
+        """Where everything is. What an ``earlier`` layout knew (default: that of ``layout.file``) stays where it was.
+        Raises LayoutRefusalError where an engine cannot do what is asked; its ``diagnostic`` says where the spec asks
+        for it."""
+        return NetworkLayout(self, self._arranged(engine, earlier, progress))
+
+    def _arranged(
+        self, engine: str | None = None, earlier: Layout | None = None, progress: Progress | None = None
+    ) -> Layout:
+        from neurovis_spec.layout.model import LayoutRefusalError
+
+        try:
+            return pipeline.arrange(self.network, engine, earlier or self.memory, progress)
+        except LayoutRefusalError as refusal:
+            span = pipeline.locate(refusal, self.spec, self.request, self.network, engine)
+            if span is not None:
+                refusal.locate(span, self.sources)
+            raise
+
+    @cached_property
+    def _layout(self) -> Layout:
+        return self._arranged()
+
+    @cached_property
+    def gains(self) -> Gains:
+        """The gains of Eqs. 2–5 for this network: the author's, else from the range of its default run."""
+        return pipeline.measure(self.network)
+
+    def choose_engine(self) -> tuple[str, str]:
+        """The layout engine, and why."""
+        from neurovis_spec.layout.choose import choose_engine
+        from neurovis_spec.layout.problem import problem_of
+
+        engine = self.network.layout.engine
+        if engine != "auto":
+            return engine, "the spec names it"
+        return choose_engine(problem_of(self.network))
+
+    def choose_backend(self) -> tuple[str, str]:
+        """The backend that runs it by default, and why."""
+        from neurovis_spec.runtime.backend import choose_backend
+
+        return choose_backend(self.network)
+
+    def describe(self) -> dict[str, object]:
+        """What ``neurovis inspect --format json`` prints."""
+        from neurovis_spec.describe import describe
+
+        return describe(self.network, self.choose_engine())
+
+    def render(
+        self,
+        path: str | Path,
+        *,
+        step: int | None = None,
+        recording: Recording | None = None,
+        theme: str | None = None,
+        engine: str | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        """Draw one step into a file whose suffix says what kind.
+
+        Without ``step`` it is the last of the recording, or of a default run. Without ``recording`` the network runs
+        as far as the step. Raises OutputError for a kind that nobody draws, before anything is run.
+        """
+        from neurovis_spec.scene.renderers import renderer_for
+
+        suffix = Path(path).suffix
+        renderer_for(suffix, moving=False)
+        layout = self._layout if engine is None else self._arranged(engine)
+        snapshot = self._snapshot(step, recording, progress)
+        scene = pipeline.picture(self.network, layout, snapshot, self.gains, self._settings(theme))
+        content = pipeline.draw(scene, suffix)
+        with replacing(path) as file:
+            file.write(content)
+
+    def animate(
+        self,
+        path: str | Path,
+        *,
+        steps: int | None = None,
+        start: int = 0,
+        fps: float | None = None,
+        recording: Recording | None = None,
+        theme: str | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        """Draw ``steps`` steps from step ``start`` on, one a frame, into a file whose suffix says what kind.
+
+        ``fps`` defaults to 1/dt, at most 60, and to 25 where the spec writes no dt.
+        """
+        from neurovis_spec.scene.renderers import renderer_for
+        from neurovis_spec.snapshots import snapshots_from
+
+        suffix = Path(path).suffix
+        renderer_for(suffix, moving=True)
+        if fps is None:
+            fps = min(1 / self.network.dt, MOST_FPS) if self.network.dt_given else DEFAULT_FPS
+        if not (math.isfinite(fps) and fps > 0):
+            raise ValueError(f"frames a second are above 0, not {fps}")
+        run = partial(self.run, progress=progress)
+        snapshots = snapshots_from(self.network, start, steps, recording, run)
+        film = pipeline.moving(self.network, self._layout, snapshots, self.gains, self._settings(theme), fps)
+        content = pipeline.animate(film, suffix, progress)
+        with replacing(path) as file:
+            file.write(content)
+
+    def _settings(self, theme: str | None) -> RenderSettings:
+        from neurovis_spec.scene.renderers import RendererError
+        from neurovis_spec.scene.themes import THEMES
+
+        if theme is not None and theme not in THEMES:
+            raise RendererError(f"there is no theme '{theme}'", suggest(theme, THEMES, "there are"))
+        return self.network.render if theme is None else replace(self.network.render, theme=theme)
+
+    def _snapshot(self, step: int | None, recording: Recording | None, progress: Progress | None) -> Snapshot:
+        from neurovis_spec.snapshots import snapshot_at
+
+        return snapshot_at(self.network, step, recording, partial(self.run, progress=progress))
+
+    def _repr_svg_(self) -> str:
+        """The network at the last step of its default run, for a notebook."""
+        snapshot = self._snapshot(None, None, None)
+        scene = pipeline.picture(self.network, self._layout, snapshot, self.gains, self.network.render)
+        return pipeline.draw(scene, ".svg").decode()
+
+
+@dataclass(frozen=True, eq=False)
+class NetworkLayout:
+    """The layout of a compiled network."""
+
+    compiled: CompiledNetwork
+    value: Layout
+
+    @property
+    def engine(self) -> str:
+        """The engine that made it."""
+        return self.value.engine
+
+    @property
+    def positions(self) -> Mapping[str, Point]:
+        """Where each neuron is, by name, in units of the layout; x grows right, y grows down."""
+        return self.value.positions
+
+    @property
+    def routes(self) -> Mapping[str, Route]:
+        """How each connection runs, by name: a cubic Bézier spline of 1 + 3k points."""
+        return self.value.routes
+
+    def metrics(self) -> dict[str, float | int]:
+        """What ``neurovis layout --metrics`` prints, but for the seconds."""
+        from neurovis_spec.layout.metrics import metrics
+        from neurovis_spec.layout.problem import problem_of
+
+        return metrics(self.value, problem_of(self.compiled.network))
+
+    def dump(self) -> str:
+        """The layout file as a text."""
+        from neurovis_spec.layout.file import dump
+
+        return dump(self.value)
+
+    def save(self, path: str | Path) -> None:
+        """Write the layout file."""
+        with replacing(path) as file:
+            file.write(self.dump().encode())
+
+    def _repr_svg_(self) -> str:
+        """The network in this layout, before anything happens, for a notebook."""
+        from neurovis_spec.runtime.recording import Snapshot
+
+        network = self.compiled.network
+        snapshot = Snapshot(0, np.zeros(len(network.neurons)), network.connections.weights, None)
+        scene = pipeline.picture(network, self.value, snapshot, self.compiled.gains, network.render)
+        return pipeline.draw(scene, ".svg").decode()

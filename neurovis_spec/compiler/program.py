@@ -1,0 +1,168 @@
+"""The update program: what a step does, and by which definitions.
+
+In: nothing; these are values of a Network. Definitions (activations, models, rules) are typed expressions; blocks and
+plasticities say which neurons and connections they are for; operations say what each reads and what it writes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.language.expressions.tree import Tree
+
+Combine = Literal["sum", "product", "distance"]
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A state of a model or rule; the expressions see the definition's names. Without ``each_step`` it stays."""
+
+    name: str
+    initial: Tree
+    each_step: Tree | None = None
+    each_episode: Tree | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Activation:
+    """``value`` is an expression of ``x``, the combined input, and the parameters."""
+
+    name: str
+    parameters: tuple[str, ...]
+    value: Tree
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """How the activity follows from ``drive`` (u[t]); ``f`` in ``activity`` is the neuron's activation (a Call of
+    ``f`` with one argument)."""
+
+    name: str
+    parameters: tuple[str, ...]
+    let: tuple[tuple[str, Tree], ...]
+    state: tuple[Quantity, ...]
+    activity: Tree
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """How a weight changes. The expressions see pre, sent, post, weight, k, t, dt, parameters, state, let, signals."""
+
+    name: str
+    parameters: tuple[str, ...]
+    signals: tuple[str, ...]
+    let: tuple[tuple[str, Tree], ...]
+    state: tuple[Quantity, ...]
+    each_step: Tree | None
+    each_episode: Tree | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Block:
+    """Neurons that are updated together: the same activation, model, combination and level.
+
+    ``members`` are neuron indices, ascending. ``incoming`` are the connections into them, in the order of the
+    connections, and ``slots`` says which member (position in ``members``) each of them goes to.
+    Parameters are arrays as long as ``members``.
+    """
+
+    level: int
+    members: IntArray
+    combine: Combine
+    activation: Activation
+    activation_parameters: Mapping[str, FloatArray]
+    model: Model
+    model_parameters: Mapping[str, FloatArray]
+    incoming: IntArray
+    slots: IntArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plasticity:
+    """Connections that learn by one rule. ``signals`` gives, for each signal of the rule, one index a
+    connection into the activities of all neurons followed by the vector of all inputs. Parameters are as long as
+    ``members``."""
+
+    rule: Rule
+    members: IntArray
+    parameters: Mapping[str, FloatArray]
+    signals: Mapping[str, IntArray]
+    #: how the author wrote it, for display: ``delta(rate=0.01)``
+    title: str
+
+
+# The update program. Names in ``reads`` and ``writes``: inputs, activity, weights, signals (w·a under way), history
+# (past activities), drive[b], cells[b] (states of block b), traces[p] (states of plasticity p).
+
+
+@dataclass(frozen=True, slots=True)
+class ReadInputs:
+    """s[t]: expressions, tables and what the caller supplied, into the vector of all inputs."""
+
+    reads: frozenset[str] = frozenset()
+    writes: frozenset[str] = frozenset({"inputs"})
+
+
+@dataclass(frozen=True, slots=True)
+class Gather:
+    """u[t] of a block: what arrives, combined, + bias + input (§5.2)."""
+
+    block: int
+
+    @property
+    def reads(self) -> frozenset[str]:
+        """Delay 0 reads activities of this step, the rest the signals under way."""
+        return frozenset({"inputs", "activity", "weights", "signals"})
+
+    @property
+    def writes(self) -> frozenset[str]:
+        """The drive of the block."""
+        return frozenset({f"drive[{self.block}]"})
+
+
+@dataclass(frozen=True, slots=True)
+class Update:
+    """The states and the activity of a block; at step 0 neurons with ``initial`` take it instead."""
+
+    block: int
+
+    @property
+    def reads(self) -> frozenset[str]:
+        """The drive and the states of the block."""
+        return frozenset({f"drive[{self.block}]", f"cells[{self.block}]"})
+
+    @property
+    def writes(self) -> frozenset[str]:
+        """The states of the block and its activities."""
+        return frozenset({f"cells[{self.block}]", "activity"})
+
+
+@dataclass(frozen=True, slots=True)
+class Send:
+    """w[t]·a[t] of every delayed connection leaves its source; a[t] is remembered for ``pre``."""
+
+    reads: frozenset[str] = frozenset({"activity", "weights"})
+    writes: frozenset[str] = frozenset({"signals", "history"})
+
+
+@dataclass(frozen=True, slots=True)
+class Learn:
+    """The rule of a plasticity, step and (where it has them) episode: w[t+1] and its states, from old values."""
+
+    plasticity: int
+
+    @property
+    def reads(self) -> frozenset[str]:
+        """Everything that a rule may name."""
+        return frozenset({"inputs", "activity", "history", "weights", f"traces[{self.plasticity}]"})
+
+    @property
+    def writes(self) -> frozenset[str]:
+        """The weights of its connections and their states."""
+        return frozenset({"weights", f"traces[{self.plasticity}]"})
+
+
+Operation: TypeAlias = ReadInputs | Gather | Update | Send | Learn

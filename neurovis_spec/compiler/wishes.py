@@ -1,0 +1,61 @@
+"""What a spec wishes for its picture: the ``layout`` and ``render`` sections, references resolved.
+
+In: nothing; these are values of a Network. Nothing of them changes what the network does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+
+@dataclass(frozen=True, slots=True)
+class Mirror:
+    """Neurons of which the second of each pair is the mirror image of the first, on an axis along the direction.
+
+    ``scope`` is the path of the instance in whose frame the axis lies, empty for the whole; ``instances`` are the paths
+    of the instances that were named, if any.
+    """
+
+    scope: str
+    pairs: tuple[tuple[int, int], ...]
+    instances: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class LayoutSettings:
+    """The ``layout`` section, references resolved. Pins by neuron index, units of the layout."""
+
+    engine: str = "auto"
+    direction: Literal["down", "up", "right", "left"] = "down"
+    positions: Mapping[int, tuple[float, float]] = field(default_factory=dict)
+    #: neuron indices → row, column, grid, ring, arc
+    arrange: tuple[tuple[tuple[int, ...], str], ...] = ()
+    boxes: tuple[tuple[str, tuple[int, ...]], ...] = ()
+    neuron_spacing: float = 1.0
+    rank_spacing: float = 2.0
+    #: for each instance with pins of its module: its path, and its pins relative to its origin
+    relative: tuple[tuple[str, Mapping[int, tuple[float, float]]], ...] = ()
+    #: where instances have their origin, by path; the pins within them are among the positions then
+    origins: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    mirrors: tuple[Mirror, ...] = ()
+    #: neurons on one line across the direction
+    align: tuple[tuple[int, ...], ...] = ()
+    #: an earlier layout, as the spec names it
+    file: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RenderSettings:
+    """The ``render`` section. A gain of None is chosen from the network's range."""
+
+    activity: float | None = None
+    signal: float | None = None
+    thickness: float | None = None
+    change: float | None = None
+    theme: str = "default"
+    size: tuple[int, int] | None = None
+    labels: bool = True
+    legend: bool = True
+    title: bool | str = True
