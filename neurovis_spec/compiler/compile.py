@@ -32,7 +32,8 @@ from neurovis_spec.compiler.populate import Population, populate, without_neuron
 from neurovis_spec.compiler.references import Directory, key_span, other_parameter
 from neurovis_spec.compiler.sections import check_ros, layout_settings, make_outputs, render_settings
 from neurovis_spec.compiler.tables import Files
-from neurovis_spec.compiler.units import Expander, Unit, constants_of
+from neurovis_spec.compiler.unit import Unit
+from neurovis_spec.compiler.units import Expander, constants_of
 from neurovis_spec.compiler.warnings import Compiled, warn
 from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError
 from neurovis_spec.language.expressions.functions import CONSTANTS

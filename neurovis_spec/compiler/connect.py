@@ -18,7 +18,7 @@ from neurovis_spec.compiler.limits import Limits
 from neurovis_spec.compiler.network import Connections
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import Directory, resolve_each
-from neurovis_spec.compiler.units import Unit
+from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.diagnostics import shown
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.sections import ConnectionModel, written

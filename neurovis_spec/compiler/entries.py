@@ -23,7 +23,7 @@ from neurovis_spec.compiler.patterns import all_to_all, pairs_of
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import Directory
 from neurovis_spec.compiler.scale import look_at_scale, scaled
-from neurovis_spec.compiler.units import Unit
+from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.located import Formula, Located

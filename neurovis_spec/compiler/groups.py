@@ -21,7 +21,7 @@ from neurovis_spec.compiler.positions import positions_of
 from neurovis_spec.compiler.program import Activation, Combine, Model
 from neurovis_spec.compiler.references import key_span
 from neurovis_spec.compiler.settings import check_initials, choose, look_at_settings, parameters, spread
-from neurovis_spec.compiler.units import Unit
+from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.diagnostics import meant, shown, suggest
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, too_long
 from neurovis_spec.language.sections import GroupModel

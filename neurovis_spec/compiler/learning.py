@@ -15,7 +15,7 @@ from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.program import Rule
 from neurovis_spec.compiler.references import Directory, few, resolve_end
 from neurovis_spec.compiler.settings import check_initials, choose, look_at_settings, parameters, settle
-from neurovis_spec.compiler.units import Unit
+from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.diagnostics import shown, suggest
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.source import Entry, Scalar

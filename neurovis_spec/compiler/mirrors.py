@@ -14,7 +14,7 @@ from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.pins import Pins
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import Directory, resolve, resolve_end
-from neurovis_spec.compiler.units import Unit
+from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.compiler.wishes import Mirror
 from neurovis_spec.diagnostics import Findings, shown
 from neurovis_spec.language.located import Located

@@ -13,7 +13,7 @@ from neurovis_spec.compiler.arrays import frozen
 from neurovis_spec.compiler.constants import Constants, Value, width_of
 from neurovis_spec.compiler.network import Noise
 from neurovis_spec.compiler.populate import Population
-from neurovis_spec.compiler.units import Unit
+from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.tree import Conditional, Draw, Tree, children, draws, names

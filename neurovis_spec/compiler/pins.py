@@ -14,7 +14,7 @@ from typing import Final, NamedTuple, TypeAlias
 
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import Directory, key_of, look_at_keys, resolve_end
-from neurovis_spec.compiler.units import Unit
+from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.diagnostics import Findings, Span, shown
 from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel
 from neurovis_spec.language.located import Located

@@ -22,7 +22,7 @@ from neurovis_spec.compiler.groups import Builder, Built, Kind
 from neurovis_spec.compiler.limits import Limits
 from neurovis_spec.compiler.network import Neurons
 from neurovis_spec.compiler.references import Directory, key_span
-from neurovis_spec.compiler.units import Unit
+from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.language.located import IDENTIFIER
 from neurovis_spec.language.sections import GroupModel
 

@@ -18,7 +18,7 @@ from neurovis_spec.compiler.network import Output
 from neurovis_spec.compiler.pins import DIAMETER, FARTHEST, pins_of
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import Directory, key_of, look_at_keys, resolve, resolve_end
-from neurovis_spec.compiler.units import Unit
+from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.compiler.wishes import LayoutSettings, RenderSettings
 from neurovis_spec.diagnostics import Findings, Span, shown, suggest
 from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel, RenderModel

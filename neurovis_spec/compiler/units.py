@@ -11,12 +11,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple, NoReturn
+from typing import NoReturn
 
 from neurovis_spec.compiler.bindings import Binding, bindings_of, shared_out
 from neurovis_spec.compiler.census import Census, Excess
 from neurovis_spec.compiler.constants import Constants
-from neurovis_spec.compiler.definitions import Definitions
 from neurovis_spec.compiler.gaps import Gaps
 from neurovis_spec.compiler.limits import DEEPEST, MOST_INSTANCES, Limits
 from neurovis_spec.compiler.modules import Library, Module
@@ -25,6 +24,7 @@ from neurovis_spec.compiler.parameters import make_parameters
 from neurovis_spec.compiler.references import Section, key_of, key_span
 from neurovis_spec.compiler.signals import make_input
 from neurovis_spec.compiler.tables import Files
+from neurovis_spec.compiler.unit import Expansion, Unit
 from neurovis_spec.diagnostics import Findings, shown, suggest
 from neurovis_spec.language.expressions.tree import Number, names, substitute
 from neurovis_spec.language.located import NAME_RULE, Formula, too_long
@@ -33,52 +33,6 @@ from neurovis_spec.language.modules import INCLUDED, InstanceModel
 
 #: What ``set`` knows beside the parameters: the number of the instance, from 0, and how many its entry makes.
 COUNTED = ("i", "n")
-
-
-@dataclass(frozen=True)
-class Unit:
-    """The spec (its ``path`` is empty) or one instance (``left1``, ``left1.knee``).
-
-    ``inputs`` are those that its names may mean, those of instances within it by their dotted names. ``children`` are
-    the places of the instances within it, by name: ``left`` means all of a counted one, ``left1`` the first of them.
-    ``settings`` are the parameters that ``set`` gives, each with the names that its formula uses in the unit around.
-    """
-
-    path: str
-    section: Section
-    constants: Constants
-    definitions: Definitions
-    files: Files
-    inputs: Mapping[str, Input]
-    module: str | None = None
-    parent: int = -1
-    declared: str = ""
-    number: int = 0
-    children: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
-    settings: Mapping[str, frozenset[str]] = field(default_factory=dict)
-
-    def called(self, name: str) -> str:
-        """The name that something of this unit has in the whole network."""
-        return f"{self.path}.{name}" if self.path else name
-
-    @property
-    def gaps(self) -> Gaps:
-        """What could not be read, in this unit and among the definitions."""
-        return self.definitions.gaps
-
-
-class Expansion(NamedTuple):
-    """All units, and the inputs of the network in the order of their places in the vector of all inputs."""
-
-    units: tuple[Unit, ...]
-    inputs: tuple[Input, ...]
-
-    def depend(self) -> None:
-        """What is structural in an instance is so for the parameters, of the unit around it, that it was set from."""
-        for unit in reversed(self.units):
-            for name, used in unit.settings.items():
-                if name in unit.constants.structural:
-                    self.units[unit.parent].constants.depend(used)
 
 
 @dataclass(frozen=True)

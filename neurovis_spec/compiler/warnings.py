@@ -16,7 +16,8 @@ from neurovis_spec.compiler.inert import changes_nothing
 from neurovis_spec.compiler.modules import Library
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.references import Section, key_span
-from neurovis_spec.compiler.units import COUNTED, Unit
+from neurovis_spec.compiler.unit import Unit
+from neurovis_spec.compiler.units import COUNTED
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.parser import parse, unknown_names
 from neurovis_spec.language.expressions.tree import names

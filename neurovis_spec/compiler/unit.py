@@ -1,0 +1,63 @@
+"""A unit: the spec itself or an instance of a module, with what the names in it mean.
+
+In: nothing; these are the values that ``units`` makes and that everything which resolves a name reads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from neurovis_spec.compiler.constants import Constants
+from neurovis_spec.compiler.definitions import Definitions
+from neurovis_spec.compiler.gaps import Gaps
+from neurovis_spec.compiler.network import Input
+from neurovis_spec.compiler.references import Section
+from neurovis_spec.compiler.tables import Files
+
+
+@dataclass(frozen=True)
+class Unit:
+    """The spec (its ``path`` is empty) or one instance (``left1``, ``left1.knee``).
+
+    ``inputs`` are those that its names may mean, those of instances within it by their dotted names. ``children`` are
+    the places of the instances within it, by name: ``left`` means all of a counted one, ``left1`` the first of them.
+    ``settings`` are the parameters that ``set`` gives, each with the names that its formula uses in the unit around.
+    """
+
+    path: str
+    section: Section
+    constants: Constants
+    definitions: Definitions
+    files: Files
+    inputs: Mapping[str, Input]
+    module: str | None = None
+    parent: int = -1
+    declared: str = ""
+    number: int = 0
+    children: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    settings: Mapping[str, frozenset[str]] = field(default_factory=dict)
+
+    def called(self, name: str) -> str:
+        """The name that something of this unit has in the whole network."""
+        return f"{self.path}.{name}" if self.path else name
+
+    @property
+    def gaps(self) -> Gaps:
+        """What could not be read, in this unit and among the definitions."""
+        return self.definitions.gaps
+
+
+class Expansion(NamedTuple):
+    """All units, and the inputs of the network in the order of their places in the vector of all inputs."""
+
+    units: tuple[Unit, ...]
+    inputs: tuple[Input, ...]
+
+    def depend(self) -> None:
+        """What is structural in an instance is so for the parameters, of the unit around it, that it was set from."""
+        for unit in reversed(self.units):
+            for name, used in unit.settings.items():
+                if name in unit.constants.structural:
+                    self.units[unit.parent].constants.depend(used)
