@@ -37,11 +37,16 @@ def kept(problem: LayoutProblem, fresh: Layout) -> Layout:
     if twins is not None:
         _copied(problem, ways, twins, new, routes)
     _moved_routes(problem, fresh, ways, routes)
-    # what is within a frame first, since the frame is around it
+    # what is within a frame first, since the frame is around it: others may then run into it that did not before
     within = [i for i in range(len(problem.edges)) if i not in routes and ways.within(i)]
-    for chosen in (within, None):
-        rest = [i for i in range(len(problem.edges)) if i not in routes] if chosen is None else chosen
-        routes.update(_found(problem, ways, rest, routes))
+    routes.update(_found(problem, ways, within, routes))
+    outside = [i for i in sorted(routes) if not ways.within(i)]
+    for i, entering in zip(outside, _entering(problem, memory, ways, outside, routes), strict=True):
+        if entering:
+            del routes[i]
+    new = sorted({*new, *(i for i in outside if i not in routes)})
+    rest = [i for i in range(len(problem.edges)) if i not in routes]
+    routes.update(_found(problem, ways, rest, routes))
     if twins is not None:
         _draw_alike(problem, ways, twins, new, routes)
     return Layout(
@@ -123,10 +128,21 @@ def _old_routes(problem: LayoutProblem, memory: Layout, ways: _Ways) -> dict[int
     over = Obstacles([ways.centres[k] for k in new]).crowded(
         [routes[i] for i in chosen], [(place.get(a, -1), place.get(b, -1)) for a, b in ends], TOUCH
     )
-    before = ways.frames.rects({i: ways.centres[i] for i, known in enumerate(there) if known}, routes)
-    changed = [wall for wall in ways.walls(routes) if wall[1] not in before]
-    through = Walls(changed, len(ways.centres)).entered([routes[i] for i in chosen], ends)
+    through = _entering(problem, memory, ways, chosen, routes)
     return {i: routes[i] for i, a, b in zip(chosen, over, through, strict=True) if not (a or b)}
+
+
+def _entering(
+    problem: LayoutProblem, memory: Layout, ways: _Ways, chosen: Sequence[int], routes: Mapping[int, Route]
+) -> list[bool]:
+    """For each of these edges whether its route runs through a frame that is not drawn as it was."""
+    places = zip(problem.neurons, ways.centres, strict=True)
+    known = {i: point for i, (name, point) in enumerate(places) if memory.positions.get(name) == point}
+    old = {i: memory.routes[edge.name] for i, edge in enumerate(problem.edges) if edge.name in memory.routes}
+    before = ways.frames.rects(known, old)
+    changed = [wall for wall in ways.walls(routes) if wall[1] not in before]
+    ends = [(problem.edges[i].source, problem.edges[i].target) for i in chosen]
+    return Walls(changed, len(ways.centres)).entered([routes[i] for i in chosen], ends)
 
 
 def _moved_routes(problem: LayoutProblem, fresh: Layout, ways: _Ways, routes: dict[int, Route]) -> None:

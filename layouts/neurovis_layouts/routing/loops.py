@@ -1,6 +1,7 @@
 """Self-loops: out of the disc and back, to the side where there is most room.
 
-In: a centre, what is around it. Out: a route that leaves the centre and comes back to it.
+In: a centre, what is around it, the loops that it has. Out: a route that leaves the centre and comes back to it, clear
+of those loops: around them, or to another side.
 """
 
 from __future__ import annotations
@@ -8,8 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from neurovis_layouts.routing.obstacles import REACH, Obstacles
-from neurovis_spec.layout.geometry import distance
+import numpy as np
+
+from neurovis_layouts.routing.obstacles import REACH, Obstacles, points_on
+from neurovis_layouts.routing.walls import FloatArray
+from neurovis_spec.layout.geometry import cubics, distance
 from neurovis_spec.layout.model import Point, Route
 
 _DIAGONAL = math.sqrt(0.5)
@@ -35,8 +39,13 @@ _CROWDED = 0.35
 _ENTERING = 8.0
 #: An edge within some 50° of a loop's way runs along one of its legs, which stand 30° to either side.
 _LEGS = 0.64
-#: Length of the handles: three quarters of it is how far the loop reaches.
-_HANDLES = (1.05, 0.74)
+#: Shapes, the first of equals wins: how long the handles are (three quarters of it is how far the loop reaches) and how
+#: far apart for a unit; two that lie around those, and one that fits between.
+_SHAPES = ((1.05, 0.59), (0.74, 0.59))
+_FURTHER = (*_SHAPES, (1.3, 1.35), (0.98, 1.35), (0.9, 0.36), (1.75, 0.36))
+#: How far loops of one neuron are apart where they can be seen, what it costs if they are not, and where that begins.
+_APART, _TOGETHER, _SEEN = 0.14, 40.0, 0.36
+_STEP = 0.05
 
 
 def loop(centre: Point, way: Point, handle: float, wide: float = 0.59) -> Route:
@@ -53,25 +62,41 @@ def loop(centre: Point, way: Point, handle: float, wide: float = 0.59) -> Route:
 def best_loop(
     centre: Point,
     index: int,
-    turn: int,
+    before: Sequence[Route],
     near: Sequence[Point],
     tangents: Sequence[Point],
     obstacles: Obstacles,
-    enters: Callable[[Route], bool] | None = None,
+    enters: Callable[[Sequence[Route]], Sequence[bool]] | None = None,
 ) -> Route:
     """The loop with most room. ``near`` are neighbours' centres, ``tangents`` unit vectors in which other edges leave
-    or arrive; ``turn`` counts the loops that this neuron has already: each further one is drawn around the first.
-    ``enters`` says whether a loop enters a foreign frame, if there are such."""
-    ranked: list[tuple[float, int, Route]] = []
-    for place, (way, cost) in enumerate(_WAYS):
-        crowd = _crowd(centre, way, near) + _traffic(way, tangents) + cost
-        for smaller, handle in enumerate(_HANDLES):
-            route = loop(centre, way, handle * (1 + 0.3 * turn), 0.59 + 0.1 * turn)
-            clearance = obstacles.clearance(route, (index, index))
-            missing = max(0.0, REACH - clearance)
-            entering = _ENTERING if enters is not None and enters(route) else 0.0
-            ranked.append((crowd + 8 * missing + entering + 0.12 * smaller, place, route))
-    return min(ranked, key=lambda item: (item[0], item[1]))[2]
+    or arrive; ``before`` are the loops that this neuron has already, which it keeps off. ``enters`` says which loops
+    enter a foreign frame, if there are such."""
+    shapes = _FURTHER if before else _SHAPES
+    routes = [loop(centre, way, *shape) for way, _ in _WAYS for shape in shapes]
+    clear = obstacles.clearances(routes, [(index, index)] * len(routes))
+    entering = enters(routes) if enters is not None else [False] * len(routes)
+    others = [_seen(route) for route in before]
+    costs: list[float] = []
+    for number, route in enumerate(routes):
+        way, cost = _WAYS[number // len(shapes)]
+        crowd = _crowd(centre, way, near) + _traffic(way, tangents) + cost + 0.12 * (number % len(shapes))
+        crowd += 8 * max(0.0, REACH - clear[number]) + _ENTERING * entering[number]
+        costs.append(crowd + _TOGETHER * max((_APART - _between(_seen(route), other) for other in others), default=0.0))
+    return routes[min(range(len(routes)), key=lambda number: (costs[number], number // len(shapes)))]
+
+
+def _seen(route: Route) -> FloatArray:
+    """(n, 2) points on a loop, outside its disc."""
+    points, _ = points_on(np.array(cubics(route), dtype=np.float64), np.zeros(1, dtype=np.int64), _STEP)
+    x, y = (points - np.array(route[0])).T
+    seen: FloatArray = points[x * x + y * y > _SEEN * _SEEN]
+    return seen
+
+
+def _between(one: FloatArray, other: FloatArray) -> float:
+    """How close two lines come, at most ``_APART``."""
+    x, y = one[:, None, 0] - other[None, :, 0], one[:, None, 1] - other[None, :, 1]
+    return min(_APART, math.sqrt(float((x * x + y * y).min())))
 
 
 def _crowd(centre: Point, way: Point, near: Sequence[Point]) -> float:

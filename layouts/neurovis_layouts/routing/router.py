@@ -252,22 +252,24 @@ def _loops(
         if edges[i].target in tangents:
             tangents[edges[i].target].append(_unit(route[-1], route[-2]))
     near = _neighbours(centres, tangents)
-    turns: dict[int, int] = {}
-    turn: dict[int, int] = {}
-    for i in looping:
-        neuron = edges[i].source
-        turn[i] = turns.get(neuron, 0)
-        turns[neuron] = turn[i] + 1
 
-    def best(i: int, walls: Walls | None) -> Route:
+    def best(i: int, before: Sequence[Route], walls: Walls | None) -> Route:
         own = edges[i].source
-        enters = None if walls is None else lambda route: walls.entered([route], [(own, own)])[0]
-        return best_loop(centres[own], own, turn[i], near[own], tangents[own], obstacles, enters)
 
-    result = {i: best(i, None) for i in looping}
-    if walls is not None:
-        entered = walls.entered([result[i] for i in looping], [(edges[i].source,) * 2 for i in looping])
-        result.update({i: best(i, walls) for i, enters in zip(looping, entered, strict=True) if enters})
+        def enters(tried: Sequence[Route]) -> list[bool]:
+            return walls.entered(tried, [(own, own)] * len(tried)) if walls is not None else [False] * len(tried)
+
+        return best_loop(centres[own], own, before, near[own], tangents[own], obstacles, enters)
+
+    result: dict[int, Route] = {}
+    drawn: dict[int, list[Route]] = {}
+    for i in looping:
+        own = edges[i].source
+        before = drawn.setdefault(own, [])
+        result[i] = best(i, before, None)
+        if walls is not None and walls.entered([result[i]], [(own, own)])[0]:
+            result[i] = best(i, before, walls)
+        before.append(result[i])
     return result
 
 
