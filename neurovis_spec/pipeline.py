@@ -24,6 +24,7 @@ from neurovis_spec.compiler.compile import Request, compile_spec
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.garbage import uncollected
 from neurovis_spec.language.includes import read_includes
 from neurovis_spec.language.reader import read_file, read_text
 from neurovis_spec.language.shape import read_spec
@@ -61,7 +62,8 @@ def include(spec: Spec, request: Request, findings: Findings) -> Request:
 
 def build(spec: Spec, request: Request, findings: Findings) -> Network | None:
     """Expand, connect, check, lower: frozen arrays and an update program."""
-    return compile_spec(spec, request, findings)
+    with uncollected():
+        return compile_spec(spec, request, findings)
 
 
 def allow(findings: Findings) -> None:

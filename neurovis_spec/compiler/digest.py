@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -45,10 +45,12 @@ class _Writer:
         self._pieces.clear()
 
     def value(self, value: object) -> None:
-        if value is None:
-            self.put("none")
-        elif isinstance(value, str):
+        if isinstance(value, str):
             self.put("text", value.encode())
+        elif type(value) in self._records:  # there may be many thousands of a kind
+            self._record(cast("DataclassInstance", value))
+        elif value is None:
+            self.put("none")
         elif isinstance(value, float):
             self.put("number", value.hex().encode())
         elif isinstance(value, (bool, int)):

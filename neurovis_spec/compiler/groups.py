@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple, cast
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.definitions import Defaults, Definitions
 from neurovis_spec.compiler.draws import Stream
@@ -53,6 +54,23 @@ class Built(NamedTuple):
     input: IntArray
     position: FloatArray | None
     first: int | None
+
+
+class _Unsaid(NamedTuple):
+    """What n neurons have of which nothing is said."""
+
+    bias: FloatArray
+    initial: FloatArray
+    input: IntArray
+
+
+@lru_cache(maxsize=64)
+def _unsaid(n: int) -> _Unsaid:
+    """The same arrays, which nobody writes to, for all groups of a size: instances have many."""
+    result = _Unsaid(np.zeros(n), np.full(n, np.nan), np.full(n, -1, dtype=np.int64))
+    for array in result:
+        frozen(array)
+    return result
 
 
 @dataclass(frozen=True)
@@ -117,9 +135,9 @@ class Builder:
             model=model,
             names=names,
             labels=labels or names,
-            bias=np.zeros(n) if bias is None else bias,
-            initial=np.full(n, np.nan) if initial is None else initial,
-            input=np.full(n, -1, dtype=np.int64) if input_index is None else input_index,
+            bias=_unsaid(n).bias if bias is None else bias,
+            initial=_unsaid(n).initial if initial is None else initial,
+            input=_unsaid(n).input if input_index is None else input_index,
             position=position,
             first=first_number,
         )

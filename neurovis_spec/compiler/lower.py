@@ -7,7 +7,7 @@ In: the Population, the connections, the levels. Out: Blocks (neurons that are u
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -31,6 +31,8 @@ from neurovis_spec.diagnostics import Span
 
 #: What the neurons of a block have in common: level, activation, model, combination.
 _Key: TypeAlias = tuple[int, str, str, Combine]
+#: The row of a group of one; there may be many of these.
+_ONE: Final[IntArray] = np.zeros(1, dtype=np.int64)
 
 
 def make_blocks(population: Population, sources: IntArray, targets: IntArray, levels: IntArray) -> tuple[Block, ...]:
@@ -38,9 +40,10 @@ def make_blocks(population: Population, sources: IntArray, targets: IntArray, le
     parts: dict[_Key, list[_Part]] = {}
     for group, kind in zip(population.neurons.groups, population.kinds, strict=True):
         own = levels[group.start : group.start + group.count]
-        for level in np.flatnonzero(np.bincount(own)).tolist():
+        for level in sorted(set(own.tolist())):
             key = (level, kind.activation.name, kind.model.name, group.combine)
-            parts.setdefault(key, []).append(_Part(kind, group.start, np.flatnonzero(own == level)))
+            rows = _ONE if group.count == 1 else np.flatnonzero(own == level)
+            parts.setdefault(key, []).append(_Part(kind, group.start, rows))
     order = sorted(parts, key=lambda key: (key[0], parts[key][0].members[0]))
     home = np.full(len(population.neurons), -1, dtype=np.int64)
     slot = np.zeros(len(population.neurons), dtype=np.int64)

@@ -12,7 +12,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray
-from neurovis_spec.compiler.constants import Constants, Randomness, Value
+from neurovis_spec.compiler.constants import Constants, Randomness, Value, check_finite
 from neurovis_spec.compiler.definitions import Default, Defaults, Definitions, check_bounds
 from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.limits import PATIENCE, plural
@@ -99,6 +99,9 @@ def spread(
         return _looked_at(formulas, constants, stream is not None)
     if isinstance(formulas, FormulaList):
         return _listed(formulas, n, constants, what, stream)
+    if not isinstance(formulas.value, str):
+        number = float(formulas.value)
+        return np.full(n, number) if check_finite(number, formulas, constants.findings) else None
     index = np.arange(n, dtype=np.int64)
     randomness = None if stream is None else Randomness(stream, index)
     value = constants.value(formulas, {"i": index.astype(np.float64), "n": float(n)}, randomness)

@@ -7,10 +7,7 @@ where it could not be read to its end. Findings are collected, never raised; the
 
 from __future__ import annotations
 
-import gc
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
 from typing import Final
@@ -22,6 +19,7 @@ from yaml.reader import Reader
 from yaml.scanner import Scanner, ScannerError
 
 from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.garbage import uncollected
 from neurovis_spec.language.composer import Composer, EventSource
 from neurovis_spec.language.composer_refusals import ComposingStoppedError
 from neurovis_spec.language.reader_characters import FORBIDDEN, REPLACEMENT, Lines, character_name
@@ -106,7 +104,7 @@ def read_text(text: str, file: str, findings: Findings, *, pure: bool = False) -
         clean += "\n"  # without it the parsers differ about the place of what is missing at the end
     composer = Composer(clean, file, findings, event_source(clean, pure=pure))
     try:
-        with _no_collections():
+        with uncollected():
             root = composer.document()
     except ComposingStoppedError:
         return None
@@ -115,19 +113,6 @@ def read_text(text: str, file: str, findings: Findings, *, pure: bool = False) -
         findings.error(syntax.code, syntax.span(file, lines), syntax.message, syntax.hint)
         return None
     return _document(root, file, findings)
-
-
-@contextmanager
-def _no_collections() -> Iterator[None]:
-    """Without the search for reference cycles, of which nodes have none: in a large text it goes through all of them
-    over and over, a third of the time. Where threads read at once, the last that began with it on turns it on again."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
 
 
 def event_source(text: str, *, pure: bool = False) -> EventSource:

@@ -6,15 +6,14 @@ before it starts; what it gives back is checked, put on the grid of 1/1024 and m
 
 from __future__ import annotations
 
-import gc
 import math
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from typing import cast
 
 from neurovis_spec import plugins
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import suggest
+from neurovis_spec.garbage import uncollected
 from neurovis_spec.layout.choose import choose_engine
 from neurovis_spec.layout.geometry import distance, snap
 from neurovis_spec.layout.model import (
@@ -52,26 +51,13 @@ def lay_out_problem(problem: LayoutProblem, engine: str = "auto", progress: Prog
     chosen = _engine(name)
     refuse_what_it_cannot(problem, name, chosen.capabilities)
     _refuse_close_pins(problem)
-    with _undisturbed():
+    with uncollected():
         if progress is not None and chosen.capabilities.progress:
             result = cast(ReportingEngine, chosen).lay_out(problem, progress)
         else:
             result = chosen.lay_out(problem)
         _check(problem, name, result)
         return _tidy(problem, name, result)
-
-
-@contextmanager
-def _undisturbed() -> Iterator[None]:
-    """No search for garbage meanwhile: it would walk over all points of all routes time and again, a quarter of the
-    whole, and they hold no cycles."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
 
 
 def _engine(name: str) -> LayoutEngine:
