@@ -314,6 +314,14 @@ def test_a_pinned_instance_has_its_origin_there() -> None:
     assert (at["left2.hip.E"], at["left2.hip.M"]) == ((100, 51), (102, 50.5))
 
 
+@pytest.mark.parametrize("direction", ["down", "up", "right", "left"])
+def test_an_origin_is_the_smallest_x_and_y_in_every_direction(direction: Direction) -> None:
+    at, _ = drawn(f"{{direction: {direction}, positions: {{left2: [100, 50], right3: [80, 50]}}}}")
+    for path, origin in (("left2", (100, 50)), ("right3", (80, 50))):
+        own = [point for name, point in at.items() if name.startswith(f"{path}.")]
+        assert (min(x for x, _ in own), min(y for _, y in own)) == origin
+
+
 def test_a_pin_on_one_of_a_pair_places_the_other() -> None:
     at, _ = drawn("{mirror: [[left, right], [C1, C2]], positions: {left1.T: [3, 4], C1: [9, -7], C2: [13, -7]}}")
     assert at["right1.T"] == (19, 4)

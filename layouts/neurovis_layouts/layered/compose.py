@@ -46,7 +46,8 @@ class Composer:
     def _with_origins(self, problem: LayoutProblem) -> dict[int, Point]:
         """The pins, and for instances whose origin is pinned the places of all of their neurons that keep off these.
 
-        The origin of an instance whose module pins nothing is where its smallest x and y are.
+        The origin of an instance whose module pins nothing is where its smallest x and y are in the picture: where the
+        direction is up or left, the far end of it along the direction.
         """
         second = {b for mirror in problem.mirrors for _, b in mirror.pairs}
         found: dict[int, Point] = {}
@@ -58,7 +59,8 @@ class Composer:
             places = [Move((0.0, 0.0), flip).point(place) for place in drawing.places]
             x, y = module.origin
             if not drawing.fixed:
-                x, y = x - min(px for px, _ in places), y - min(py for _, py in places)
+                first = max if problem.direction in ("up", "left") else min
+                x, y = x - min(px for px, _ in places), y - first(py for _, py in places)
             for member, (px, py) in zip(module.members, places, strict=True):
                 place = (x + px, y + py)
                 if all(distance(place, other) >= _OFF for other in problem.pins.values()):
