@@ -5,6 +5,7 @@ In: bodies (neurons, and frames with what is in them) and where they stand. Out:
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -65,10 +66,25 @@ class Ground:
             point = (place[0] + body.offsets[0][0], place[1] + body.offsets[0][1])
             return self._cells.free(point, clear) and not any(_holds(f, point, RADIUS) for f, _, _ in self._frames)
         own = _at(body.frame, place)
-        wide = own[0] - _BETWEEN, own[1] - _BETWEEN, own[2] + _BETWEEN, own[3] + _BETWEEN
-        if any(wide[0] < f[2] and f[0] < wide[2] and wide[1] < f[3] and f[1] < wide[3] for f, _, _ in self._frames):
+        if any(_near(own, frame, _BETWEEN) for frame, _, _ in self._frames):
             return False
         return not any(_holds(own, point, RADIUS) for point in self._points)
+
+    def crowding(self, body: Body, place: Point) -> tuple[float, float]:
+        """How deep in frames a body that stands here lies, or they in it, and lone discs if it is a frame; and how much
+        is missing to the distance that they should keep."""
+        points = [
+            (x + other.offsets[0][0], y + other.offsets[0][1]) for other, (x, y) in self._bodies if not other.frame
+        ]
+        own = _tight([(place[0] + body.offsets[0][0], place[1] + body.offsets[0][1])])
+        if body.frame is not None:
+            own = _at(body.frame, place)
+        rects = [frame for frame, _, _ in self._frames]
+        gap = RADIUS if body.frame is None else _BETWEEN
+        pairs = [(rect, gap) for rect in rects]
+        pairs += [((*point, *point), RADIUS) for point in points if body.frame is not None]
+        met = math.fsum(max(0.0, _depth(own, rect)) for rect, _ in pairs)
+        return met, math.fsum(max(0.0, by + _depth(own, rect)) for rect, by in pairs)
 
     def refuse(self, names: Sequence[str], body: Body) -> None:
         """Raise LayoutRefusalError where a pinned body would stand in the frame of another, or that in its own."""
@@ -78,7 +94,7 @@ class Ground:
             for member, point in zip(body.members, points, strict=True):
                 if _holds(tight, point, _DISCS):
                     raise _within(names[member], names[other.members[0]])
-            if own is not None and _meet(own, tight):
+            if own is not None and _near(own, tight, _DISCS):
                 raise _within(names[body.members[0]], names[other.members[0]])
         if own is None:
             return
@@ -88,8 +104,13 @@ class Ground:
                     raise _within(names[member], names[body.members[0]])
 
 
-def _meet(one: Rect, other: Rect) -> bool:
-    low, high = (one[0] - _DISCS, one[1] - _DISCS), (one[2] + _DISCS, one[3] + _DISCS)
+def _depth(one: Rect, other: Rect) -> float:
+    """How far one would have to move off the other, negative where they are apart."""
+    return min(one[2] - other[0], other[2] - one[0], one[3] - other[1], other[3] - one[1])
+
+
+def _near(one: Rect, other: Rect, gap: float) -> bool:
+    low, high = (one[0] - gap, one[1] - gap), (one[2] + gap, one[3] + gap)
     return low[0] < other[2] and other[0] < high[0] and low[1] < other[3] and other[1] < high[1]
 
 

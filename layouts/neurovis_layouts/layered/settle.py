@@ -11,17 +11,23 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
+from itertools import combinations
 
+from neurovis_layouts.layered.axes import axes, imaged, shift_of
 from neurovis_layouts.layered.drawing import Drawing, Move, Piece, Rect
 from neurovis_layouts.layered.ground import Body, Ground
+from neurovis_layouts.layered.parts import images_of
 from neurovis_layouts.layered.sheet import Plan
+from neurovis_layouts.layered.yielding import arranged
 from neurovis_layouts.pins import fit
-from neurovis_spec.layout.geometry import distance, snap
-from neurovis_spec.layout.model import RADIUS, LayoutProblem, LayoutRefusalError, Point
+from neurovis_spec.layout.geometry import snap
+from neurovis_spec.layout.model import LayoutProblem, LayoutRefusalError, Point
 
 _SLACK = 1e-9
-_STEP = 0.25
-_TRIES = 161
+#: Nothing that is pinned lies on anything, or too near.
+_NONE = (0.0, 0.0)
+#: Trials with frames turned round, and frames of which every two are turned together, at most.
+_MOST_TURNED, _FEW = 500, 6
 
 #: A part drawn anew, around pins of its neurons.
 Redraw = Callable[[Piece, Mapping[int, Point]], Piece]
@@ -39,6 +45,22 @@ class Settled:
     axis: float = 0.0
 
 
+@dataclass(frozen=True, slots=True)
+class _Trial:
+    """What pins make of the pieces with the axis at one place: pins with their images, how the plan moves, bodies (the
+    pieces, then other neurons), those off their wishes for a line, and how deep what is pinned lies in each other, and
+    how much it is too near."""
+
+    axis: float
+    pins: Mapping[int, Point]
+    shift: Point
+    held: list[Piece]
+    moves: list[Move]
+    bodies: list[Body]
+    shifted: AbstractSet[int]
+    crowd: tuple[float, float]
+
+
 def settled(
     problem: LayoutProblem,
     plan: Plan,
@@ -53,78 +75,110 @@ def settled(
     if not (pieces or pair or problem.align):
         places, shift, moved = fit(free, problem.pins)
         return Settled(places, [], shift, moved)
-    for last, axis in _axes(problem, free, pair):
-        try:
-            pins = _imaged(problem, pair, axis)
-            shift = (axis if pair else _shift(free, pins)[0], _shift(free, pins)[1])
-            held, moves = _held(problem, pieces, pins, shift, axis, redraw)
-            bodies = [*_frames(held, moves), *_neurons(problem, held, free, pins, shift)]
-            wishes = [body.wish for body in bodies]
-            bodies = _on_lines(problem, bodies, pins)
-            shifted = {b for b, body in enumerate(bodies) if body.wish != wishes[b]}
-            placed = _arranged(problem, bodies, pair, axis, shifted)
-            break
-        except LayoutRefusalError:
-            if last:
-                raise
+    trial, placed = _best(problem, free, pieces, pair, _remembering(redraw))
     places = list(free)
-    for body, (x, y) in zip(bodies, placed, strict=True):
+    for body, (x, y) in zip(trial.bodies, placed, strict=True):
         for member, (dx, dy) in zip(body.members, body.offsets, strict=True):
             places[member] = (x + dx, y + dy)
-    for i, point in pins.items():
+    for i, point in trial.pins.items():
         places[i] = point
-    done = [(piece, replace(move, shift=at)) for piece, move, at in zip(held, moves, placed, strict=False)]
-    kept = {i for i, (x, y) in enumerate(free) if places[i] == (x + shift[0], y + shift[1]) and i not in pins}
-    return Settled(places, done, shift, frozenset(range(len(free))) - kept, axis)
+    done = [(piece, replace(move, shift=at)) for piece, move, at in zip(trial.held, trial.moves, placed, strict=False)]
+    (dx, dy), pins = trial.shift, trial.pins
+    kept = {i for i, (x, y) in enumerate(free) if places[i] == (x + dx, y + dy) and i not in pins}
+    return Settled(places, done, trial.shift, frozenset(range(len(free))) - kept, trial.axis)
 
 
-def _shift(free: Sequence[Point], pins: Mapping[int, Point]) -> Point:
-    """The least-squares fit of the free plan to the pins, on the grid."""
-    return (
-        snap(math.fsum(x - free[i][0] for i, (x, _) in sorted(pins.items())) / len(pins)),
-        snap(math.fsum(y - free[i][1] for i, (_, y) in sorted(pins.items())) / len(pins)),
-    )
+def _remembering(redraw: Redraw) -> Redraw:
+    """A redraw that draws nothing twice."""
+    known: dict[tuple[tuple[int, ...], tuple[tuple[int, Point], ...]], Piece | LayoutRefusalError] = {}
+
+    def remembering(piece: Piece, pins: Mapping[int, Point]) -> Piece:
+        key = piece.part.members, tuple(sorted(pins.items()))
+        if key not in known:
+            try:
+                known[key] = redraw(piece, pins)
+            except LayoutRefusalError as refusal:
+                known[key] = refusal
+        found = known[key]
+        if isinstance(found, LayoutRefusalError):
+            raise found
+        return found
+
+    return remembering
 
 
-def _axes(problem: LayoutProblem, free: Sequence[Point], pair: Mapping[int, int]) -> Iterator[tuple[bool, float]]:
-    """Where the axis may be, the best place first, and whether it is the last: one place where both of a pair are
-    pinned. Raises LayoutRefusalError where such pairs disagree."""
-    pins = problem.pins
-    both = sorted((a, b) for a, b in pair.items() if a < b and a in pins and b in pins)
-    for a, b in both:
-        first = both[0]
-        apart = pins[a][0] + pins[b][0] - pins[first[0]][0] - pins[first[1]][0]
-        if abs(apart) > _SLACK or abs(pins[a][1] - pins[b][1]) > _SLACK:
-            names = problem.neurons[a], problem.neurons[b]
-            message = f"the pins of '{names[0]}' and '{names[1]}' are not mirror images"
-            raise LayoutRefusalError("mirror-pins", message, about=names)
-    if both or not pair:
-        yield True, (pins[both[0][0]][0] + pins[both[0][1]][0]) / 2 if both else 0.0
-        return
-    start = _shift(free, pins)[0]
-    for number in range(_TRIES):
-        yield number == _TRIES - 1, start + (number + 1) // 2 * (_STEP if number % 2 else -_STEP)
+def _best(
+    problem: LayoutProblem,
+    free: Sequence[Point],
+    pieces: Sequence[tuple[Piece, Move]],
+    pair: Mapping[int, int],
+    redraw: Redraw,
+) -> tuple[_Trial, list[Point]]:
+    """The first trial in which nothing that is pinned lies on anything else, and where its bodies stand; if there is
+    none the one in which least does: first with the axis elsewhere, then with frames turned round."""
+    best: tuple[_Trial, list[Point]] | None = None
+    refusal: LayoutRefusalError | None = None
+    wide = 2 + max((piece.rect[2] - piece.rect[0] for piece, _ in pieces), default=0.0)
+    turned: AbstractSet[int] = frozenset()
+    places = list(axes(problem, free, pair, wide))
+    turning = [frozenset([number]) for number in _turning(problem, pieces, pair)]
+    turning += [one | other for one, other in combinations(turning[:_FEW], 2)]
+    for change in (frozenset[int](), *turning):
+        changed = turned ^ change
+        for axis in places[: max(1, _MOST_TURNED // len(turning))] if change else places:
+            try:
+                trial = _tried(problem, free, pieces, pair, redraw, axis, changed)
+                if best is None or trial.crowd < best[0].crowd:
+                    best, turned = (trial, arranged(problem.neurons, trial.bodies, pair, axis, trial.shifted)), changed
+            except LayoutRefusalError as found:
+                refusal = refusal if change else found
+            if best is not None and best[0].crowd == _NONE:
+                return best
+    if best is None:
+        assert refusal is not None
+        raise refusal
+    return best
 
 
-def _imaged(problem: LayoutProblem, pair: Mapping[int, int], axis: float) -> dict[int, Point]:
-    images = {pair[i]: (2 * axis - x, y) for i, (x, y) in problem.pins.items() if i in pair}
-    found = dict(sorted({**images, **problem.pins}.items()))
-    for i in images:
-        if i not in problem.pins:
-            _refuse_close(problem, found, i, pair[i])
-    return found
+def _turning(problem: LayoutProblem, pieces: Sequence[tuple[Piece, Move]], pair: Mapping[int, int]) -> Iterator[int]:
+    """The pieces of which one neuron is pinned, itself or by its image, and that may be drawn as their mirror images
+    instead."""
+    pinned = problem.pins.keys() | {pair[i] for i in problem.pins if i in pair}
+    for number, (piece, _) in enumerate(pieces):
+        part = piece.part
+        if part.image_of < 0 and len(pinned.intersection(part.members)) == 1:
+            images = images_of(part, pair)
+            if not images or set(images) != set(part.members):
+                yield number
 
 
-def _refuse_close(problem: LayoutProblem, pins: Mapping[int, Point], image: int, pinned: int) -> None:
-    for j, other in pins.items():
-        if j != image and distance(pins[image], other) < 2 * RADIUS - _SLACK:
-            names = problem.neurons[pinned], problem.neurons[j]
-            raise LayoutRefusalError(
-                "mirror-pins",
-                f"no axis keeps the mirror images of pins off other pins: that of '{names[0]}' stands on '{names[1]}'",
-                "move one of the pins, or leave one out",
-                names,
-            )
+def _tried(
+    problem: LayoutProblem,
+    free: Sequence[Point],
+    pieces: Sequence[tuple[Piece, Move]],
+    pair: Mapping[int, int],
+    redraw: Redraw,
+    axis: float,
+    turned: AbstractSet[int],
+) -> _Trial:
+    """Raises LayoutRefusalError where a pin is in the frame of others, or not on its line."""
+    pins = imaged(problem, pair, axis)
+    across, along = shift_of(free, pins)
+    shift = (axis if pair else across, along)
+    held, moves = _held(problem, pieces, pins, shift, axis, redraw, turned)
+    wished = [*_frames(held, moves), *_neurons(problem, held, free, pins, shift)]
+    bodies = _on_lines(problem, wished, pins)
+    ground = Ground()
+    crowds: list[tuple[float, float]] = []
+    pinned = [body for body in bodies if body.pinned]
+    # what is pinned itself before images, so that a refusal speaks of what the spec says
+    for body in sorted(pinned, key=lambda body: problem.pins.keys().isdisjoint(body.members)):
+        ground.refuse(problem.neurons, body)
+        crowds.append(ground.crowding(body, body.wish))
+        ground.put(body, body.wish)
+    crowd = math.fsum(met for met, _ in crowds), math.fsum(near for _, near in crowds)
+    shifted = {b for b, body in enumerate(bodies) if body.wish != wished[b].wish}
+    return _Trial(axis, pins, shift, held, moves, bodies, shifted, crowd)
 
 
 def _held(
@@ -134,11 +188,13 @@ def _held(
     shift: Point,
     axis: float,
     redraw: Redraw,
+    turned: AbstractSet[int],
 ) -> tuple[list[Piece], list[Move]]:
-    """Every piece with its move; those with pins moved to them, or drawn anew."""
+    """Every piece with its move; those with pins moved to them, or drawn anew. The pieces ``turned``, and their images,
+    are drawn as their mirror images if the pins allow that."""
     found: list[Piece] = []
     moves: list[Move] = []
-    for piece, move in pieces:
+    for number, (piece, move) in enumerate(pieces):
         own = {place: pins[m] for place, m in enumerate(piece.part.members) if m in pins}
         wish = Move((move.shift[0] + shift[0], move.shift[1] + shift[1]), move.flip)
         if own:
@@ -146,7 +202,8 @@ def _held(
                 at for flip in (move.flip, not move.flip) if (at := _fitted(piece.drawing, own, flip)) is not None
             ]
             if fitting:
-                wish = fitting[0]
+                original = number if piece.part.image_of < 0 else piece.part.image_of
+                wish = fitting[-1 if original in turned else 0]
             elif piece.part.image_of >= 0:
                 piece = replace(found[piece.part.image_of], part=piece.part)
                 wish = Move((2 * axis - moves[piece.part.image_of].shift[0], 0.0), not moves[piece.part.image_of].flip)
@@ -210,85 +267,6 @@ def _on_lines(problem: LayoutProblem, bodies: list[Body], pins: Mapping[int, Poi
                     y = target
             result[b] = replace(body, wish=(x, y), level=True)
     return result
-
-
-def _arranged(
-    problem: LayoutProblem, bodies: Sequence[Body], pair: Mapping[int, int], axis: float, shifted: AbstractSet[int]
-) -> list[Point]:
-    """Where each body stands: pinned ones first, then those whose wish is free, then the others. The wishes of free
-    bodies are clear of each other, except for those ``shifted`` to the lines that pins give."""
-    owner = {m: b for b, body in enumerate(bodies) for m in body.members}
-    image = [owner[pair[body.members[0]]] if body.members[0] in pair else -1 for body in bodies]
-    ground = Ground()
-    at: dict[int, Point] = {}
-    for b, body in enumerate(bodies):
-        if body.pinned:
-            ground.refuse(problem.neurons, body)
-            ground.put(body, body.wish)
-            at[b] = body.wish
-    waiting: list[int] = []
-    for b, body in enumerate(bodies):
-        if b not in at and not (0 <= image[b] < b):
-            places = _both(body, body.wish, image[b], b, bodies, axis)
-            moved = any(k in shifted for k, _ in places)
-            if not moved and all(ground.takes(bodies[k], place, 2 * RADIUS) for k, place in places):
-                at.update(places)
-            else:
-                waiting.append(b)
-    for b, place in sorted(at.items()):
-        if not bodies[b].pinned:
-            ground.put(bodies[b], place)
-    for b in waiting:
-        found = _search(ground, bodies, b, image[b], axis)
-        if not found:
-            about = tuple(problem.neurons[m] for m in bodies[b].members)
-            raise LayoutRefusalError("pin-in-frame", "pins leave no room on a line", "move one of the pins", about)
-        for k, place in found:
-            ground.put(bodies[k], place)
-            at[k] = place
-    return [at[b] for b in range(len(bodies))]
-
-
-def _both(
-    body: Body, place: Point, image: int, own: int, bodies: Sequence[Body], axis: float
-) -> list[tuple[int, Point]]:
-    """A body and its image, where they stand together."""
-    if image < 0 or image == own:
-        return [(own, place)]
-    return [(own, place), (image, (2 * axis - place[0], place[1]))]
-
-
-def _search(ground: Ground, bodies: Sequence[Body], own: int, image: int, axis: float) -> list[tuple[int, Point]]:
-    """The free place nearest to the wish, sideways first; none where a line has no room. What is on the axis stays
-    on it if that can be."""
-    body = bodies[own]
-    x, y = body.wish
-    on_axis = image == own or (image < 0 and x == axis)
-    reach = 4
-    while True:
-        steps = range(-reach, reach + 1)
-        across, along = [0] if on_axis else steps, [0] if body.level else steps
-        around = sorted((i * i + j * j, abs(j), -i, -j) for i in across for j in along)
-        for squared, _, i, j in around:
-            if squared > reach * reach:
-                break
-            place = (x - i * _STEP, y - j * _STEP)
-            places = _both(body, place, image, own, bodies, axis)
-            if _clear_of_each_other(bodies, places) and all(ground.takes(bodies[k], p) for k, p in places):
-                return places
-        if reach > 64 and on_axis and image != own:
-            on_axis = False
-        elif reach > 4096:
-            return []
-        reach *= 2
-
-
-def _clear_of_each_other(bodies: Sequence[Body], places: Sequence[tuple[int, Point]]) -> bool:
-    if len(places) < 2:
-        return True
-    ground = Ground()
-    ground.put(bodies[places[0][0]], places[0][1])
-    return ground.takes(bodies[places[1][0]], places[1][1])
 
 
 __all__ = ["Rect", "Settled", "settled"]
