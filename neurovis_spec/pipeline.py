@@ -68,7 +68,6 @@ def build(spec: Spec, request: Request, findings: Findings) -> Network | None:
 
 def allow(findings: Findings) -> None:
     """Take out the warnings that comments allow on their lines."""
-
     if any("allow" in text for text in findings.sources.values()):
         from neurovis_spec.language.allow import silence
 
@@ -85,7 +84,6 @@ def simulate(
     progress: Progress | None = None,
 ) -> Recording:
     """Run the update program, record activities and weights."""
-
     from neurovis_spec.runtime.record import record
 
     return record(network, steps, inputs, backend, every, start, progress)
@@ -99,7 +97,6 @@ def simulate_to(
     progress: Progress | None = None,
 ) -> None:
     """The same, written to a file while it runs."""
-
     from neurovis_spec.runtime.stream import record_to
 
     record_to(network, path, course, start, progress)
@@ -107,7 +104,6 @@ def simulate_to(
 
 def remember(spec: Spec, request: Request, network: Network, findings: Findings) -> Layout | None:
     """The earlier layout that the spec names, if it names one."""
-
     if spec.layout is None or spec.layout.file is None:
         return None
     from neurovis_spec.layout.remember import read_memory
@@ -117,7 +113,6 @@ def remember(spec: Spec, request: Request, network: Network, findings: Findings)
 
 def foresee(spec: Spec, network: Network, findings: Findings) -> None:
     """What the layout will surely not be as it is meant."""
-
     if spec.layout is None or spec.layout.engine is None or not network.instances:
         return
     from neurovis_spec.layout.framing import look_at_engine
@@ -129,7 +124,6 @@ def arrange(
     network: Network, engine: str | None = None, memory: Layout | None = None, progress: Progress | None = None
 ) -> Layout:
     """A position for every neuron, a route for every connection."""
-
     from neurovis_spec.layout.arrange import lay_out
 
     return lay_out(network, engine, memory, progress)
@@ -139,7 +133,6 @@ def locate(
     refusal: LayoutRefusalError, spec: Spec, request: Request, network: Network, engine: str | None = None
 ) -> Span | None:
     """Where the spec says what an engine refuses; ``engine`` is the one that was chosen in place of the spec's."""
-
     from neurovis_spec.layout.where import where
 
     return where(refusal, spec, request, network, engine)
@@ -147,7 +140,6 @@ def locate(
 
 def measure(network: Network, progress: Progress | None = None) -> Gains:
     """The gains of Eqs. 2–5: the author's, else such that the range of a default run shows."""
-
     from neurovis_spec.scene.probe import probe
 
     return probe(network, progress)
@@ -155,7 +147,6 @@ def measure(network: Network, progress: Progress | None = None) -> Gains:
 
 def picture(network: Network, layout: Layout, snapshot: Snapshot, gains: Gains, settings: RenderSettings) -> Scene:
     """One step as discs, splines and texts."""
-
     from neurovis_spec.scene.encode import encode
 
     return encode(network, layout, snapshot, gains, settings)
@@ -170,7 +161,6 @@ def moving(
     fps: float,
 ) -> Film:
     """Several steps as a scene whose colours and widths change."""
-
     from neurovis_spec.scene.film import film
 
     return film(network, layout, snapshots, gains, settings, fps)
@@ -178,7 +168,6 @@ def moving(
 
 def draw(scene: Scene, suffix: str) -> bytes:
     """A scene as the content of a file of this kind. Raises RendererError where nobody draws such files."""
-
     from neurovis_spec.scene.renderers import renderer_for
 
     return renderer_for(suffix, moving=False).draw(scene, suffix)
@@ -186,7 +175,6 @@ def draw(scene: Scene, suffix: str) -> bytes:
 
 def animate(moving_scene: Film, suffix: str, progress: Progress | None = None) -> bytes:
     """A film as the content of a file of this kind. Raises RendererError where nobody makes such films."""
-
     from neurovis_spec.scene.renderers import renderer_for
 
     return renderer_for(suffix, moving=True).animate(moving_scene, suffix, progress)
