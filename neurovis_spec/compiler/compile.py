@@ -111,21 +111,23 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
         return None
     blocks = make_blocks(population, connections.sources, connections.targets, level)
     program = make_program(blocks, plasticity)
-    content = digest(
-        "neurovis 1",
-        spec.name.value,
-        constants.dt,
-        episode,
-        seed,
-        constants.parameters,
-        population.neurons,
-        connections,
-        inputs,
-        outputs,
-        blocks,
-        plasticity,
-        noises,
-    )
+    content = ""  # a phase of a run is asked for no hash of its own
+    if with_events:
+        content = digest(
+            "neurovis 1",
+            spec.name.value,
+            constants.dt,
+            episode,
+            seed,
+            constants.parameters,
+            population.neurons,
+            connections,
+            inputs,
+            outputs,
+            blocks,
+            plasticity,
+            noises,
+        )
     network = Network(
         name=spec.name.value,
         title=", ".join(text.value for text in spec.title or ()) or spec.name.value,
