@@ -14,19 +14,17 @@ from typing import TypeAlias
 from neurovis_layouts.packing import packed
 from neurovis_layouts.pins import fit
 from neurovis_layouts.routing import route_all
+from neurovis_spec.layout.frames import PAD, PAD_FRAME, PAD_ROUTE, TITLE, Rect
 from neurovis_spec.layout.geometry import sampled, snap
 from neurovis_spec.layout.model import LayoutEdge, LayoutProblem, Point, Route
 
-#: x0, y0, x1, y1
-Rect: TypeAlias = tuple[float, float, float, float]
 #: A connection by its ends and its number among those that share them.
 Key: TypeAlias = tuple[int, int, int]
 #: Places for these neurons, around (0, 0).
 Formation: TypeAlias = Callable[[Sequence[int]], list[Point]]
 
-#: From centres, from routes and from frames within to the line of a frame; room for a title; between frames.
-_PAD, _PAD_ROUTE, _PAD_FRAME = 0.65, 0.2, 0.35
-_TITLE, _BETWEEN = 0.35, 1.0
+#: Between frames.
+_BETWEEN = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,15 +40,15 @@ class Drawing:
         lines = [point for route in self.routes.values() for point in sampled(route, 0.1)]
         rects = [rect for _, rect in self.frames]
         around = (
-            (self.places, _PAD),
-            (lines, _PAD_ROUTE),
-            ([r[:2] for r in rects] + [r[2:] for r in rects], _PAD_FRAME),
+            (self.places, PAD),
+            (lines, PAD_ROUTE),
+            ([r[:2] for r in rects] + [r[2:] for r in rects], PAD_FRAME),
         )
         x0 = min(x - pad for points, pad in around for x, _ in points)
         y0 = min(y - pad for points, pad in around for _, y in points)
         x1 = max(x + pad for points, pad in around for x, _ in points)
         y1 = max(y + pad for points, pad in around for _, y in points)
-        return snap(x0), snap(y0 - _TITLE), snap(x1), snap(y1)
+        return snap(x0), snap(y0 - TITLE), snap(x1), snap(y1)
 
 
 class Blocks:

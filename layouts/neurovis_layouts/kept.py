@@ -12,11 +12,11 @@ import numpy as np
 
 from neurovis_layouts.alike import Alike, Move
 from neurovis_layouts.frame import from_picture, to_picture
-from neurovis_layouts.frames import Frames, bounds
 from neurovis_layouts.memory import remembered
 from neurovis_layouts.routing import route_all
 from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
 from neurovis_layouts.routing.walls import Frame, Walls
+from neurovis_spec.layout.frames import Frames, bounds
 from neurovis_spec.layout.model import Layout, LayoutProblem, Point, Route
 
 #: With more new connections than this nobody can follow one: they do not go round frames.

@@ -12,10 +12,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from neurovis_layouts.alike import Alike, Move
-from neurovis_layouts.frames import Frames, Rect, bounds
 from neurovis_layouts.pins import Cells
 from neurovis_layouts.resolved import resolved
 from neurovis_layouts.room import Copy, Room, Side
+from neurovis_spec.layout.frames import Frames, Rect, bounds
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import RADIUS, LayoutMirror, LayoutModule, LayoutProblem, Point, Route
 

@@ -10,8 +10,8 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from neurovis_layouts.frames import Frames, Rect, bounds, meet, padded, titled, united, untitled
 from neurovis_layouts.pins import Cells
+from neurovis_spec.layout.frames import Frames, Rect, bounds, meet, padded, titled, united, untitled
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import RADIUS, Point
 

@@ -10,13 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from neurovis_spec.compiler.network import Group, Network
+from neurovis_spec.layout.frames import BOX_ACROSS, BOX_DOWN, BOX_FRAME, BOX_LOOP, PAD, PAD_FRAME, PAD_ROUTE, TITLE
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.geometry import FloatArray, Rect, bounds, overlap, sample
 
-_PAD_ACROSS, _PAD_DOWN = 0.62, 0.6
-_TIGHT = 0.42
-#: Around what an instance's frame holds: centres, routes, frames; and room for its title on top.
-_PAD_FRAME, _PAD_ROUTE, _PAD_INNER, _TITLE_ROOM = 0.65, 0.2, 0.35, 0.35
+#: Around centres and frames in a box that would touch another otherwise.
+_TIGHT, _TIGHT_FRAME = 0.42, 0.15
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,9 +98,9 @@ def _routes_within(
 
 def _framed(positions: FloatArray, lines: Sequence[FloatArray], inside: tuple[int, ...], held: Sequence[Rect]) -> Rect:
     """The frame of an instance, as the layered engine keeps it free."""
-    parts = [_wider(bounds([positions[list(inside)]]), _PAD_FRAME), _wider(bounds(lines), _PAD_ROUTE)]
-    x0, y0, x1, y1 = _union([part for part in parts if part is not None] + [_padded(r, _PAD_INNER) for r in held])
-    return x0, y0 - _TITLE_ROOM, x1, y1
+    parts = [_wider(bounds([positions[list(inside)]]), PAD), _wider(bounds(lines), PAD_ROUTE)]
+    x0, y0, x1, y1 = _union([part for part in parts if part is not None] + [_padded(r, PAD_FRAME) for r in held])
+    return x0, y0 - TITLE, x1, y1
 
 
 def _wider(rect: Rect | None, by: float) -> Rect | None:
@@ -140,7 +139,7 @@ def _around(
     held: Sequence[Rect],
     tight: bool,
 ) -> Rect:
-    across, down = (_TIGHT, _TIGHT) if tight else (_PAD_ACROSS, _PAD_DOWN)
+    across, down = (_TIGHT, _TIGHT) if tight else (BOX_ACROSS, BOX_DOWN)
     dots = bounds([positions[list(inside)]])
     assert dots is not None
     x0, y0, x1, y1 = dots
@@ -154,8 +153,8 @@ def _around(
         if source == target and source in chosen
     ]
     around = bounds(loops)
-    parts = [rect, *(_padded(r, 0.15 if tight else 0.3) for r in held)]
-    return _union(parts if around is None else [*parts, _padded(around, 0.15)])
+    parts = [rect, *(_padded(r, _TIGHT_FRAME if tight else BOX_FRAME) for r in held)]
+    return _union(parts if around is None else [*parts, _padded(around, BOX_LOOP)])
 
 
 def _titled(network: Network, item: _Named) -> str:

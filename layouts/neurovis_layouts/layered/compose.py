@@ -14,18 +14,17 @@ from dataclasses import replace
 
 from neurovis_layouts.layered.bonds import bonded
 from neurovis_layouts.layered.book import Book, Key, keys_of, restricted
-from neurovis_layouts.layered.drawing import Drawing, Move, Piece, Rect
+from neurovis_layouts.layered.drawing import Drawing, Move, Piece
 from neurovis_layouts.layered.halves import symmetric_units
 from neurovis_layouts.layered.links import linked
 from neurovis_layouts.layered.parts import Part, columns_of, firm, images_of, may_be_frame, parts_of
 from neurovis_layouts.layered.settle import Settled, settled
 from neurovis_layouts.layered.sheet import Plan, planned
 from neurovis_layouts.layered.units import Unit
+from neurovis_spec.layout.frames import BOX_DOWN, Rect
 from neurovis_spec.layout.geometry import distance, snap
 from neurovis_spec.layout.model import LayoutMirror, LayoutProblem, Point, Route
 
-#: A box is drawn no closer round its neurons than this.
-_LINE = 0.6
 #: What a module pins gives way to pins closer than this.
 _OFF = 0.75
 
@@ -232,7 +231,7 @@ def _boxes_within(rests: Settled) -> Iterator[tuple[tuple[int, ...], Move, Rect]
 
 def _box(places: Sequence[Point], members: Sequence[int]) -> Rect:
     xs, ys = [places[m][0] for m in members], [places[m][1] for m in members]
-    return snap(min(xs) - _LINE), snap(min(ys) - _LINE), snap(max(xs) + _LINE), snap(max(ys) + _LINE)
+    return snap(min(xs) - BOX_DOWN), snap(min(ys) - BOX_DOWN), snap(max(xs) + BOX_DOWN), snap(max(ys) + BOX_DOWN)
 
 
 def _entered(drawing: Drawing, members: Sequence[int]) -> bool:

@@ -7,19 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
 
 from neurovis_layouts.layered.book import Key
 from neurovis_layouts.layered.parts import Part
+from neurovis_spec.layout.frames import PAD, PAD_FRAME, PAD_ROUTE, TITLE, Rect
 from neurovis_spec.layout.geometry import sampled
 from neurovis_spec.layout.model import GRID, Point, Route
-
-#: x0, y0, x1, y1
-Rect: TypeAlias = tuple[float, float, float, float]
-
-#: From centres, from routes and from frames within to the line of a frame; on top there is room for a title.
-_PAD, _PAD_ROUTE, _PAD_FRAME = 0.65, 0.2, 0.35
-_TITLE = 0.35
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,11 +59,11 @@ def around(places: Iterable[Point], routes: Iterable[Route], frames: Sequence[Re
     """The frame around neurons, routes and frames: on the grid, so that it moves exactly."""
     points = list(places)
     line = [point for route in routes for point in sampled(route, 0.3)]
-    x0 = min([x - _PAD for x, _ in points] + [x - _PAD_ROUTE for x, _ in line] + [r[0] - _PAD_FRAME for r in frames])
-    x1 = max([x + _PAD for x, _ in points] + [x + _PAD_ROUTE for x, _ in line] + [r[2] + _PAD_FRAME for r in frames])
-    y0 = min([y - _PAD for _, y in points] + [y - _PAD_ROUTE for _, y in line] + [r[1] - _PAD_FRAME for r in frames])
-    y1 = max([y + _PAD for _, y in points] + [y + _PAD_ROUTE for _, y in line] + [r[3] + _PAD_FRAME for r in frames])
-    return _down(x0), _down(y0 - _TITLE), _up(x1), _up(y1)
+    x0 = min([x - PAD for x, _ in points] + [x - PAD_ROUTE for x, _ in line] + [r[0] - PAD_FRAME for r in frames])
+    x1 = max([x + PAD for x, _ in points] + [x + PAD_ROUTE for x, _ in line] + [r[2] + PAD_FRAME for r in frames])
+    y0 = min([y - PAD for _, y in points] + [y - PAD_ROUTE for _, y in line] + [r[1] - PAD_FRAME for r in frames])
+    y1 = max([y + PAD for _, y in points] + [y + PAD_ROUTE for _, y in line] + [r[3] + PAD_FRAME for r in frames])
+    return _down(x0), _down(y0 - TITLE), _up(x1), _up(y1)
 
 
 def _down(value: float) -> float:

@@ -9,8 +9,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from neurovis_layouts.layered.drawing import Rect
 from neurovis_layouts.pins import Cells
+from neurovis_spec.layout.frames import Rect
 from neurovis_spec.layout.model import RADIUS, LayoutRefusalError, Point
 
 #: How far what gives way keeps off other discs, and frames off frames, so that lines find a way between them.

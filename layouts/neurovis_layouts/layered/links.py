@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from neurovis_layouts.layered.book import Key
-from neurovis_layouts.layered.drawing import Rect
 from neurovis_layouts.layered.settle import Settled
 from neurovis_layouts.layered.sheet import Plan
 from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.routing import Waypoint, route_all
 from neurovis_layouts.routing.channels import channels
+from neurovis_spec.layout.frames import Rect
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import LayoutEdge, LayoutProblem, Point, Route
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 from neurovis_layouts.layered.axes import axes, imaged, shift_of
-from neurovis_layouts.layered.drawing import Drawing, Move, Piece, Rect
+from neurovis_layouts.layered.drawing import Drawing, Move, Piece
 from neurovis_layouts.layered.ground import Body, Ground
 from neurovis_layouts.layered.parts import images_of
 from neurovis_layouts.layered.sheet import Plan
@@ -267,6 +267,3 @@ def _on_lines(problem: LayoutProblem, bodies: list[Body], pins: Mapping[int, Poi
                     y = target
             result[b] = replace(body, wish=(x, y), level=True)
     return result
-
-
-__all__ = ["Rect", "Settled", "settled"]

@@ -1,4 +1,5 @@
-"""Frames: the rectangles that instances of modules and boxes are drawn as, in the picture's coordinates.
+"""Frames: the rectangles that instances of modules and boxes are drawn as, in the picture's coordinates, and how far
+their lines are from what they hold.
 
 In: a problem, where its neurons stand, routes. Out: by number, those of the instances first, then those of the boxes,
 who is in a frame, which frames hold which, and the rectangles of what is placed.
@@ -15,10 +16,10 @@ from neurovis_spec.layout.model import LayoutProblem, Point, Route
 #: x0, y0, x1, y1
 Rect: TypeAlias = tuple[float, float, float, float]
 
-#: From centres, routes and frames within to the line of an instance's frame, and room for its title.
-_PAD, _PAD_ROUTE, _PAD_FRAME, _TITLE = 0.65, 0.2, 0.35, 0.35
-#: The same for boxes: centres, loops, frames.
-_BOX, _BOX_LOOP, _BOX_FRAME = 0.62, 0.15, 0.3
+#: From centres, routes and frames within to the line of an instance's frame, and room for its title on top.
+PAD, PAD_ROUTE, PAD_FRAME, TITLE = 0.65, 0.2, 0.35, 0.35
+#: The same for boxes: from centres, sideways and up and down; from loops, from frames.
+BOX_ACROSS, BOX_DOWN, BOX_LOOP, BOX_FRAME = 0.62, 0.6, 0.15, 0.3
 
 
 class Frames:
@@ -57,23 +58,22 @@ class Frames:
                 continue
             lines = [p for i in self._inner.get(number, ()) if i in routes for p in sampled(routes[i], 0.1)]
             held = [rect for n in self._held.get(number, ()) if (rect := found[n]) is not None]
-            parts = [padded(bounds(at), _PAD if instance else _BOX)]
-            parts += [padded(bounds(lines), _PAD_ROUTE if instance else _BOX_LOOP)] if lines else []
-            parts += [padded(rect, _PAD_FRAME if instance else _BOX_FRAME) for rect in held]
+            parts = [padded(bounds(at), PAD) if instance else _boxed(bounds(at))]
+            parts += [padded(bounds(lines), PAD_ROUTE if instance else BOX_LOOP)] if lines else []
+            parts += [padded(rect, PAD_FRAME if instance else BOX_FRAME) for rect in held]
             found[number] = titled(united(parts)) if instance else united(parts)
         return found
 
     def grown(self, number: int, rect: Rect) -> Rect:
         """What a frame is at least when it holds this frame."""
         instance = number < self.instances
-        wider = padded(rect, _PAD_FRAME if instance else _BOX_FRAME)
+        wider = padded(rect, PAD_FRAME if instance else BOX_FRAME)
         return titled(wider) if instance else wider
 
     def single(self, number: int, point: Point) -> Rect:
         """What a frame is at least when it holds a neuron in no frame within it."""
-        instance = number < self.instances
-        wider = padded((*point, *point), _PAD if instance else _BOX)
-        return titled(wider) if instance else wider
+        rect = (*point, *point)
+        return titled(padded(rect, PAD)) if number < self.instances else _boxed(rect)
 
     def related(self, one: int, other: int) -> bool:
         """Whether frames have neurons in common, so that they cannot keep off each other."""
@@ -91,6 +91,11 @@ def padded(rect: Rect, by: float) -> Rect:
     return rect[0] - by, rect[1] - by, rect[2] + by, rect[3] + by
 
 
+def _boxed(rect: Rect) -> Rect:
+    """The line of a box around centres."""
+    return rect[0] - BOX_ACROSS, rect[1] - BOX_DOWN, rect[2] + BOX_ACROSS, rect[3] + BOX_DOWN
+
+
 def united(rects: Iterable[Rect]) -> Rect:
     """The rectangle around rectangles."""
     x0, y0, x1, y1 = zip(*rects, strict=True)
@@ -99,12 +104,12 @@ def united(rects: Iterable[Rect]) -> Rect:
 
 def titled(rect: Rect) -> Rect:
     """With room for a title on top."""
-    return rect[0], rect[1] - _TITLE, rect[2], rect[3]
+    return rect[0], rect[1] - TITLE, rect[2], rect[3]
 
 
 def untitled(rect: Rect) -> Rect:
     """Without the room for a title."""
-    return rect[0], rect[1] + _TITLE, rect[2], rect[3]
+    return rect[0], rect[1] + TITLE, rect[2], rect[3]
 
 
 def meet(one: Rect, other: Rect, gap: float = 0.0) -> bool:

@@ -1,0 +1,58 @@
+"""Frames: one rule says how far their lines are from what they hold, for engines, memory and pictures alike."""
+
+from __future__ import annotations
+
+import neurovis_layouts.blocks
+import neurovis_layouts.layered.drawing
+import numpy as np
+import pytest
+from neurovis_layouts.layered.compose import Composer
+
+import neurovis_spec as nv
+import neurovis_spec.scene.boxes
+from neurovis_spec.layout import frames
+from neurovis_spec.layout.problem import problem_of
+
+LEGS = """
+neurovis: 1
+name: legs
+modules:
+  knee: {neurons: {E: {}, F: {}}, connections: {E -> F: 1, F -> E: 1}}
+  leg:
+    neurons: {S: {count: 3, bias: 1}, T: {}}
+    instances: {knee: {module: knee}}
+    connections: {S -> T: 1, T -> T: 1, T -> knee.E: 1, knee.F -> S1: 1}
+instances: {left: {module: leg, count: 2}}
+neurons: {C: {count: 2}, D: {}}
+connections: {left1.T -> C: 1, C -> D: 1, D -> left2.S: 1}
+layout: {boxes: {pair: [C]}}
+"""
+
+
+def test_frames_are_drawn_where_engines_and_memory_keep_room_for_them() -> None:
+    network = nv.compile_text(LEGS)
+    problem = problem_of(network.network)
+    layout = network.layout("layered").value
+    placed = {i: layout.positions[name] for i, name in enumerate(problem.neurons)}
+    routes = {i: layout.routes[edge.name] for i, edge in enumerate(problem.edges)}
+    remembered = frames.Frames(problem).rects(placed, routes)
+    names = network.network.neurons.names
+    positions = np.array([layout.positions[name] for name in names])
+    splines = [np.array(layout.routes[name]) for name in network.network.connection_names]
+    drawn = {box.path: box.rect for box in neurovis_spec.scene.boxes.boxes_of(network.network, positions, splines)}
+    free = Composer(problem).whole()
+    shift = placed[0][0] - free.places[0][0], placed[0][1] - free.places[0][1]
+    planned = {frozenset(own): rect for own, rect in (*free.frames, *free.boxes)}
+    for number, path in enumerate([*(module.path for module in problem.modules), *(name for name, _ in problem.boxes)]):
+        rect = remembered[number]
+        assert rect is not None
+        assert drawn[path] == pytest.approx(rect, abs=0.02), path  # routes are sampled, more or less finely
+        kept = planned[frames.Frames(problem).members[number]]
+        assert kept[0] + shift[0] == pytest.approx(rect[0], abs=0.03), path
+        assert kept[1] + shift[1] == pytest.approx(rect[1], abs=0.03), path
+
+
+@pytest.mark.parametrize("module", [neurovis_layouts.blocks, neurovis_layouts.layered.drawing, neurovis_spec.scene.boxes])
+def test_nobody_has_distances_of_their_own(module: object) -> None:
+    for name in ("PAD", "PAD_ROUTE", "PAD_FRAME", "TITLE"):
+        assert getattr(module, name) is getattr(frames, name)
