@@ -2,7 +2,7 @@
 
 In: centres, edges, and what an engine knows about the way (waypoints). Out: a cubic spline for every edge. The
 modules: ``ports`` (who leaves and arrives where on a disc), ``curves`` (along the direction), ``bows`` (from anywhere
-to anywhere), ``loops`` (to itself), ``obstacles`` (which neurons are in the way), ``apart`` (those that
+to anywhere), ``loops`` (to itself), ``obstacles`` (which neurons are in the way), ``sheaves`` (those that
 share both ends).
 """
 

@@ -9,13 +9,13 @@ import math
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 
-from neurovis_layouts.routing.apart import apart
 from neurovis_layouts.routing.bows import FEW_TRIES, MANY_TRIES, Wish, clear_bow, clear_bows
 from neurovis_layouts.routing.curves import Waypoint, curve
 from neurovis_layouts.routing.detours import Detours
 from neurovis_layouts.routing.loops import best_loop
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
 from neurovis_layouts.routing.ports import Port, leanings
+from neurovis_layouts.routing.sheaves import spread_out
 from neurovis_layouts.routing.walls import Frame, Walls
 from neurovis_spec.layout.geometry import distance
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
@@ -72,7 +72,7 @@ def route_all(
     if len(edges) <= min(careful, _MOST_AT_LENGTH):
         wide = [(own, (x0 - _OFF, y0 - _OFF, x1 + _OFF, y1 + _OFF)) for own, (x0, y0, x1, y1) in frames]
         bows = frozenset(rest) - detoured.keys()
-        routes.update(apart(edges, routes, bows, near, Walls(wide, len(centres)) if wide else None))
+        routes.update(spread_out(edges, routes, bows, near, Walls(wide, len(centres)) if wide else None))
     routes.update(_loops(edges, centres, routes, near, walls))
     return [routes[i] for i in range(len(edges))]
 

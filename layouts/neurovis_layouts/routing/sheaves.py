@@ -1,4 +1,4 @@
-"""Apart: connections that share both ends, in either direction, do not run on each other.
+"""Sheaves: connections that share both ends, in either direction, do not run on each other.
 
 In: routes that are drawn, what is in the way. Out: for those that run on another between the same ends, the route
 shifted to a side, where it is clear of the other, of discs and frames, and on no third.
@@ -31,7 +31,7 @@ _END = 0.4
 _STEP = 0.1
 
 
-def apart(
+def spread_out(
     edges: Sequence[LayoutEdge],
     routes: Mapping[int, Route],
     fixed: AbstractSet[int],
