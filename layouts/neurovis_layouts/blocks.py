@@ -125,7 +125,7 @@ def routed(drawing: Drawing, edges: Sequence[LayoutEdge]) -> Drawing:
     keys = keys_of(edges)
     new = [i for i, key in enumerate(keys) if key not in drawing.routes]
     walls = [(frozenset(own), rect) for own, rect in drawing.frames]
-    made = route_all([edges[i] for i in new], drawing.places, frames=walls)
+    made = route_all([edges[i] for i in new], drawing.places, frames=walls, drawn=list(drawing.routes.values()))
     routes = dict(drawing.routes)
     for i, route in zip(new, made, strict=True):
         routes[keys[i]] = (route[0], *((snap(x), snap(y)) for x, y in route[1:-1]), route[-1])

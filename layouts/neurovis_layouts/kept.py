@@ -13,7 +13,7 @@ import numpy as np
 from neurovis_layouts.alike import Alike, Move
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.memory import remembered
-from neurovis_layouts.routing import route_all
+from neurovis_layouts.routing import route_all, told_apart
 from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
 from neurovis_layouts.routing.walls import Frame, Walls
 from neurovis_spec.layout.frames import Frames, bounds
@@ -103,13 +103,15 @@ def _found(problem: LayoutProblem, ways: _Ways, rest: Sequence[int], routes: Map
     shown = [i for i, e in enumerate(problem.edges) if frozenset((e.source, e.target)) in ends]
     walls = ways.walls(routes) if len(shown) <= _CAREFULLY else []
     walls = [(own, bounds([flat(rect[:2]), flat(rect[2:])])) for own, rect in walls]
-    made = route_all([problem.edges[i] for i in shown], [flat(point) for point in ways.centres], {}, frames=walls)
-    wanted = set(rest)
-    return {
-        i: tuple(to_picture(point, problem.direction) for point in route)
-        for i, route in zip(shown, made, strict=True)
-        if i in wanted
-    }
+    edges, centres = [problem.edges[i] for i in shown], [flat(point) for point in ways.centres]
+    others = [tuple(map(flat, routes[i])) for i in sorted(routes.keys() - set(shown))]
+    made = dict(enumerate(route_all(edges, centres, {}, frames=walls, drawn=others)))
+    made.update({k: tuple(map(flat, routes[i])) for k, i in enumerate(shown) if i in routes})
+    new = {k for k, i in enumerate(shown) if i not in routes}
+    if len(shown) <= _CAREFULLY:
+        between = {k: route for k, route in made.items() if edges[k].source != edges[k].target}
+        made.update(told_apart(edges, centres, between, new & between.keys(), walls, others))
+    return {shown[k]: tuple(to_picture(point, problem.direction) for point in made[k]) for k in sorted(new)}
 
 
 def _old_routes(problem: LayoutProblem, memory: Layout, ways: _Ways) -> dict[int, Route]:

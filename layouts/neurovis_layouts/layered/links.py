@@ -5,17 +5,20 @@ In: places, frames, the plan's waypoints. Out: a route for each; those of mirror
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from neurovis_layouts.layered.book import Key
 from neurovis_layouts.layered.settle import Settled
 from neurovis_layouts.layered.sheet import Plan
 from neurovis_layouts.layered.units import Unit
-from neurovis_layouts.routing import Waypoint, route_all
+from neurovis_layouts.routing import Waypoint, route_all, told_apart
 from neurovis_layouts.routing.channels import channels
 from neurovis_spec.layout.frames import Rect
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import LayoutEdge, LayoutProblem, Point, Route
+
+#: With more connections than this nobody can tell them apart.
+_MOST = 1000
 
 
 def linked(
@@ -28,7 +31,7 @@ def linked(
     frames: Sequence[tuple[tuple[int, ...], Rect]],
     boxes: Sequence[tuple[tuple[int, ...], Rect]],
     pair: Mapping[int, int],
-    drawn: Iterable[Route],
+    drawn: Sequence[Route],
 ) -> dict[Key, Route]:
     """Routes of these edges by key; ``boxes`` are drawn, though nothing had to make room for them; ``drawn`` are the
     routes within the frames."""
@@ -38,12 +41,27 @@ def linked(
         planned = _passing(problem, plan, rests)
         gates = {k: planned[i] for k, i in enumerate(links) if i in planned}
         ways, lateral = channels(dict(enumerate(edges)), rests.places, framed, gates, drawn)
-        routes = route_all(edges, rests.places, ways, _bowed(edges, units), lateral, frames=framed)
+        routes = route_all(edges, rests.places, ways, _bowed(edges, units), lateral, frames=framed, drawn=drawn)
     else:
         ways = _passing(problem, plan, rests)
-        routes = route_all(edges, rests.places, ways, _bowed(edges, units), frames=framed)
+        routes = route_all(edges, rests.places, ways, _bowed(edges, units), frames=framed, drawn=drawn)
     found = {keys[i]: tuple(_snapped(route)) for i, route in zip(links, routes, strict=True)}
-    return _reflected(found, rests, pair) if pair else found
+    if not pair:
+        return found
+    found = _reflected(found, rests, pair)
+    # what has no image may now meet the image of another
+    here = {i: found[keys[link]] for i, link in enumerate(links) if edges[i].source != edges[i].target}
+    single = {i for i in here if not _imaged(keys[links[i]], found, rests, pair)}
+    if len(here) <= _MOST:
+        moved = told_apart(edges, rests.places, here, single, framed, drawn)
+        found.update({keys[links[i]]: tuple(_snapped(route)) for i, route in moved.items()})
+    return found
+
+
+def _imaged(key: Key, routes: Mapping[Key, Route], rests: Settled, pair: Mapping[int, int]) -> bool:
+    """Whether a route is the reflection of another, or of itself."""
+    source, target, number = key
+    return (_image(source, rests, pair), _image(target, rests, pair), number) in routes or pair.get(source) == target
 
 
 def _snapped(route: Route) -> list[Point]:

@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 
+from neurovis_layouts.routing.arrivals import parted
 from neurovis_layouts.routing.bows import FEW_TRIES, MANY_TRIES, Wish, clear_bow, clear_bows
 from neurovis_layouts.routing.curves import Waypoint, curve
 from neurovis_layouts.routing.detours import Detours
@@ -20,7 +21,7 @@ from neurovis_layouts.routing.walls import Frame, Walls
 from neurovis_spec.layout.geometry import distance
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
-__all__ = ["Waypoint", "route_all"]
+__all__ = ["Waypoint", "route_all", "told_apart"]
 
 _NEAR = 3.0
 #: With more edges than this nobody can follow one: discs in the way are not gone round.
@@ -44,13 +45,14 @@ def route_all(
     lateral: Mapping[int, Sequence[Waypoint]] | None = None,
     careful: int = _MOST_CAREFULLY,
     frames: Sequence[Frame] = (),
+    drawn: Sequence[Route] = (),
 ) -> list[Route]:
     """Routes by edge index.
 
     Without ``waypoints`` every edge runs from anywhere to anywhere; with them, edges not in ``bowed`` run along the
     direction (through their waypoints, if they have any). Those in ``lateral`` run across it, through waypoints with x
     and y exchanged. With more than ``careful`` edges, discs in the way are not gone round. No route enters one of the
-    ``frames`` that holds neither of its ends, if there is a way round.
+    ``frames`` that holds neither of its ends, if there is a way round. ``drawn`` are other routes, which are there.
     """
     near = Obstacles(centres)
     obstacles = near if len(edges) <= careful else Obstacles(())
@@ -70,11 +72,28 @@ def route_all(
     detoured = {} if walls is None else _round_frames(edges, centres, routes, walls)
     routes.update(detoured)
     if len(edges) <= min(careful, _MOST_AT_LENGTH):
-        wide = [(own, (x0 - _OFF, y0 - _OFF, x1 + _OFF, y1 + _OFF)) for own, (x0, y0, x1, y1) in frames]
-        bows = frozenset(rest) - detoured.keys()
-        routes.update(spread_out(edges, routes, bows, near, Walls(wide, len(centres)) if wide else None))
+        routes.update(
+            told_apart(edges, centres, routes, routes.keys(), frames, drawn, frozenset(rest) - detoured.keys())
+        )
     routes.update(_loops(edges, centres, routes, near, walls))
     return [routes[i] for i in range(len(edges))]
+
+
+def told_apart(
+    edges: Sequence[LayoutEdge],
+    centres: Sequence[Point],
+    routes: Mapping[int, Route],
+    free: AbstractSet[int],
+    frames: Sequence[Frame] = (),
+    drawn: Sequence[Route] = (),
+    bows: AbstractSet[int] = frozenset(),
+) -> dict[int, Route]:
+    """Routes by edge index for those that have to give way, of those that are ``free`` to, so that connections can be
+    told apart; ``routes`` are of edges between two neurons, ``bows`` those that are apart from each other."""
+    wide = [(own, (x0 - _OFF, y0 - _OFF, x1 + _OFF, y1 + _OFF)) for own, (x0, y0, x1, y1) in frames]
+    obstacles, walls = Obstacles(centres), Walls(wide, len(centres)) if wide else None
+    found = spread_out(edges, routes, free, bows, obstacles, walls)
+    return {**found, **parted(edges, centres, {**routes, **found}, free, drawn, obstacles, walls)}
 
 
 def _round_frames(
