@@ -52,7 +52,9 @@ def test_frames_are_drawn_where_engines_and_memory_keep_room_for_them() -> None:
         assert kept[1] + shift[1] == pytest.approx(rect[1], abs=0.03), path
 
 
-@pytest.mark.parametrize("module", [neurovis_layouts.blocks, neurovis_layouts.layered.drawing, neurovis_spec.scene.boxes])
+@pytest.mark.parametrize(
+    "module", [neurovis_layouts.blocks, neurovis_layouts.layered.drawing, neurovis_spec.scene.boxes]
+)
 def test_nobody_has_distances_of_their_own(module: object) -> None:
     for name in ("PAD", "PAD_ROUTE", "PAD_FRAME", "TITLE"):
         assert getattr(module, name) is getattr(frames, name)
