@@ -135,8 +135,19 @@ class CompiledNetwork:
             raise
 
     @cached_property
+    def _layouts(self) -> dict[str | None, NetworkLayout]:
+        return {}
+
+    def drawn(self, engine: str | None = None) -> NetworkLayout:
+        """The layout that pictures are drawn in, by this engine or the spec's; computed once. Raises what ``layout``
+        raises."""
+        if engine not in self._layouts:
+            self._layouts[engine] = self.layout(engine)
+        return self._layouts[engine]
+
+    @property
     def _layout(self) -> Layout:
-        return self._arranged()
+        return self.drawn().value
 
     @cached_property
     def gains(self) -> Gains:
@@ -184,7 +195,7 @@ class CompiledNetwork:
 
         suffix = Path(path).suffix
         renderer_for(suffix, moving=False)
-        layout = self._layout if engine is None else self._arranged(engine)
+        layout = self.drawn(engine).value
         snapshot = self._snapshot(step, recording, progress)
         scene = pipeline.picture(self.network, layout, snapshot, self.gains, self._settings(theme))
         content = pipeline.draw(scene, suffix)
@@ -263,6 +274,12 @@ class NetworkLayout:
     def routes(self) -> Mapping[str, Route]:
         """How each connection runs, by name: a cubic Bézier spline of 1 + 3k points."""
         return self.value.routes
+
+    @cached_property
+    def warnings(self) -> tuple[Diagnostic, ...]:
+        """What was noticed about it, such as frames that pins put on each other (``frames-overlap``)."""
+        own = self.compiled
+        return pipeline.examine(self.value, own.spec, own.request, own.network, own.sources).sorted()
 
     def metrics(self) -> dict[str, float | int]:
         """What ``neurovis layout --metrics`` prints, but for the seconds."""

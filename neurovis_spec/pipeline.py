@@ -129,6 +129,23 @@ def arrange(
     return lay_out(network, engine, memory, progress)
 
 
+def examine(layout: Layout, spec: Spec, request: Request, network: Network, sources: Mapping[str, str]) -> Findings:
+    """What in a layout is surely not as it is meant: warnings, but for those that are allowed."""
+
+    from neurovis_spec.layout.clashes import clashes
+    from neurovis_spec.layout.problem import problem_of
+
+    findings = Findings(dict(sources))
+    found = clashes(problem_of(network), layout)
+    if found:
+        from neurovis_spec.language.allow import drop_allowed
+        from neurovis_spec.layout.where import note_clashes
+
+        note_clashes(found, spec, request, network, findings)
+        drop_allowed(findings)
+    return findings
+
+
 def locate(
     refusal: LayoutRefusalError, spec: Spec, request: Request, network: Network, engine: str | None = None
 ) -> Span | None:

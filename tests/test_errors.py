@@ -2,8 +2,8 @@
 
 The expected findings stand in the specs, beside the offending lines: ``# error: LINE:COLUMN CODE  WORDS``, or
 ``# warning: …``; the words must occur in the message or the hint. What they include lies in ``include``, with the
-findings of its own. Specs in ``layout`` compile, and a layout engine refuses them: ``# refused: CODE  WORDS``. The
-files in ``layout_files`` are layout files.
+findings of its own. Specs in ``layout`` compile, and a layout engine refuses them: ``# refused: CODE  WORDS``, or
+warns of what came out: ``# warned: CODE  WORDS``. The files in ``layout_files`` are layout files.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ INCLUDED = sorted((FOLDER / "include").glob("*.yaml"))
 REFUSED = sorted((FOLDER / "layout").glob("*.yaml"))
 LAYOUT_FILES = sorted((FOLDER / "layout_files").glob("*.yaml"))
 EXPECTED = re.compile(r"# (error|warning): (\d+):(\d+) ([\w-]+)(?:  (.*?))?(?=\s+# error|\s+# warning|$)", re.MULTILINE)
-REFUSAL = re.compile(r"# refused: ([\w-]+)  (.*)")
+REFUSAL = re.compile(r"# (refused|warned): ([\w-]+)  (.*)")
 
 
 def findings(path: Path) -> tuple[tuple[Diagnostic, ...], set[str]]:
@@ -62,7 +62,7 @@ def test_every_code_is_covered() -> None:
     covered = {
         code for path in (*SPECS, *INCLUDED, *LAYOUT_FILES) for _, _, _, code, _ in EXPECTED.findall(text_of(path))
     }
-    covered |= {code for path in REFUSED for code, _ in REFUSAL.findall(text_of(path))}
+    covered |= {code for path in REFUSED for _, code, _ in REFUSAL.findall(text_of(path))}
     wanted = {code.name for code in catalogue().values() if code.rare is None}
     elsewhere = {name for name in wanted if catalogue()[name].command.startswith("neurovis run")}
     assert wanted - covered - elsewhere == set()
@@ -85,8 +85,13 @@ def test_layout_file(path: Path) -> None:
 
 @pytest.mark.parametrize("path", REFUSED, ids=lambda path: path.stem)
 def test_refusal(path: Path) -> None:
-    ((code, words),) = REFUSAL.findall(text_of(path))
+    ((how, code, words),) = REFUSAL.findall(text_of(path))
     network = nv.compile(path)
+    if how == "warned":
+        (warning,) = network.layout().warnings
+        assert warning.code == code
+        assert words in f"{warning.message} {warning.hint or ''}"
+        return
     with pytest.raises(LayoutRefusalError) as caught:
         network.layout()
     assert caught.value.code == code

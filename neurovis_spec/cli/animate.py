@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from neurovis_spec.cli.files import check_target, network_of, recording_of, writing
+from neurovis_spec.cli.files import check_target, network_of, recording_of, show_warnings, writing
 from neurovis_spec.cli.options import (
     examples,
     output_option,
@@ -65,4 +65,5 @@ def command(
     record = recording_of(recording)
     with progress("drawing") as bar, writing(output):
         network.animate(output, steps=steps, start=start, fps=fps, recording=record, theme=theme, progress=bar)
+    show_warnings(network.drawn())
     click.echo(str(output))

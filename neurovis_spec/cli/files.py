@@ -18,7 +18,7 @@ from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.progress import progress
 
 if TYPE_CHECKING:
-    from neurovis_spec.compiled import CompiledNetwork
+    from neurovis_spec.compiled import CompiledNetwork, NetworkLayout
     from neurovis_spec.compiler.arrays import FloatArray
     from neurovis_spec.compiler.network import Network
     from neurovis_spec.layout import Layout
@@ -54,6 +54,14 @@ def network_of(spec: str, parameters: Mapping[str, float] | None = None) -> Comp
     if network.warnings:
         click.echo(show_text(network.warnings, network.sources), err=True)
     return network
+
+
+def show_warnings(layout: NetworkLayout) -> None:
+    """What was noticed about a layout, on standard error."""
+    if layout.warnings:
+        from neurovis_spec.findings import show_text
+
+        click.echo(show_text(layout.warnings, layout.compiled.sources), err=True)
 
 
 def standard_input() -> str:

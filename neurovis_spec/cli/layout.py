@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from neurovis_spec.cli.files import check_target, count, earlier_layout, network_of, writing
+from neurovis_spec.cli.files import check_target, count, earlier_layout, network_of, show_warnings, writing
 from neurovis_spec.cli.options import engine_option, examples, output_option, set_option, spec_argument
 from neurovis_spec.cli.progress import progress
 
@@ -58,6 +58,7 @@ def command(
     with progress("laying out") as bar:
         layout = network.layout(engine, earlier=earlier, progress=bar)
     seconds = perf_counter() - begun
+    show_warnings(layout)
     if output is not None:
         with writing(output):
             layout.save(output)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from neurovis_spec.cli.files import check_target, network_of, recording_of, writing
+from neurovis_spec.cli.files import check_target, network_of, recording_of, show_warnings, writing
 from neurovis_spec.cli.options import (
     engine_option,
     examples,
@@ -52,4 +52,5 @@ def command(
     record = recording_of(recording)
     with progress("drawing") as bar, writing(output):
         network.render(output, step=step, recording=record, theme=theme, engine=engine, progress=bar)
+    show_warnings(network.drawn(engine))
     click.echo(str(output))

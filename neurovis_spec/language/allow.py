@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 import yaml
 
-from neurovis_spec.codes import catalogue
+from neurovis_spec.codes import VALIDATE, catalogue
 from neurovis_spec.diagnostics import Diagnostic, Findings, Span, suggest
 from neurovis_spec.language.reader_characters import FORBIDDEN, REPLACEMENT, Lines
 
@@ -94,10 +94,9 @@ def silence(findings: Findings) -> None:
     """Take the allowed warnings out of the findings, and note each allow that is useless."""
     if any(item.code in _UNREADABLE for item in findings.sorted()):
         return
-    asked = [allow for file, text in findings.sources.items() for allow in allows(text, file)]
+    asked = _asked(findings)
     if not asked:
         return
-    asked = asked[:_MOST]
     # a spec with errors has not been looked through for warnings
     complete = not findings.failed
     there = {_key(item) for item in findings.sorted() if item.severity == "warning"}
@@ -105,11 +104,20 @@ def silence(findings: Findings) -> None:
         if allow.code != USELESS:
             _judge(allow, there, complete, findings)
     useless = {_key(item) for item in findings.sorted() if item.code == USELESS}
-    wanted = {(allow.span.file, allow.span.line, allow.code) for allow in asked}
-    findings.drop(lambda item: _key(item) in wanted)
+    drop_allowed(findings)
     for allow in asked:
         if allow.code == USELESS:
             _judge(allow, useless, complete, findings)
+
+
+def drop_allowed(findings: Findings) -> None:
+    """Take the allowed warnings out of the findings."""
+    wanted = {(allow.span.file, allow.span.line, allow.code) for allow in _asked(findings)}
+    findings.drop(lambda item: _key(item) in wanted)
+
+
+def _asked(findings: Findings) -> list[Allow]:
+    return [allow for file, text in findings.sources.items() for allow in allows(text, file)][:_MOST]
 
 
 def _key(item: Diagnostic) -> tuple[str, int, str]:
@@ -129,6 +137,6 @@ def _judge(allow: Allow, there: set[tuple[str, int, str]], complete: bool, findi
         message, hint = f"there is no code '{allow.code[:40]}'", suggest(allow.code[:40], names, "warnings") or hint
     elif code.severity == "error":
         message, hint = f"'{allow.code}' is an error; only warnings can be allowed", "mend what the error is about"
-    elif not complete:
-        return
+    elif not complete or code.command != VALIDATE:
+        return  # what only a layout can tell is not looked for before there is one
     findings.warning(USELESS, allow.span, message, hint)

@@ -20,6 +20,8 @@ Rect: TypeAlias = tuple[float, float, float, float]
 PAD, PAD_ROUTE, PAD_FRAME, TITLE = 0.65, 0.2, 0.35, 0.35
 #: The same for boxes: from centres, sideways and up and down; from loops, from frames.
 BOX_ACROSS, BOX_DOWN, BOX_LOOP, BOX_FRAME = 0.62, 0.6, 0.15, 0.3
+#: From centres and from frames where a box would touch another otherwise.
+BOX_TIGHT, BOX_TIGHT_FRAME = 0.42, 0.15
 
 
 class Frames:

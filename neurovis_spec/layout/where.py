@@ -1,14 +1,14 @@
-"""Where the spec says what a layout engine refuses.
+"""Where the spec says what a layout engine refuses, or what makes frames lie on each other.
 
-In: a LayoutRefusalError, the spec and the network that it became. Out: the place of the pin, the line, the mirror, the
-arrangement or the group that the refusal is about, None where the spec says nothing of the kind. It is looked for when
-something is refused, so that no network has to know where it was written.
+In: a LayoutRefusalError or clashes, the spec and the network that it became. Out: the place of the pin, the line, the
+mirror, the arrangement or the group that the refusal is about, None where the spec says nothing of the kind; warnings.
+It is looked for when there is something to say, so that no network has to know where it was written.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from neurovis_spec.compiler.compile import Request
@@ -17,6 +17,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.references import Section, key_of, key_span
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.spec import Spec
+from neurovis_spec.layout.clashes import Clash
 from neurovis_spec.layout.model import LayoutRefusalError
 
 #: What a refusal may be about: parts of ``layout`` (and ``neurons``), the likeliest first.
@@ -29,6 +30,7 @@ _PARTS: Final[Mapping[str, Sequence[str]]] = {
     "mirror-frames": ("mirror",),
     "mirror-arrange": ("arrange", "mirror"),
     "pin-in-frame": ("positions", "mirror", "align"),
+    "frames-overlap": ("positions", "file", "boxes", "instances", "neurons"),
     "pins-too-close": ("positions",),
     "pin-not-finite": ("positions",),
     "layout-pins-unsupported": ("positions",),
@@ -41,6 +43,7 @@ _PARTS: Final[Mapping[str, Sequence[str]]] = {
 }
 #: These speak of all of a part, not of neurons.
 _WHOLE: Final = "-unsupported"
+_APART: Final = "move one of them, where a pin or the layout file says where it is, or let it go"
 _NUMBER: Final = re.compile(r"(?P<stem>.*?)(?P<number>\d+)")
 
 
@@ -83,18 +86,29 @@ def where(
     refusal: LayoutRefusalError, spec: Spec, request: Request, network: Network, chosen: str | None = None
 ) -> Span | None:
     """The place in the spec that a refusal is about. ``chosen`` is the engine, where it was not the spec's choice."""
+    return _place(refusal.code, refusal.about, spec, _Sections(spec, request, network), chosen)
+
+
+def note_clashes(found: Iterable[Clash], spec: Spec, request: Request, network: Network, findings: Findings) -> None:
+    """Note warnings (``frames-overlap``) where the spec makes frames lie on each other."""
     sections = _Sections(spec, request, network)
-    for part in _PARTS.get(refusal.code, ("engine",)):
+    for clash in found:
+        span = _place("frames-overlap", clash.about, spec, sections, None)
+        findings.warning("frames-overlap", span or Span(*spec.name.span), clash.message, _APART)
+
+
+def _place(code: str, about: Sequence[str], spec: Spec, sections: _Sections, chosen: str | None) -> Span | None:
+    for part in _PARTS.get(code, ("engine",)):
         if part in ("engine", "file", "direction"):
             written = None if spec.layout is None else getattr(spec.layout, part)
             if written is not None and (part != "engine" or chosen is None):
                 return Span(*written.span)
             continue
-        if refusal.code.endswith(_WHOLE):
+        if code.endswith(_WHOLE):
             said = (entry.span for section in sections.all() for entry in _entries(section, part))
             found = next(said, None)
         else:
-            found = _about(refusal.about, sections, part) or _beside(refusal.about, sections, part)
+            found = _about(about, sections, part) or _beside(about, sections, part)
         if found is not None:
             return found
     return None
@@ -130,9 +144,9 @@ def _beside(about: Sequence[str], sections: _Sections, part: str) -> Span | None
 
 def _entries(section: Section, part: str) -> Iterator[_Entry]:
     """What a section says in one of its parts."""
-    if part == "neurons":
-        for name in section.neurons:
-            yield _Entry(key_span(section, "neurons", name), (name,))
+    if part in ("neurons", "instances"):
+        for name in section.neurons if part == "neurons" else section.instances:
+            yield _Entry(key_span(section, part, name), (name,))
     layout = section.layout
     if layout is None:
         return

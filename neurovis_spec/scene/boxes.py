@@ -10,12 +10,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from neurovis_spec.compiler.network import Group, Network
-from neurovis_spec.layout.frames import BOX_ACROSS, BOX_DOWN, BOX_FRAME, BOX_LOOP, PAD, PAD_FRAME, PAD_ROUTE, TITLE
+from neurovis_spec.layout.frames import (
+    BOX_ACROSS,
+    BOX_DOWN,
+    BOX_FRAME,
+    BOX_LOOP,
+    BOX_TIGHT,
+    BOX_TIGHT_FRAME,
+    PAD,
+    PAD_FRAME,
+    PAD_ROUTE,
+    TITLE,
+)
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.geometry import FloatArray, Rect, bounds, overlap, sample
-
-#: Around centres and frames in a box that would touch another otherwise.
-_TIGHT, _TIGHT_FRAME = 0.42, 0.15
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +147,7 @@ def _around(
     held: Sequence[Rect],
     tight: bool,
 ) -> Rect:
-    across, down = (_TIGHT, _TIGHT) if tight else (BOX_ACROSS, BOX_DOWN)
+    across, down = (BOX_TIGHT, BOX_TIGHT) if tight else (BOX_ACROSS, BOX_DOWN)
     dots = bounds([positions[list(inside)]])
     assert dots is not None
     x0, y0, x1, y1 = dots
@@ -153,7 +161,7 @@ def _around(
         if source == target and source in chosen
     ]
     around = bounds(loops)
-    parts = [rect, *(_padded(r, _TIGHT_FRAME if tight else BOX_FRAME) for r in held)]
+    parts = [rect, *(_padded(r, BOX_TIGHT_FRAME if tight else BOX_FRAME) for r in held)]
     return _union(parts if around is None else [*parts, _padded(around, BOX_LOOP)])
 
 
