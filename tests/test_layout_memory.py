@@ -18,7 +18,7 @@ import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.layout.arrange import lay_out_problem
-from neurovis_spec.layout.file import parse
+from neurovis_spec.layout.file import dump, parse
 from neurovis_spec.layout.geometry import distance
 from neurovis_spec.layout.metrics import metrics
 from neurovis_spec.layout.model import Layout, LayoutProblem, Point
@@ -216,8 +216,8 @@ layout: {boxes: {a: [A], b: [B]}}
     assert suite.through_frames(now, problem) == []
 
 
-@pytest.mark.parametrize("moved", ["left2.S", "right1.K", "right3.M", "C2"])
-def test_the_template_and_the_mirror_go_before_a_place_edited_by_hand(moved: str) -> None:
+@pytest.mark.parametrize("moved", ["left2.S", "right1.K", "right3.M"])
+def test_the_template_goes_before_a_place_edited_by_hand(moved: str) -> None:
     network = hexapod(3)
     before = network.layout("layered").value
     x, y = before.positions[moved]
@@ -225,6 +225,80 @@ def test_the_template_and_the_mirror_go_before_a_place_edited_by_hand(moved: str
     now = network.layout("layered", earlier=edited).value
     assert now.positions == before.positions
     in_order(network, now)
+
+
+def moved_by_hand(layout: Layout, paths: tuple[str, ...], by: Point) -> Layout:
+    """The layout file with these instances, or neurons, put elsewhere, its routes as they were."""
+    there = dict(layout.positions)
+    for name, (x, y) in layout.positions.items():
+        if name.startswith(tuple(f"{path}." for path in paths)) or name in paths:
+            there[name] = x + by[0], y + by[1]
+    return replace(layout, positions=there)
+
+
+@pytest.mark.parametrize("path", ["left1", "right2", "C2"])
+def test_what_was_moved_by_hand_stays_and_its_image_follows(path: str) -> None:
+    network = hexapod(3)
+    before = network.layout("layered").value
+    by = (0.25, -1.5) if path == "C2" else (1.5, 40)
+    edited = moved_by_hand(before, (path,), by)
+    now = network.layout("layered", earlier=edited).value
+    own = {name for name in before.positions if name == path or name.startswith(f"{path}.")}
+    images = {b if a in own else a for a, b in images_of(network) if a in own or b in own}
+    assert all(now.positions[name] == edited.positions[name] for name in own)
+    across = -by[0], by[1]
+    for name in images:
+        (x, y), (a, b) = before.positions[name], now.positions[name]
+        assert (a - x, b - y) == across
+    assert all(now.positions[name] == before.positions[name] for name in now.positions.keys() - own - images)
+    assert metrics(now, problem_of(network.network))["symmetry"] == 1
+    assert network.layout("layered", earlier=now).positions == now.positions
+
+
+def images_of(network: nv.CompiledNetwork) -> list[tuple[str, str]]:
+    problem = problem_of(network.network)
+    return [(problem.neurons[a], problem.neurons[b]) for mirror in problem.mirrors for a, b in mirror.pairs]
+
+
+@pytest.mark.parametrize("by", [(0.5, 0.25), (-1, 1), (1.5, -2)])
+def test_the_rest_gives_way_to_what_was_moved_by_hand(by: Point) -> None:
+    network = legs()
+    before = network.layout("layered").value
+    (x, y), (a, b) = before.positions["left1.S"], before.positions["right2.S"]
+    edited = moved_by_hand(before, ("left1",), (a - x + by[0], b - y + by[1]))
+    drawn = network.layout("layered", earlier=edited)
+    for name, point in edited.positions.items():
+        if name.startswith(("left1.", "left2.", "right1.")):
+            assert drawn.positions[name] == point
+    assert apart(drawn.value)
+    assert not suite.frames_meet(drawn.value, problem_of(network.network))
+    assert drawn.warnings == ()
+
+
+def test_two_moved_on_to_each_other_by_hand_stay_and_are_warned_of(tmp_path: Path) -> None:
+    spec, file = tmp_path / "legs.yaml", tmp_path / "legs.layout.yaml"
+    text = legs().sources["<text>"]
+    before = legs().layout("layered").value
+    (x, y), (a, b) = before.positions["left1.S"], before.positions["left2.S"]
+    edited = moved_by_hand(before, ("left1",), (0, 40))
+    edited = moved_by_hand(edited, ("left2",), (x - a + 3.25, y - b + 40))
+    spec.write_text(f"{text}layout: {{file: {file.name}}}\n", encoding="utf-8")
+    file.write_text(dump(edited), encoding="utf-8")
+    drawn = nv.compile(spec).layout("layered")
+    assert drawn.positions == edited.positions
+    (warning,) = drawn.warnings
+    assert warning.message == "the frames of 'left1' and 'left2' lie on each other"
+    line = spec.read_text(encoding="utf-8").split("\n")[warning.span.line - 1]
+    assert line[warning.span.column - 1 : warning.span.end_column - 1] == file.name
+
+
+def test_an_instance_moved_on_to_its_own_image_finds_a_place_beside_it() -> None:
+    network = hexapod(2)
+    before = network.layout("layered").value
+    (x, _), (a, _) = before.positions["left1.S"], before.positions["right1.S"]
+    now = network.layout("layered", earlier=moved_by_hand(before, ("left1",), ((a - x) / 2, 0))).value
+    assert apart(now)
+    assert metrics(now, problem_of(network.network))["symmetry"] == 1
 
 
 def test_what_follows_a_place_edited_by_hand_follows_the_first() -> None:

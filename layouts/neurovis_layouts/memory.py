@@ -12,8 +12,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from neurovis_layouts.alike import Alike, Move
+from neurovis_layouts.edited import by_hand, giving_way, moved_routes
 from neurovis_layouts.pins import Cells
-from neurovis_layouts.resolved import resolved
+from neurovis_layouts.resolved import resolved, whole
 from neurovis_layouts.room import Copy, Room, Side
 from neurovis_spec.layout.frames import Frames, Rect, bounds
 from neurovis_spec.layout.geometry import snap
@@ -29,11 +30,14 @@ def remembered(problem: LayoutProblem, fresh: Sequence[Point], routes: Mapping[i
     placed = _not_on_pins(problem, {**known, **problem.pins})
     if not placed:
         return list(fresh)
-    wanted = resolved(problem, fresh, placed)
-    before = {**placed, **wanted}
-    placed = {i: point for i, point in placed.items() if i not in wanted}
+    wanted, put = resolved(problem, fresh, placed, by_hand(problem))
     frames = Frames(problem)
-    old = {i: problem.memory.routes[e.name] for i, e in enumerate(problem.edges) if e.name in problem.memory.routes}
+    before = {**placed, **put, **wanted}
+    old = moved_routes(problem, before)
+    for i in whole(problem, giving_way(problem, frames, before, put.keys(), old)) & before.keys():
+        if i not in problem.pins and i not in put:
+            wanted.setdefault(i, before[i])
+    placed = {i: point for i, point in before.items() if i not in wanted}
     shapes = _Shapes(problem, frames, fresh, routes, before, old)
     room = Room(frames, placed, frames.rects(placed, old), _sides(problem, fresh, before))
     wishes = _Wishes(problem, fresh, placed)

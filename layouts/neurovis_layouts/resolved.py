@@ -1,30 +1,39 @@
 """Resolved: where memory contradicts what is to be drawn alike, the template and the mirror win.
 
 In: a problem, a fresh layout of it, and what an earlier layout knew, which may have been edited by hand. Out: the
-places of those that have to follow others: instances the first of their make, second ones of mirrored pairs the first.
-What the fresh layout does not draw alike either is left as it is.
+places of those that have to follow others: instances the first of their make, of mirrored pairs the one that was not
+moved by hand, else the second. What the fresh layout does not draw alike either is left as it is.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 
-from neurovis_spec.layout.model import LayoutMirror, LayoutModule, LayoutProblem, Point
+from neurovis_layouts.pins import Cells
+from neurovis_spec.layout.model import RADIUS, LayoutMirror, LayoutModule, LayoutProblem, Point
 
 #: Differences up to this are rounding.
 _SLACK = 1e-6
 
 
-def resolved(problem: LayoutProblem, fresh: Sequence[Point], known: Mapping[int, Point]) -> dict[int, Point]:
-    """Places wanted for neurons that cannot stay, and for all that is placed together with these; empty where memory
-    agrees with itself."""
+def resolved(
+    problem: LayoutProblem, fresh: Sequence[Point], known: Mapping[int, Point], hand: Mapping[int, Point]
+) -> tuple[dict[int, Point], dict[int, Point]]:
+    """Places wanted for neurons that cannot stay, and for all that is placed together with these; and the places that
+    were given by hand (``hand`` says where these neurons were before), or follow from such a place. Both are empty
+    where memory agrees with itself."""
     where = dict(known)
     moved: set[int] = set()
     _follow_makes(problem, fresh, where, moved)
-    _follow_mirrors(problem, fresh, where, moved)
-    moved -= problem.pins.keys()
-    return {i: where[i] for i in sorted(moved)}
+    put = set(hand) - moved
+    _follow_mirrors(problem, fresh, where, moved, hand, put)
+    both = whole(problem, _on_each_other(put, where, problem.pins)) & put
+    put -= both
+    moved |= both
+    moved -= problem.pins.keys() | put
+    return {i: where[i] for i in sorted(moved)}, {i: where[i] for i in sorted(put)}
 
 
 def _follow_makes(problem: LayoutProblem, fresh: Sequence[Point], where: dict[int, Point], moved: set[int]) -> None:
@@ -48,7 +57,7 @@ def _follow_makes(problem: LayoutProblem, fresh: Sequence[Point], where: dict[in
             flip, shift = _best_fit(pairs, where, ((1.0, 1.0), mirrored), problem.pins)
             for a, b in pairs:
                 where[b] = shift[0] + flip[0] * where[a][0], shift[1] + flip[1] * where[a][1]
-            moved.update(_whole(problem, [b for _, b in pairs]) & where.keys())
+            moved.update(whole(problem, [b for _, b in pairs]) & where.keys())
 
 
 def _alike(
@@ -80,7 +89,14 @@ def _best_fit(
     return best[1], best[2]
 
 
-def _follow_mirrors(problem: LayoutProblem, fresh: Sequence[Point], where: dict[int, Point], moved: set[int]) -> None:
+def _follow_mirrors(
+    problem: LayoutProblem,
+    fresh: Sequence[Point],
+    where: dict[int, Point],
+    moved: set[int],
+    hand: Mapping[int, Point],
+    put: set[int],
+) -> None:
     across = 0 if problem.direction in ("down", "up") else 1
     scopes: dict[int, list[LayoutMirror]] = {}
     for mirror in problem.mirrors:
@@ -91,16 +107,22 @@ def _follow_mirrors(problem: LayoutProblem, fresh: Sequence[Point], where: dict[
         pairs = [(a, b) for a, b in pairs if _mirrored(fresh[a], fresh[b], twice, across)]
         if not pairs:
             continue
-        twice = _twice(pairs, where, across)
+        # what was moved by hand does not take the axis along, unless all was
+        firm = [(a, b) for a, b in pairs if a not in hand or b not in hand]
+        twice = _twice(firm or pairs, {**where, **hand} if firm else where, across)
         followed: list[int] = []
         for a, b in pairs:
             if _mirrored(where[a], where[b], twice, across):
                 continue
-            first, second = (b, a) if b in problem.pins and a not in problem.pins else (a, b)
+            leads = [(i in problem.pins, i in hand) for i in (a, b)]
+            first, second = (b, a) if leads[1] > leads[0] else (a, b)
             x, y = where[first]
             where[second] = (twice - x, y) if across == 0 else (x, twice - y)
-            followed += (a, b)
-        moved.update(_whole(problem, followed) & where.keys())
+            if first in put and second not in problem.pins:
+                put.add(second)
+            else:
+                followed += (a, b)
+        moved.update(whole(problem, followed) & where.keys())
 
 
 def _twice(pairs: Sequence[tuple[int, int]], where: Mapping[int, Point] | Sequence[Point], across: int) -> float:
@@ -113,7 +135,18 @@ def _mirrored(one: Point, other: Point, twice: float, across: int) -> bool:
     return abs(one[across] + other[across] - twice) <= _SLACK and abs(one[1 - across] - other[1 - across]) <= _SLACK
 
 
-def _whole(problem: LayoutProblem, neurons: Sequence[int]) -> set[int]:
+def _on_each_other(put: AbstractSet[int], where: Mapping[int, Point], pins: Mapping[int, Point]) -> Iterator[int]:
+    """Those put somewhere whose discs would overlap, such as an instance moved on to the axis, and its image."""
+    cells = Cells()
+    for point in pins.values():
+        cells.add(point)
+    for i in sorted(put):
+        if not cells.free(where[i], 2 * RADIUS):
+            yield i
+        cells.add(where[i])
+
+
+def whole(problem: LayoutProblem, neurons: Iterable[int]) -> set[int]:
     """These neurons with all others in the outermost instances around them, and the mirror images of all of them."""
     found = set(neurons)
     images = {n: mate for mirror in problem.mirrors for a, b in mirror.pairs for n, mate in ((a, b), (b, a))}
