@@ -92,3 +92,36 @@ def test_instances_are_refused_for_their_neurons_before_any_is_made() -> None:
     assert (found.code, found.span.line) == ("too-many", 4)
     assert found.message == "this makes 1,200,000 neurons; the limit is 1,000,000"
     assert found.hint == "raise it with --limit"
+
+
+@pytest.mark.parametrize("count", ["legs", "0", "-3", "2.5", "1/0", '"normal(0, 1)"'])
+@pytest.mark.parametrize("nested", [False, True])
+def test_a_count_at_fault_is_a_finding_where_the_module_counts_by_what_is_set(count: str, nested: bool) -> None:
+    """No instances at all have no largest count."""
+    leg = "  leg: {parameters: {toes: 1}, neurons: {K: {count: toes, bias: 1}}}\n"
+    entry = f"{{x: {{module: leg, count: {count}, set: {{toes: 2}}}}}}"
+    text = f"modules:\n{leg}neurons: {{N: {{bias: 1}}}}\ninstances: {entry}\n"
+    if nested:
+        body = f"  body: {{parameters: {{toes: 2}}, neurons: {{N: {{bias: 1}}}}, instances: {entry}}}\n"
+        text = f"modules:\n{leg}{body}instances: {{y: {{module: body, count: 2, set: {{toes: 1 + i}}}}}}\n"
+    with pytest.raises(nv.SpecError) as error:
+        network_of(text)
+    (finding,) = error.value.diagnostics
+    wanted = {
+        "legs": "unknown-name",
+        "2.5": "not-an-integer",
+        "1/0": "not-finite",
+        '"normal(0, 1)"': "draw-not-allowed",
+    }
+    assert finding.code == wanted.get(count, "out-of-range")
+
+
+def test_a_count_of_which_some_are_none_is_a_finding() -> None:
+    text = """\
+modules:
+  leg: {parameters: {toes: 1}, neurons: {K: {count: toes, bias: 1}}}
+  body: {parameters: {toes: 2}, instances: {x: {module: leg, count: toes - 1, set: {toes: 2}}}}
+instances: {y: {module: body, set: {toes: 1}}}
+"""
+    with pytest.raises(nv.SpecError, match="'count' must be at least 1, this is 0"):
+        network_of(text)

@@ -59,11 +59,19 @@ class Editor:
         return types.Position(before.count("\n"), len(line.encode("utf-16-le")) // 2)
 
 
-def edit(folder: Path, scenario: Callable[[Editor], Awaitable[None]], capabilities: object = None) -> None:
+COMMAND = ("-m", "neurovis_spec", "lsp", "--stdio")
+
+
+def edit(
+    folder: Path,
+    scenario: Callable[[Editor], Awaitable[None]],
+    capabilities: object = None,
+    command: tuple[str, ...] = COMMAND,
+) -> None:
     """Start ``neurovis lsp``, run a scenario with it, and end it."""
 
     async def session() -> None:
-        config = ClientServerConfig(server_command=[sys.executable, "-m", "neurovis_spec", "lsp", "--stdio"])
+        config = ClientServerConfig(server_command=[sys.executable, *command])
         client = await config.start()
         assert isinstance(client, LanguageClient)
         given = capabilities if isinstance(capabilities, types.ClientCapabilities) else types.ClientCapabilities()
@@ -101,6 +109,34 @@ def test_findings_follow_what_is_typed(tmp_path: Path) -> None:
         assert await editor.findings() == []
 
     edit(tmp_path, scenario)
+
+
+#: The server with a compiler that has a mistake.
+STUMBLING = """
+from neurovis_spec.lsp import server
+check = server.check
+def stumbling(document):
+    if "stumble" in document.text.text:
+        raise IndexError("a mistake")
+    return check(document)
+server.check = stumbling
+server.serve()
+"""
+
+
+def test_a_mistake_of_the_compiler_is_said_and_leaves_no_old_findings(tmp_path: Path) -> None:
+    async def scenario(editor: Editor) -> None:
+        (finding,) = await editor.open(SPEC.replace("activation: swish", "activation: tahn"))
+        assert finding.code == "unknown-activation"
+        editor.type(SPEC + "# stumble\n")
+        (finding,) = await editor.findings()
+        assert finding.code == "internal"
+        assert finding.severity == types.DiagnosticSeverity.Error
+        assert finding.range.start == types.Position(0, 0)
+        editor.type(SPEC)
+        assert await editor.findings() == []
+
+    edit(tmp_path, scenario, command=("-c", STUMBLING))
 
 
 def test_an_unsaved_document_reads_the_data_files_of_its_folder(tmp_path: Path) -> None:

@@ -186,6 +186,8 @@ class Census:
         if module is None:
             return
         counts = _counted(model.count, constants, known, len(many))
+        if not counts.any():  # a count at fault: there are no rows to go on with
+            return
         total = np.minimum(many * counts, _HUGE)
         done.instances += float(total.sum())
         waiting = done.waiting.setdefault(module.name, {})

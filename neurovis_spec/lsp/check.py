@@ -13,7 +13,7 @@ from pathlib import Path
 from neurovis_spec import pipeline
 from neurovis_spec.compiler.compile import Request
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.diagnostics import Diagnostic, Findings
+from neurovis_spec.diagnostics import Diagnostic, Findings, Span
 from neurovis_spec.language.includes import read_includes
 from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.files import Files
@@ -36,6 +36,13 @@ def check(document: Document) -> Checked:
     if document.page.library:
         return _library(document)
     return _compiled(document.text.text, document.file, document.folder, document.root, document.files)
+
+
+def stumbled(document: Document) -> Checked:
+    """What there is to say where a check ended in a mistake of ours: that nothing is known."""
+    message = "a mistake of NeuroVis, not of the spec: it could not be checked as it is now"
+    span = Span(document.file, 1, 1, 1, 1)
+    return Checked((Diagnostic("internal", message, span, hint="please report it with this text"),), None)
 
 
 def _compiled(text: str, file: str, folder: Path, root: Path, files: Files) -> Checked:

@@ -20,7 +20,7 @@ from pygls.lsp.server import LanguageServer
 from pygls.uris import from_fs_path, to_fs_path
 
 from neurovis_spec.lsp import wire
-from neurovis_spec.lsp.check import Checked, check
+from neurovis_spec.lsp.check import Checked, check, stumbled
 from neurovis_spec.lsp.completion import complete
 from neurovis_spec.lsp.definition import definition
 from neurovis_spec.lsp.desk import Desk
@@ -126,7 +126,7 @@ class SpecServer(LanguageServer):
                 checked = await asyncio.get_running_loop().run_in_executor(self._compiler, check, document)
         except Exception:  # a mistake of ours must not end the server: the editor would restart it for ever
             _log.exception("the check of %s has failed", uri)
-            return
+            checked = stumbled(document)  # what was found before is of another text
         for path in self._desk.keep(uri, document, checked):
             self._publish(path)
         self._publish(document.path, uri, version)
