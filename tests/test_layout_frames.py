@@ -6,11 +6,12 @@ import neurovis_layouts.blocks
 import neurovis_layouts.layered.drawing
 import numpy as np
 import pytest
+from neurovis_layouts.frame import to_picture
 from neurovis_layouts.layered.compose import Composer
 
 import neurovis_spec as nv
 import neurovis_spec.scene.boxes
-from neurovis_spec.layout import frames
+from neurovis_spec.layout import Direction, frames
 from neurovis_spec.layout.problem import problem_of
 
 LEGS = """
@@ -29,27 +30,34 @@ layout: {boxes: {pair: [C]}}
 """
 
 
-def test_frames_are_drawn_where_engines_and_memory_keep_room_for_them() -> None:
-    network = nv.compile_text(LEGS)
+@pytest.mark.parametrize("direction", ["down", "up", "right", "left"])
+def test_frames_are_drawn_where_engines_and_memory_keep_room_for_them(direction: Direction) -> None:
+    network = nv.compile_text(LEGS.replace("{boxes", f"{{direction: {direction}, boxes"))
     problem = problem_of(network.network)
     layout = network.layout("layered").value
     placed = {i: layout.positions[name] for i, name in enumerate(problem.neurons)}
     routes = {i: layout.routes[edge.name] for i, edge in enumerate(problem.edges)}
     remembered = frames.Frames(problem).rects(placed, routes)
-    names = network.network.neurons.names
-    positions = np.array([layout.positions[name] for name in names])
+    positions = np.array([layout.positions[name] for name in network.network.neurons.names])
     splines = [np.array(layout.routes[name]) for name in network.network.connection_names]
     drawn = {box.path: box.rect for box in neurovis_spec.scene.boxes.boxes_of(network.network, positions, splines)}
     free = Composer(problem).whole()
-    shift = placed[0][0] - free.places[0][0], placed[0][1] - free.places[0][1]
+    first = to_picture(free.places[0], direction)
+    shift = placed[0][0] - first[0], placed[0][1] - first[1]
     planned = {frozenset(own): rect for own, rect in (*free.frames, *free.boxes)}
     for number, path in enumerate([*(module.path for module in problem.modules), *(name for name, _ in problem.boxes)]):
         rect = remembered[number]
         assert rect is not None
         assert drawn[path] == pytest.approx(rect, abs=0.02), path  # routes are sampled, more or less finely
-        kept = planned[frames.Frames(problem).members[number]]
-        assert kept[0] + shift[0] == pytest.approx(rect[0], abs=0.03), path
-        assert kept[1] + shift[1] == pytest.approx(rect[1], abs=0.03), path
+        x0, y0, x1, y1 = planned[frames.Frames(problem).members[number]]
+        kept = frames.bounds([to_picture(corner, direction) for corner in ((x0, y0), (x1, y1))])
+        room = [side + shift[k % 2] for k, side in enumerate(kept)]
+        if direction == "down":
+            assert room == pytest.approx(rect, abs=0.03), path
+        assert room[0] <= rect[0] + 0.03, path
+        assert room[1] <= rect[1] + 0.03, path
+        assert room[2] >= rect[2] - 0.03, path
+        assert room[3] >= rect[3] - 0.03, path
 
 
 @pytest.mark.parametrize(

@@ -220,7 +220,10 @@ def _joined(
     links = [i for i, key in enumerate(keys) if key not in routes]
     drawn = list(routes.values())
     routes.update(linked(problem, links, keys, plan, rests, units, frames, boxes, pair, drawn))
-    return Drawing(tuple(places), routes, tuple(frames), tuple(boxes), rests.axis if pair else None, bool(problem.pins))
+    axis = rests.axis if pair else None
+    return Drawing(
+        tuple(places), routes, tuple(frames), tuple(boxes), axis, bool(problem.pins), direction=problem.direction
+    )
 
 
 def _boxes_within(rests: Settled) -> Iterator[tuple[tuple[int, ...], Move, Rect]]:

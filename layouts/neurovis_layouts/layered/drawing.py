@@ -12,7 +12,7 @@ from neurovis_layouts.layered.book import Key
 from neurovis_layouts.layered.parts import Part
 from neurovis_spec.layout.frames import PAD, PAD_FRAME, PAD_ROUTE, TITLE, Rect
 from neurovis_spec.layout.geometry import sampled
-from neurovis_spec.layout.model import GRID, Point, Route
+from neurovis_spec.layout.model import GRID, Direction, Point, Route
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,10 +28,13 @@ class Drawing:
     axis: float | None = None
     #: its coordinates are given by pins, so that its origin means something
     fixed: bool = False
+    direction: Direction = "down"
 
     def rect(self) -> Rect:
         """The frame around all of it."""
-        return around(self.places, self.routes.values(), [rect for _, rect in (*self.frames, *self.boxes)])
+        return around(
+            self.places, self.routes.values(), [rect for _, rect in (*self.frames, *self.boxes)], self.direction
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,15 +58,25 @@ class Move:
         return min(ax, bx), ay, max(ax, bx), by
 
 
-def around(places: Iterable[Point], routes: Iterable[Route], frames: Sequence[Rect]) -> Rect:
-    """The frame around neurons, routes and frames: on the grid, so that it moves exactly."""
+def around(
+    places: Iterable[Point], routes: Iterable[Route], frames: Sequence[Rect], direction: Direction = "down"
+) -> Rect:
+    """The frame around neurons, routes and frames: on the grid, so that it moves exactly. There is room for the title
+    where the picture has its top: across the direction on both sides, since the frame may be turned round."""
     points = list(places)
     line = [point for route in routes for point in sampled(route, 0.3)]
     x0 = min([x - PAD for x, _ in points] + [x - PAD_ROUTE for x, _ in line] + [r[0] - PAD_FRAME for r in frames])
     x1 = max([x + PAD for x, _ in points] + [x + PAD_ROUTE for x, _ in line] + [r[2] + PAD_FRAME for r in frames])
     y0 = min([y - PAD for _, y in points] + [y - PAD_ROUTE for _, y in line] + [r[1] - PAD_FRAME for r in frames])
     y1 = max([y + PAD for _, y in points] + [y + PAD_ROUTE for _, y in line] + [r[3] + PAD_FRAME for r in frames])
-    return _down(x0), _down(y0 - TITLE), _up(x1), _up(y1)
+    match direction:
+        case "down":
+            y0 -= TITLE
+        case "up":
+            y1 += TITLE
+        case "right" | "left":
+            x0, x1 = x0 - TITLE, x1 + TITLE
+    return _down(x0), _down(y0), _up(x1), _up(y1)
 
 
 def _down(value: float) -> float:
