@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from itertools import combinations
+
 import layout_conformance as suite
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import neurovis_spec as nv
-from neurovis_spec.layout import LayoutRefusalError
+from neurovis_spec.layout import Layout, LayoutProblem, LayoutRefusalError, Point
+from neurovis_spec.layout.arrange import lay_out_problem
+from neurovis_spec.layout.clashes import clashes
+from neurovis_spec.layout.geometry import distance
 from neurovis_spec.layout.metrics import metrics
-from neurovis_spec.layout.problem import problem_of
+from neurovis_spec.layout.problem import canonical, problem_of
 
 LEGS = """
 neurovis: 1
@@ -44,3 +52,97 @@ def test_a_refusal_speaks_of_what_is_pinned_itself() -> None:
         legs("{mirror: [[left, right]], positions: {left1.T: [0, 0], right2.S1: [-1, -2]}}").layout("layered")
     assert caught.value.code == "pin-in-frame"
     assert {name.partition(".")[0] for name in caught.value.about} == {"left1", "right2"}
+
+
+@st.composite
+def walkers(draw: st.DrawFn, most: int) -> LayoutProblem:
+    """Legs on two sides, perhaps mirror images, with knees in them, boxes, and up to ``most`` pins: of neurons
+    anywhere, of whole legs, and, where there may be several, of neurons in the module."""
+    count, size = draw(st.integers(1, 3)), draw(st.integers(1, 4))
+    knees = suite.members("K", 2) if draw(st.booleans()) else []
+    own = [*suite.members("S", size), *(f"knee.{name}" for name in knees)]
+    legs = [f"{side}{i + 1}" for side in ("left", "right") for i in range(count)]
+    middle = suite.members("C", draw(st.integers(0, 4)))
+    names = [f"{leg}.{name}" for leg in legs for name in own] + middle
+    inner = draw(st.lists(st.tuples(st.sampled_from(own), st.sampled_from(own)), max_size=8))
+    pairs = [(f"{leg}.{a}", f"{leg}.{b}") for leg in legs for a, b in inner]
+    pairs += draw(st.lists(st.tuples(st.sampled_from(names), st.sampled_from(names)), max_size=14))
+    mirrors = []
+    if draw(st.booleans()):
+        sides = [(f"left{i + 1}", f"right{i + 1}") for i in range(count)]
+        mirrors = [("", [(f"{a}.{name}", f"{b}.{name}") for a, b in sides for name in own], sides)]
+        if len(middle) > 1 and draw(st.booleans()):
+            mirrors.append(("", [(middle[0], middle[1])], []))
+    lattice = st.tuples(st.integers(-9, 9), st.integers(-9, 9))
+    spots = [(1.5 * x, 1.25 * y) for x, y in draw(st.lists(lattice, unique=True, min_size=1, max_size=most))]
+    chosen = draw(st.lists(st.sampled_from([*names, *legs]), unique=True, min_size=1, max_size=most))
+    pins = {name: spot for name, spot in zip(chosen, spots, strict=False) if name in names}
+    origins = {name: spot for name, spot in zip(chosen, spots, strict=False) if name in legs}
+    relative: dict[str, Mapping[str, Point]] = {}
+    if most > 1 and draw(st.integers(0, 3)) == 0:
+        relative = {leg: {f"{leg}.{name}": (1.5 * k, 0.75 * k) for k, name in enumerate(own[:2])} for leg in legs}
+    groups = [("C", middle)] if middle else []
+    groups += [(f"{leg}.S", [f"{leg}.{name}" for name in suite.members("S", size)]) for leg in legs]
+    return canonical(
+        "walker",
+        names,
+        groups,
+        suite.named(pairs, draw(st.integers(0, 1))),
+        pins,
+        draw(st.sampled_from(["down", "up", "right", "left"])),
+        boxes=[("frame", middle[:2])] if len(middle) > 2 and draw(st.booleans()) else [],
+        modules=[(leg, "leg") for leg in legs] + ([(f"{leg}.knee", "knee") for leg in legs] if knees else []),
+        relative=relative,
+        origins=origins,
+        mirrors=mirrors,
+    )
+
+
+def attempt(problem: LayoutProblem) -> tuple[Layout | None, str]:
+    try:
+        return lay_out_problem(problem, "layered"), ""
+    except LayoutRefusalError as refusal:
+        return None, refusal.code
+
+
+def check_pins(problem: LayoutProblem, layout: Layout) -> None:
+    """Pins and origins exact, mirror images to the last bit, instances alike unless pins bend them, discs apart."""
+    at = [layout.positions[name] for name in problem.neurons]
+    assert all(at[i] == pin for i, pin in problem.pins.items())
+    assert all(distance(a, b) >= 0.6 - 1e-9 for a, b in combinations(at, 2))
+    across = 0 if problem.direction in ("down", "up") else 1
+    image = {a: b for mirror in problem.mirrors for pair in mirror.pairs for a, b in (pair, pair[::-1])}
+    assert len({at[a][across] + at[b][across] for a, b in image.items()}) <= 1
+    assert all(at[a][1 - across] == at[b][1 - across] for a, b in image.items())
+    bent = problem.pins.keys() | {image[i] for i in problem.pins if i in image}
+    shapes: dict[str, set[tuple[Point, ...]]] = {}
+    for module in problem.modules:
+        if not bent.isdisjoint(module.members):
+            continue
+        (x, y), own = at[module.members[0]], [at[member] for member in module.members]
+        if module.origin is not None and not module.pins:
+            assert (min(a for a, _ in own), min(b for _, b in own)) == module.origin
+        shape = [(a - x, b - y) for a, b in own]
+        turned = [(-a + 0.0, b) if across == 0 else (a, -b + 0.0) for a, b in shape]
+        shapes.setdefault(module.template, set()).add(tuple(min(shape, turned)))
+    assert all(len(alike) == 1 for alike in shapes.values())
+
+
+@settings(max_examples=80, deadline=None, derandomize=True)
+@given(problem=walkers(most=1))
+def test_everything_gives_way_to_one_pin(problem: LayoutProblem) -> None:
+    layout = lay_out_problem(problem, "layered")
+    check_pins(problem, layout)
+    assert clashes(problem, layout) == []
+    assert not suite.frames_meet(layout, problem)
+
+
+@settings(max_examples=120, deadline=None, derandomize=True)
+@given(problem=walkers(most=4))
+def test_pins_are_kept_and_what_they_put_on_each_other_is_told(problem: LayoutProblem) -> None:
+    layout, refusal = attempt(problem)
+    if layout is None:
+        assert refusal in {"pin-in-frame", "mirror-pins", "pins-too-close"}
+        return
+    check_pins(problem, layout)
+    assert clashes(problem, layout) or not suite.frames_meet(layout, problem)
