@@ -111,6 +111,10 @@ class Commands(click.Group):
         for stream in (sys.stdout, sys.stderr):
             if hasattr(stream, "reconfigure"):
                 stream.reconfigure(errors="backslashreplace")
+        if "_NEUROVIS_COMPLETE" in os.environ:  # as the README sets it: somebody has pressed the key
+            from neurovis_spec.cli.shells import register
+
+            register()
         try:
             result = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
             status = result if isinstance(result, int) else 0

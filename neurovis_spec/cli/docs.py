@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import click
 
+from neurovis_spec.cli.completion import one_of
 from neurovis_spec.cli.options import examples
+
+
+def _names() -> Iterable[str]:
+    from neurovis_spec.manual.topics import topics
+
+    return topics()
 
 
 @click.command(
@@ -15,7 +24,7 @@ from neurovis_spec.cli.options import examples
         "neurovis docs tanh",
     )
 )
-@click.argument("name", metavar="[NAME]", required=False)
+@click.argument("name", metavar="[NAME]", required=False, shell_complete=one_of(_names))
 def command(name: str | None) -> None:
     """Explain a built-in, a key of the language, a function or a pattern.
 

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import click
 
+from neurovis_spec.cli.completion import one_of
 from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.options import examples
 
 
+def _codes() -> Iterable[str]:
+    from neurovis_spec.codes import catalogue
+
+    return ("list", *catalogue())
+
+
 @click.command(epilog=examples("neurovis explain delay-0-cycle", "neurovis explain list"))
-@click.argument("code", metavar="CODE")
+@click.argument("code", metavar="CODE", shell_complete=one_of(_codes))
 def command(code: str) -> None:
     """Explain the code of a finding, with examples.
 

@@ -12,7 +12,7 @@ import click
 from neurovis_spec.cli.differences import difference
 from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.files import STDIN, standard_input, writing
-from neurovis_spec.cli.options import examples
+from neurovis_spec.cli.options import examples, specs_argument
 from neurovis_spec.cli.progress import progress
 from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError
 from neurovis_spec.findings import printable, show_text
@@ -28,7 +28,7 @@ _BOM: Final = "\ufeff"
         "cat first.yaml | neurovis fmt -",
     )
 )
-@click.argument("specs", metavar="SPEC...", nargs=-1, required=True)
+@specs_argument
 @click.option("--check", is_flag=True, help="Write nothing; name the files that would change, and end with status 1.")
 @click.option("--diff", is_flag=True, help="Write nothing; show what would change.")
 def command(specs: tuple[str, ...], check: bool, diff: bool) -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib.resources import files as package_files
 from importlib.resources.abc import Traversable
 from pathlib import Path, PurePosixPath
 
 import click
 
+from neurovis_spec.cli.completion import one_of
 from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.files import check_target, writing
 from neurovis_spec.cli.options import examples, known
@@ -39,6 +40,10 @@ def examples_at_hand() -> Mapping[str, Traversable]:
     return dict(sorted(found.items()))
 
 
+def _examples() -> Iterable[str]:
+    return ("list", *examples_at_hand())
+
+
 @click.command(
     epilog=examples("neurovis new first", "neurovis new walking --from cpg_rbf", "neurovis new try --from list")
 )
@@ -47,7 +52,8 @@ def examples_at_hand() -> Mapping[str, Traversable]:
     "--from",
     "example",
     metavar="EXAMPLE",
-    callback=known("example", lambda: ("list", *examples_at_hand())),
+    callback=known("example", _examples),
+    shell_complete=one_of(_examples),
     help="Copy an example with its data and included files; 'list' shows which there are.",
 )
 def command(name: str, example: str | None) -> None:

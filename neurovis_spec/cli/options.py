@@ -14,6 +14,7 @@ from typing import TypeVar
 import click
 
 from neurovis_spec import plugins
+from neurovis_spec.cli.completion import input_files, one_of, paths, settings
 from neurovis_spec.diagnostics import suggest
 
 F = TypeVar("F", bound=Callable[..., object])
@@ -70,6 +71,14 @@ def known(what: str, names: Callable[[], Iterable[str]]) -> Callback:
     return check
 
 
+def _backends() -> Iterable[str]:
+    return ("list", *plugins.names(plugins.BACKENDS))
+
+
+def _engines() -> Iterable[str]:
+    return ("auto", *plugins.names(plugins.LAYOUTS))
+
+
 def _themes() -> Iterable[str]:
     from neurovis_spec.scene.themes import THEMES
 
@@ -105,7 +114,10 @@ def compile_options(command: F) -> F:
 
 def spec_argument(command: F) -> F:
     """``SPEC``, with these options."""
-    return click.argument("spec", metavar="SPEC")(compile_options(command))
+    return click.argument("spec", metavar="SPEC", shell_complete=paths)(compile_options(command))
+
+
+specs_argument = click.argument("specs", metavar="SPEC...", nargs=-1, required=True, shell_complete=paths)
 
 
 set_option = click.option(
@@ -114,6 +126,7 @@ set_option = click.option(
     metavar="name=value",
     multiple=True,
     callback=_settings,
+    shell_complete=settings,
     help="Give a parameter another value. Repeatable, once for each.",
 )
 input_option = click.option(
@@ -122,28 +135,35 @@ input_option = click.option(
     metavar="name=FILE",
     multiple=True,
     callback=_files,
+    shell_complete=input_files,
     help="Replace the source of an input by a .csv or .npy file, one row a step. Repeatable, once for each.",
 )
 backend_option = click.option(
     "--backend",
     metavar="B",
-    callback=known("backend", lambda: ("list", *plugins.names(plugins.BACKENDS))),
+    callback=known("backend", _backends),
+    shell_complete=one_of(_backends),
     help="What computes; 'list' shows which there are.",
 )
 engine_option = click.option(
     "--engine",
     metavar="E",
-    callback=known("layout engine", lambda: ("auto", *plugins.names(plugins.LAYOUTS))),
+    callback=known("layout engine", _engines),
+    shell_complete=one_of(_engines),
     help="Layout engine, such as layered, circular, grid or manual; else the spec's.",
 )
 theme_option = click.option(
     "--theme",
     metavar="T",
     callback=known("theme", _themes),
+    shell_complete=one_of(_themes),
     help="default, dark, print or paper; else the spec's.",
 )
 recording_option = click.option(
-    "--recording", metavar="FILE", help="Show steps of this recording; without it the network is run."
+    "--recording",
+    metavar="FILE",
+    shell_complete=paths,
+    help="Show steps of this recording; without it the network is run.",
 )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from neurovis_spec.cli.completion import paths
 from neurovis_spec.cli.files import check_target, count, network_of, recording_of, tables, writing
 from neurovis_spec.cli.options import backend_option, compile_options, examples, input_option, output_option, set_option
 from neurovis_spec.cli.progress import progress
@@ -29,7 +30,7 @@ _MOST_SHOWN = 20
         "neurovis run --backend list",
     )
 )
-@click.argument("spec", metavar="SPEC", required=False)
+@click.argument("spec", metavar="SPEC", required=False, shell_complete=paths)
 @click.option(
     "--steps", type=click.IntRange(1, 2**53), metavar="N", help="Steps to run; default: the spec's time.steps."
 )
@@ -43,6 +44,7 @@ _MOST_SHOWN = 20
     "--from",
     "start",
     metavar="RECORDING",
+    shell_complete=paths,
     help="Begin with the last weights and activities of this recording; states of models begin anew.",
 )
 @output_option("Write the recording here (.npz or .csv); without it a summary is printed.")

@@ -8,7 +8,7 @@ from dataclasses import replace
 import click
 
 from neurovis_spec.cli.files import STDIN, compiled, count
-from neurovis_spec.cli.options import compile_options, examples
+from neurovis_spec.cli.options import compile_options, examples, specs_argument
 from neurovis_spec.diagnostics import Diagnostic, SpecError
 from neurovis_spec.findings import printable, show_text, to_json
 
@@ -23,7 +23,7 @@ FORMATS = ("text", "json", "sarif", "github")
         "neurovis validate first.yaml --format sarif > findings.sarif",
     )
 )
-@click.argument("specs", metavar="SPEC...", nargs=-1, required=True)
+@specs_argument
 @click.option(
     "--format", "form", type=click.Choice(FORMATS), default="text", help="How findings are shown: text is the default."
 )
