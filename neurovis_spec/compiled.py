@@ -74,7 +74,10 @@ class CompiledNetwork:
         from neurovis_spec.runtime.simulation import Simulation
 
         return Simulation(
-            self.network, backend, start, lambda values: rebind(self.spec, self.request, self.network, values)
+            self.network,
+            backend,
+            start,
+            lambda values, since: rebind(self.spec, self.request, self.network, values, since),
         )
 
     def run(

@@ -183,6 +183,81 @@ def test_setting_by_hand_and_by_an_event_go_together() -> None:
     assert simulation.weight("A -> B") == 2
 
 
+LEVEL = (
+    HEAD
+    + """
+parameters: {level: 0.5, twice: 2*level}
+neurons: {A: {bias: level}, S: {count: 2}}
+events:
+  - {at: 2, set: {level: 1}}
+  - {from: 3, clamp: {S: level, S2: twice}}
+  - {at: 6, set: {level: 3*level}}
+"""
+)
+
+
+@BACKENDS
+def test_what_is_clamped_follows_the_parameters(backend: str) -> None:
+    recording = run(LEVEL, backend, 9)
+    assert recording["A"].tolist() == [0.5] * 2 + [1.0] * 4 + [3.0] * 3
+    assert recording["S"][:, 0].tolist() == [0.0] * 3 + [1.0] * 3 + [3.0] * 3
+    assert recording["S"][:, 1].tolist() == [0.0] * 3 + [2.0] * 3 + [6.0] * 3
+
+
+def test_a_clamp_that_a_parameter_makes_infinite_is_a_finding() -> None:
+    with pytest.raises(nv.SpecError, match="infinite") as caught:
+        nv.compile_text(LEVEL.replace("S: level", "S: 1/(level - 1)"))
+    (finding,) = caught.value.diagnostics
+    assert (finding.code, finding.span.line) == ("not-finite", 9)
+
+
+@pytest.mark.parametrize("by_hand", range(8))
+def test_what_is_set_by_hand_holds_until_a_later_event(by_hand: int) -> None:
+    """Events up to the step at which something is set are past, those before the first step excepted."""
+    simulation = nv.compile_text(LEVEL).simulator()
+    seen = []
+    for k in range(9):
+        if k == by_hand:
+            simulation.set(level=7)
+        simulation.step()
+        seen.append(simulation.activity.tolist())
+    level = 0.5
+    for k in range(9):
+        level = {2: 1.0, 6: 3 * level}.get(k, level)
+        level = 7.0 if k == by_hand else level
+        assert seen[k] == [level, level if k >= 3 else 0.0, 2 * level if k >= 3 else 0.0]
+
+
+def test_what_an_event_has_set_is_not_worked_out_anew() -> None:
+    text = HEAD + "parameters: {a: 1, b: 1}\nneurons: {A: {bias: a}, B: {bias: b}}\nevents: [{at: 1, set: {a: 2*b}}]"
+    simulation = nv.compile_text(text).simulator()
+    simulation.step()
+    simulation.step()
+    simulation.set(b=5)
+    simulation.step()
+    assert simulation.activity.tolist() == [2.0, 5.0]
+
+
+def test_events_come_again_after_a_state_of_an_earlier_step() -> None:
+    """What was set by hand stays, as the state says."""
+    simulation = nv.compile_text(CHAIN + "events: [{at: 1, set: {gain: 3}}, {at: 4, set: {gain: 4}}]").simulator()
+    for _ in range(2):
+        simulation.step()
+    early = simulation.state()
+    for _ in range(4):
+        simulation.step()
+    simulation.set(push=2)
+    simulation.restore(early)
+    assert simulation.weight("A -> B") == 3
+    gains, pushes = [], []
+    for _ in range(4):
+        simulation.step()
+        gains.append(simulation.weight("A -> B"))
+        pushes.append(simulation.activity[0])
+    assert gains == [3.0, 4.0, 4.0, 4.0]
+    assert pushes == [2.0] * 4
+
+
 @pytest.mark.parametrize(
     ("event", "code", "column"),
     [

@@ -154,7 +154,7 @@ def test_states_are_kept_and_gone_back_to() -> None:
 # ---- parameters --------------------------------------------------------------------------------------------------
 
 
-def adjustable(values: Mapping[str, float]) -> Network:
+def adjustable(values: Mapping[str, float], since: int | None = None) -> Network:
     """A -> B by ``gain``, A -> D learned, B leaks, A reads ``offset`` · 1."""
     gain, offset, rate = (
         values.get(name, default) for name, default in (("gain", 2.0), ("offset", 1.0), ("rate", 1.0))
@@ -206,7 +206,7 @@ def test_parameters_that_cannot_be_set(values: Mapping[str, float], words: str) 
 
 
 def test_a_rebinding_of_another_structure_is_refused() -> None:
-    simulation = Simulation(adjustable({}), rebind=lambda values: build([Unit("A")]))
+    simulation = Simulation(adjustable({}), rebind=lambda values, since: build([Unit("A")]))
     with pytest.raises(ParameterError, match="another structure"):
         simulation.set(gain=1.0)
     assert simulation.weight("A -> B") == 2.0

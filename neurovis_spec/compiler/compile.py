@@ -59,6 +59,8 @@ class Request:
     files: Mapping[Path, Files] = field(default_factory=dict)
     #: whether this is for a run that has begun: a plastic weight is then what it has become, not what it would begin as
     begun: bool = False
+    #: the step of that run at which ``parameters`` were set: what events set by then is past
+    since: int | None = None
 
 
 def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_events: bool = True) -> Network | None:
@@ -151,6 +153,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
         hash=content,
         noises=noises,
         instances=_instances(units, population),
+        given=dict(request.parameters),
     )
     if not with_events:
         return network
@@ -209,7 +212,8 @@ def _eventful(
     if findings.errors > before:
         return None
     entry = spec.source.entry("events")
-    made = with_phases(network, events, again, constants, opening(spec.source) if entry is None else entry.key.span)
+    place = opening(spec.source) if entry is None else entry.key.span
+    made = with_phases(network, events, again, constants, place, request.since)
     return None if findings.errors > before else replace(made, hash=digest(network.hash, events))
 
 
@@ -300,9 +304,11 @@ def _report_cycle(
     findings.error("delay-0-cycle", bundles[int(entry[cycle.connection])].key, message, hint)
 
 
-def rebind(spec: Spec, request: Request, network: Network, changes: Mapping[str, float]) -> Network:
-    """The same network with other parameters. Raises SpecError where these are unknown, out of bounds, or where
-    something of the structure depends on them."""
+def rebind(
+    spec: Spec, request: Request, network: Network, changes: Mapping[str, float], since: int | None = None
+) -> Network:
+    """The same network with other parameters, set at step ``since`` of a run: events set them again only after that.
+    Raises SpecError where these are unknown, out of bounds, or where something of the structure depends on them."""
     findings = Findings()
     fixed = [name for name in changes if name in network.structural]
     for name in fixed:
@@ -311,7 +317,8 @@ def rebind(spec: Spec, request: Request, network: Network, changes: Mapping[str,
         findings.error("structural-parameter", span, message)
     findings.check()
     parameters = {**request.parameters, **changes}
-    made = compile_spec(spec, replace(request, parameters=parameters, seed=network.seed, begun=True), findings)
+    changed = replace(request, parameters=parameters, seed=network.seed, begun=True, since=since)
+    made = compile_spec(spec, changed, findings)
     findings.check()
     if made is None:  # pragma: no cover - an error is among the findings where there is no network
         raise SpecError((Diagnostic("internal", "the network could not be made", opening(spec.source)),))

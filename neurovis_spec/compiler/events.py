@@ -33,12 +33,13 @@ _KEYS = ("at", "from", "to", "set", "clamp", "lesion")
 
 @dataclass(frozen=True)
 class Event:
-    """One event, resolved: it applies from step ``at`` on; a clamp ends before step ``to``."""
+    """One event, resolved: it applies from step ``at`` on; a clamp ends before step ``to``. What is set and what is
+    clamped follow the parameters, as these are by then."""
 
     at: int
     to: int | None = None
     set: Mapping[str, Formula] = field(default_factory=dict)
-    clamp: tuple[tuple[int, float], ...] = ()
+    clamp: tuple[tuple[int, Formula], ...] = ()
     neurons: tuple[int, ...] = ()
     connections: tuple[int, ...] = ()
 
@@ -142,10 +143,10 @@ class EventReader:
             message = f"'{name}' cannot be set in a run: the structure of the network depends on it"
             self.findings.error("structural-parameter", span, message)
 
-    def _clamp(self, model: EventModel, name: str, formula: Formula) -> list[tuple[int, float]]:
+    def _clamp(self, model: EventModel, name: str, formula: Formula) -> list[tuple[int, Formula]]:
         neurons = resolve_end(key_of(model.source, "clamp", name), self.directory, self.findings)
         value = self.constants.scalar(formula)
-        return [] if neurons is None or value is None else [(neuron, value) for neuron in neurons]
+        return [] if neurons is None or value is None else [(neuron, formula) for neuron in neurons]
 
     def _lesion(self, text: Located[str], neurons: list[int], connections: list[int]) -> None:
         if "->" not in text.value:

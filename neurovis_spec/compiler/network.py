@@ -9,7 +9,7 @@ and what it writes.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
@@ -191,6 +191,8 @@ class Network:
     clamped: tuple[tuple[int, float], ...] = ()
     #: events: the step from which on another network runs, with the same neurons and connections, ascending
     phases: tuple[tuple[int, Network], ...] = ()
+    #: parameters that have a value from outside, or in a phase from an event, in the place of what the spec says
+    given: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
     def neuron_index(self) -> Mapping[str, int]:

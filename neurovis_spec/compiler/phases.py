@@ -13,6 +13,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from heapq import heappop, heappush
+from operator import itemgetter
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +24,7 @@ from neurovis_spec.compiler.events import Event
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Block, Learn, Plasticity
 from neurovis_spec.diagnostics import Span
+from neurovis_spec.language.located import Formula
 
 #: Compiles the network anew with other parameters, without its events; None where that is at fault.
 Recompile = Callable[[Mapping[str, float]], Network | None]
@@ -33,10 +35,19 @@ MOST = 10_000
 
 
 def with_phases(
-    network: Network, events: tuple[Event, ...], recompile: Recompile, constants: Constants, place: Span
+    network: Network,
+    events: tuple[Event, ...],
+    recompile: Recompile,
+    constants: Constants,
+    place: Span,
+    since: int | None = None,
 ) -> Network:
     """The network with a phase for each step at which something changes. An expression that is set sees the values that
-    the parameters have by then, not those of the other parameters that are set in the same step."""
+    the parameters have by then, not those of the other parameters that are set in the same step.
+
+    ``since``: the network is one with the parameters of this step, at which they were set by hand; what events have set
+    by then is past.
+    """
     begun, over = defaultdict[int, list[int]](list), defaultdict[int, list[int]](list)
     for number, event in enumerate(events):
         begun[event.at].append(number)
@@ -55,6 +66,8 @@ def with_phases(
     for step in steps:
         new = [(number, events[number]) for number in begun.get(step, ())]
         due = {name: formula for _, event in new for name, formula in event.set.items()}
+        if since is not None and step <= since:
+            due = {}
         if due:
             now = replace(constants, parameters=dict(base.parameters))
             values = {name: now.scalar(formula) for name, formula in due.items()}
@@ -69,7 +82,7 @@ def with_phases(
             base = known[key]
         silent = lesions.add(event for _, event in new)
         clamps.go_on(new, over.get(step, ()), silent)
-        phases.append((step, clamps.on(lesions.without(base))))
+        phases.append((step, clamps.on(lesions.without(base), constants)))
     return replace(network, phases=tuple(phases))
 
 
@@ -114,11 +127,15 @@ class _Clamps:
     """The clamps that hold at a step: of several of a neuron the one that is written last; a lesion holds for good."""
 
     def __init__(self) -> None:
-        self._held: list[tuple[int, float]] = []
+        #: ascending neurons, each with what it is held at; None is 0, for good
+        self._held: list[tuple[int, Formula | None]] = []
         self._network: Network | None = None
         self._result: Network | None = None
+        #: what formulas are worth with the parameters of a network, by the formula's id
+        self._values: dict[int, float] = {}
+        self._parameters: Mapping[str, float] | None = None
         #: by neuron: the clamps that hold and some that are over, that of the last event first
-        self._of = defaultdict[int, list[tuple[int, float]]](list)
+        self._of = defaultdict[int, list[tuple[int, Formula]]](list)
         self._over = set[int]()
         self._silent = set[int]()
         self._neurons_of: dict[int, Iterable[int]] = {}
@@ -130,31 +147,43 @@ class _Clamps:
             clamps = dict(event.clamp)
             self._neurons_of[number] = clamps
             touched |= clamps.keys()
-            for neuron, value in clamps.items():
-                heappush(self._of[neuron], (-number, value))
+            for neuron, formula in clamps.items():
+                heappush(self._of[neuron], (-number, formula))
         for number in over:
             self._over.add(number)
             touched.update(self._neurons_of.pop(number))
         for neuron in silent:
             self._silent.add(neuron)
-            self._put(neuron, 0.0)
+            self._put(neuron, (neuron, None))
         for neuron in touched - self._silent:
             heap = self._of[neuron]
             while heap and -heap[0][0] in self._over:
                 heappop(heap)
-            self._put(neuron, heap[0][1] if heap else None)
+            self._put(neuron, (neuron, heap[0][1]) if heap else None)
 
-    def on(self, network: Network) -> Network:
-        """A network with what is clamped; the same one while nothing changes."""
+    def on(self, network: Network, constants: Constants) -> Network:
+        """A network with what is clamped, at what its parameters make of that; the same one while nothing changes."""
         if self._result is None or network is not self._network:
-            self._network, self._result = network, replace(network, clamped=tuple(self._held), phases=())
+            if network.parameters is not self._parameters:
+                self._parameters, self._values = network.parameters, {}
+            now = replace(constants, parameters=dict(network.parameters))
+            held = tuple((neuron, self._value(formula, now)) for neuron, formula in self._held)
+            self._network, self._result = network, replace(network, clamped=held, phases=())
         return self._result
 
-    def _put(self, neuron: int, value: float | None) -> None:
+    def _value(self, formula: Formula | None, now: Constants) -> float:
+        """What a neuron is held at; what is at fault, a finding, stands as 0."""
+        if formula is None:
+            return 0.0
+        if id(formula) not in self._values:  # one for a whole group
+            self._values[id(formula)] = now.scalar(formula) or 0.0
+        return self._values[id(formula)]
+
+    def _put(self, neuron: int, entry: tuple[int, Formula | None] | None) -> None:
         """Note what a neuron is held at, if at anything."""
-        begin = bisect_left(self._held, (neuron,))
+        begin = bisect_left(self._held, neuron, key=itemgetter(0))
         end = begin + (begin < len(self._held) and self._held[begin][0] == neuron)
-        self._held[begin:end] = [] if value is None else [(neuron, value)]
+        self._held[begin:end] = [] if entry is None else [entry]
         self._result = None
 
 

@@ -23,7 +23,7 @@ from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.runtime.watch import Watch
 
-Rebind: TypeAlias = Callable[[Mapping[str, float]], Network]
+Rebind: TypeAlias = Callable[[Mapping[str, float], int | None], Network]
 
 
 class ParameterError(ValueError):
@@ -34,7 +34,8 @@ class Simulation:
     """A run in the making.
 
     ``start`` is a recording to go on from (see ``resume``); ``rebind`` makes the network with other values of
-    parameters, without it ``set`` is refused. Raises BackendError, RecordingError.
+    parameters, those that it has at a step (None: before the first), without it ``set`` is refused. Raises
+    BackendError, RecordingError.
     """
 
     def __init__(
@@ -47,7 +48,9 @@ class Simulation:
         self._original, self._backend, self._rebind = network, backend, rebind
         self._begin = initial_state(network) if start is None else resumed_state(network, start)
         go_over(self._begin, network, network_at(network, 0))
+        #: what was set by hand, and the step of the last time
         self._chosen: dict[str, float] = {}
+        self._since = 0
         self._use(network)
         self._watch = Watch(network)
         self._state = self._begin.copy()
@@ -77,7 +80,7 @@ class Simulation:
     @property
     def weights(self) -> FloatArray:
         """w[k], for the next step, of the connections that can change, in the order of a ``.npz``; a copy."""
-        return self._state.weights[self.network.changing]
+        return self._state.weights[self._original.changing]
 
     def weight(self, name: str) -> float:
         """w[k] of any connection by name. Raises KeyError with the nearest names."""
@@ -110,21 +113,27 @@ class Simulation:
         }
 
     def set(self, values: Mapping[str, float] | None = None, /, **parameters: float) -> None:
-        """Give parameters other values from step k on.
+        """Give parameters other values from step k on, until an event of a later step sets them again.
 
         Fixed weights, biases, inputs and parameters of models and rules follow; plastic weights, states and signals
         under way stay. Raises ParameterError, and then nothing has changed.
         """
-        chosen = self._chosen | self._checked({**(values or {}), **parameters})
+        checked = self._checked({**(values or {}), **parameters})
+        k, before = self._state.k, self._phase
+        # what events have set by now stays; before the first step none has, they come after what is set by hand
+        self._use(self._bound(self._chosen | (dict(before.given) if k else {}) | checked, k), k)
+        go_over(self._state, before, self._phase)
+        self._chosen |= checked
+        self._since = k
+
+    def _bound(self, given: Mapping[str, float], step: int) -> Network:
+        """The network with these parameters from a step on. Raises ParameterError."""
         if self._rebind is None:
             raise ParameterError("this simulation was made without a way to compile the network again")
-        network = self._rebind(chosen)
+        network = self._rebind(given, step or None)
         if not _same_structure(self.network, network):
             raise ParameterError("with these parameters the network has another structure")
-        before = self._phase
-        self._use(network, self._state.k)
-        go_over(self._state, before, self._phase)
-        self._chosen = chosen
+        return network
 
     def _checked(self, values: Mapping[str, float]) -> dict[str, float]:
         for name, value in values.items():
@@ -143,16 +152,22 @@ class Simulation:
         """Back to the beginning, with the parameters of the beginning."""
         self._use(self._original)
         self._watch = Watch(self._original)
-        self._state, self._chosen = self._begin.copy(), {}
+        self._state, self._chosen, self._since = self._begin.copy(), {}, 0
 
     def state(self) -> State:
         """A copy of all that the run carries from step to step."""
         return self._state.copy()
 
     def restore(self, state: State) -> None:
-        """Go on from a state of this simulation. Parameters stay as they are, and so do the fixed weights."""
+        """Go on from a state of this simulation. Parameters that were set by hand stay as they are, and so do the fixed
+        weights; what events set goes by the step."""
         restored = state.copy()
-        self._use(self.network, restored.k)
+        k, network = restored.k, self.network
+        if k < self._since and self._original.phases:  # events between the two steps are to come again
+            stay = {name: self._phase.given.get(name, value) for name, value in self._chosen.items()}
+            network = self._bound({**(network_at(self._original, k).given if k else {}), **stay}, k)
+            self._since = k
+        self._use(network, k)
         fixed = self.network.connections.rules < 0
         restored.weights[fixed] = self._phase.connections.weights[fixed]
         self._state = restored
