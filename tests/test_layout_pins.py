@@ -54,6 +54,41 @@ def test_a_refusal_speaks_of_what_is_pinned_itself() -> None:
     assert {name.partition(".")[0] for name in caught.value.about} == {"left1", "right2"}
 
 
+def corner(layout: Layout, path: str) -> Point:
+    """The smallest x and y of an instance's neurons."""
+    own = [point for name, point in layout.positions.items() if name.startswith(f"{path}.")]
+    return min(x for x, _ in own), min(y for _, y in own)
+
+
+@pytest.mark.parametrize("engine", ["layered", "grid", "circular", "organic", "large"])
+@pytest.mark.parametrize("pins", ["", ", right2.T: [45, 4]"])
+def test_every_engine_places_the_origin_of_an_instance(engine: str, pins: str) -> None:
+    drawn = legs(f"{{positions: {{left1: [50, 20], right1: [40, -8]{pins}}}}}").layout(engine)
+    assert (corner(drawn.value, "left1"), corner(drawn.value, "right1")) == ((50, 20), (40, -8))
+    assert drawn.metrics()["overlaps"] == 0
+    assert drawn.positions["right2.T"] == (45, 4) or not pins
+
+
+@pytest.mark.parametrize("engine", ["layered", "grid", "circular"])
+def test_a_pin_on_an_instance_goes_before_what_a_file_remembers(engine: str) -> None:
+    before = legs("{}").layout(engine).value
+    x, y = corner(before, "left2")
+    network = legs(f"{{positions: {{left1: [{x + 0.5}, {y + 0.25}]}}}}")
+    drawn = network.layout(engine, earlier=before)
+    assert corner(drawn.value, "left1") == (x + 0.5, y + 0.25)
+    assert corner(drawn.value, "left2") != (x, y)  # it gives way, as a whole
+    offset = [
+        {name[6:]: (a - x, b - y) for name, (a, b) in layout.positions.items() if name.startswith("left2.")}
+        for layout, (x, y) in ((before, (x, y)), (drawn.value, corner(drawn.value, "left2")))
+    ]
+    assert offset[0] == offset[1]
+    for name, point in before.positions.items():
+        assert drawn.positions[name] == point or name.startswith("left")
+    assert drawn.metrics()["overlaps"] == 0
+    assert drawn.warnings == ()
+    assert network.layout(engine, earlier=drawn.value).positions == drawn.positions
+
+
 @st.composite
 def walkers(draw: st.DrawFn, most: int) -> LayoutProblem:
     """Legs on two sides, perhaps mirror images, with knees in them, boxes, and up to ``most`` pins: of neurons

@@ -11,7 +11,7 @@ import numpy as np
 from neurovis_layouts.apart import near_pairs
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.kept import kept
-from neurovis_layouts.pins import fit
+from neurovis_layouts.pins import fit, with_origins
 from neurovis_layouts.routing import route_all
 from neurovis_layouts.wiring import FloatArray, IntArray
 from neurovis_spec.layout.geometry import snap
@@ -24,8 +24,8 @@ _CAREFUL = 1000
 def drawn(problem: LayoutProblem, engine: str, places: FloatArray) -> Layout:
     """The layout with the neurons at the first of ``places`` (n, 2), where no pin says otherwise."""
     flat: list[Point] = [(snap(x), snap(y)) for x, y in places[: len(problem.neurons)].tolist()]
-    pins = {i: from_picture(point, problem.direction) for i, point in problem.pins.items()}
-    centres, _, _ = fit(flat, pins)
+    pins = with_origins(problem, [to_picture(point, problem.direction) for point in flat])
+    centres, _, _ = fit(flat, {i: from_picture(point, problem.direction) for i, point in pins.items()})
     routes = route_all(problem.edges, centres, careful=_CAREFUL)
     turned = problem.direction
     fresh = Layout(

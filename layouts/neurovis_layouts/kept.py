@@ -7,6 +7,7 @@ was, routes included; what is new, or runs into something new, is routed anew, a
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,6 +29,8 @@ def kept(problem: LayoutProblem, fresh: Layout) -> Layout:
     memory = problem.memory
     if memory is None:
         return fresh
+    placed = {m for module in problem.modules if module.origin is not None for m in module.members}
+    problem = replace(problem, pins={**{m: fresh.positions[problem.neurons[m]] for m in placed}, **problem.pins})
     there = {i: fresh.routes[edge.name] for i, edge in enumerate(problem.edges)}
     centres = remembered(problem, [fresh.positions[name] for name in problem.neurons], there)
     ways = _Ways(problem, centres)

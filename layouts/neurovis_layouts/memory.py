@@ -27,17 +27,18 @@ def remembered(problem: LayoutProblem, fresh: Sequence[Point], routes: Mapping[i
     assert problem.memory is not None
     earlier = problem.memory.positions
     known = {i: earlier[name] for i, name in enumerate(problem.neurons) if name in earlier}
-    placed = _not_on_pins(problem, {**known, **problem.pins})
+    placed = {**known, **problem.pins}
     if not placed:
         return list(fresh)
     wanted, put = resolved(problem, fresh, placed, by_hand(problem))
     frames = Frames(problem)
     before = {**placed, **put, **wanted}
     old = moved_routes(problem, before)
-    for i in whole(problem, giving_way(problem, frames, before, put.keys(), old)) & before.keys():
+    newly = put.keys() | {i for i, point in problem.pins.items() if known.get(i) != point}
+    for i in whole(problem, giving_way(problem, frames, before, newly, old)) & before.keys():
         if i not in problem.pins and i not in put:
             wanted.setdefault(i, before[i])
-    placed = {i: point for i, point in before.items() if i not in wanted}
+    placed = _not_on_pins(problem, {i: point for i, point in before.items() if i not in wanted})
     shapes = _Shapes(problem, frames, fresh, routes, before, old)
     room = Room(frames, placed, frames.rects(placed, old), _sides(problem, fresh, before))
     wishes = _Wishes(problem, fresh, placed)

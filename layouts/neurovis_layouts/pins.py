@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from neurovis_spec.layout.geometry import distance, snap
-from neurovis_spec.layout.model import RADIUS, Point
+from neurovis_spec.layout.model import RADIUS, LayoutProblem, Point
 
 #: How far a neuron that has to give way keeps off, at least.
 _CLEAR = 0.75
@@ -50,6 +50,31 @@ def fit(free: Sequence[Point], pins: Mapping[int, Point]) -> tuple[list[Point], 
         cells.add(placed[i])
         moved.add(i)
     return [placed[i] for i in range(len(free))], shift, frozenset(moved)
+
+
+def with_origins(problem: LayoutProblem, free: Sequence[Point]) -> dict[int, Point]:
+    """The pins, and for instances whose origin is pinned the places of their neurons, as the free layout (in the
+    picture's coordinates) has these in relation to each other; but for those that stand on pins then.
+
+    The origin of an instance whose module pins nothing is where its smallest x and y are.
+    """
+    taken = Cells()
+    for point in problem.pins.values():
+        taken.add(point)
+    found: dict[int, Point] = {}
+    for module in problem.modules:
+        if module.origin is None or not module.members:
+            continue
+        own = [free[member] for member in module.members]
+        x, y = module.origin[0] - min(a for a, _ in own), module.origin[1] - min(b for _, b in own)
+        for member, (a, b) in list(module.pins.items())[:1]:
+            x, y = module.origin[0] + a - free[member][0], module.origin[1] + b - free[member][1]
+        places = {i: (x + a, y + b) for i, (a, b) in zip(module.members, own, strict=True) if i not in problem.pins}
+        places = {i: place for i, place in places.items() if taken.free(place, 2 * RADIUS)}
+        for place in places.values():
+            taken.add(place)
+        found.update(places)
+    return dict(sorted({**found, **problem.pins}.items()))
 
 
 class Cells:

@@ -11,7 +11,7 @@ from neurovis_layouts.blocks import Blocks, Drawing, keys_of, routed
 from neurovis_layouts.formations import offsets
 from neurovis_layouts.frame import to_picture
 from neurovis_layouts.kept import kept
-from neurovis_layouts.pins import fit
+from neurovis_layouts.pins import fit, with_origins
 from neurovis_spec.layout.model import Arrangement, Layout, LayoutProblem, Point
 
 
@@ -63,9 +63,10 @@ def place(problem: LayoutProblem, engine: str, how: Arrangement, spacing: float)
 
 def _pinned(drawing: Drawing, problem: LayoutProblem) -> Drawing:
     """The drawing moved to the pins; of what these bend no frame and no route is left."""
-    if not problem.pins:
+    pins = with_origins(problem, drawing.places)
+    if not pins:
         return drawing
-    centres, (dx, dy), bent = fit(drawing.places, problem.pins)
+    centres, (dx, dy), bent = fit(drawing.places, pins)
     broken = {m for own, _ in drawing.frames if bent.intersection(own) for m in own} | bent
     return Drawing(
         tuple(centres),
