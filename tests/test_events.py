@@ -228,6 +228,20 @@ def test_what_is_set_by_hand_holds_until_a_later_event(by_hand: int) -> None:
         assert seen[k] == [level, level if k >= 3 else 0.0, 2 * level if k >= 3 else 0.0]
 
 
+@BACKENDS
+def test_rates_of_instances_part_and_meet(backend: str) -> None:
+    """Instances learn by one rule each, whether their rates are equal or not."""
+    begin = HEAD + "parameters: {p: 0.1}\nevents: [{at: 2, set: {p: 0}}, {at: 4, set: {p: 0.1}}]\n"
+    neurons = "neurons: {A: {bias: 1}, B: {bias: 1}}"
+    wires = "connections: {A -> B: {weight: 0, plasticity: {hebbian: {rate: RATE}}}}"
+    module = f"modules: {{leg: {{parameters: {{r: 0.1}}, {neurons}, {wires.replace('RATE', 'r')}}}}}\n"
+    recording = run(begin + module + "instances: {left: {module: leg, set: {r: p}}, right: {module: leg}}", backend)
+    for side, rate in (("left", "p"), ("right", "0.1")):
+        plain = run(f"{begin}{neurons}\n{wires.replace('RATE', rate)}", backend)
+        assert recording.weight(f"{side}.A -> {side}.B").tolist() == plain.weight("A -> B").tolist()
+    assert (np.diff(recording.weight("left.A -> left.B")) == 0).tolist()[:5] == [True, False, True, True, False]
+
+
 def test_what_an_event_has_set_is_not_worked_out_anew() -> None:
     text = HEAD + "parameters: {a: 1, b: 1}\nneurons: {A: {bias: a}, B: {bias: b}}\nevents: [{at: 1, set: {a: 2*b}}]"
     simulation = nv.compile_text(text).simulator()

@@ -18,17 +18,18 @@ from neurovis_spec.compiler.settings import check_initials, choose, look_at_sett
 from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.diagnostics import shown, suggest
 from neurovis_spec.language.located import Located
-from neurovis_spec.language.source import Entry, Scalar
+from neurovis_spec.language.source import Entry, Node, Scalar
 from neurovis_spec.language.values import Choice
 
 
 class Learning(NamedTuple):
-    """A rule in use. ``signals`` are indices into all activities followed by all inputs, one a connection."""
+    """A rule in use. ``signals`` are indices into all activities followed by all inputs, one a connection; ``texts``
+    are what the author calls them."""
 
     rule: Rule
     parameters: Mapping[str, FloatArray]
     signals: Mapping[str, IntArray]
-    title: str
+    texts: Mapping[str, str]
 
 
 def learning_of(
@@ -71,7 +72,7 @@ def learning_of(
             signals[signal] = where
     if failed or values is None or not check_initials(rule.state, values, choice, constants):
         return None
-    return Learning(rule, values, signals, _title(rule, values, settled.entries))
+    return Learning(rule, values, signals, {name: _text(settled.entries[name].value) for name in rule.signals})
 
 
 def _signal(
@@ -117,13 +118,16 @@ def _signal(
     return None
 
 
-def _title(rule: Rule, values: Mapping[str, FloatArray], entries: Mapping[str, Entry]) -> str:
-    """``delta(rate=0.01, target=T)``."""
+def _text(node: Node) -> str:
+    """What an author calls a signal."""
+    return str(node.value) if isinstance(node, Scalar) else "…"
+
+
+def title_of(rule: Rule, values: Mapping[str, FloatArray], texts: Mapping[str, str]) -> str:
+    """A rule in use for display: ``delta(rate=0.01, target=T)``; a parameter that has several values is ``…``."""
     parts = [
         f"{name}={array[0]:g}" if len(array) and (array == array[0]).all() else f"{name}=…"
         for name, array in values.items()
     ]
-    for signal in rule.signals:
-        node = entries[signal].value
-        parts.append(f"{signal}={node.value}" if isinstance(node, Scalar) else signal)
+    parts += [f"{signal}={texts[signal]}" for signal in rule.signals]
     return f"{rule.name}({', '.join(parts)})" if parts else rule.name

@@ -14,7 +14,7 @@ import numpy as np
 from neurovis_spec.compiler.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.entries import Bundle
 from neurovis_spec.compiler.groups import Kind
-from neurovis_spec.compiler.learning import Learning
+from neurovis_spec.compiler.learning import Learning, title_of
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.program import (
     Block,
@@ -99,8 +99,8 @@ def _column(parts: list[tuple[Mapping[str, FloatArray], IntArray]]) -> Mapping[s
 
 def make_plasticity(bundles: tuple[Bundle, ...]) -> tuple[tuple[Plasticity, ...], IntArray]:
     """One Plasticity a plastic entry, the instances of a module together, and for each connection the number of its
-    Plasticity or −1."""
-    numbers: dict[tuple[Span, str], int] = {}
+    Plasticity or −1. Which these are depends on no parameter: in a run it stays."""
+    numbers: dict[Span, int] = {}
     parts: list[list[tuple[Learning, IntArray]]] = []
     rules: list[IntArray] = [np.zeros(0, dtype=np.int64)]
     start = 0
@@ -108,8 +108,7 @@ def make_plasticity(bundles: tuple[Bundle, ...]) -> tuple[tuple[Plasticity, ...]
         n, learning = len(bundle.sources), bundle.learning
         number = -1
         if learning is not None:
-            # An entry has the same place in all instances; by its title the rule is used in the same way.
-            number = numbers.setdefault((bundle.key, learning.title), len(parts))
+            number = numbers.setdefault(bundle.key, len(parts))  # an entry has the same place in all instances
             if number == len(parts):
                 parts.append([])
             parts[number].append((learning, np.arange(start, start + n, dtype=np.int64)))
@@ -126,7 +125,7 @@ def _together(parts: list[tuple[Learning, IntArray]]) -> Plasticity:
     signals = {name: np.concatenate([one.signals[name] for one, _ in parts]) for name in first.signals}
     for array in (members, *parameters.values(), *signals.values()):
         frozen(array)
-    return Plasticity(first.rule, members, parameters, signals, first.title)
+    return Plasticity(first.rule, members, parameters, signals, title_of(first.rule, parameters, first.texts))
 
 
 def make_program(blocks: tuple[Block, ...], plasticity: tuple[Plasticity, ...]) -> tuple[Operation, ...]:
