@@ -63,6 +63,7 @@ class Findings:
     _errors: int = 0
     _faults: set[Span] = field(default_factory=set)
     _several: dict[Diagnostic, int] = field(default_factory=dict)
+    _unread: dict[Span, frozenset[Diagnostic]] = field(default_factory=dict)
 
     def error(self, code: str, span: Span, message: str, hint: str | None = None, *, several: bool = False) -> None:
         """Note a mistake. ``several``: it is one of a data file that the stretch names, which may have several; they
@@ -77,6 +78,19 @@ class Findings:
     def warning(self, code: str, span: Span, message: str, hint: str | None = None) -> None:
         """Note something legal that is surely not meant."""
         self._items.append(Diagnostic(code, message, span, "warning", hint))
+
+    def unread(self, span: Span) -> None:
+        """What stands there could not be read, for a reason that is noted: all else that is found there follows."""
+        self._unread[span] = frozenset(item for item in self._items if item.span == span)
+        self._faults.add(span)
+
+    def take(self, others: Findings) -> None:
+        """Note what others have noted."""
+        for item in others._items:
+            self._items.append(item)
+            if item.severity == "error":
+                self._errors += 1
+                self._faults.add(item.span)
 
     def drop(self, unwanted: Callable[[Diagnostic], bool]) -> None:
         """Forget warnings that the author has allowed; errors stay."""
@@ -108,6 +122,8 @@ class Findings:
                 first.setdefault(item.span, item.code)
         told: dict[tuple[Span, str, str], Diagnostic] = {}
         for item in self._items:
+            if item not in self._unread.get(item.span, (item,)):
+                continue
             if item in self._several:
                 told[item.span, item.code, item.message] = item
             elif first.get(item.span, item.code) == item.code:

@@ -28,6 +28,7 @@ from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.sections import ConnectionModel
+from neurovis_spec.language.source import Scalar
 from neurovis_spec.language.values import FileReference, Rows
 
 #: Keys of a body that say which connections there are.
@@ -230,12 +231,19 @@ class EntryBuilder:
         if ends is None:
             return None
         n, m = len(ends.sources), len(ends.targets)
+        if n > 1 and m > 1 and self._may_be_a_matrix():
+            return None
         if n > 1 and m > 1:
             message = f"{n} neurons to {m} neurons: how are they connected?"
             hint = "add pattern: all_to_all, or pattern: one_to_one, or a matrix"
             self.constants.findings.error("pattern-missing", self.key.span, message, hint)
             return None
         return _Shape(*all_to_all(ends))
+
+    def _may_be_a_matrix(self) -> bool:
+        """Whether what is given as the weight, and was refused, may have been meant to say who is connected."""
+        weight = self.body.source.get("weight")
+        return not self._kept("weight") and not (isinstance(weight, Scalar) and isinstance(weight.value, str))
 
     def _edges(self) -> _Shape | None:
         assert self.body.edges is not None

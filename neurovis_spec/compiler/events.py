@@ -23,12 +23,10 @@ from neurovis_spec.compiler.references import (
     resolve_end,
     resolve_ends,
 )
-from neurovis_spec.diagnostics import Findings, shown, suggest
+from neurovis_spec.diagnostics import Findings, Span, shown, suggest
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.model import lost_names
 from neurovis_spec.language.sections import EventModel
-
-_KEYS = ("at", "from", "to", "set", "clamp", "lesion")
 
 
 @dataclass(frozen=True)
@@ -42,6 +40,8 @@ class Event:
     clamp: tuple[tuple[int, Formula], ...] = ()
     neurons: tuple[int, ...] = ()
     connections: tuple[int, ...] = ()
+    #: where each parameter that is set is named
+    keys: Mapping[str, Span] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,8 @@ class EventReader:
             self._lesion(text, neurons, connections)
         if at is None or self.findings.errors > before:
             return None
-        return Event(at, to, model.set, tuple(clamps), tuple(neurons), tuple(connections))
+        keys = {name: key_of(model.source, "set", name).span for name in model.set}
+        return Event(at, to, model.set, tuple(clamps), tuple(neurons), tuple(connections), keys)
 
     def _check_keys(self, model: EventModel) -> None:
         """``set`` and ``lesion`` go with ``at``, ``clamp`` with ``from`` and perhaps ``to``."""
@@ -114,7 +115,7 @@ class EventReader:
             self.findings.error("bad-event", span, message, hint)
 
         actions = [name for name in ("set", "clamp", "lesion") if source.entry(name) is not None]
-        if not actions and all(entry.name in _KEYS for entry in source.entries):
+        if not actions and not model.lost:
             first = source.entries[0].key.span if source.entries else source.span
             self.findings.error("bad-event", first, "this event does nothing", "give it set, clamp or lesion")
         if not actions:

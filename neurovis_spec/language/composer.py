@@ -8,6 +8,7 @@ on. One event at a time is held, and nothing deeper than the language allows; lo
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from typing import Final, Protocol
 
 from yaml.events import (
@@ -45,12 +46,16 @@ class EventSource(Protocol):
 class Composer:
     """Composes one document."""
 
-    def __init__(self, text: str, file: str, findings: Findings, parser: EventSource) -> None:
+    def __init__(
+        self, text: str, file: str, findings: Findings, parser: EventSource, unread: Collection[int] = ()
+    ) -> None:
         self._text = text
         self._file = file
         self._get = parser.get_event
         self._refuse = Refusals(text, file, findings)
         self._anchored: dict[str, Scalar] = {}
+        #: where values begin that could not be read
+        self._unread = unread
         #: Line and column of each bracket that is open right now, outermost first: for wording a syntax error.
         self.open_brackets: list[tuple[int, int]] = []
 
@@ -99,7 +104,9 @@ class Composer:
             scalar = self._block_scalar(event, index, line, column)
         else:
             span = Span(self._file, line, column, end.line + 1, end.column + 1)
-            if event.style in ("'", '"'):
+            if self._unread and index in self._unread:
+                scalar = Scalar(True, span, None)  # fits hardly anywhere
+            elif event.style in ("'", '"'):
                 scalar = self._quoted(event.value, span, end.index - index - 2)
             else:
                 scalar = self._plain(event.value, span)

@@ -96,7 +96,7 @@ class _Reader:
             self.findings.error(data.code, path.span, f"the file '{shown(path.value)}' {data.reason}")
             return False
         name = os.path.normpath(Path(file).parent / path.value)
-        document = read_content(data, name, self.findings)
+        document = read_content(data, name, self.findings, mend=True)
         model = None if document is None else read_included(document, self.findings)
         if model is None:
             return False

@@ -131,8 +131,8 @@ def as_bool(node: Node, info: ValidationInfo) -> Located[bool]:
     refuse(info, node, "true or false", hint)
 
 
-def formula_of(node: Node, findings: Findings) -> Formula | None:
-    """A finite number, or the text of an expression; None where it is neither (that is noted)."""
+def formula_of(node: Node, findings: Findings, hint: str | None = None) -> Formula | None:
+    """A finite number, or the text of an expression; None where it is neither (that is noted, with the hint)."""
     if isinstance(node, Scalar):
         value = node.value
         if isinstance(value, str) and value.strip():
@@ -140,17 +140,18 @@ def formula_of(node: Node, findings: Findings) -> Formula | None:
         if isinstance(value, (int, float)) and not isinstance(value, bool):
             if math.isfinite(value):
                 return Located(value, node)
-            hint = "a spec has finite numbers alone; a bound that there is not is left out"
-            findings.error("not-finite", node.span, "a finite number is wanted here", hint)
+            bound = "a spec has finite numbers alone; a bound that there is not is left out"
+            findings.error("not-finite", node.span, "a finite number is wanted here", bound)
             return None
     message = f"expected a number or an expression, found {describe(node)}"
-    findings.error("wrong-type", node.span, message)
+    findings.error("wrong-type", node.span, message, hint)
     return None
 
 
 def as_formula(node: Node, info: ValidationInfo) -> Formula:
     """A finite number, or the text of an expression."""
-    formula = formula_of(node, findings_of(info))
+    rows = info.field_name == "weight" and isinstance(node, (Sequence, Packed))
+    formula = formula_of(node, findings_of(info), "rows of weights stand under 'matrix'" if rows else None)
     if formula is None:
         give_up()
     return formula

@@ -22,6 +22,7 @@ from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.garbage import uncollected
 from neurovis_spec.language.composer import Composer, EventSource
 from neurovis_spec.language.composer_refusals import ComposingStoppedError
+from neurovis_spec.language.mending import LARGEST_MENDED, MOST_MENDED, faulty_value, left_out
 from neurovis_spec.language.reader_characters import FORBIDDEN, REPLACEMENT, Lines, character_name
 from neurovis_spec.language.reader_files import FileFault, read_bytes
 from neurovis_spec.language.reader_syntax import explain
@@ -66,30 +67,33 @@ class _PythonParser:
             raise ScannerError(context, None, "found invalid Unicode character escape code", mark) from error
 
 
-def read_file(path: Path, name: str, findings: Findings) -> SourceDocument | None:
+def read_file(path: Path, name: str, findings: Findings, *, mend: bool = False) -> SourceDocument | None:
     """Read a file; ``name`` is what findings call it. Never raises for what is in the file or in its stead."""
     data = read_bytes(path, LARGEST)
     if isinstance(data, FileFault):
         findings.error(data.code, Span(name, 1, 1, 1, 1), f"the file {data.reason}")
         return None
-    return read_content(data, name, findings)
+    return read_content(data, name, findings, mend=mend)
 
 
-def read_content(data: bytes, name: str, findings: Findings) -> SourceDocument | None:
+def read_content(data: bytes, name: str, findings: Findings, *, mend: bool = False) -> SourceDocument | None:
     """Read the bytes of a file that findings call ``name``."""
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
         _refuse_bytes(data, error.start, name, findings)
         return None
-    return read_text(text, name, findings)
+    return read_text(text, name, findings, mend=mend)
 
 
-def read_text(text: str, file: str, findings: Findings, *, pure: bool = False) -> SourceDocument | None:
+def read_text(
+    text: str, file: str, findings: Findings, *, pure: bool = False, mend: bool = False
+) -> SourceDocument | None:
     """Read a text; ``file`` is what findings call it, ``pure`` takes the Python parser though there is a C one.
 
     Never raises for what is in the text. None means that it has no root that is a mapping, or could not be read to its
-    end; a document is returned also where there were findings that reading could get past.
+    end; a document is returned also where there were findings that reading could get past. With ``mend`` these are
+    syntax errors, too, where it is clear which value is at fault: it is left out.
     """
     text = text.removeprefix(_BOM)
     findings.sources[file] = text
@@ -102,17 +106,31 @@ def read_text(text: str, file: str, findings: Findings, *, pure: bool = False) -
     clean = _without_directives(clean, file, findings)
     if not clean.endswith(("\n", "\r")):
         clean += "\n"  # without it the parsers differ about the place of what is missing at the end
-    composer = Composer(clean, file, findings, event_source(clean, pure=pure))
-    try:
-        with uncollected():
-            root = composer.document()
-    except ComposingStoppedError:
-        return None
-    except yaml.YAMLError as error:
-        syntax = explain(error, lines, composer.open_brackets)
+    unread: set[int] = set()
+    for _ in range(MOST_MENDED + 1):
+        refused = Findings()
+        composer = Composer(clean, file, refused, event_source(clean, pure=pure), unread)
+        try:
+            with uncollected():
+                root = composer.document()
+        except ComposingStoppedError:
+            findings.take(refused)
+            return None
+        except yaml.YAMLError as error:
+            syntax = explain(error, lines, composer.open_brackets)
+        else:
+            findings.take(refused)
+            return _document(root, file, findings)
         findings.error(syntax.code, syntax.span(file, lines), syntax.message, syntax.hint)
-        return None
-    return _document(root, file, findings)
+        opened = composer.open_brackets[0][0] if composer.open_brackets else syntax.line
+        found = faulty_value(Lines(clean), min(opened, syntax.line)) if mend and len(clean) <= LARGEST_MENDED else None
+        if found is None:
+            findings.take(refused)
+            return None
+        clean = left_out(clean, found)
+        unread = {start for start in unread if not found.start <= start < found.end} | {found.unread}
+        findings.unread(Span(file, found.line, found.column, found.line, found.column + 1))
+    return None
 
 
 def event_source(text: str, *, pure: bool = False) -> EventSource:
