@@ -6,7 +6,7 @@ In: the Population, the connections, the levels. Out: Blocks (neurons that are u
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
@@ -40,9 +40,8 @@ def make_blocks(population: Population, sources: IntArray, targets: IntArray, le
     parts: dict[_Key, list[_Part]] = {}
     for group, kind in zip(population.neurons.groups, population.kinds, strict=True):
         own = levels[group.start : group.start + group.count]
-        for level in sorted(set(own.tolist())):
+        for level, rows in _by_level(own):
             key = (level, kind.activation.name, kind.model.name, group.combine)
-            rows = _ONE if group.count == 1 else np.flatnonzero(own == level)
             parts.setdefault(key, []).append(_Part(kind, group.start, rows))
     order = sorted(parts, key=lambda key: (key[0], parts[key][0].members[0]))
     home = np.full(len(population.neurons), -1, dtype=np.int64)
@@ -73,6 +72,18 @@ def make_blocks(population: Population, sources: IntArray, targets: IntArray, le
             frozen(array)
         blocks.append(block)
     return tuple(blocks)
+
+
+def _by_level(levels: IntArray) -> Iterator[tuple[int, IntArray]]:
+    """Each level, and the rows that have it, ascending; a chain with delay 0 has as many levels as neurons."""
+    if len(levels) == 1:
+        yield int(levels[0]), _ONE
+        return
+    rows = np.argsort(levels, kind="stable")
+    found, starts = np.unique(levels[rows], return_index=True)
+    ends = [*starts[1:].tolist(), len(rows)]
+    for level, start, end in zip(found.tolist(), starts.tolist(), ends, strict=True):
+        yield level, rows[start:end]
 
 
 class _Part(NamedTuple):
