@@ -8,13 +8,13 @@ After Sander (1996), Layout of compound directed graphs.
 
 from __future__ import annotations
 
-import heapq
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from itertools import pairwise
 
+import networkx as nx
 import numpy as np
 
 from neurovis_layouts.layered.crossings import Segments
@@ -81,46 +81,36 @@ def _part(levels: Levels, order: list[list[int]], box: int, sides: dict[tuple[in
     """
     spans = [r for r, rank in enumerate(order) if any(levels.nodes[n].box == box for n in rank)]
     foreign = [n for r in spans for n in order[r] if levels.nodes[n].box != box]
-    root = {n: n for n in foreign}
-
-    def find(n: int) -> int:
-        while root[n] != n:
-            root[n] = root[root[n]]
-            n = root[n]
-        return n
-
-    def join(a: int, b: int) -> None:
-        low, high = sorted((find(a), find(b)))
-        root[high] = low
-
+    hanging: nx.Graph[int] = nx.Graph()
+    hanging.add_nodes_from(foreign)
     for r in spans[:-1]:
-        for segment in levels.segments[r]:
-            if segment.upper in root and segment.lower in root:
-                join(segment.upper, segment.lower)
+        ends = ((segment.upper, segment.lower) for segment in levels.segments[r])
+        hanging.add_edges_from(pair for pair in ends if pair[0] in hanging and pair[1] in hanging)
     first: dict[int, int] = {}
     for n in foreign:
         other = levels.nodes[n].box
         if other >= 0:
-            join(first.setdefault(other, n), n)
-    lean: dict[int, int] = {}
+            hanging.add_edge(first.setdefault(other, n), n)
+    part = {n: number for number, mates in enumerate(nx.connected_components(hanging)) for n in mates}
+    lean: dict[int, int] = dict.fromkeys(part.values(), 0)
     for r in spans:
         start = next(i for i, n in enumerate(order[r]) if levels.nodes[n].box == box)
         for i, n in enumerate(order[r]):
-            if n in root:
-                lean[find(n)] = lean.get(find(n), 0) + (1 if i > start else -1)
+            if n in part:
+                lean[part[n]] += 1 if i > start else -1
     for other, n in sorted(first.items()):
         settled = sides.get((box, other), 0)
-        if settled and lean[find(n)] * settled <= 0:
-            if any(sides.get((box, b), settled) != settled for b, m in first.items() if find(m) == find(n)):
+        if settled and lean[part[n]] * settled <= 0:
+            if any(sides.get((box, b), settled) != settled for b, m in first.items() if part[m] == part[n]):
                 return False
-            lean[find(n)] = settled
+            lean[part[n]] = settled
     for other, n in first.items():
-        side = -1 if lean[find(n)] < 0 else 1
+        side = -1 if lean[part[n]] < 0 else 1
         sides[box, other], sides[other, box] = side, -side
     for r in spans:
-        left = [n for n in order[r] if n in root and lean[find(n)] < 0]
-        right = [n for n in order[r] if n in root and lean[find(n)] >= 0]
-        order[r] = left + [n for n in order[r] if n not in root] + right
+        left = [n for n in order[r] if n in part and lean[part[n]] < 0]
+        right = [n for n in order[r] if n in part and lean[part[n]] >= 0]
+        order[r] = left + [n for n in order[r] if n not in part] + right
     return True
 
 
@@ -176,23 +166,21 @@ class Strips:
                     self._apart(a, other, _outside(nodes[a]))
         for line_of in self._line.values():
             self._apart(line_of, line_of + 1, 0.0)
-        self._sorted = list(self._topological())
+        self._sorted = self._topological()
 
     def _apart(self, a: int, b: int, gap: float) -> None:
         self._after[a][b] = max(self._after[a].get(b, 0.0), gap)
         self._before[b][a] = max(self._before[b].get(a, 0.0), gap)
 
-    def _topological(self) -> Iterator[int]:
-        waiting = {n: len(before) for n, before in enumerate(self._before)}
-        ready = [n for n, count in waiting.items() if count == 0]
-        heapq.heapify(ready)
-        while ready:
-            n = heapq.heappop(ready)
-            yield n
-            for other in self._after[n]:
-                waiting[other] -= 1
-                if waiting[other] == 0:
-                    heapq.heappush(ready, other)
+    def _topological(self) -> list[int]:
+        """The nodes and lines from left to right, none where the distances go round in a circle."""
+        graph: nx.DiGraph[int] = nx.DiGraph()
+        graph.add_nodes_from(range(len(self._after)))
+        graph.add_edges_from((a, b) for a, after in enumerate(self._after) for b in after)
+        try:
+            return list(nx.lexicographical_topological_sort(graph))
+        except nx.NetworkXUnfeasible:
+            return []
 
     def fit(self) -> bool:
         """Whether all distances can be kept at once."""
