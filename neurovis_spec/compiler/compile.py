@@ -234,7 +234,8 @@ def _report_no_neurons(spec: Spec, population: Population, findings: Findings) -
             return
     node = spec.source.entry("neurons")
     span = opening(spec.source) if node is None else node.key.span
-    findings.error("no-neurons", span, "a network needs at least one neuron", "add a group under 'neurons'")
+    message, hint = "a network needs at least one neuron", "add a group under 'neurons'"
+    findings.error("no-neurons", span, message, hint, several=True)  # also where the name is missing there
 
 
 def _look_at_cycles(made: Connected, population: Population, findings: Findings) -> None:

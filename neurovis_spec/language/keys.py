@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator
 from typing import Final, NamedTuple
 
-from neurovis_spec.diagnostics import Findings, did_you_mean, meant, nearest, shown, suggest
+from neurovis_spec.diagnostics import Findings, did_you_mean, meant, nearest, shown, slips, suggest
 from neurovis_spec.language.source import Entry, Mapping
 
 #: Errors after which unknown keys are no longer compared with the known ones.
@@ -55,9 +55,12 @@ def _read(
             findings.error("unknown-key", span, _unknown(name))
         elif name not in known:
             close = nearest(name, known)
-            hint = did_you_mean(sorted(close, key=lambda one: one not in free)) if close else words.home(name)
+            # a key of another place is hardly a misspelling by two slips
+            home = None if any(slips(name, one) == 1 for one in close) else words.home(name)
+            hint, right = home, None if home else meant(name, free)
+            if home is None and close:
+                hint = did_you_mean(sorted(close, key=lambda one: one not in free))
             findings.error("unknown-key", span, _unknown(name), hint or suggest(name, known, "known here"))
-            right = meant(name, free)
             if right is None:
                 perhaps.update(close)
         if right is not None:

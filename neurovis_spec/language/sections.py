@@ -224,6 +224,8 @@ def _connections(node: Node, info: ValidationInfo) -> list[tuple[Located[str], o
     left out."""
     result: list[tuple[Located[str], object]] = []
     for mapping in _mappings(node, info, "a mapping FROM -> TO: weight, or a list of such"):
+        if _in_parts(mapping, info):
+            continue
         first: dict[str, Entry] = {}
         for entry in mapping.entries:
             same = first.setdefault("".join(entry.name.split()), entry)
@@ -235,6 +237,21 @@ def _connections(node: Node, info: ValidationInfo) -> list[tuple[Located[str], o
             with suppress(PydanticCustomError):
                 result.append((Located(entry.name, entry.key), _body(entry, info)))
     return result
+
+
+def _in_parts(mapping: Mapping, info: ValidationInfo) -> bool:
+    """Whether a mapping says ``from`` and ``to`` with keys of their own, as other languages do, which is noted."""
+    ends = [entry for entry in mapping.entries if entry.name in _ENDS]
+    if len(ends) != 2 or any("->" in entry.name for entry in mapping.entries):
+        return False
+    source, target = (shown(str(entry.value.value)) if isinstance(entry.value, Scalar) else "…" for entry in ends)
+    message = f"'{ends[0].name}' is no connection"
+    findings_of(info).error("bad-connection", ends[0].key.span, message, f"write {source} -> {target}: {{weight: …}}")
+    return True
+
+
+#: How other languages call the ends of a connection.
+_ENDS = ("from", "to", "source", "target", "pre", "post")
 
 
 def written(section: Mapping) -> int:

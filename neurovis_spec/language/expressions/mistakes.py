@@ -31,6 +31,7 @@ _INSTEAD: Mapping[str, str] = {
     "trunc": "write 'sign(x) * floor(abs(x))'",
     "square": "write 'x^2'",
     "cbrt": "write 'sign(x) * abs(x)^(1/3)'",
+    "f": "f(x), the neuron's activation, is known in the 'activity' of a model alone",
     "relu": "write 'max(x, 0)'",
     "where": "write 'a if condition else b'",
     "sum": "write the terms one by one",
