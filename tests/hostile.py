@@ -70,6 +70,17 @@ def replaced(data: Data, path: Place, wrong: str) -> str:
     return json.dumps(_with(data, path, _MARK), indent=1, ensure_ascii=False).replace(f'"{_MARK}"', wrong)
 
 
+def without(data: Data, path: Place) -> Data:
+    """The spec without this place."""
+    first, rest = path[0], path[1:]
+    if isinstance(data, dict):
+        kept = {key: value for key, value in data.items() if key != first or rest}
+        return {key: without(value, rest) if key == first else value for key, value in kept.items()}
+    assert isinstance(data, list)
+    items = [(index, value) for index, value in enumerate(data) if index != first or rest]
+    return [without(value, rest) if index == first else value for index, value in items]
+
+
 def _with(data: Data, path: Place, value: Data) -> Data:
     if not path:
         return value

@@ -12,9 +12,9 @@ import pytest
 import yaml
 
 import neurovis_spec as nv
-from neurovis_spec.compiler.constants import RESERVED
 from neurovis_spec.language.data_files import KINDS, LARGEST
 from neurovis_spec.language.data_files_table import MOST_CELLS
+from neurovis_spec.language.model import RESERVED
 from neurovis_spec.manual.keys import keys
 
 ROOT = Path(__file__).parents[1]

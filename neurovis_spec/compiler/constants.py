@@ -29,8 +29,6 @@ Value: TypeAlias = float | FloatArray
 
 #: Names that an expression may always use.
 ALWAYS = (*CONSTANTS, "dt")
-#: Names that no parameter may have (§6).
-RESERVED = frozenset({"t", "k", "dt", "i", "j", "n", "pi", "e"})
 #: Names that mean something elsewhere, and why not here.
 _ELSEWHERE: Mapping[str, str] = {
     "k": "the step is known in a run; this value is worked out once, before it",

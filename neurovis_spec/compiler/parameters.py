@@ -8,10 +8,11 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 
-from neurovis_spec.compiler.constants import RESERVED, Constants
+from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.references import Section, key_span
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.expressions.tree import names
+from neurovis_spec.language.model import RESERVED
 from neurovis_spec.language.values import Parameter
 
 

@@ -21,6 +21,7 @@ from neurovis_spec.compiler.settings import look_at_settings
 from neurovis_spec.diagnostics import Findings, Span, meant, shown, suggest
 from neurovis_spec.diagnostics import nearest as nearest_names
 from neurovis_spec.language.located import Formula, formula_of
+from neurovis_spec.language.patterns import SETTINGS
 from neurovis_spec.language.values import Choice
 
 
@@ -68,14 +69,6 @@ _USES: Mapping[str, str] = {
     "small_world": "{small_world: {degree: 4, rewire: 0.1}}",
     "band": "{band: {width: 1}}",
 }
-_SETTINGS: Mapping[str, tuple[str, ...]] = {
-    "random": ("probability",),
-    "fixed_indegree": ("count",),
-    "fixed_outdegree": ("count",),
-    "nearest": ("count",),
-    "small_world": ("degree", "rewire"),
-    "band": ("width",),
-}
 PATTERNS = (*_FIXED, *_USES)
 
 
@@ -106,7 +99,7 @@ def pairs_of(
         message = f"'{name}' needs ends of equal size; these have {n} and {m} neurons"
         findings.error("wrong-size", span, message)
         return None
-    if len(values) < len(_SETTINGS.get(name, ())) or name != written:
+    if len(values) < len(SETTINGS[name]) or name != written:
         return None
     if name in _FIXED:
         return _FIXED[name](ends) if fits(least_pairs(name, n, m, {})) else None
@@ -118,7 +111,7 @@ def least_pairs(name: str, n: int, m: int, values: Mapping[str, float]) -> int:
     or nearly so. 0 where that cannot be said, as these are no settings for such ends."""
     if name in _FIXED:
         return n * m if name == "all_to_all" else n
-    if not set(_SETTINGS.get(name, (name,))) <= values.keys():
+    if not set(SETTINGS.get(name, (name,))) <= values.keys():
         return 0
     if name == "random":
         probability = values["probability"]
@@ -136,7 +129,7 @@ def least_pairs(name: str, n: int, m: int, values: Mapping[str, float]) -> int:
 
 def _settings(name: str, choice: Choice, findings: Findings) -> dict[str, Formula]:
     """The formulas of the settings; each of them has to be there."""
-    allowed = _SETTINGS.get(name, ())
+    allowed = SETTINGS[name]
     entries = {entry.name: entry for entry in choice.settings if entry.name in allowed}
     perhaps: set[str] = set()
     for entry in choice.settings:

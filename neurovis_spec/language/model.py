@@ -206,12 +206,15 @@ Keyed = Annotated[dict[str, V], WrapValidator(_keyed)]
 
 @dataclass(frozen=True, slots=True)
 class KeysAreNames:
-    """Says in the schema that keys are names."""
+    """Says in the schema that keys are names, and none of those that the language has ``reserved``."""
+
+    reserved: tuple[str, ...] = ()
 
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        return {**handler(schema), "propertyNames": {"pattern": f"^{IDENTIFIER.pattern}$"}}
+        others: JsonSchemaValue = {"not": {"enum": [*self.reserved]}} if self.reserved else {}
+        return {**handler(schema), "propertyNames": {"pattern": f"^{IDENTIFIER.pattern}$", **others}}
 
 
 @dataclass(frozen=True, slots=True)
@@ -241,3 +244,7 @@ class Filled:
 
 #: A mapping whose keys are names of the author's: ``Named[Group]``.
 Named = Annotated[dict[str, V], WrapValidator(_named), KeysAreNames()]
+#: Names that mean something in expressions, which no parameter may have.
+RESERVED = ("t", "k", "dt", "i", "j", "n", "pi", "e")
+#: A mapping whose keys are names of parameters: ``NamedParameters[ParameterField]``.
+NamedParameters = Annotated[dict[str, V], WrapValidator(_named), KeysAreNames(RESERVED)]

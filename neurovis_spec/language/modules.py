@@ -13,7 +13,7 @@ from pydantic import Field
 from neurovis_spec.language.drawing import ModuleLayoutModel
 from neurovis_spec.language.library import Library, version_field
 from neurovis_spec.language.located import FormulaField, IdentifierField, Leaf, Located, TextField, TextsField
-from neurovis_spec.language.model import Model, Named, StandIns
+from neurovis_spec.language.model import Model, Named, NamedParameters, StandIns
 from neurovis_spec.language.sections import ConnectionsField, GroupModel, InputModel
 from neurovis_spec.language.values import ParameterField
 
@@ -50,7 +50,7 @@ class ModuleModel(Model):
 
     title: TextField | None = Field(None, description="A title.")
     description: TextField | None = Field(None, description="What this is.")
-    parameters: Named[ParameterField] = Field(
+    parameters: NamedParameters[ParameterField] = Field(
         default_factory=dict, description="Constants of its own, in order; an instance may set them."
     )
     inputs: Named[InputModel] = Field(
@@ -73,7 +73,7 @@ class IncludedModel(Library):
         None, description="The version of the language: 1."
     )
     authors: TextsField | None = Field(None, description="Who wrote it.")
-    license: TextField | None = Field(None, description="Under which licence.")
+    license: TextsField | None = Field(None, description="Under which licence.")
     references: TextsField | None = Field(None, description="What it goes back to.")
     include: TextsField = Field(default=(), description="Files whose modules and definitions are used here.")
     modules: Named[ModuleModel] = Field(default_factory=dict, description="Networks to be used several times.")

@@ -13,8 +13,10 @@ from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from neurovis_spec.diagnostics import shown
+from neurovis_spec.language.combinations import CONNECTION, EVENT, GROUP, INPUT, ONE_KEY
 from neurovis_spec.language.located import (
     FORMULA,
+    IDENTIFIER,
     BoolField,
     FormulaField,
     Leaf,
@@ -27,10 +29,12 @@ from neurovis_spec.language.located import (
     words,
 )
 from neurovis_spec.language.model import Filled, Keyed, KeysAreNames, Model
+from neurovis_spec.language.patterns import PatternField
 from neurovis_spec.language.source import Entry, Mapping, Node, Packed, Scalar, Sequence
 from neurovis_spec.language.values import (
     FILE,
     FORMULAS,
+    ONE_REFERENCE,
     CentreField,
     ChoiceField,
     EdgesField,
@@ -60,6 +64,8 @@ def _table(node: Node, info: ValidationInfo) -> FileReference | Sequence | Packe
 class InputModel(Model):
     """A signal that comes from outside the network."""
 
+    model_config = INPUT
+
     PLACE: ClassVar[str] = "an input"
 
     expression: FormulaField | None = Field(None, description="A formula of k (the step), t (seconds) and parameters.")
@@ -83,14 +89,22 @@ def _position(node: Node, info: ValidationInfo) -> FileReference | Sequence | Pa
     refuse(info, node, "a position [x, y], a list of them, or {file: …}")
 
 
+_NAME = {"type": "string", "pattern": f"^{IDENTIFIER.pattern}$"}
+_NAMES = {"anyOf": [_NAME, {"type": "array", "items": _NAME}]}
+
+
 class GroupModel(Model):
     """A group of neurons, or a single one."""
+
+    model_config = GROUP
 
     PLACE: ClassVar[str] = "a group of neurons"
 
     count: FormulaField | None = Field(None, description="How many neurons; K with count 3 makes K1, K2, K3.")
     first: FormulaField | None = Field(None, description="The number of the first neuron (default 1).")
-    names: TextsField | None = Field(None, description="The names of the neurons, one by one.")
+    names: Annotated[TextsField, WithJsonSchema(_NAMES)] | None = Field(
+        None, description="The names of the neurons, one by one."
+    )
     activation: ChoiceField | None = Field(
         None, description="Activation function, name or {name: {parameter: value}} (default identity)."
     )
@@ -123,6 +137,8 @@ class GroupModel(Model):
 class ScaleModel(Model):
     """How the weights of an entry are scaled together; one of the three."""
 
+    model_config = ONE_KEY
+
     PLACE: ClassVar[str] = "a 'scale'"
 
     spectral_radius: FormulaField | None = Field(
@@ -137,6 +153,8 @@ class ScaleModel(Model):
 class ConnectionModel(Model):
     """The body of a connection; a bare weight is read as ``{weight: …}``."""
 
+    model_config = CONNECTION
+
     PLACE: ClassVar[str] = "a connection"
 
     weight: FormulaField | None = Field(
@@ -146,7 +164,7 @@ class ConnectionModel(Model):
     scale: ScaleModel | None = Field(None, description="Scales the weights of this entry together when they are made.")
     matrix: MatrixField | None = Field(None, description="Dense rows, rows are sources; null means no connection.")
     edges: EdgesField | None = Field(None, description="[[from, to, weight, delay], …], the last two optional.")
-    pattern: ChoiceField | None = Field(
+    pattern: PatternField | None = Field(
         None,
         description="Which pairs are connected: all_to_all, one_to_one, chain, ring, {random: {probability: p}}, ….",
     )
@@ -174,8 +192,13 @@ def _pair(node: Node, info: ValidationInfo) -> tuple[Node, Node]:
     refuse(info, node, "bounds [low, high]")
 
 
+_LESION = {"anyOf": [ONE_REFERENCE, {"type": "array", "items": ONE_REFERENCE}]}
+
+
 class EventModel(Model):
     """Something that changes during a run."""
+
+    model_config = EVENT
 
     PLACE: ClassVar[str] = "an event"
 
@@ -188,7 +211,7 @@ class EventModel(Model):
     clamp: Annotated[Keyed[FormulaField], Filled("{neurons: activity}")] = Field(
         default_factory=dict, description="{neurons: activity}."
     )
-    lesion: Annotated[PartsField, Filled("a neuron or a connection")] = Field(
+    lesion: Annotated[PartsField, WithJsonSchema(_LESION), Filled("a neuron or a connection")] = Field(
         default=(), description="Neurons and connections (FROM -> TO) that are removed."
     )
 

@@ -21,7 +21,7 @@ from neurovis_spec.language.located import (
     TextsField,
     refuse,
 )
-from neurovis_spec.language.model import Model, Named, StandIns
+from neurovis_spec.language.model import Model, Named, NamedParameters, StandIns
 from neurovis_spec.language.modules import INCLUDED, InstanceModel, ModuleModel
 from neurovis_spec.language.sections import ConnectionsField, EventsField, GroupModel, InputModel, Time
 from neurovis_spec.language.source import Mapping, Node
@@ -59,7 +59,7 @@ class Spec(Library):
     references: TextsField | None = Field(None, description="What it goes back to.")
     time: Time | None = Field(None, description="The clock: dt, steps, episode.")
     seed: IntegerField | None = Field(None, description="The only source of randomness (default 0).")
-    parameters: Named[ParameterField] = Field(default_factory=dict, description="Named constants, in order.")
+    parameters: NamedParameters[ParameterField] = Field(default_factory=dict, description="Named constants, in order.")
     include: TextsField = Field(
         default=(), description="Files whose modules, activations, models and rules are used here."
     )

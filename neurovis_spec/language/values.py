@@ -144,9 +144,10 @@ FILE = {
     "additionalProperties": False,
 }
 _CELL = {"anyOf": [*FORMULA["anyOf"], {"type": "null"}]}
+_END = {"type": "string", "pattern": "\\S"}
 _EDGE = {
     "type": "array",
-    "prefixItems": [{"type": "string", "minLength": 1}, {"type": "string", "minLength": 1}, _CELL, FORMULA],
+    "prefixItems": [_END, _END, _CELL, FORMULA],
     "minItems": 2,
     "maxItems": 4,
 }
@@ -282,10 +283,11 @@ def as_reference(node: Node, info: ValidationInfo) -> Reference:
     return Reference(parts, node.span, findings_of(info).errors > before)
 
 
-ReferenceField = Annotated[
-    Reference,
-    Leaf(as_reference, {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
-]
+ONE_REFERENCE = {"type": "string", "pattern": "[A-Za-z_]"}
+#: The schema of a reference, or of a list of them: each names something.
+REFERENCES = {"anyOf": [ONE_REFERENCE, {"type": "array", "items": ONE_REFERENCE, "minItems": 1}]}
+
+ReferenceField = Annotated[Reference, Leaf(as_reference, REFERENCES)]
 
 
 class Point(NamedTuple):

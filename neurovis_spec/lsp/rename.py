@@ -11,9 +11,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from neurovis_spec.compiler.constants import RESERVED
 from neurovis_spec.diagnostics import Diagnostic, Span
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, bad_name
+from neurovis_spec.language.model import RESERVED
 from neurovis_spec.language.scalars import resolve
 from neurovis_spec.lsp.check import check
 from neurovis_spec.lsp.document import Document

@@ -154,7 +154,8 @@ def _list(shape: Mapping[str, object]) -> str:
         if items.get("items") == {"type": "string"} and items.get("maxItems") is None:
             return "list of lists"
         return "list of pairs" if items.get("maxItems") == 2 else "list of rows"
-    return "list of texts" if isinstance(items, dict) and _one(items) == "text" else "list"
+    word = _one(items) if isinstance(items, dict) else ""
+    return f"list of {word}s" if word in ("text", "name") else "list"
 
 
 def _mapping(shape: Mapping[str, object]) -> str:
