@@ -159,6 +159,56 @@ def test_where_an_event_stands_does_not_show_in_the_hash() -> None:
     assert nv.compile_text(text).hash != nv.compile_text(text.replace("gain: 3", "gain: 4")).hash
 
 
+#: A place that follows a parameter, and one that holds the same number.
+PLACES = [
+    "neurons: {A: {bias: P}}",
+    "neurons: {A: {bias: 1, activation: {leaky_relu: {slope: P}}}}",
+    "neurons: {A: {bias: 1, model: {leaky_integrator: {leak: P}}}}",
+    "neurons: {A: {noise: 'normal(0, P)'}}",
+    "neurons: {A: {input: s}}\ninputs: {s: {expression: P*k}}",
+    "neurons: {A: {input: s}}\ninputs: {s: {values: [[1], [P]]}}",
+    "neurons: {A: {bias: 1}, B: {}}\nconnections: {A -> B: P}",
+    "neurons: {A: {bias: 1}, B: {}}\nconnections: {A -> B: {matrix: [[P]]}}",
+    "neurons: {A: {bias: 1}, B: {combine: distance}}\nconnections: {A -> B: {centre: P}}",
+    "neurons: {A: {bias: 1}, B: {bias: 1}}\nconnections: {A -> B: {plasticity: {hebbian: {rate: P}}}}",
+    "neurons: {A: {bias: 1}, B: {bias: 1}}\nconnections: {A -> B: {plasticity: hebbian, bounds: [-9, 5*P]}}",
+    "modules: {m: {parameters: {q: 1}, neurons: {A: {bias: q}}}}\ninstances: {x: {module: m, set: {q: P}}}",
+    "neurons: {A: {bias: 1}}\nclamp: P",
+]
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_networks_that_an_event_parts_have_other_hashes(place: str) -> None:
+    """Both are the same until the parameter is set."""
+    head = "neurovis: 1\nname: x\nparameters: {p: 0.5}\n"
+    events = "events:\n  - {at: 3, set: {p: 0.75}}\n"
+    place, _, clamp = place.partition("\nclamp: ")
+    events += f"  - {{from: 2, clamp: {{A: {clamp}}}}}\n" if clamp else ""
+    texts = [(f"{head}{place}\n{events}").replace("P", written) for written in ("p", "0.5", "0.50", "p + 0")]
+    moves, stays, also, moved = (nv.compile_text(text).hash for text in texts)
+    assert moves != stays
+    assert stays == also
+    if "expression" not in place and "noise" not in place:  # an input and a noise keep their formulas
+        assert moves == moved
+
+
+def test_clamps_and_lesions_show_in_the_hash() -> None:
+    events = [
+        "[]",
+        "[{from: 3, clamp: {A: 1}}]",
+        "[{from: 3, clamp: {A: 2}}]",
+        "[{from: 3, clamp: {B: 1}}]",
+        "[{from: 3, to: 9, clamp: {A: 1}}]",
+        "[{at: 3, lesion: A}]",
+        "[{at: 4, lesion: A}]",
+        "[{at: 3, lesion: A -> B}]",
+        "[{at: 3, lesion: B -> C}]",
+    ]
+    assert len({nv.compile_text(f"{CHAIN}events: {event}").hash for event in events}) == len(events)
+    same = ["[{from: 3, clamp: {A: 1}}]", "[{from: 1 + 2, clamp: {A: push}}]"]
+    assert len({nv.compile_text(f"{CHAIN}events: {event}").hash for event in same}) == 1
+
+
 def test_events_show_in_the_hash_and_in_what_can_change(tmp_path: Path) -> None:
     plain = nv.compile_text(CHAIN)
     later, sooner = (nv.compile_text(CHAIN + f"events: [{{at: {at}, set: {{gain: 3}}}}]") for at in (5000, 50))
@@ -270,6 +320,53 @@ def test_events_come_again_after_a_state_of_an_earlier_step() -> None:
         pushes.append(simulation.activity[0])
     assert gains == [3.0, 4.0, 4.0, 4.0]
     assert pushes == [2.0] * 4
+
+
+def warnings(text: str) -> list[tuple[str, int, int, str]]:
+    """Code, line, column, message of each."""
+    found = nv.compile_text(text).warnings
+    return [(item.code, item.span.line, item.span.column, item.message) for item in found]
+
+
+@pytest.mark.parametrize(
+    "rest",
+    [
+        "neurons: {A: {initial: p, bias: 1}}",
+        "neurons: {A: {bias: 1}, B: {}}\nconnections: {A -> B: {weight: p, plasticity: hebbian}}",
+        "neurons: {A: {bias: 1}}\nlayout: {positions: {A: [p, 0]}}",
+        "neurons: {A: {bias: 1, position: [p, 0]}}",
+        "neurons: {A: {bias: 'max(p, 20)'}}",
+        "neurons: {A: {bias: 1}, N: {noise: 'normal(0, q)'}}",
+        "neurons: {A: {bias: 1}}\nmodules: {m: {parameters: {r: 1}, neurons: {K: {bias: 1, initial: r}}}}\n"
+        "instances: {x: {module: m, set: {r: p}}}",
+    ],
+)
+def test_what_is_set_in_vain_is_a_warning(rest: str) -> None:
+    head = HEAD + "parameters: {p: 2, q: 1}\n"
+    found = warnings(f"{head}events: [{{at: 3, set: {{p: 5}}}}]\n{rest}\noutputs: {{o: A}}\n")
+    assert ("no-effect", 5, 24, "setting 'p' changes nothing in the run") in found
+
+
+@pytest.mark.parametrize(
+    "rest",
+    [
+        "events: [{at: 3, set: {p: 2}}]\nneurons: {A: {initial: p, bias: 1}}",
+        "events: [{at: 3, set: {p: 5}}]\nneurons: {A: {initial: p, bias: p}}",
+        "events: [{at: 3, set: {p: 5}}, {at: 4, set: {r: p}}]\nneurons: {A: {bias: r}}",
+        "events: [{at: 3, set: {p: 5}}, {from: 4, clamp: {A: q}}]\nneurons: {A: {bias: 1}}",
+        "events: [{at: 3, set: {p: 5}}]\nneurons: {A: {input: s}}\ninputs: {s: {expression: q*k}}",
+        "events: [{at: 3, set: {p: 5}}]\nneurons: {A: {noise: 'normal(0, q)'}}",
+    ],
+)
+def test_what_is_set_to_some_effect_is_no_warning(rest: str) -> None:
+    found = warnings(f"{HEAD}parameters: {{p: 2, q: 3*p, r: 1}}\n{rest}\n")
+    assert not [item for item in found if item[0] == "no-effect"]
+
+
+def test_what_is_set_twice_at_a_step_names_both_places() -> None:
+    text = HEAD + "parameters: {g: 1}\nneurons: {A: {bias: g}}\nevents:\n"
+    found = warnings(text + "  - {at: 2, set: {g: 2*g}}\n  - {at: 1, set: {g: 4}}\n  - {at: 2, set: {g: g + 1}}\n")
+    assert found == [("no-effect", 7, 19, "'g' is set again at this step (line 9): what is set here is lost")]
 
 
 @pytest.mark.parametrize(

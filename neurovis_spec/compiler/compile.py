@@ -214,7 +214,7 @@ def _eventful(
     entry = spec.source.entry("events")
     place = opening(spec.source) if entry is None else entry.key.span
     made = with_phases(network, events, again, constants, place, request.since)
-    return None if findings.errors > before else replace(made, hash=digest(network.hash, events))
+    return None if findings.errors > before else made
 
 
 def _read_events(spec: Spec, connected: Connected, directory: Directory, constants: Constants) -> tuple[Event, ...]:

@@ -20,10 +20,13 @@ import numpy.typing as npt
 
 from neurovis_spec.compiler.arrays import IntArray, frozen
 from neurovis_spec.compiler.constants import Constants
+from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.events import Event
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Block, Learn, Plasticity
+from neurovis_spec.compiler.settable import differences
 from neurovis_spec.diagnostics import Span
+from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.located import Formula
 
 #: Compiles the network anew with other parameters, without its events; None where that is at fault.
@@ -45,8 +48,8 @@ def with_phases(
     """The network with a phase for each step at which something changes. An expression that is set sees the values that
     the parameters have by then, not those of the other parameters that are set in the same step.
 
-    ``since``: the network is one with the parameters of this step, at which they were set by hand; what events have set
-    by then is past.
+    Its hash covers what each of the phases is. ``since``: the network is one with the parameters of this step, at which
+    they were set by hand; what events have set by then is past.
     """
     begun, over = defaultdict[int, list[int]](list), defaultdict[int, list[int]](list)
     for number, event in enumerate(events):
@@ -60,30 +63,88 @@ def with_phases(
         )
         return network
     phases: list[tuple[int, Network]] = []
-    base, chosen = network, dict[str, float]()
-    known: dict[tuple[tuple[str, str], ...], Network] = {}
-    clamps, lesions = _Clamps(), _Lesions()
+    course: list[object] = []
+    settings, clamps, lesions = _Settings(network, events, recompile, constants), _Clamps(), _Lesions()
     for step in steps:
         new = [(number, events[number]) for number in begun.get(step, ())]
-        due = {name: formula for _, event in new for name, formula in event.set.items()}
-        if since is not None and step <= since:
-            due = {}
-        if due:
-            now = replace(constants, parameters=dict(base.parameters))
-            values = {name: now.scalar(formula) for name, formula in due.items()}
-            chosen = chosen | {name: value for name, value in values.items() if value is not None}
-            key = tuple((name, chosen[name].hex()) for name in sorted(chosen))  # -0.0 is another one than 0.0
-            if key not in known:
-                made = recompile(chosen)
-                if made is None:
-                    return network
-                # the parameter that is set does not reach back to the activity at step 0
-                known[key] = replace(made, neurons=replace(made.neurons, initial=network.neurons.initial))
-            base = known[key]
+        if since is None or step > since:
+            settings.go_on([event for _, event in new])
+        if settings.failed:
+            return network
         silent = lesions.add(event for _, event in new)
         clamps.go_on(new, over.get(step, ()), silent)
-        phases.append((step, clamps.on(lesions.without(base), constants)))
-    return replace(network, phases=tuple(phases))
+        phase = clamps.on(lesions.without(settings.base), constants)
+        held = None if phases and phase.clamped is phases[-1][1].clamped else np.array(phase.clamped)
+        cut = sorted({index for _, event in new for index in event.connections})
+        course.append((step, settings.mark, sorted(silent), cut, held))
+        phases.append((step, phase))
+    return replace(network, phases=tuple(phases), hash=digest(network.hash, course))
+
+
+class _Settings:
+    """What is set by a step, and the network with it; each is compiled once."""
+
+    def __init__(self, network: Network, events: tuple[Event, ...], recompile: Recompile, constants: Constants) -> None:
+        self.base = network
+        #: of what the parameters are, and of what they make of the network where it differs from the first one
+        self.mark = ("", digest({}))
+        self.failed = False
+        self._first, self._recompile, self._constants = network, recompile, constants
+        self._chosen: dict[str, float] = {}
+        self._known: dict[tuple[tuple[str, str], ...], tuple[Network, tuple[str, str]]] = {}
+        self._read = _read(events, constants)
+
+    def go_on(self, events: Iterable[Event]) -> None:
+        """Set what further events set, all of a step."""
+        due: dict[str, tuple[Formula, Span]] = {}
+        for event in events:
+            for name, formula in event.set.items():
+                key = event.keys[name]
+                if name in due:
+                    message = f"'{name}' is set again at this step (line {key.line}): what is set here is lost"
+                    self._constants.findings.warning("no-effect", due[name][1], message, "set it once")
+                due[name] = formula, key
+        if not due:
+            return
+        now = replace(self._constants, parameters=dict(self.base.parameters))
+        values = {name: now.scalar(formula) for name, (formula, _) in due.items()}
+        self._chosen |= {name: value for name, value in values.items() if value is not None}
+        before, (_, effect) = self.base, self.mark
+        choice = tuple((name, self._chosen[name].hex()) for name in sorted(self._chosen))  # -0.0 is not 0.0
+        if choice not in self._known:
+            made = self._recompile(self._chosen)
+            if made is None:
+                self.failed = True
+                return
+            # the parameter that is set does not reach back to the activity at step 0
+            made = replace(made, neurons=replace(made.neurons, initial=self._first.neurons.initial))
+            self._known[choice] = made, (digest(made.parameters), digest(differences(made, self._first)))
+        self.base, self.mark = self._known[choice]
+        if self.mark[1] == effect and self._read.isdisjoint(due):
+            self._look(before, {name: key for name, (_, key) in due.items()})
+
+    def _look(self, before: Network, due: Mapping[str, Span]) -> None:
+        """Parameters that got another value, by which nothing in the run changes."""
+        for name, key in due.items():
+            if before.parameters[name] != self.base.parameters[name]:
+                message = f"setting '{name}' changes nothing in the run"
+                hint = "what it begins with (an initial, a weight that learns) and how it is drawn stay as they are"
+                self._constants.findings.warning("no-effect", key, message, hint)
+
+
+def _read(events: tuple[Event, ...], constants: Constants) -> set[str]:
+    """The parameters that events themselves depend on."""
+    formulas = {id(formula): formula for event in events for formula in event.set.values()}
+    formulas |= {id(formula): formula for event in events for _, formula in event.clamp}
+    trees = [constants.tree(formula) for formula in formulas.values()]
+    waiting = [name for tree in trees if tree is not None for name in names(tree)]
+    found: set[str] = set()
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found.add(name)
+            waiting += constants.uses.get(name, ())
+    return found
 
 
 class _Lesions:
