@@ -9,6 +9,7 @@ import pytest
 from small_specs import HEAD, answer, codes, compiled, network_of
 
 import neurovis_spec as nv
+from neurovis_spec.compiler.meanings import MEANINGS
 
 USE = "\nneurons: {A: {activation: %s, bias: 2}}"
 
@@ -317,3 +318,20 @@ def test_every_array_of_a_network_is_frozen() -> None:
     for entry in network.plasticity:
         arrays += [entry.members, *entry.parameters.values(), *entry.signals.values()]
     assert all(isinstance(array, np.ndarray) and not array.flags.writeable for array in arrays)
+
+
+@pytest.mark.parametrize(
+    ("section", "names", "rest"),
+    [
+        ("activations", "pi e dt x", "value: 1"),
+        ("models", "pi e dt t k drive", "activity: 1"),
+        ("rules", "pi e dt t k pre sent post weight", "weight: {each_step: weight}"),
+    ],
+)
+def test_whoever_declares_a_name_that_is_given_is_told_what_it_means(section: str, names: str, rest: str) -> None:
+    for name in names.split():
+        text = f"neurovis: 1\nname: y\nneurons: {{A: {{}}}}\n{section}: {{d: {{let: {{{name}: 1}}, {rest}}}}}"
+        with pytest.raises(nv.SpecError) as caught:
+            nv.compile_text(text)
+        (found,) = [one for one in caught.value.diagnostics if one.code == "duplicate-name"]
+        assert found.message == f"'{name}' already means something here: {MEANINGS[name]}"

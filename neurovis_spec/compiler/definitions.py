@@ -16,6 +16,7 @@ import numpy as np
 from neurovis_spec.compiler.constants import ALWAYS, Value, check_finite, is_constant, parse_formula
 from neurovis_spec.compiler.gaps import Gaps, gaps_of
 from neurovis_spec.compiler.limits import PATIENCE
+from neurovis_spec.compiler.meanings import MEANINGS
 from neurovis_spec.compiler.program import Activation, Model, Quantity, Rule
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.arrays import evaluate_array
@@ -80,11 +81,15 @@ class _Checker:
         """A parameter, state, signal or intermediate value; each name once, and none that is given."""
         span = self._key(section, name)
         if name in self.known:
-            first = self.known[name]
-            where = "" if first is None else f" (it is declared in line {first.line})"
-            message = f"'{name}' already means something here{where}"
-            self.findings.error("duplicate-name", span, message, "choose another name")
+            self.findings.error("duplicate-name", span, self.taken(name), "choose another name")
         self.known[name] = span
+
+    def taken(self, name: str) -> str:
+        """What a name that is known already means."""
+        first = self.known[name]
+        if first is not None:
+            return f"'{name}' already means something here (it is declared in line {first.line})"
+        return f"'{name}' already means something here: {MEANINGS[name]}"
 
     def _key(self, section: str, name: str) -> Span:
         node = self.source.get(section)
@@ -226,7 +231,7 @@ def _rule(name: str, model: RuleModel, findings: Findings, dt: float) -> tuple[R
         if not IDENTIFIER.fullmatch(signal.value):
             findings.error("bad-name", signal.span, bad_name(signal.value), NAME_RULE)
         elif signal.value in checker.known:
-            findings.error("duplicate-name", signal.span, f"'{signal.value}' already means something here")
+            findings.error("duplicate-name", signal.span, checker.taken(signal.value), "choose another name")
         checker.known[signal.value] = signal.span
         if findings.errors - before >= PATIENCE:
             break

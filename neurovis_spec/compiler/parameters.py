@@ -9,6 +9,7 @@ import math
 from collections.abc import Collection, Mapping
 
 from neurovis_spec.compiler.constants import Constants
+from neurovis_spec.compiler.meanings import MEANINGS
 from neurovis_spec.compiler.references import Section, key_span
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.expressions.tree import names
@@ -40,7 +41,8 @@ def _parameter(
     (span, place), findings = spans, constants.findings
     if name in RESERVED:
         message = f"a parameter may not be called '{name}': the language gives this name a meaning of its own"
-        findings.error("reserved-name", span, message)
+        hint = f"'{name}' is {MEANINGS[name]}; take another name, such as '{name}_0'"
+        findings.error("reserved-name", span, message, hint)
     at_fault = name in constants.broken or parameter.failed  # or what is set is at fault
     tree = constants.tree(parameter.value, what="parameters before this one, and constants", later=later)
     constants.uses[name] = frozenset() if tree is None or name in given else names(tree)
