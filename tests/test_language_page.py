@@ -149,6 +149,45 @@ def test_the_names_of_parameters_that_are_taken() -> None:
     assert set(re.findall(r"`(\w+)`", line)) == set(RESERVED)
 
 
+@pytest.mark.parametrize(
+    ("short", "long"),
+    [
+        (
+            "neurons: {A: {}, B: {bias: 1}}\nconnections: {B -> A: }",
+            "neurons: {A: {}, B: {bias: 1}}\nconnections: {B -> A: {}}",
+        ),
+        ("neurons: {A: {bias: 1, activation: {gaussian: }}}", "neurons: {A: {bias: 1, activation: gaussian}}"),
+        (
+            "neurons: {A: {bias: 1}}\nconnections: {A -> A: {plasticity: {hebbian: }}}",
+            "neurons: {A: {bias: 1}}\nconnections: {A -> A: {plasticity: hebbian}}",
+        ),
+    ],
+)
+def test_settings_alone_may_be_missing(short: str, long: str) -> None:
+    head = "neurovis: 1\nname: x\n"
+    assert nv.compile_text(head + short).hash == nv.compile_text(head + long).hash
+
+
+@pytest.mark.parametrize("text", ["neurons: {A: }", "neurons: {A: {bias: }}", "neurons: {A: {}}\nparameters:"])
+def test_no_other_value_may_be_missing(text: str) -> None:
+    with pytest.raises(nv.SpecError):
+        nv.compile_text(f"neurovis: 1\nname: x\n{text}")
+
+
+def test_what_the_page_allows_is_silent() -> None:
+    (text,) = (block for block in BLOCKS if "neurovis: allow" in block)
+    network = nv.compile_text(f"neurovis: 1\nname: x\nneurons: {{A: {{bias: 1}}}}\n{text}")
+    assert network.warnings == ()
+
+
+def test_an_expression_that_is_set_reads_the_values_before() -> None:
+    run = nv.compile_text(
+        "neurovis: 1\nname: x\nparameters: {gain: 1, other: 5}\nneurons: {A: {bias: gain}, B: {bias: other}}\n"
+        "events: [{at: 1, set: {gain: 2*gain, other: gain}}, {at: 2, set: {other: gain}}]"
+    ).run(3)
+    assert (run["A"].tolist(), run["B"].tolist()) == ([1, 2, 2], [5, 1, 2])
+
+
 def test_the_data_files_are_those_that_are_read() -> None:
     section = PAGE.partition("### Data files")[2].partition("\n### ")[0]
     assert tuple(re.findall(r"^\| `(\.\w+)`", section, re.MULTILINE)) == KINDS
