@@ -184,7 +184,9 @@ def _named(node: Node, handler: Callable[[object], dict[str, V]], info: Validati
         refuse(info, node, "a mapping")
     for entry in node.entries:
         if not IDENTIFIER.fullmatch(entry.name):
-            findings_of(info).error("bad-name", entry.key.span, bad_name(entry.name), NAME_RULE)
+            tight = entry.name.partition(":")[0]
+            hint = f"a blank is missing after '{tight}:'" if IDENTIFIER.fullmatch(tight) else NAME_RULE
+            findings_of(info).error("bad-name", entry.key.span, bad_name(entry.name), hint)
     return _keyed(node, handler, info)
 
 
