@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lsp_marks import marked
 
+from neurovis_spec.language.patterns import SETTINGS
 from neurovis_spec.lsp.check import check
 from neurovis_spec.lsp.completion import Completion, complete
 from neurovis_spec.lsp.definition import definition
@@ -68,6 +69,14 @@ def offered(text: str) -> dict[str, Completion]:
         (BASE + "connections:\n  K -> O: {plasticity: {delta: {rate: ¦", ["alpha", "beta"], ["K"]),
         (BASE + "connections:\n  K -> O: {plasticity: {delta: {target: ¦", ["T", "go"], ["alpha"]),
         (BASE + "connections:\n  K -> O: {pattern: ¦", ["all_to_all", "random"], ["alpha"]),
+        (BASE + "connections:\n  K -> O: {pattern: {¦", ["ring", "random", "band"], ["probability"]),
+        (BASE + "connections:\n  K -> O: {pattern: {random: {¦", ["probability"], ["random", "count"]),
+        (BASE + "connections:\n  K -> O: {pattern: {random: {pro¦}}}", ["probability"], ["random"]),
+        (BASE + "connections:\n  K -> O: {pattern: {small_world: {degree: 2, ¦}}}", ["rewire"], ["degree"]),
+        (BASE + "connections:\n  K -> O:\n    pattern:\n      nearest:\n        ¦", ["count"], ["nearest"]),
+        (BASE + "connections:\n  - K -> O: {pattern: {band: {width: ¦}}}", ["alpha", "max"], ["width"]),
+        (BASE + "connections:\n  K -> O: {scale: {¦}}", ["norm", "indegree"], ["alpha"]),
+        (BASE + "connections:\n  K -> O: {scale: {indegree: ¦}}", ["true", "false"], ["alpha", "sin"]),
         (BASE + "outputs: {o: [K, ¦", ["K", "O", "K3"], ["alpha"]),
         (BASE + "layout: {positions: {¦", ["K1", "O"], ["K"]),
         (BASE + "layout: {engine: ¦", ["auto", "layered", "circular"], []),
@@ -90,6 +99,15 @@ def test_a_key_comes_with_its_colon_and_its_description() -> None:
     assert offered("neurons:\n  K: {cou¦")["count"].insert == "count: "
     assert offered("neurons:\n  K: {cou¦: 3}")["count"].insert == "count"
     assert "How many neurons" in offered("neurons:\n  K: {¦")["count"].documentation
+
+
+def test_patterns_and_their_settings_come_with_what_they_mean() -> None:
+    found = offered(BASE + "connections:\n  K -> O: {pattern: {¦")
+    assert found["ring"].documentation == "As chain, and the last with the first."
+    for name, wanted in SETTINGS.items():
+        inside = offered(BASE + f"connections:\n  K -> O: {{pattern: {{{name}: {{¦")
+        assert tuple(inside) == wanted
+        assert all(item.documentation for item in inside.values())
 
 
 def test_a_completion_replaces_the_word_alone() -> None:

@@ -23,7 +23,7 @@ from neurovis_spec.lsp.roles import Role, Scope, role_of
 from neurovis_spec.lsp.shapes import keys_at, words_at
 from neurovis_spec.lsp.text import Place
 from neurovis_spec.lsp.tolerant import Where, where
-from neurovis_spec.lsp.words import GIVEN, PATTERN_SETTINGS, PATTERNS, THEMES, functions
+from neurovis_spec.lsp.words import GIVEN, PATTERNS, THEMES, functions
 
 _WORD = re.compile(r"(?:(?<![\w.])[A-Za-z_]\w*\.(?!\.))*(?:(?<!\w)[A-Za-z_]\w*)?$", re.ASCII)
 _REST = re.compile(r"\w*", re.ASCII)
@@ -126,7 +126,7 @@ def _of_role(role: Role | None, scope: Scope, path: Path, front: str, index: Ind
         case "setting" | "setting value":
             yield from _settings(role, scope, path, front, index, place)
         case "pattern":
-            yield from _patterns(path)
+            yield from (_Offer(name, "definition", meaning) for name, meaning in PATTERNS.items())
         case "engine":
             yield from (_Offer(name, "word") for name in ("auto", *plugins.names(plugins.LAYOUTS)))
         case "names" if role.kind == "input":
@@ -273,12 +273,3 @@ def _settings(role: Role, scope: Scope, path: Path, front: str, index: Index, pl
         yield from _neurons(scope, front, index, signals=True)
     else:
         yield from _formula(role, Scope(scope.module), path, index, place)
-
-
-def _patterns(path: Path) -> Iterator[_Offer]:
-    settings = PATTERN_SETTINGS.get(str(path[-2]), ()) if path[-3:-2] == ("pattern",) else ()
-    if path[-3:-2] == ("pattern",):
-        yield from (_Offer(name, "parameter") for name in settings)
-        return
-    for name, meaning in PATTERNS.items():
-        yield _Offer(name, "definition", meaning)

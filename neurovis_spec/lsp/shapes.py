@@ -19,6 +19,7 @@ from neurovis_spec.language.model import Model
 from neurovis_spec.language.modules import IncludedModel
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.lsp.outline import Path
+from neurovis_spec.lsp.words import PATTERNS
 
 #: What may stand somewhere: a model, a type annotation, or the JSON Schema of a leaf.
 _Kind: TypeAlias = object
@@ -27,7 +28,7 @@ _Kind: TypeAlias = object
 SPEC_ALONE: Final = frozenset(Spec.model_fields) - frozenset(IncludedModel.model_fields)
 LIBRARY_ALONE: Final = frozenset({"modules", "activations", "models", "rules"})
 
-#: Keys of leaves, whose schemas carry no words of their own.
+#: Keys of leaves, the patterns among them, whose schemas carry no words of their own.
 _LEAF_KEYS = {
     "value": "The value, a number or an expression.",
     "min": "The least value that may be set.",
@@ -35,6 +36,12 @@ _LEAF_KEYS = {
     "description": "Shown as tooltip and on hover.",
     "file": "A file, by its path relative to this one.",
     "key": "The name of the array in an archive.",
+    "probability": "The probability of each pair, from 0 to 1.",
+    "count": "With how many neurons each one is connected.",
+    "degree": "How many neighbours on the ring each neuron is connected with; an even number.",
+    "rewire": "The probability with which a connection is led elsewhere, from 0 to 1.",
+    "width": "The largest difference |i − j| of two neurons that are connected.",
+    **PATTERNS,
 }
 
 
