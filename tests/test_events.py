@@ -400,6 +400,40 @@ def test_structural_parameters_cannot_be_set() -> None:
     assert [d.code for d in caught.value.diagnostics] == ["structural-parameter"]
 
 
+NEAR = "connections: {L -> L: {pattern: {nearest: {count: 1}}}}"
+
+
+@pytest.mark.parametrize(
+    "rest",
+    [
+        f"neurons: {{L: {{count: 3, position: [[p, 0], [1, 0], [9, 0]], bias: i}}}}\n{NEAR}",
+        f"neurons: {{L: {{count: 3, position: ['q*i^2', 0], bias: i}}}}\n{NEAR}",
+        "neurons: {L: {count: 2, bias: 1, position: [[0, 0], [3, 0]]}, K: {count: 2, position: [[1, p], [2, 0]]}}\n"
+        "connections: {L -> K: {pattern: {nearest: {count: 1}}}}",
+        "modules: {m: {parameters: {r: 1}, neurons: {L: {count: 3, position: [r*i^2, 0], bias: 1}}, "
+        f"{NEAR}}}}}\n"
+        "instances: {x: {module: m, set: {r: q}}}",
+        "modules: {m: {parameters: {r: 1}, neurons: {L: {count: 3, position: [r*i^2, 0], bias: 1}}}}\n"
+        "instances: {x: {module: m, set: {r: q}}}\n"
+        "connections: {x.L -> x.L: {pattern: {nearest: {count: 1}}}}",
+    ],
+)
+def test_positions_by_which_connections_are_there_cannot_be_set(rest: str) -> None:
+    text = f"{HEAD}parameters: {{p: 2, q: 2*p}}\n{rest}\n"
+    with pytest.raises(nv.SpecError, match="'p' cannot be set in a run") as caught:
+        nv.compile_text(f"{text}events: [{{at: 2, set: {{p: 8}}}}]")
+    assert [item.code for item in caught.value.diagnostics] == ["structural-parameter"]
+    with pytest.raises(ValueError, match="'p' cannot be set in a run"):
+        nv.compile_text(text).simulator().set(p=8)
+
+
+def test_positions_by_which_weights_go_can_be_set() -> None:
+    text = HEAD + "parameters: {p: 2}\nneurons: {A: {bias: 1, position: [0, 0]}, B: {position: [p, 0]}}\n"
+    simulation = nv.compile_text(text + "connections: {A -> B: distance}").simulator()
+    simulation.set(p=8)
+    assert simulation.weight("A -> B") == 8
+
+
 def test_set_changes_no_initial_activity() -> None:
     """§9: what is set at step 0 already changes the bias, but not the activity at step 0 that the group begins with."""
     text = "neurovis: 1\nname: x\nparameters: {g: 1}\nneurons: {A: {initial: g, bias: g}}\n"

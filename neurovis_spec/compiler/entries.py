@@ -223,6 +223,8 @@ class EntryBuilder:
         assert self.body.pattern is not None
         ends = None if self._misplaced() else self._ends()
         pairs = pairs_of(self.body.pattern, ends, self.constants, self._stream("edges"), self._fits)
+        if ends is not None and self.body.pattern.name.value == "nearest":
+            self.place.population.go_by_position(np.concatenate((ends.sources, ends.targets)))
         return None if pairs is None else _Shape(*pairs)
 
     def _all(self) -> _Shape | None:

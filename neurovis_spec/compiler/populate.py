@@ -16,11 +16,13 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.arrays import FloatArray, frozen
+from neurovis_spec.compiler.arrays import FloatArray, IntArray, frozen
+from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.gaps import Gaps
 from neurovis_spec.compiler.groups import Builder, Built, Kind
 from neurovis_spec.compiler.limits import Limits
 from neurovis_spec.compiler.network import Neurons
+from neurovis_spec.compiler.positions import depend_on_positions
 from neurovis_spec.compiler.references import Directory, key_span
 from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.language.located import IDENTIFIER
@@ -43,6 +45,8 @@ class Population:
     owners: tuple[int, ...]
     #: for each neuron whether what the spec says of its position is at fault
     misplaced: npt.NDArray[np.bool_]
+    #: what each unit's expressions may use
+    constants: tuple[Constants, ...]
     #: groups of which it is not known which neurons they have, each with the place of its unit
     lost: tuple[tuple[GroupModel, int], ...] = ()
 
@@ -53,6 +57,15 @@ class Population:
         for group, model in zip(self.neurons.groups, self.models, strict=True):
             result[group.start : group.start + group.count] = group.combine == "distance" or "combine" in model.lost
         return result
+
+    def go_by_position(self, neurons: IntArray) -> None:
+        """Note that connections are there, or not, by where these neurons are."""
+        for number in np.unique(np.searchsorted(self._starts, neurons, side="right") - 1).tolist():
+            depend_on_positions(self.models[number].position, self.constants[self.owners[number]])
+
+    @cached_property
+    def _starts(self) -> IntArray:
+        return np.array([group.start for group in self.neurons.groups], dtype=np.int64)
 
     @property
     def directory(self) -> Directory:
@@ -191,7 +204,8 @@ def _join(settled: list[_Settled]) -> Population:
     wrong = [item.position is None or "position" in item.model.lost for item in built]
     misplaced = np.repeat(np.array(wrong, dtype=np.bool_), sizes)
     lost = tuple((model, place) for place, one in enumerate(settled) for model in one.lost)
-    return Population(neurons, directories, kinds, models, owners, misplaced, lost)
+    constants = tuple(one.unit.constants for one in settled)
+    return Population(neurons, directories, kinds, models, owners, misplaced, constants, lost)
 
 
 def _placed(item: Built) -> FloatArray:

@@ -8,6 +8,7 @@ sin(2*pi*i/n)]``.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.constants import Constants, Value
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.tables import Files
+from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.located import formula_of
 from neurovis_spec.language.source import Node, Packed, Scalar, Sequence
 from neurovis_spec.language.values import FileReference
@@ -81,6 +84,19 @@ def positions_of(
     if any(point is None for point in points):
         return None
     return np.array([point for point in points if point is not None], dtype=np.float64)
+
+
+def depend_on_positions(node: FileReference | Sequence | Packed | None, constants: Constants) -> None:
+    """Note that something of the structure depends on the parameters by which these positions are written."""
+    if node is None or isinstance(node, FileReference):
+        return
+    quiet = replace(constants, findings=Findings())
+    for item in node.items:
+        for number in item.items if isinstance(item, (Sequence, Packed)) else (item,):
+            if isinstance(number, Scalar) and isinstance(number.value, str):
+                formula = formula_of(number, quiet.findings)
+                tree = None if formula is None else quiet.tree(formula, ("i", "n"))
+                constants.depend(() if tree is None else names(tree))
 
 
 def _look(node: FileReference | Sequence | Packed | None, constants: Constants, files: Files) -> None:
