@@ -2,7 +2,7 @@
 
 In: the text of a spec. Out: the text with canonical blanks, indentation and line ends, in which every comment, the
 author's order, quotes and blank lines are kept; or None, and findings, for a text that the reader refuses. Formatting
-twice changes nothing more, and the values are the same before and after (keys of connections but for their blanks).
+twice changes nothing more, and the values are the same before and after (names of connections but for their blanks).
 """
 
 from __future__ import annotations

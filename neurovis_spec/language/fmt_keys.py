@@ -1,7 +1,7 @@
-"""Keys of connections with single blanks: ``K1+K3->O`` becomes ``K1 + K3 -> O``.
+"""References to connections with single blanks: ``K1+K3->O`` becomes ``K1 + K3 -> O``.
 
-In: the keys of a mapping as written, and the keys on the way to it. Out: the keys as they are to be written. What is
-no connection's key stays as it is, since blanks count in a text.
+In: the keys of a mapping or a value as written, and the keys on the way to it. Out: the same as it is to be written.
+What is no reference to connections stays as it is, since blanks count in a text.
 """
 
 from __future__ import annotations
@@ -22,8 +22,13 @@ def is_connections(path: Sequence[str]) -> bool:
     return False
 
 
+def names_connections(path: Sequence[str]) -> bool:
+    """Whether the texts at this path may name connections: those that an event lesions."""
+    return tuple(path) == ("events", "lesion")
+
+
 def normal(key: str) -> str:
-    """A connection's key, quoted or not, with single blanks; anything else as it is.
+    """A connection's name, quoted or not, with single blanks; anything else as it is.
 
     >>> normal("K1+K3..K5->O"), normal('"A->B"'), normal("a ->")
     ('K1 + K3..K5 -> O', '"A -> B"', 'a ->')

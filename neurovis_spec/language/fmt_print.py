@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 
 from neurovis_spec.language.fmt_align import aligned
 from neurovis_spec.language.fmt_gaps import Comment, Gap
-from neurovis_spec.language.fmt_keys import is_connections, normal_all
+from neurovis_spec.language.fmt_keys import is_connections, names_connections, normal, normal_all
 from neurovis_spec.language.fmt_lines import LineWriter
 from neurovis_spec.language.fmt_tree import (
     Block,
@@ -165,9 +165,9 @@ class _Printer:
         """A scalar or flow collection; ``base`` is the column that lines behind the first are indented from."""
         match node:
             case str():
-                self._out.write(node)
+                self._out.write(normal(node) if names_connections(path) else node)
             case Row():
-                self._out.write(_row(node))
+                self._out.write(_row(Row(tuple(map(normal, node.cells))) if names_connections(path) else node))
             case Lines():
                 self._lines(node.lines, base + _STEP)
             case Block():
