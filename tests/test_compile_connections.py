@@ -369,11 +369,67 @@ def test_signals_of_rules() -> None:
     assert signal("T2") == [4, 4]
     assert signal("U2..U3") == [6, 7]
     assert signal("s") == [9, 9]  # inputs stand behind the activities
+    assert signal("[U2, U4]") == [6, 8]  # a list is taken together
+    assert signal("[s, O]") == [9, 0]
+    assert signal("[T]") == [3, 4]
     assert codes(text % "U") == ["wrong-size"]
     assert codes(text % "v") == ["wrong-size"]
+    assert codes(text % "[T, O]") == ["wrong-size"]
+    assert codes(text % "[]") == ["wrong-type"]
+    assert codes(text % "[T1, 3]") == ["wrong-type"]
+    assert codes(text % "[T1, Z1]") == ["unknown-signal"]
+    assert codes(text % "[Y1, Z1]") == ["unknown-signal"] * 2
     assert codes(text % "Z") == ["unknown-signal"]
     assert codes(text % "3") == ["wrong-type"]
     assert codes(text.replace(", target: %s", "")) == ["missing-signal"]
+
+
+def test_a_list_as_a_signal_is_named_where_the_rule_is_shown() -> None:
+    text = "neurons: {O: {}, A: {count: %d}, T: {count: 9}}\nconnections: {O -> A: {plasticity: {delta: {target: %s}}}}"
+    (rule,) = network_of(text % (2, "[T1, T2]")).plasticity
+    assert rule.title == "delta(rate=0.01, target=[T1, T2])"
+    (rule,) = network_of(text % (4, "[T1, T2, T3, T4]")).plasticity
+    assert rule.title == "delta(rate=0.01, target=[T1, T2, T3, …])"
+    code, message, _ = answer(text % (4, "[T1, T2]"))
+    assert (code, message) == (
+        "wrong-size",
+        "the signal 'target' has 2 components; 1 or 4, one for each target, are wanted",
+    )
+
+
+def rates(rate: str, pattern: str = "all_to_all") -> list[float]:
+    """The rates of the connections from three neurons to two, in order."""
+    text = "neurons: {A: {count: 3, bias: 1}, B: {count: 2, bias: 1}}\n"
+    body = f"{{pattern: {pattern}, plasticity: {{hebbian: {{rate: {rate}}}}}}}"
+    (rule,) = network_of(f"{text}connections: {{A -> B: {body}}}").plasticity
+    return list(rule.parameters["rate"])
+
+
+def test_parameters_of_rules_know_the_ends_of_a_connection() -> None:
+    assert rates("i") == [0, 0, 1, 1, 2, 2]
+    assert rates("j") == [0, 1, 0, 1, 0, 1]
+    assert rates("n_from + n_to / 10") == [3.2] * 6
+    assert rates("10*i + j", "{band: {width: 0}}") == [0, 11]
+    assert rates("[1, 2*i, j, 4, 5, i]") == [1, 0, 0, 4, 5, 2]  # in the order of the connections
+
+
+def test_parameters_of_rules_that_do_not_fit() -> None:
+    with pytest.raises(nv.SpecError) as caught:
+        rates("[1, 2, 3]")
+    (finding,) = caught.value.diagnostics
+    assert (finding.code, finding.message) == ("wrong-size", "'rate' has 3 values for 6 connections")
+    with pytest.raises(nv.SpecError) as caught:
+        rates("1/n")
+    (finding,) = caught.value.diagnostics
+    assert finding.code == "unknown-name"
+    assert finding.hint == "'n' is known within a group (its count); a connection has n_from and n_to"
+
+
+def test_parameters_of_the_rule_of_an_entry_at_fault_are_looked_at() -> None:
+    text = "neurons: {A: {count: 3, bias: 1}, B: {count: 2, bias: 1}}\n"
+    body = "{pattern: one_to_one, plasticity: {hebbian: {rate: %s}}}"
+    assert codes(f"{text}connections: {{A -> B: {body % 'i + j/n_to'}}}") == ["wrong-size"]
+    assert codes(f"{text}connections: {{A -> B: {body % 'i/n'}}}") == ["wrong-size", "unknown-name"]
 
 
 def test_entries_of_the_same_ends() -> None:

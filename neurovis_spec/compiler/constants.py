@@ -34,11 +34,11 @@ _ELSEWHERE: Mapping[str, str] = {
     "k": "the step is known in a run; this value is worked out once, before it",
     "t": "the time is known in a run; this value is worked out once, before it",
     "dt": "this is 'dt' itself",
-    "i": "'i' is known within a group (the neuron's index) and in a connection's weight and centre (the source's)",
-    "j": "'j' is known in a connection's weight and centre (the target's index)",
+    "i": "'i' is known within a group (the neuron's index) and in a connection's weight, centre, rule (the source's)",
+    "j": "'j' is known in a connection's weight, centre, rule (the target's index)",
     "n": "'n' is known within a group (its count); a connection has n_from and n_to",
-    "n_from": "'n_from' is known in the weight and the centre of a connection",
-    "n_to": "'n_to' is known in the weight and the centre of a connection",
+    "n_from": "'n_from' is known in the weight, the centre and the rule of a connection",
+    "n_to": "'n_to' is known in the weight, the centre and the rule of a connection",
     "distance": "'distance' is known in the weight and the centre of a connection",
 }
 _NOT_FINITE = "look for a division by zero, an overflow, or a root or logarithm of a negative number"

@@ -16,7 +16,7 @@ from neurovis_spec.compiler.constants import Constants, Randomness
 from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.edges import EdgeReader, End, delay_of
 from neurovis_spec.compiler.ends import Ends
-from neurovis_spec.compiler.learning import Learning, learning_of
+from neurovis_spec.compiler.learning import Learning, Wired, learning_of
 from neurovis_spec.compiler.limits import Limits, amount
 from neurovis_spec.compiler.matrices import Grid, grid_of
 from neurovis_spec.compiler.patterns import all_to_all, pairs_of
@@ -352,12 +352,13 @@ class EntryBuilder:
     def _learning(self, shape: _Shape | None) -> Learning | None:
         if self.body.plasticity is None:
             return None
-        count = None if self.targets is None else len(self.targets)
-        found = None if shape is None else shape.j
+        wired = None
+        if shape is not None and self.sources is not None and self.targets is not None:
+            wired = Wired(shape.i, shape.j, len(self.sources), len(self.targets))
         return learning_of(
             self.body.plasticity,
-            found,
-            count,
+            wired,
+            None if self.targets is None else len(self.targets),
             self.place.unit,
             self.place.directory,
             len(self.place.population.neurons),

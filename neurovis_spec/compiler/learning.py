@@ -12,13 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.limits import PATIENCE
 from neurovis_spec.compiler.program import Rule
 from neurovis_spec.compiler.references import Directory, few, resolve_end
-from neurovis_spec.compiler.settings import check_initials, choose, look_at_settings, parameters, settle
+from neurovis_spec.compiler.settings import Each, check_initials, choose, look_at_settings, parameters, settle
 from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.diagnostics import shown, suggest
 from neurovis_spec.language.located import Located
-from neurovis_spec.language.source import Entry, Node, Scalar
+from neurovis_spec.language.source import Entry, Node, Packed, Scalar, Sequence
 from neurovis_spec.language.values import Choice
 
 
@@ -32,28 +33,46 @@ class Learning(NamedTuple):
     texts: Mapping[str, str]
 
 
+class Wired(NamedTuple):
+    """The connections of an entry: connection c goes from the ``i[c]``-th of ``n_from`` sources to the ``j[c]``-th of
+    ``n_to`` targets."""
+
+    i: IntArray
+    j: IntArray
+    n_from: int
+    n_to: int
+
+
+#: What a parameter of a rule may depend on.
+_PAIR = ("i", "j", "n_from", "n_to")
+#: Signals of a list that are named where a rule is shown.
+_SHOWN = 3
+
+
 def learning_of(
     choice: Choice,
-    targets: IntArray | None,
+    wired: Wired | None,
     target_count: int | None,
     unit: Unit,
     directory: Directory,
     neurons: int,
 ) -> Learning | None:
-    """The rule of an entry whose connection c goes to the ``targets[c]``-th of ``target_count`` targets; None where one
-    of these is not known: the entry is at fault, and its rule is looked at only.
+    """The rule of an entry with these connections; None where they are not known: the entry is at fault, and its rule
+    is looked at only.
 
     ``directory`` says what the names of the unit mean, ``neurons`` is how many the network has.
     """
     constants, definitions = unit.constants, unit.definitions
     found = choose(choice, definitions.rules, "rule", definitions, constants.findings)
     if found is None:
-        look_at_settings(choice, constants, ("i", "n"))
+        look_at_settings(choice, constants, _PAIR)
         return None
     rule, defaults = found
     known = (*(default.name for default in defaults), *rule.signals)
     settled = settle(choice, known, constants.findings)
-    values = parameters(choice, defaults, None if targets is None else len(targets), constants, settled)
+    targets = None if wired is None else wired.j
+    each = Each("connection", _PAIR, None if wired is None else wired._asdict())
+    values = parameters(choice, defaults, None if targets is None else len(targets), constants, settled, each)
     signals: dict[str, IntArray] = {}
     failed = values is None
     for signal in rule.signals:
@@ -83,44 +102,62 @@ def _signal(
     directory: Directory,
     neurons: int,
 ) -> IntArray | None:
-    findings, inputs = unit.constants.findings, unit.inputs
-    node = entry.value
-    if not isinstance(node, Scalar) or not isinstance(node.value, str):
-        findings.error(
-            "wrong-type", node.span, f"the signal '{entry.name}' is the name of a neuron, a group or an input"
-        )
-        return None
-    name = node.value.strip()
-    if name in inputs:
-        source = inputs[name]
-        first = neurons + source.start
-        where = np.arange(first, first + source.size, dtype=np.int64)
-    elif unit.gaps.cover("inputs", name) or directory.covers(name):
-        return None
-    elif directory.find(name) is None and "." not in name and "+" not in name:
-        names = (*unit.section.inputs, *directory.known)
-        hint = suggest(name, few(name, names), "inputs and neurons")
-        findings.error("unknown-signal", node.span, f"there is no neuron, group or input '{shown(name)}'", hint)
-        return None
-    else:
-        found = resolve_end(Located(node.value, node), directory, findings)
-        if found is None:
+    """Where a signal comes from, for each connection; one name, or a list of names that are taken together."""
+    node, before = entry.value, unit.constants.findings.errors
+    items = node.items if isinstance(node, (Sequence, Packed)) else (node,)
+    parts: list[IntArray | None] = []
+    for item in items:
+        parts.append(_place(entry.name, item, unit, directory, neurons))
+        if unit.constants.findings.errors - before >= PATIENCE:
             return None
-        where = np.array(found, dtype=np.int64)
+    if not parts:
+        message = f"the signal '{entry.name}' names no neuron, group or input"
+        unit.constants.findings.error("wrong-type", node.span, message)
+    found = [part for part in parts if part is not None]
+    if not found or len(found) < len(parts):
+        return None
+    where = np.concatenate(found)
     if len(where) == 1 and targets is not None:
         return np.repeat(where, len(targets))
     if len(where) == target_count and targets is not None:
         return where[targets]
     if target_count is None or len(where) in (1, target_count):
         return None
-    message = f"the signal '{name}' has {len(where)} components; 1 or {target_count}, one for each target, are wanted"
-    findings.error("wrong-size", node.span, message)
+    called = f"'{_text(node)}'" if isinstance(node, Scalar) else f"'{entry.name}'"
+    message = f"the signal {called} has {len(where)} components; 1 or {target_count}, one for each target, are wanted"
+    unit.constants.findings.error("wrong-size", node.span, message)
     return None
+
+
+def _place(signal: str, node: Node, unit: Unit, directory: Directory, neurons: int) -> IntArray | None:
+    """Where a name of a signal is found, in all activities followed by all inputs."""
+    findings, inputs = unit.constants.findings, unit.inputs
+    if not isinstance(node, Scalar) or not isinstance(node.value, str):
+        message = f"the signal '{signal}' is the name of a neuron, a group or an input, or a list of these"
+        findings.error("wrong-type", node.span, message)
+        return None
+    name = node.value.strip()
+    if name in inputs:
+        source = inputs[name]
+        first = neurons + source.start
+        return np.arange(first, first + source.size, dtype=np.int64)
+    if unit.gaps.cover("inputs", name) or directory.covers(name):
+        return None
+    if directory.find(name) is None and not any(mark in name for mark in (".", "+")):
+        names = (*unit.section.inputs, *directory.known)
+        hint = suggest(name, few(name, names), "inputs and neurons")
+        findings.error("unknown-signal", node.span, f"there is no neuron, group or input '{shown(name)}'", hint)
+        return None
+    found = resolve_end(Located(node.value, node), directory, findings)
+    return None if found is None else np.array(found, dtype=np.int64)
 
 
 def _text(node: Node) -> str:
     """What an author calls a signal."""
-    return str(node.value) if isinstance(node, Scalar) else "…"
+    if isinstance(node, (Sequence, Packed)):
+        few = [_text(item) for item in node.items[:_SHOWN]]
+        return f"[{', '.join(few if len(node.items) <= _SHOWN else [*few, '…'])}]"
+    return str(node.value).strip() if isinstance(node, Scalar) else "…"
 
 
 def title_of(rule: Rule, values: Mapping[str, FloatArray], texts: Mapping[str, str]) -> str:

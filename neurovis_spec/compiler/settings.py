@@ -1,7 +1,7 @@
 """Settings: what an author gives an activation, a model or a rule at its use.
 
 In: a Choice (a name with settings), the definition's parameters with their defaults, the Constants. Out: the value of
-every parameter, one for each of n neurons; the neuron's index ``i`` and the count ``n`` are known there.
+every parameter, one for each of n neurons or connections (Each), of which the indices are known there.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.constants import Constants, Randomness, Value, check_finite
 from neurovis_spec.compiler.definitions import Default, Defaults, Definitions, check_bounds
 from neurovis_spec.compiler.draws import Stream
@@ -37,6 +37,30 @@ class Settled(NamedTuple):
     entries: Mapping[str, Entry]
     perhaps: frozenset[str]
     failed: bool
+
+
+class Each(NamedTuple):
+    """What values are for: ``known`` are the names that mean something of each of them, numbers or arrays of integers,
+    None where it is not known how many there are."""
+
+    noun: str
+    names: tuple[str, ...]
+    known: Mapping[str, int | IntArray] | None = None
+
+    def extra(self, one: int | None = None) -> dict[str, Value]:
+        """The values of the names, for all or for one."""
+        result: dict[str, Value] = {}
+        for name, value in (self.known or {}).items():
+            if isinstance(value, np.ndarray):
+                result[name] = value.astype(np.float64) if one is None else float(value[one])
+            else:
+                result[name] = float(value)
+        return result
+
+
+def neurons(n: int | None) -> Each:
+    """n neurons of a group: ``i`` and ``n``."""
+    return Each("neuron", ("i", "n"), None if n is None else {"i": np.arange(n, dtype=np.int64), "n": n})
 
 
 def choose(
@@ -88,39 +112,45 @@ def look_at_settings(choice: Choice, constants: Constants, extra: tuple[str, ...
 
 
 def spread(
-    formulas: Formula | FormulaList, n: int | None, constants: Constants, what: str, stream: Stream | None = None
+    formulas: Formula | FormulaList,
+    n: int | None,
+    constants: Constants,
+    what: str,
+    stream: Stream | None = None,
+    each: Each | None = None,
 ) -> FloatArray | None:
-    """One value for each of n neurons: from one formula of ``i`` and ``n``, or from a list of n. Where n is not known,
-    one value for all, or None.
+    """One value for each of n neurons, or for ``each`` of n others: from one formula, or from a list of n. Where n is
+    not known, one value for all, or None.
 
     With a stream the formulas may draw random numbers; the counter of neuron i is (i, 0, 0, number of the draw).
     """
     if n is None:
-        return _looked_at(formulas, constants, stream is not None)
+        return _looked_at(formulas, constants, stream is not None, each or neurons(n))
     if isinstance(formulas, FormulaList):
-        return _listed(formulas, n, constants, what, stream)
+        return _listed(formulas, n, constants, what, stream, each or neurons(n))
     if not isinstance(formulas.value, str):
         number = float(formulas.value)
         return np.full(n, number) if check_finite(number, formulas, constants.findings) else None
-    index = np.arange(n, dtype=np.int64)
-    randomness = None if stream is None else Randomness(stream, index)
-    value = constants.value(formulas, {"i": index.astype(np.float64), "n": float(n)}, randomness)
+    randomness = None if stream is None else Randomness(stream, np.arange(n, dtype=np.int64))
+    value = constants.value(formulas, (each or neurons(n)).extra(), randomness)
     return None if value is None else np.broadcast_to(np.asarray(value, dtype=np.float64), (n,)).copy()
 
 
-def _looked_at(formulas: Formula | FormulaList, constants: Constants, random: bool) -> FloatArray | None:
-    """The value of a formula that depends on no neuron; the others are looked at."""
+def _looked_at(formulas: Formula | FormulaList, constants: Constants, random: bool, each: Each) -> FloatArray | None:
+    """The value of a formula that is the same for each; the others are looked at."""
     if isinstance(formulas, FormulaList):
         for item in formulas.items[:_MOST_LOOKS]:
-            constants.look(item, ("i", "n"), random)
+            constants.look(item, each.names, random)
         return None
-    value = constants.look(formulas, ("i", "n"), random)
+    value = constants.look(formulas, each.names, random)
     return None if value is None else np.array([value], dtype=np.float64)
 
 
-def _listed(formulas: FormulaList, n: int, constants: Constants, what: str, stream: Stream | None) -> FloatArray | None:
+def _listed(
+    formulas: FormulaList, n: int, constants: Constants, what: str, stream: Stream | None, each: Each
+) -> FloatArray | None:
     if len(formulas.items) != n:
-        message = f"{what} has {plural(len(formulas.items), 'value')} for {plural(n, 'neuron')}"
+        message = f"{what} has {plural(len(formulas.items), 'value')} for {plural(n, each.noun)}"
         constants.findings.error("wrong-size", formulas.span, message)
         return None
     result: list[float] = []
@@ -130,7 +160,7 @@ def _listed(formulas: FormulaList, n: int, constants: Constants, what: str, stre
             result.append(float(item.value))
             continue
         randomness = None if stream is None else Randomness(stream, position)
-        value = constants.value(item, {"i": float(position), "n": float(n)}, randomness)
+        value = constants.value(item, each.extra(position), randomness)
         if value is not None:
             result.append(float(value))
         elif constants.findings.errors - before >= PATIENCE:
@@ -159,9 +189,10 @@ def parameters(
     n: int | None,
     constants: Constants,
     settled: Settled | None = None,
+    each: Each | None = None,
 ) -> dict[str, FloatArray] | None:
-    """The value of every parameter of a definition for n neurons or connections; None where one is at fault, or where n
-    is not known and one depends on it.
+    """The value of every parameter of a definition for n neurons, or for ``each`` of n connections; None where one is
+    at fault, or where n is not known and one depends on it.
 
     ``settled`` are its settings, where the caller has looked at them for more than the parameters.
     """
@@ -171,7 +202,7 @@ def parameters(
     result: dict[str, FloatArray] = {}
     for default in defaults:
         entry = settled.entries.get(default.name)
-        value = _default(default, n, values) if entry is None else _setting(entry, default.name, n, constants)
+        value = _default(default, n, values) if entry is None else _setting(entry, default.name, n, constants, each)
         if value is None:
             continue
         if entry is None and not np.isfinite(value).all():
@@ -186,9 +217,9 @@ def parameters(
     return None if settled.failed or len(result) < len(defaults) else result
 
 
-def _setting(entry: Entry, name: str, n: int | None, constants: Constants) -> FloatArray | None:
+def _setting(entry: Entry, name: str, n: int | None, constants: Constants, each: Each | None) -> FloatArray | None:
     formulas = _formulas(entry, constants)
-    return None if formulas is None else spread(formulas, n, constants, f"'{name}'")
+    return None if formulas is None else spread(formulas, n, constants, f"'{name}'", each=each)
 
 
 def _default(default: Default, n: int | None, values: Mapping[str, Value]) -> FloatArray | None:
