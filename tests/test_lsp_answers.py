@@ -66,8 +66,9 @@ def offered(text: str) -> dict[str, Completion]:
         (BASE + "connections:\n  K -> O: ¦", ["alpha", "j", "n_from"], ["K"]),
         (BASE + "connections:\n  K -> O: {plasticity: {¦", ["delta", "oja"], ["tanh"]),
         (BASE + "connections:\n  K -> O: {plasticity: {delta: {¦", ["rate", "target"], ["alpha"]),
-        (BASE + "connections:\n  K -> O: {plasticity: {delta: {rate: ¦", ["alpha", "beta"], ["K"]),
+        (BASE + "connections:\n  K -> O: {plasticity: {delta: {rate: ¦", ["alpha", "beta", "i", "n_to"], ["K", "n"]),
         (BASE + "connections:\n  K -> O: {plasticity: {delta: {target: ¦", ["T", "go"], ["alpha"]),
+        (BASE + "connections:\n  K -> O: {plasticity: {delta: {target: [K1, ¦", ["T", "go"], ["alpha"]),
         (BASE + "connections:\n  K -> O: {pattern: ¦", ["all_to_all", "random"], ["alpha"]),
         (BASE + "connections:\n  K -> O: {pattern: {¦", ["ring", "random", "band"], ["probability"]),
         (BASE + "connections:\n  K -> O: {pattern: {random: {¦", ["probability"], ["random", "count"]),
@@ -221,6 +222,11 @@ def test_definition_leads_to_what_ships_and_to_what_is_included(tmp_path: Path) 
 def renamed(text: str, new: str) -> str:
     document, place = marked(text)
     return apply(document, rename(document, place, new)).source
+
+
+def test_renaming_a_group_renames_it_in_lists_of_signals() -> None:
+    text = (BASE + REST).replace("K1 + K3..K5 -> O", "O -> K1 + K2").replace("target: T", "target: [K4, T]")
+    assert "target: [Leg4, T]" in renamed(text.replace("arrange: {K3..K4", "arrange: {K3..K¦4"), "Leg")
 
 
 def test_renaming_a_group_renames_its_neurons_and_ranges() -> None:

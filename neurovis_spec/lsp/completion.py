@@ -263,6 +263,8 @@ def _definitions(found: Iterable[Definition]) -> Iterator[_Offer]:
 def _settings(role: Role, scope: Scope, path: Path, front: str, index: Index, place: Place) -> Iterator[_Offer]:
     """The settings of a definition; the value of one: a reference for a signal, else an expression."""
     assert role.kind is not None
+    if isinstance(path[-1], int):  # one of a list
+        path = path[:-1]
     definition = known(role.kind, index.all_items).get(str(path[-2]))
     if role.use == "setting":
         for parameter in () if definition is None else definition.parameters:

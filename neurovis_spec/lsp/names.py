@@ -61,8 +61,8 @@ def _names(item: Item, role: Role, scope: Scope, text: Text, lookup: Lookup) -> 
         case "formula":
             yield from _formula(item, role, scope, text)
         case "setting value":
-            rule, setting = str(item.path[-2]), str(item.path[-1])
-            if lookup.is_signal(rule, setting):
+            rule, setting = item.path[-2:] if isinstance(item.path[-1], str) else item.path[-3:-1]
+            if lookup.is_signal(str(rule), str(setting)):
                 yield from _references(item, scope, text, lookup)
             else:
                 yield from _formula(item, role, scope, text)

@@ -122,7 +122,7 @@ _VALUES: Final[Mapping[str, Role]] = {
     "connections # * pattern": Role("pattern"),
     "connections # * pattern * *": _FORMULA,
     "connections # * plasticity": Role("choice", "rule"),
-    "connections # * plasticity * * #": Role("setting value", "rule"),
+    "connections # * plasticity * * #": Role("setting value", "rule", given=("i", "j", "n_from", "n_to")),
     "connections # * edges # #": Role("references"),
     "outputs * #": Role("references"),
     "layout boxes * #": Role("references"),
