@@ -31,6 +31,9 @@ _MOST_AT_LENGTH = 1000
 #: Nor where all of them together are longer than this by the heights tried.
 _MOST_LENGTH = 250_000.0
 _STEEP_ENOUGH = 0.75
+#: Bows of more than three equal connections are wider by this share of the way, each than the one in it, since their
+#: legs would be as steep.
+_WIDER = 0.12
 #: How far off a foreign frame one stays that makes room for another between the same ends.
 _OFF = 0.06
 #: Handles, leanings and slopes for a curve that comes too close to a disc.
@@ -227,7 +230,11 @@ def _bows(
         # each further one outside those before it, wherever obstacles have sent these
         wishes = {
             ends: Wish(
-                centres[ends[0]], centres[ends[1]], ends, *_least(place, len(equal), ends, between, reach, centres)
+                centres[ends[0]],
+                centres[ends[1]],
+                ends,
+                *_least(place, len(equal), ends, between, reach, centres),
+                _WIDER * max(0, place - 2),
             )
             for ends, equal in between.items()
             if place < len(equal)
