@@ -5,7 +5,7 @@ In: lines as points. Out: for two heights, where every line that passes both pas
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -13,15 +13,20 @@ import numpy as np
 from neurovis_layouts.routing.walls import FloatArray
 from neurovis_spec.layout.model import Point
 
-_NOWHERE = (np.array([np.inf, -np.inf]), np.zeros(2))
+#: How many heights and runs there is room for at first.
+_FEW = 64
 
 
 class Lines:
     """Lines, cut where they turn back."""
 
     def __init__(self) -> None:
+        #: of each run the heights, in order, and where it is there
         self._runs: list[tuple[FloatArray, FloatArray]] = []
-        self._at: dict[float, FloatArray] = {}
+        #: the row of the table that each height has; where each run (second index) passes it, NaN where it does not
+        self._rows: dict[float, int] = {}
+        self._heights: FloatArray = np.zeros(_FEW)
+        self._table: FloatArray = np.full((_FEW, _FEW), np.nan)
 
     def add(self, line: Sequence[Point]) -> range:
         """Note a line; the numbers of its runs, which go one way."""
@@ -35,31 +40,47 @@ class Lines:
         self._note(run)
         return range(first, len(self._runs))
 
-    def drop(self, runs: Iterable[int]) -> None:
+    def drop(self, runs: Sequence[int]) -> None:
         """Forget runs."""
         for run in runs:
-            self._runs[run] = _NOWHERE
-            for known in self._at.values():
-                known[run : run + 1] = np.nan
+            self._runs[run] = np.array([np.inf, -np.inf]), np.zeros(2)
+            self._table[:, run] = np.nan
 
     def _note(self, run: Sequence[Point]) -> None:
         found = np.array(run if run[0][1] <= run[-1][1] else run[::-1], dtype=np.float64)
         if found[0, 1] < found[-1, 1]:
-            self._runs.append((found[:, 1].copy(), found[:, 0].copy()))
+            number, known = len(self._runs), len(self._rows)
+            if number == self._table.shape[1]:
+                self._table = np.concatenate((self._table, np.full_like(self._table, np.nan)), axis=1)
+            ys, xs = found[:, 1].copy(), found[:, 0].copy()
+            self._runs.append((ys, xs))
+            self._table[:known, number] = np.interp(self._heights[:known], ys, xs, np.nan, np.nan)
 
     def between(self, top: float, bottom: float) -> tuple[FloatArray, FloatArray]:
         """Where the lines that pass two heights pass the first, and the second."""
-        above, below = self._passing(top), self._passing(bottom)
-        both = ~(np.isnan(above) | np.isnan(below))
+        above, below = self.passing((top, bottom))
+        both = ~np.isnan(above + below)
         return above[both], below[both]
 
-    def _passing(self, y: float) -> FloatArray:
-        """Where each run passes a height; NaN where it does not."""
-        known = self._at.get(y, np.zeros(0))
-        if len(known) < len(self._runs):
-            new = [np.interp(y, ys, xs) if ys[0] <= y <= ys[-1] else np.nan for ys, xs in self._runs[len(known) :]]
-            known = self._at[y] = np.concatenate((known, np.array(new, dtype=np.float64)))
-        return known
+    def passing(self, heights: Sequence[float]) -> FloatArray:
+        """(heights, runs) where each run passes each height; NaN where it does not."""
+        rows = [self._row(y) for y in heights]
+        passing: FloatArray = self._table[rows, : len(self._runs)]
+        return passing
+
+    def _row(self, y: float) -> int:
+        """The row of the table for a height."""
+        row = self._rows.get(y)
+        if row is None:
+            row = self._rows[y] = len(self._rows)
+            if row == len(self._table):
+                self._heights = np.concatenate((self._heights, np.zeros_like(self._heights)))
+                self._table = np.concatenate((self._table, np.full_like(self._table, np.nan)))
+            self._heights[row] = y
+            for run, (ys, xs) in enumerate(self._runs):
+                if ys[0] <= y <= ys[-1]:
+                    self._table[row, run] = np.interp(y, ys, xs)
+        return row
 
 
 def crossed(a: FloatArray, b: FloatArray, lines: tuple[FloatArray, FloatArray]) -> FloatArray:
@@ -69,5 +90,8 @@ def crossed(a: FloatArray, b: FloatArray, lines: tuple[FloatArray, FloatArray]) 
     [[0.0], [1.0]]
     """
     left, right = a[:, None] < lines[0], b[:, None] < lines[1]
-    total: FloatArray = (left[None, :, :] != right[:, None, :]).sum(axis=2).astype(np.float64)
+    # those that are right of either end, but for those that are so of both
+    ones, others = left.sum(axis=1), right.sum(axis=1)
+    both = right.astype(np.float32) @ left.astype(np.float32).T
+    total: FloatArray = ones[None, :] + others[:, None] - 2.0 * both.astype(np.float64)
     return total

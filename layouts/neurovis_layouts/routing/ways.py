@@ -249,27 +249,28 @@ def _reach(rows: Rows, path: FloatArray, limits: FloatArray, at: int) -> int:
     x = ax + (ends[:, 0] - ax)[:, None] * (y - ay)[None, :] / (ends[:, 1] - ay)[:, None]
     behind = np.arange(len(ends))[:, None] < np.arange(len(y))[None, :]
     clear = (((low <= x) & (x <= high)) | behind).all(axis=1)
-    for number in np.flatnonzero(clear)[::-1].tolist():
+    candidates = np.flatnonzero(clear)[::-1].tolist()
+    if not candidates:
+        return at + 1
+    passing = rows.lines.passing(path[at : last + 1, 1].tolist())
+    known = np.cumsum(_crossings(path[at : last + 1, 0], passing))
+    for number in candidates:
         line = zip(x[number, : number + 1].tolist(), path[at + 1 : at + 2 + number].tolist(), strict=True)
         if any(_beside(rows.used(height), place, own) for place, (own, height) in line):
             continue
         to = at + 2 + int(number)
-        straight = [(ax, ay), *zip(x[number, : number + 1].tolist(), y[: number + 1].tolist(), strict=True)]
-        straight.append((float(path[to, 0]), float(path[to, 1])))
-        if _crossings(rows, straight) <= _crossings(rows, [(float(a), float(b)) for a, b in path[at : to + 1]]):
+        straight = np.concatenate((path[at : at + 1, 0], x[number, : number + 1], path[to : to + 1, 0]))
+        if _crossings(straight, passing[: number + 3]).sum() <= known[to - at - 1]:
             return to
     return at + 1
 
 
-def _crossings(rows: Rows, line: Sequence[Point]) -> int:
-    """How many lines a way crosses between its rows."""
-    total = 0
-    for (ax, top), (bx, bottom) in pairwise(line):
-        lines = rows.lines.between(min(top, bottom), max(top, bottom))
-        if len(lines[0]):
-            ends = (ax, bx) if top <= bottom else (bx, ax)
-            total += int(crossed(np.array(ends[:1]), np.array(ends[1:]), lines)[0, 0])
-    return total
+def _crossings(line: FloatArray, passing: FloatArray) -> IntArray:
+    """(n − 1,) how many lines a way (n,) crosses from row to row; ``passing`` (n, lines) is where these pass each."""
+    left = line[:, None] < passing
+    there = ~np.isnan(passing)
+    crossed: IntArray = ((left[1:] != left[:-1]) & there[1:] & there[:-1]).sum(axis=1)
+    return crossed
 
 
 def _beside(used: Sequence[float], x: float, own: float) -> bool:
