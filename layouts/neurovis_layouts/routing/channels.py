@@ -25,7 +25,8 @@ _MOST = 1500
 #: With more edges than this nobody counts how often they cross.
 _MOST_CROSSED = 300
 _SAMPLED = 0.25
-_ROUNDS = 3
+#: How often all ways are found, and where they are more than so many.
+_ROUNDS, _FEWER, _MANY = 3, 2, 120
 
 
 def channels(
@@ -43,7 +44,8 @@ def channels(
     network = _Network(edges, centres, frames, gates)
     if network.careful:
         network.note(drawn)
-    for turn in range(_ROUNDS if network.careful else 1):
+    rounds = _ROUNDS if len(edges) <= _MANY else _FEWER
+    for turn in range(rounds if network.careful else 1):
         for i in sorted(edges, key=lambda i: (_length(edges[i], centres), i)):
             if edges[i].source != edges[i].target:
                 network.find(i, turn > 0)

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from neurovis_layouts.routing.obstacles import points_on
-from neurovis_layouts.routing.walls import FloatArray, IntArray
+from neurovis_layouts.routing.walls import BoolArray, FloatArray, IntArray
 from neurovis_spec.layout.geometry import cubics
 from neurovis_spec.layout.model import Point, Route
 
@@ -21,7 +21,7 @@ _CLOSE = 0.12
 _END = 0.4
 _STEP = 0.1
 #: How far from a place crossings are counted.
-_NEAR = 3.0
+_NEAR = 2.5
 
 
 def line_of(route: Route) -> FloatArray:
@@ -61,52 +61,56 @@ class Strokes:
 
     def __init__(self, routes: Mapping[int, Route], others: Sequence[Route]) -> None:
         self.lines = {i: line_of(route) for i, route in sorted(routes.items())}
-        self._others = [line_of(route) for route in others]
-        self._segments: tuple[FloatArray, FloatArray, IntArray] | None = None
+        first = _segments([*self.lines.items(), *((-1, line_of(route)) for route in others)])
+        self._from, self._to, self._owner = first
+        #: edges whose lines are others by now than at first
+        self._noted: dict[int, FloatArray] = {}
 
     def note(self, edge: int, route: Route) -> None:
         """Note that an edge has another route now."""
-        self.lines[edge] = line_of(route)
-        self._segments = None
+        self.lines[edge] = self._noted[edge] = line_of(route)
 
     def crossed(self, edges: Sequence[int], routes: Sequence[Route], place: Point) -> list[int]:
         """How often each of these routes, of these edges, crosses lines of other edges near a place."""
-        a, b, owner = self._near(place)
-        result: list[int] = []
-        for edge, route in zip(edges, routes, strict=True):
-            line = line_of(route)
-            away = line - np.array(place)
-            here = np.flatnonzero((away * away).sum(axis=1)[:-1] < _NEAR * _NEAR)
-            foreign = owner != edge
-            result.append(_crossings(line[here], line[here + 1], a[foreign], b[foreign]))
-        return result
-
-    def _near(self, place: Point) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Segments near a place: from, to, and of which edge each is."""
-        if self._segments is None:
-            lines = [*self.lines.items(), *((-1, line) for line in self._others)]
-            lines = [(edge, line) for edge, line in lines if len(line) > 1]
-            self._segments = (
-                np.concatenate([np.zeros((0, 2)), *(line[:-1] for _, line in lines)]),
-                np.concatenate([np.zeros((0, 2)), *(line[1:] for _, line in lines)]),
-                np.concatenate(
-                    [
-                        np.zeros(0, dtype=np.int64),
-                        *(np.full(len(line) - 1, edge, dtype=np.int64) for edge, line in lines),
-                    ]
-                ),
-            )
-        a, b, owner = self._segments
-        away = a - np.array(place)
-        near = (away * away).sum(axis=1) < (_NEAR + 1) * (_NEAR + 1)
-        return a[near], b[near], owner[near]
+        lines = [line_of(route) for route in routes]
+        near = [line[_close(line, place)] for line in lines]
+        a, b, number = _segments(list(enumerate(near)))
+        if not len(a):
+            return [0] * len(edges)
+        low, high = np.minimum(a, b).min(axis=0) - 2 * _STEP, np.maximum(a, b).max(axis=0) + 2 * _STEP
+        c, d, owner = _segments(sorted(self._noted.items()))
+        c, d = np.concatenate((self._from, c)), np.concatenate((self._to, d))
+        here = ((c > low) & (c < high)).all(axis=1)
+        here[: len(self._from)] &= ~np.isin(self._owner, list(self._noted))
+        c, d, owner = c[here], d[here], np.concatenate((self._owner, owner))[here]
+        crossing = _crossing(a, b, c, d) & (np.array(edges)[number][:, None] != owner[None, :])
+        return [int(count) for count in np.bincount(number, crossing.sum(axis=1), len(edges))]
 
 
-def _crossings(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> int:
-    """How many of the segments from a to b cross those from c to d."""
+def _close(line: FloatArray, place: Point) -> BoolArray:
+    """(n,) which points of a line are near a place."""
+    away = line - np.array(place)
+    near: BoolArray = (away * away).sum(axis=1) < _NEAR * _NEAR
+    return near
+
+
+def _segments(lines: Sequence[tuple[int, FloatArray]]) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Segments of lines, of two steps each: from, to, and of which line each is."""
+    coarse = [(number, line[::2]) for number, line in lines if len(line) > 2]
+    counts = [len(line) - 1 for _, line in coarse]
+    return (
+        np.concatenate([np.zeros((0, 2)), *(line[:-1] for _, line in coarse)]),
+        np.concatenate([np.zeros((0, 2)), *(line[1:] for _, line in coarse)]),
+        np.repeat(np.array([number for number, _ in coarse], dtype=np.int64), counts),
+    )
+
+
+def _crossing(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> BoolArray:
+    """(k, n) which of the segments from a to b (k, 2) cross which of those from c to d (n, 2)."""
     (ux, uy), (vx, vy) = (b - a).T[:, :, None], (d - c).T[:, None, :]
     wx, wy = (c[None, :, :] - a[:, None, :]).transpose(2, 0, 1)
     cross = ux * vy - uy * vx
     sign, whole = np.sign(cross), np.abs(cross)
     t, s = (wx * vy - wy * vx) * sign, (wx * uy - wy * ux) * sign
-    return int(((t >= 0) & (t < whole) & (s >= 0) & (s < whole)).sum())
+    crossing: BoolArray = (t >= 0) & (t < whole) & (s >= 0) & (s < whole)
+    return crossing
