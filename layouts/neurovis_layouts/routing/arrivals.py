@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
@@ -86,10 +85,12 @@ def parted(
         ends.setdefault(edges[i].target, []).append(_End(i, False))
     fixed: dict[int, list[tuple[_End, Point]]] = {}
     number = {centres[neuron]: neuron for neuron in ends}
-    for route in drawn:
-        for leaves, line in ((True, route), (False, route[::-1])):
-            if line[0] in number:
-                fixed.setdefault(number[line[0]], []).append((_End(-1, leaves), _place(line)))
+    there = [(leaves, route[:: 1 if leaves else -1]) for route in drawn for leaves in (True, False)]
+    there = [(leaves, line) for leaves, line in there if line[0] in number]
+    for (leaves, line), place in zip(there, _places([line for _, line in there]), strict=True):
+        fixed.setdefault(number[line[0]], []).append((_End(-1, leaves), place))
+    all_ends = [end for own in ends.values() for end in own]
+    places = dict(zip(all_ends, _places([routes[e.edge][:: 1 if e.leaves else -1] for e in all_ends]), strict=True))
     between: dict[frozenset[int], list[int]] = {}
     for i in sorted(routes):
         between.setdefault(frozenset((edges[i].source, edges[i].target)), []).append(i)
@@ -102,7 +103,7 @@ def parted(
             both = [*own, *(end for end, _ in others)]
             if free.isdisjoint(end.edge for end in own) or len(both) > _MOST:
                 continue
-            turned |= _Disc(picture, centres[neuron], own, others).part()
+            turned |= _Disc(picture, centres[neuron], own, others, places).part()
         if len(turned) == before:
             break
     return {i: picture.routes[i] for i in sorted(turned)}
@@ -112,12 +113,17 @@ class _Disc:
     """The ends at one disc, those that may be turned first."""
 
     def __init__(
-        self, picture: _Picture, centre: Point, own: Sequence[_End], others: Sequence[tuple[_End, Point]]
+        self,
+        picture: _Picture,
+        centre: Point,
+        own: Sequence[_End],
+        others: Sequence[tuple[_End, Point]],
+        seen: dict[_End, Point],
     ) -> None:
-        self._picture, self._centre = picture, centre
+        """``seen`` is where each end of a route is seen."""
+        self._picture, self._centre, self._seen = picture, centre, seen
         self._ends = [*own, *(end for end, _ in others)]
-        routes = [picture.routes[end.edge] if end.leaves else picture.routes[end.edge][::-1] for end in own]
-        places = [*map(_place, routes), *(place for _, place in others)]
+        places = [*(seen[end] for end in own), *(place for _, place in others)]
         self._places: FloatArray = np.array(places) - np.array(centre)
         self._leaves = np.array([end.leaves for end in self._ends])
         self._free = [end.edge in picture.free for end in self._ends]
@@ -125,18 +131,24 @@ class _Disc:
     def part(self) -> set[int]:
         """Turn what has to be; the edges turned."""
         turned: set[int] = set()
-        for a, b in combinations(range(len(self._ends)), 2):
-            one, other = self._ends[a], self._ends[b]
-            if one.edge == other.edge or not (self._free[a] or self._free[b]):
-                continue
-            least = _CLOSE if one.leaves != other.leaves else _ONE if len(self._ends) <= _FEW else 0.0
-            if self._gap(a, b) < least:
+        kinds = self._leaves[:, None] != self._leaves[None, :]
+        least = np.where(kinds, _CLOSE, _ONE if len(self._ends) <= _FEW else 0.0)
+        for a, one in enumerate(self._ends):
+            after = a
+            while True:
+                x, y = (self._places - self._places[a]).T
+                near = np.flatnonzero(np.sqrt(x * x + y * y) < least[a])
+                b = next((int(k) for k in near if k > after and self._parts(one, self._ends[k])), None)
+                if b is None:
+                    break
                 turned |= self._parted(a, b)
+                after = b
         return turned
 
-    def _gap(self, a: int, b: int) -> float:
-        (ax, ay), (bx, by) = self._places[[a, b]].tolist()
-        return distance((ax, ay), (bx, by))
+    def _parts(self, one: _End, other: _End) -> bool:
+        """Whether one of two ends may be turned off the other."""
+        free = self._picture.free
+        return one.edge != other.edge and (one.edge in free or other.edge in free)
 
     def _parted(self, a: int, b: int) -> set[int]:
         """Turn one of two ends, or both to opposite sides, if that is better."""
@@ -146,11 +158,12 @@ class _Disc:
         ways = [(s, t) for s, t in ways if (self._free[a] or not s) and (self._free[b] or not t)]
         lines = {(end, step): self._line(end, step) for way in ways for end, step in zip((a, b), way, strict=True)}
         spoilt = self._spoilt({key: line for key, line in lines.items() if line})
+        seen = self._from(lines)
         costs = [
             _TURNING * (abs(s) + abs(t))
             + spoilt.get((a, s), 0.0)
             + spoilt.get((b, t), 0.0)
-            + self._crowd({a: self._from(a, lines[a, s]), b: self._from(b, lines[b, t])})
+            + self._crowd({a: seen[a, s], b: seen[b, t]})
             for s, t in ways
         ]
         s, t = ways[min(range(len(ways)), key=lambda number: (costs[number], number))]
@@ -160,7 +173,10 @@ class _Disc:
                 edge, route = self._ends[end].edge, lines[end, step]
                 self._picture.routes[edge] = route
                 self._picture.lines.note(edge, route)
-                self._places[end] = self._from(end, route)
+                self._places[end] = seen[end, step]
+                self._seen.update(
+                    zip((_End(edge, True), _End(edge, False)), _places([route, route[::-1]]), strict=True)
+                )
                 turned.add(edge)
         return turned
 
@@ -169,9 +185,11 @@ class _Disc:
         picture = self._picture
         edges, routes = [self._ends[end].edge for end, _ in lines], list(lines.values())
         own = [picture.ends(edge) for edge in edges]
-        clear = picture.obstacles.clearances(routes, own)
-        enters = picture.walls.entered(routes, own) if picture.walls is not None else [False] * len(routes)
-        crossed = picture.lines.crossed(edges, routes, self._centre)
+        # of a route only what turns
+        pieces = [self._turning(end, route) for (end, _), route in lines.items()]
+        clear = picture.obstacles.clearances(pieces, own)
+        enters = picture.walls.entered(pieces, own) if picture.walls is not None else [False] * len(routes)
+        crossed = picture.lines.crossed(edges, pieces, self._centre)
         costs = [
             _NEARING * (REACH - clearance)
             + _ENTERING * (entering + (clearance < TOUCH + _SLACK))
@@ -194,13 +212,19 @@ class _Disc:
         line = (line[0], (x + cosine * dx - sine * dy, y + sine * dx + cosine * dy), *line[2:])
         return line if self._ends[end].leaves else line[::-1]
 
-    def _from(self, end: int, route: Route) -> Point:
-        """Where an end is seen on this route, from the centre."""
-        if not route:
-            x, y = self._places[end].tolist()
-            return x, y
-        x, y = _place(route if self._ends[end].leaves else route[::-1])
-        return x - self._centre[0], y - self._centre[1]
+    def _turning(self, end: int, route: Route) -> Route:
+        """The part of a route that is another where its end is turned, from the centre on."""
+        now = self._picture.routes[self._ends[end].edge]
+        rest = len(_merged(now[:: 1 if self._ends[end].leaves else -1])) - 4
+        return route[:: 1 if self._ends[end].leaves else -1][: len(route) - rest]
+
+    def _from(self, lines: Mapping[tuple[int, int], Route]) -> dict[tuple[int, int], Point]:
+        """Where ends are seen on these routes, from the centre."""
+        known = {key: line[:: 1 if self._ends[key[0]].leaves else -1] for key, line in lines.items() if line}
+        places = dict(zip(known, _places(list(known.values())), strict=True))
+        (cx, cy), stay = self._centre, {end: self._places[end].tolist() for end, _ in lines}
+        away = {key: (x - cx, y - cy) for key, (x, y) in places.items()}
+        return {key: away.get(key, (stay[key[0]][0], stay[key[0]][1])) for key in lines}
 
     def _crowd(self, moved: Mapping[int, Point]) -> float:
         """What it costs that two ends are there: close to others."""
@@ -223,13 +247,17 @@ def _merged(route: Route) -> Route:
     return route
 
 
-def _place(route: Route) -> Point:
-    """Where a route leaves the ring round its first point in which arrowheads lie."""
-    a, b, c, d = (np.array(point) for point in route[:4])
-    t, s = _T[:, None], 1 - _T[:, None]
-    line = s * s * s * a + 3 * s * s * t * b + 3 * s * t * t * c + t * t * t * d
-    x, y = (line - a).T
+def _places(routes: Sequence[Route]) -> list[Point]:
+    """Where each route leaves the ring round its first point in which arrowheads lie."""
+    if not routes:
+        return []
+    p = np.array([route[:4] for route in routes], dtype=np.float64)[:, :, None, :]
+    t, s = _T[None, :, None], 1 - _T[None, :, None]
+    away = s * s * s * p[:, 0] + 3 * s * s * t * p[:, 1] + 3 * s * t * t * p[:, 2] + t * t * t * p[:, 3] - p[:, 0]
+    x, y = away[:, :, 0], away[:, :, 1]
     far = np.sqrt(x * x + y * y)
-    beyond = int(np.argmax(far >= _AT)) if far[-1] >= _AT else len(far) - 1
-    px, py = (_AT / max(float(far[beyond]), 1e-9) * (line[beyond] - a) + a).tolist()
-    return px, py
+    far[:, -1] = np.where((far < _AT).all(axis=1), np.maximum(far[:, -1], 1e-9), far[:, -1])
+    beyond = np.where((far < _AT).all(axis=1), far.shape[1] - 1, np.argmax(far >= _AT, axis=1))
+    each = np.arange(len(p))
+    found = _AT / far[each, beyond][:, None] * away[each, beyond] + p[:, 0, 0]
+    return [(px, py) for px, py in found.tolist()]

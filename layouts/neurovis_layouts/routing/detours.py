@@ -16,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from neurovis_layouts.routing.rounded import rounded
+from neurovis_layouts.routing.sight import MOST, Sight, lengths, runs_along
 from neurovis_layouts.routing.walls import BoolArray, FloatArray, IntArray, Walls, meet, touch
 from neurovis_spec.layout.geometry import distance, sampled
 from neurovis_spec.layout.model import Point, Route
@@ -29,6 +30,8 @@ _CLEAR = ((0.1, 0.44), (0.02, 0.34))
 _HASTE = 1.1
 #: What a bend costs, a lane that is taken already, and a corner that an edge between the same neurons has taken.
 _BEND, _TAKEN, _SAME = 0.2, 0.6, 1e6
+#: Outwards, from each side of a rectangle.
+_OUT = np.array([-1.0, -1.0, 1.0, 1.0])
 #: Directions round a disc.
 _DIAGONAL = 0.7071067811865476
 _QUARTER = np.array([(1, 0), (_DIAGONAL, _DIAGONAL), (0, 1), (-_DIAGONAL, _DIAGONAL)], dtype=np.float64)
@@ -100,6 +103,9 @@ class Detours:
         ]
         #: (lane and corner, frame, 4): where, and to which sides the corner points
         self._corners: FloatArray = np.stack(corners)
+        flat = self._corners.reshape(-1, 4)
+        #: what corners see, by how far off frames lines stay
+        self._sights = {off: Sight(flat, walls.rects + off * _OUT) for off, _ in _CLEAR}
         self._taken = _Taken()
         self._between: dict[tuple[int, int], list[Point]] = {}
 
@@ -130,20 +136,26 @@ class Detours:
         loose[[source, target]] = False
         frames, discs = np.flatnonzero(foreign), np.flatnonzero(loose)
         for off, clear in _CLEAR:
-            rects = self._walls.rects[frames] + np.array([-off, -off, off, off])
+            rects = self._walls.rects[frames] + off * _OUT
             whole = _Ground(rects, self._centres[discs], clear)
-            path = self._over(ends, whole, frames, bends, alone)
+            path = self._over(ends, whole, frames, self._sights[off], bends, alone)
             if path is not None:
                 break
         return path, whole
 
     def _over(
-        self, ends: FloatArray, whole: _Ground, frames: IntArray, bends: Mapping[Point, float], alone: bool
+        self,
+        ends: FloatArray,
+        whole: _Ground,
+        frames: IntArray,
+        sight: Sight,
+        bends: Mapping[Point, float],
+        alone: bool,
     ) -> list[Point] | None:
         """The shortest line round what is in its way: at first nothing, then whatever the last one ran into."""
         met, touched = np.zeros(len(whole.rects), dtype=np.bool_), np.zeros(len(whole.discs), dtype=np.bool_)
         if not alone:
-            met |= meet(ends[:1], ends[1:], whole.rects + np.array([-1.0, -1.0, 1.0, 1.0]))[0]
+            met |= meet(ends[:1], ends[1:], whole.rects + _OUT)[0]
         path: list[Point] | None = [(x, y) for x, y in ends.tolist()]
         while path is not None:
             line = np.array(path, dtype=np.float64)
@@ -156,20 +168,74 @@ class Detours:
             beside = (ground.discs[:, None, :] + _BESIDE * _AROUND[None, :, :]).reshape(-1, 2)
             beside = np.concatenate([beside, np.zeros_like(beside)], axis=1)
             nodes = np.concatenate([self._corners[:, frames[met]].reshape(-1, 4), beside])
-            nodes = nodes[whole.free(nodes[:, :2], nodes[:, :2])]
-            path = _shortest(ends, nodes, ground, bends, self._taken, alone)
+            corners, among = self._corners.shape[:2], np.zeros(self._corners.shape[1], dtype=np.bool_)
+            among[frames[met]] = True
+            number = (np.arange(corners[0])[:, None] * corners[1] + frames[met][None, :]).reshape(-1)
+            free = whole.free(nodes[:, :2], nodes[:, :2])
+            known = sight if corners[1] <= MOST else None
+            graph = _Graph(ends, nodes[free], ground, number[free[: len(number)]], among, known)
+            path = _shortest(graph, bends, self._taken, alone)
         return None
 
 
-def _shortest(
-    ends: FloatArray, nodes: FloatArray, ground: _Ground, bends: Mapping[Point, float], taken: _Taken, alone: bool
-) -> list[Point] | None:
-    """The shortest line from the first end to the second, over nodes (n, 4), a place and to which sides the corner
-    there points."""
-    points, sides = np.concatenate([ends, nodes[:, :2]]), np.concatenate([np.zeros((2, 2)), nodes[:, 2:]])
+class _Graph:
+    """The ends of a way, corners and places beside discs, in this order: ``points`` (n, 2); from where one sees what.
+    ``number`` are the corners' (c,) in ``sight``, ``among`` those of the rectangles that are in the way; without
+    ``sight`` all is looked at anew."""
+
+    def __init__(
+        self,
+        ends: FloatArray,
+        nodes: FloatArray,
+        ground: _Ground,
+        number: IntArray,
+        among: BoolArray,
+        sight: Sight | None,
+    ) -> None:
+        self.points = np.concatenate([ends, nodes[:, :2]])
+        self._sides: FloatArray = np.concatenate([np.zeros((2, 2)), nodes[:, 2:]])
+        self._ground, self._known = ground, 0
+        if sight is not None:
+            self._known = len(number)
+            corners = self.points[2 : 2 + self._known]
+            # the end and what is beside discs
+            others = np.array([1, *range(2 + self._known, len(self.points))])
+            a = np.repeat(corners, len(others), axis=0)
+            b = np.tile(self.points[others], (len(number), 1))
+            along = runs_along(b - a, np.repeat(self._sides[2 : 2 + self._known], len(others), axis=0))
+            along &= runs_along(b - a, np.tile(self._sides[others], (len(number), 1)))
+            along[along] = ground.free(a[along], b[along])
+            self._far = np.zeros((self._known, len(self.points)))
+            self._open = np.zeros(self._far.shape, dtype=np.bool_)
+            within = slice(2, 2 + self._known)
+            self._far[:, within], self._open[:, within] = sight.views(number, among)
+            self._far[:, others] = lengths(b - a).reshape(len(number), len(others))
+            self._open[:, others] = along.reshape(len(number), len(others))
+
+    def view(self, at: int) -> tuple[FloatArray, BoolArray]:
+        """(n,) how far all are from one of them, and to which of them a line may run."""
+        if 0 <= at - 2 < self._known:
+            return self._far[at - 2], self._open[at - 2]
+        way = self.points - self.points[at]
+        return lengths(way), runs_along(way, self._sides) & runs_along(way, self._sides[at])
+
+    def clear(self, at: int, to: IntArray) -> IntArray:
+        """Those of what it sees which nothing stands in the way to."""
+        known = 0 <= at - 2 < self._known
+        if not len(to) or (known and not len(self._ground.discs)):
+            return to
+        here = np.repeat(self.points[at][None, :], len(to), axis=0)
+        if known:
+            return to[~touch(here, self.points[to], self._ground.discs, self._ground.clear).any(axis=1)]
+        return to[self._ground.free(here, self.points[to])]
+
+
+def _shortest(graph: _Graph, bends: Mapping[Point, float], taken: _Taken, alone: bool) -> list[Point] | None:
+    """The shortest line from the first end to the second."""
+    points = graph.points
     places: list[Point] = [(x, y) for x, y in points.tolist()]
     extra = np.array([0.0, 0.0, *(_BEND + bends.get(place, 0.0) for place in places[2:])])
-    ahead = _HASTE * _far(points, points[1])
+    ahead = _HASTE * lengths(points - points[1])
     best = np.full(len(points), np.inf)
     best[0] = 0.0
     before = np.zeros(len(points), dtype=np.int64)
@@ -185,27 +251,14 @@ def _shortest(
         if done[at]:
             continue
         done[at] = True
-        cost = best[at] + _far(points, points[at]) + extra + taken.beside(places[at], points)
-        way = points - points[at]
-        better = np.flatnonzero((cost < best) & ~done & _round(way, sides) & _round(way, sides[at]))
+        far, along = graph.view(at)
+        cost = best[at] + far + extra + taken.beside(places[at], points)
+        better = np.flatnonzero((cost < best) & ~done & along)
         if at == 0 and not alone:
             better = better[better != 1]
-        better = better[ground.free(np.repeat(points[at][None, :], len(better), axis=0), points[better])]
+        better = graph.clear(at, better)
         best[better] = cost[better]
         before[better] = at
         for node in better.tolist():
             heapq.heappush(waiting, (float(best[node] + ahead[node]), node))
     return None
-
-
-def _round(way: FloatArray, sides: FloatArray) -> BoolArray:
-    """Whether a line runs along a corner, as a taut string does: neither to it from the front nor through it."""
-    (x, y), least = (way * sides).T, 1e-9
-    along: BoolArray = ~(((x > least) & (y > least)) | ((x < -least) & (y < -least)))
-    return along
-
-
-def _far(points: FloatArray, point: FloatArray) -> FloatArray:
-    x, y = (points - point).T
-    far: FloatArray = np.sqrt(x * x + y * y)
-    return far

@@ -62,7 +62,9 @@ class Strokes:
     def __init__(self, routes: Mapping[int, Route], others: Sequence[Route]) -> None:
         self.lines = {i: line_of(route) for i, route in sorted(routes.items())}
         first = _segments([*self.lines.items(), *((-1, line_of(route)) for route in others)])
-        self._from, self._to, self._owner = first
+        # from left to right, so that what is near a place is found soon
+        order = np.argsort(first[0][:, 0], kind="stable")
+        self._from, self._to, self._owner = (figures[order] for figures in first)
         #: edges whose lines are others by now than at first
         self._noted: dict[int, FloatArray] = {}
 
@@ -78,11 +80,13 @@ class Strokes:
         if not len(a):
             return [0] * len(edges)
         low, high = np.minimum(a, b).min(axis=0) - 2 * _STEP, np.maximum(a, b).max(axis=0) + 2 * _STEP
+        first, last = np.searchsorted(self._from[:, 0], (low[0], high[0])).tolist()
+        here = first + np.flatnonzero((self._from[first:last, 1] > low[1]) & (self._from[first:last, 1] < high[1]))
+        here = here[~np.isin(self._owner[here], list(self._noted))]
         c, d, owner = _segments(sorted(self._noted.items()))
-        c, d = np.concatenate((self._from, c)), np.concatenate((self._to, d))
-        here = ((c > low) & (c < high)).all(axis=1)
-        here[: len(self._from)] &= ~np.isin(self._owner, list(self._noted))
-        c, d, owner = c[here], d[here], np.concatenate((self._owner, owner))[here]
+        new = ((c > low) & (c < high)).all(axis=1)
+        c, d = np.concatenate((self._from[here], c[new])), np.concatenate((self._to[here], d[new]))
+        owner = np.concatenate((self._owner[here], owner[new]))
         crossing = _crossing(a, b, c, d) & (np.array(edges)[number][:, None] != owner[None, :])
         return [int(count) for count in np.bincount(number, crossing.sum(axis=1), len(edges))]
 

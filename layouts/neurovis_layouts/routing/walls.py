@@ -69,7 +69,10 @@ def meet(a: FloatArray, b: FloatArray, rects: FloatArray) -> BoolArray:
     mx, my = ((a + b) / 2)[:, None, :].transpose(2, 0, 1) - middle.T[:, None, :]
     wide, high = np.abs(ex), np.abs(ey)
     entered: BoolArray = (np.abs(mx) < half[:, 0] + wide) & (np.abs(my) < half[:, 1] + high)
-    entered &= np.abs(mx * ey - my * ex) <= half[:, 0] * high + half[:, 1] * wide
+    # few are near on both axes: the third is looked at for these alone
+    k, f = np.nonzero(entered)
+    ex, ey, wide, high = ex[k, 0], ey[k, 0], wide[k, 0], high[k, 0]
+    entered[k, f] = np.abs(mx[k, f] * ey - my[k, f] * ex) <= half[f, 0] * high + half[f, 1] * wide
     return entered
 
 
@@ -78,7 +81,7 @@ def touch(a: FloatArray, b: FloatArray, centres: FloatArray, clear: float) -> Bo
     ux, uy = (b - a)[:, 0, None], (b - a)[:, 1, None]
     squared = np.maximum(ux * ux + uy * uy, 1e-12)
     x, y = centres[None, :, 0] - a[:, 0, None], centres[None, :, 1] - a[:, 1, None]
-    t = np.clip((x * ux + y * uy) / squared, 0.0, 1.0)
+    t = np.minimum(np.maximum((x * ux + y * uy) / squared, 0.0), 1.0)
     dx, dy = x - t * ux, y - t * uy
     near: BoolArray = dx * dx + dy * dy < clear * clear
     return near
