@@ -17,7 +17,7 @@ import numpy as np
 
 from neurovis_layouts.routing.rounded import rounded
 from neurovis_layouts.routing.sight import MOST, Sight, lengths, runs_along
-from neurovis_layouts.routing.walls import BoolArray, FloatArray, IntArray, Walls, meet, touch
+from neurovis_layouts.routing.walls import BoolArray, FloatArray, IntArray, Walls, blocked, meet, touch
 from neurovis_spec.layout.geometry import distance, sampled
 from neurovis_spec.layout.model import Point, Route
 
@@ -26,8 +26,9 @@ _LANES = (0.16, 0.3, 0.44, 0.58)
 _BESIDE = 0.52
 #: How close to frames and to centres a line may come: at best, and at all.
 _CLEAR = ((0.1, 0.44), (0.02, 0.34))
-#: Ways that look longer than the best by this factor are not followed up: a tenth of the work.
-_HASTE = 1.1
+#: Ways that look longer than the best by this factor are not followed up: a tenth of the work; and where more detours
+#: than so many are looked for.
+_HASTE, _MORE_HASTE, _MANY = 1.1, 1.3, 60
 #: What a bend costs, a lane that is taken already, and a corner that an edge between the same neurons has taken.
 _BEND, _TAKEN, _SAME = 0.2, 0.6, 1e6
 #: Outwards, from each side of a rectangle.
@@ -48,8 +49,8 @@ class _Ground:
 
     def free(self, a: FloatArray, b: FloatArray) -> BoolArray:
         """(k,) whether the segments from ``a`` to ``b`` (k, 2) are clear of all."""
-        found: BoolArray = np.logical_not(meet(a, b, self.rects).any(axis=1))
-        found[found] = ~touch(a[found], b[found], self.discs, self.clear).any(axis=1)
+        found: BoolArray = np.logical_not(blocked(a, b, self.rects))
+        found[found] = ~touch(a[found], b[found], self.discs, self.clear).any(axis=0)
         return found
 
     def clears(self, piece: Route) -> bool:
@@ -90,8 +91,9 @@ class _Taken:
 class Detours:
     """Finds detours, one after the other."""
 
-    def __init__(self, walls: Walls, centres: Sequence[Point], lanes: int = len(_LANES)) -> None:
-        """``lanes`` is how many there are around a frame, at most."""
+    def __init__(self, walls: Walls, centres: Sequence[Point], lanes: int = len(_LANES), ways: int = 1) -> None:
+        """``lanes`` is how many there are around a frame, at most; ``ways`` how many detours will be looked for."""
+        self._haste = _HASTE if ways <= _MANY else _MORE_HASTE
         self._walls = walls
         self._centres: FloatArray = np.array(centres, dtype=np.float64).reshape(-1, 2)
         x0, y0, x1, y1 = walls.rects.T
@@ -160,7 +162,7 @@ class Detours:
         while path is not None:
             line = np.array(path, dtype=np.float64)
             new = meet(line[:-1], line[1:], whole.rects).any(axis=0) & ~met
-            near = touch(line[:-1], line[1:], whole.discs, whole.clear).any(axis=0) & ~touched
+            near = touch(line[:-1], line[1:], whole.discs, whole.clear).any(axis=1) & ~touched
             if len(path) > 2 - alone and not (new.any() or near.any()):
                 return path
             met, touched = met | new, touched | near
@@ -174,7 +176,7 @@ class Detours:
             free = whole.free(nodes[:, :2], nodes[:, :2])
             known = sight if corners[1] <= MOST else None
             graph = _Graph(ends, nodes[free], ground, number[free[: len(number)]], among, known)
-            path = _shortest(graph, bends, self._taken, alone)
+            path = _shortest(graph, bends, self._taken, alone, self._haste)
         return None
 
 
@@ -226,16 +228,18 @@ class _Graph:
             return to
         here = np.repeat(self.points[at][None, :], len(to), axis=0)
         if known:
-            return to[~touch(here, self.points[to], self._ground.discs, self._ground.clear).any(axis=1)]
+            return to[~touch(here, self.points[to], self._ground.discs, self._ground.clear).any(axis=0)]
         return to[self._ground.free(here, self.points[to])]
 
 
-def _shortest(graph: _Graph, bends: Mapping[Point, float], taken: _Taken, alone: bool) -> list[Point] | None:
+def _shortest(
+    graph: _Graph, bends: Mapping[Point, float], taken: _Taken, alone: bool, haste: float
+) -> list[Point] | None:
     """The shortest line from the first end to the second."""
     points = graph.points
     places: list[Point] = [(x, y) for x, y in points.tolist()]
     extra = np.array([0.0, 0.0, *(_BEND + bends.get(place, 0.0) for place in places[2:])])
-    ahead = _HASTE * lengths(points - points[1])
+    ahead = haste * lengths(points - points[1])
     best = np.full(len(points), np.inf)
     best[0] = 0.0
     before = np.zeros(len(points), dtype=np.int64)

@@ -110,7 +110,8 @@ def _round_frames(
     if not through:
         return {}
     shared = _shared(edges)
-    first, detours = Detours(walls, centres, 1), Detours(walls, centres)
+    first = Detours(walls, centres, 1, ways=len(through))
+    detours = Detours(walls, centres, ways=len(through))
     longer = {i: first.longer(edges[i].source, edges[i].target) for i in through}
     found: dict[int, Route] = {}
     for i in sorted(through, key=lambda i: (-longer[i], i)):

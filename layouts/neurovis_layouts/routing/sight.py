@@ -37,7 +37,8 @@ class Sight:
             self._look(corner)
         square = np.ix_(corners, corners)
         mask = _words(among[None, :])[0]
-        return self._far[square], ~(self._entered[square] & mask).any(axis=2)
+        entered = np.bitwise_or.reduce(self._entered[square] & mask, axis=2)
+        return self._far[square], entered == 0
 
     def _look(self, corner: int) -> None:
         here = np.repeat(self._points[corner][None, :], len(self._points), axis=0)

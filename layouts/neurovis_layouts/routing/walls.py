@@ -63,24 +63,39 @@ class Walls:
 
 def meet(a: FloatArray, b: FloatArray, rects: FloatArray) -> BoolArray:
     """(k, f) whether the segments from ``a`` (k, 2) to ``b`` (k, 2) enter rectangles (f, 4), borders apart."""
-    # apart on no axis: across, along, and that square to the segment (separating axes)
-    half, middle = (rects[:, 2:] - rects[:, :2]) / 2, (rects[:, 2:] + rects[:, :2]) / 2
-    ex, ey = ((b - a) / 2).T[:, :, None]
-    mx, my = ((a + b) / 2)[:, None, :].transpose(2, 0, 1) - middle.T[:, None, :]
-    wide, high = np.abs(ex), np.abs(ey)
-    entered: BoolArray = (np.abs(mx) < half[:, 0] + wide) & (np.abs(my) < half[:, 1] + high)
-    # few are near on both axes: the third is looked at for these alone
-    k, f = np.nonzero(entered)
-    ex, ey, wide, high = ex[k, 0], ey[k, 0], wide[k, 0], high[k, 0]
-    entered[k, f] = np.abs(mx[k, f] * ey - my[k, f] * ex) <= half[f, 0] * high + half[f, 1] * wide
+    entered: BoolArray = np.zeros((len(a), len(rects)), dtype=np.bool_)
+    entered[_meetings(a, b, rects)] = True
     return entered
 
 
+def blocked(a: FloatArray, b: FloatArray, rects: FloatArray) -> BoolArray:
+    """(k,) whether the segments from ``a`` (k, 2) to ``b`` (k, 2) enter any of the rectangles (f, 4)."""
+    entered: BoolArray = np.zeros(len(a), dtype=np.bool_)
+    entered[_meetings(a, b, rects)[0]] = True
+    return entered
+
+
+def _meetings(a: FloatArray, b: FloatArray, rects: FloatArray) -> tuple[IntArray, IntArray]:
+    """Which segment enters which rectangle."""
+    # apart on no axis: across, along, and that square to the segment (separating axes)
+    half, middle = (rects[:, 2:] - rects[:, :2]) / 2, (rects[:, 2:] + rects[:, :2]) / 2
+    (ex, ey), (mx, my) = ((b - a) / 2).T, ((a + b) / 2).T
+    wide, high = np.abs(ex), np.abs(ey)
+    near = np.abs(mx[:, None] - middle[:, 0]) < half[:, 0] + wide[:, None]
+    near &= np.abs(my[:, None] - middle[:, 1]) < half[:, 1] + high[:, None]
+    # few are near on both axes: the third is looked at for these alone
+    k, f = np.nonzero(near)
+    ex, ey, wide, high = ex[k], ey[k], wide[k], high[k]
+    x, y = mx[k] - middle[f, 0], my[k] - middle[f, 1]
+    entered = np.abs(x * ey - y * ex) <= half[f, 0] * high + half[f, 1] * wide
+    return k[entered], f[entered]
+
+
 def touch(a: FloatArray, b: FloatArray, centres: FloatArray, clear: float) -> BoolArray:
-    """(k, c) whether the segments from ``a`` (k, 2) to ``b`` (k, 2) come closer than ``clear`` to centres (c, 2)."""
-    ux, uy = (b - a)[:, 0, None], (b - a)[:, 1, None]
+    """(c, k) whether the segments from ``a`` (k, 2) to ``b`` (k, 2) come closer than ``clear`` to centres (c, 2)."""
+    ux, uy = b[:, 0] - a[:, 0], b[:, 1] - a[:, 1]
     squared = np.maximum(ux * ux + uy * uy, 1e-12)
-    x, y = centres[None, :, 0] - a[:, 0, None], centres[None, :, 1] - a[:, 1, None]
+    x, y = centres[:, 0, None] - a[:, 0], centres[:, 1, None] - a[:, 1]
     t = np.minimum(np.maximum((x * ux + y * uy) / squared, 0.0), 1.0)
     dx, dy = x - t * ux, y - t * uy
     near: BoolArray = dx * dx + dy * dy < clear * clear
