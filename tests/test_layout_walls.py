@@ -178,3 +178,35 @@ def test_rounded_lines_run_from_end_to_end_and_stay_within_their_corners() -> No
         assert min(distance(corner, p) for p in sampled(sharp, 0.02)) < 0.05
     steps = [distance(a, b) for a, b in pairwise(sampled(route, 0.05))]
     assert max(steps) < 0.2
+
+
+def test_what_is_planned_through_a_frame_that_is_foreign_now_goes_round_it() -> None:
+    """And so sends no other connection round."""
+    ways = "A1 -> B1: 1, A2 -> B2: 1, A3 -> B3: 1, B1 -> C1: 1, B2 -> C2: 1, B3 -> C3: 1, A1 -> X: 1, X -> C3: 1"
+    text = f"""neurovis: 1
+name: nested
+neurons: {{A: {{count: 3, bias: 1}}, B: {{count: 3}}, C: {{count: 3}}, X: {{}}}}
+connections: {{{ways}, C1 -> A1: 0.5}}
+layout: {{engine: layered, boxes: {{outer: [A, B, C], inner: [B], mid: [X]}}}}
+"""
+    problem = problem_of(nv.compile_text(text).network)
+    layout = lay_out_problem(problem, "layered")
+    check(layout, problem)
+    for one, other in (("A2", "B2"), ("B2", "C2")):
+        ends = sorted((layout.positions[one][0], layout.positions[other][0]))
+        assert all(ends[0] - 0.4 < x < ends[1] + 0.4 for x, _ in sampled(layout.routes[f"{one} -> {other}"]))
+
+
+def test_a_detour_that_gives_way_to_another_stays_off_discs() -> None:
+    inner = "m0 -> m1: 1, m1 -> m2: 1, m2 -> m0: 1, m2 -> m1: 1"
+    ways = "C2 -> left1.m0: 1, C2 -> left1.m2: 1, D3 -> left1.m2: 1, left1.m0 -> C2: 1, left1.m2 -> C2: 1"
+    text = f"""neurovis: 1
+name: pairs
+modules: {{leg: {{neurons: {{m0: {{}}, m1: {{}}, m2: {{}}}}, connections: {{{inner}}}}}}}
+instances: {{left: {{module: leg, count: 2}}, right: {{module: leg, count: 2}}}}
+neurons: {{C: {{count: 2}}, D: {{count: 3}}}}
+connections: {{{ways}, left1.m2 -> D3: 1, left2.m1 -> D1: 1, right2.m2 -> D1: 1}}
+layout: {{engine: layered, mirror: [[left, right], [C1, C2]], direction: left}}
+"""
+    problem = problem_of(nv.compile_text(text).network)
+    check(lay_out_problem(problem, "layered"), problem)

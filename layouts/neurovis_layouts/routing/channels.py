@@ -57,6 +57,16 @@ def _length(edge: LayoutEdge, centres: Sequence[Point]) -> float:
     return abs(ax - bx) + abs(ay - by)
 
 
+def _walled(edge: LayoutEdge, gates: Sequence[Waypoint], frames: Sequence[Frame]) -> bool:
+    """Whether a gate of an edge is in a frame that holds neither of its ends."""
+    return any(
+        rect[0] < gate.x < rect[2] and rect[1] < gate.y < rect[3]
+        for own, rect in frames
+        if edge.source not in own and edge.target not in own
+        for gate in gates
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class _Way:
     """A way that was found: along the direction or across it, its points, where it bends, its line, and what is noted
@@ -79,7 +89,9 @@ class _Network:
         frames: Sequence[Frame],
         gates: Mapping[int, Sequence[Waypoint]],
     ) -> None:
-        self._edges, self._centres, self._gates = edges, centres, gates
+        self._edges, self._centres = edges, centres
+        # what was planned to run where there is a foreign frame now finds its way round that
+        self._gates = {i: line for i, line in gates.items() if i in edges and not _walled(edges[i], line, frames)}
         across = [(own, (r[1], r[0], r[3], r[2])) for own, r in frames]
         self._down = Rows(centres, frames, len(edges), True)
         self._side = Rows([(y, x) for x, y in centres], across, len(edges))

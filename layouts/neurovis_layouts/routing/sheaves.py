@@ -12,7 +12,7 @@ from collections.abc import Set as AbstractSet
 
 import numpy as np
 
-from neurovis_layouts.routing.obstacles import REACH, Obstacles
+from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
 from neurovis_layouts.routing.strokes import line_of, together
 from neurovis_layouts.routing.walls import FloatArray, IntArray, Walls
 from neurovis_spec.layout.model import LayoutEdge, Route
@@ -23,9 +23,12 @@ _SHARE = 0.2
 _CELL, _ROW = 0.12, 1 << 31
 #: Shifts that are tried to either side, what a unit of them costs, and how often all are gone through.
 _SHIFTS, _FAR, _ROUNDS = (0.16, 0.22, 0.3, 0.42, 0.6, 0.9), 0.3, 2
-#: What it costs to enter a frame, a unit closer to a disc than ``REACH``, a whole line on one of the same ends, on
-#: another's.
+#: What it costs to enter a frame or a disc, a unit closer to a disc than ``REACH``, a whole line on one of the same
+#: ends, on another's.
 _ENTERING, _NEARING, _SAME, _OTHER = 8.0, 6.0, 4.0, 1.0
+
+#: What is this close to a disc may be measured to run over it.
+_SLACK = 0.02
 
 
 def spread_out(
@@ -84,7 +87,7 @@ def _shifted(
     enters = walls.entered(tried, [own] * len(tried)) if walls is not None else [False] * len(tried)
     costs = [
         _FAR * abs(shift)
-        + _ENTERING * entering
+        + _ENTERING * (entering + (clearance < TOUCH + _SLACK))
         + _NEARING * (REACH - clearance)
         + _SAME * max(0.0, together(line, mates) - _SHARE / 2)
         + _OTHER * _crowded(line, drawn)
