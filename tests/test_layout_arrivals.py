@@ -9,12 +9,14 @@ import layout_conformance as suite
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from neurovis_layouts.routing.arrivals import parted
+from neurovis_layouts.routing.obstacles import Obstacles
 from test_layout_compound import attempt, walkers
 
 import neurovis_spec as nv
-from neurovis_spec.layout import Layout, LayoutProblem, Point
+from neurovis_spec.layout import Layout, LayoutEdge, LayoutProblem, Point
 from neurovis_spec.layout.arrange import lay_out_problem
-from neurovis_spec.layout.geometry import distance, sampled
+from neurovis_spec.layout.geometry import distance, sampled, straight, turn
 from neurovis_spec.layout.model import Route
 from neurovis_spec.layout.problem import problem_of
 
@@ -91,3 +93,14 @@ def test_where_ends_are_few_none_arrives_where_another_leaves(problem: LayoutPro
     layout, _ = attempt(problem)
     if layout is not None:
         assert min(meetings(layout, problem, 4), default=(1.0,)) >= (0.05,)
+
+
+def test_where_ends_are_many_they_stay_as_even_as_they_are() -> None:
+    """Such as those of a ring, whose lines are images of each other."""
+    for count, turned in ((3, True), (8, False)):
+        centres = [(6 * x, 6 * y) for x, y in (turn(i / count) for i in range(count))]
+        pairs = [(a, b) for a in range(count) for b in range(count) if a != b]
+        edges = [LayoutEdge(f"{a} -> {b}", a, b, 1) for a, b in pairs]
+        routes = {i: straight(centres[a], centres[b]) for i, (a, b) in enumerate(pairs)}
+        found = parted(edges, centres, routes, routes.keys(), [], Obstacles(centres), None)
+        assert bool(found) == turned

@@ -32,7 +32,7 @@ _SHORT = 1.0
 #: What is this close to a disc may be measured to run over it.
 _SLACK = 0.02
 #: With more ends than this at a disc there is no room for all.
-_MOST = 40
+_MOST = 12
 _T = np.arange(1, 33, dtype=np.float64) / 32
 #: Turned by ``_STEP`` times −``_STEPS``, …, ``_STEPS``: cosine and sine.
 _TURNS = tuple(turn(number * _STEP) for number in range(-_STEPS, _STEPS + 1))
