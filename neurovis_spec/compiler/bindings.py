@@ -6,8 +6,8 @@ input that one instance gets.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 from neurovis_spec.compiler.gaps import Gaps
 from neurovis_spec.compiler.limits import plural
@@ -18,13 +18,21 @@ from neurovis_spec.language.located import Located
 from neurovis_spec.language.model import lost_names
 from neurovis_spec.language.modules import InstanceModel
 
+#: Sizes that are told of.
+_FEW = 3
 
-class Binding(NamedTuple):
-    """What an instance says an input of its module is, where, and what it is; None where that is at fault."""
+
+@dataclass(frozen=True)
+class Binding:
+    """What an entry of instances says an input of its module is, where, and what it is; None where that is at fault.
+
+    ``wanted`` notes how many components the module's own input has, in each of the instances.
+    """
 
     name: str
     span: Span
     input: Input | None
+    wanted: list[int] = field(default_factory=list)
 
 
 def bindings_of(
@@ -53,17 +61,35 @@ def _unknown(outer: Located[str], section: Section, findings: Findings) -> None:
     findings.error("unknown-input", outer.span, message, hint)
 
 
-def shared_out(made: Input, bound: Binding, position: int, count: int, findings: Findings) -> Input | None:
-    """What one of ``count`` instances gets of an input around it; None where the sizes do not fit, which is noted."""
+def shared_out(made: Input, bound: Binding, position: int, count: int) -> Input | None:
+    """What one of ``count`` instances gets of an input around it; None where the sizes do not fit (``check_sizes``)."""
     outer = bound.input
+    bound.wanted.append(made.size)
     if outer is None:
         return None
     if outer.size == made.size:
         return Input(outer.name, outer.start, made.size)
     if outer.size == count * made.size:
         return Input(outer.name, outer.start + position * made.size, made.size)
-    wanted = f"{made.size}" if count == 1 else f"{made.size} or {count * made.size}"
-    message = f"the input '{bound.name}' has {plural(outer.size, 'component')}; {wanted} are wanted here"
-    hint = None if count == 1 else "one of count × size is shared out, one of the module's size goes to each"
-    findings.error("wrong-size", bound.span, message, hint)
     return None
+
+
+def check_sizes(bound: Binding, called: Sequence[str], findings: Findings) -> None:
+    """A finding where an input does not fit the instances of an entry, which are ``called`` so: it goes to each of
+    them, or is shared out among them in equal parts."""
+    outer, count = bound.input, len(called)
+    if outer is None or len(bound.wanted) < count or set(bound.wanted) in ({outer.size}, {outer.size / count}):
+        return  # of an input that is at fault itself all is said
+    has = f"the input '{bound.name}' has {plural(outer.size, 'component')}"
+    sizes = dict.fromkeys(bound.wanted)
+    if len(sizes) > 1:
+        wants = [f"'{called[bound.wanted.index(size)]}' wants {size}" for size in list(sizes)[:_FEW]]
+        more = ", …" if len(sizes) > _FEW else ""
+        hint = "one input is the same for all of them, or shared out in equal parts; declare an entry for each size"
+        message = f"{has}, and the instances disagree: {', '.join(wants)}{more}"
+        findings.error("wrong-size", bound.span, message, hint)
+        return
+    size = bound.wanted[0]
+    wanted = f"{size}" if count == 1 else f"{size} or {count * size}"
+    share = "one of count × size is shared out, one of the module's size goes to each"
+    findings.error("wrong-size", bound.span, f"{has}; {wanted} are wanted here", None if count == 1 else share)

@@ -13,7 +13,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import NoReturn
 
-from neurovis_spec.compiler.bindings import Binding, bindings_of, shared_out
+from neurovis_spec.compiler.bindings import Binding, bindings_of, check_sizes, shared_out
 from neurovis_spec.compiler.census import Census, Excess
 from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.gaps import Gaps
@@ -201,7 +201,7 @@ class Expander:
             if made is None:
                 continue
             if name in bound:
-                shared = shared_out(made, bound[name], place.position, place.count, self.findings)
+                shared = shared_out(made, bound[name], place.position, place.count)
                 if shared is not None:
                     result[name] = shared
                 continue
@@ -245,6 +245,8 @@ class Expander:
                 module.model, constants, module.folder, place, way, bound, module=module.name, settings=settings
             )
             result[own] = (index,)
+        for binding in bound.values():
+            check_sizes(binding, called, self.findings)
         if count is not None:
             result[name] = tuple(result[own][0] for own in called)
         return result
