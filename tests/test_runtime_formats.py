@@ -36,10 +36,11 @@ def same(one: Recording, other: Recording) -> None:
         expected, found = getattr(one, name), getattr(other, name)
         assert found.dtype == expected.dtype
         assert np.array_equal(found, expected, equal_nan=found.dtype.kind == "f")
-    assert (one.neurons, one.dt, one.views, one.network, one.hash) == (
+    assert (one.neurons, one.dt, one.views, one.counted, one.network, one.hash) == (
         other.neurons,
         other.dt,
         other.views,
+        other.counted,
         other.network,
         other.hash,
     )
@@ -214,6 +215,8 @@ BAD: Mapping[str, Mapping[str, object]] = {
     "'about' is no mapping": {"about": np.array("[1]")},
     "JSONDecodeError": {"about": np.array("{")},
     "names neurons that are not there": {"about": np.array(json.dumps({"views": {"K": [[7], False]}}))},
+    "counts no instances": {"about": np.array(json.dumps({"counted": {"left": -1}}))},
+    "counts more instances than there is room for": {"about": np.array(json.dumps({"counted": {"left": 1 << 60}}))},
     "names no views": {"about": np.array(json.dumps({"views": 3}))},
     "ranks a connection": {"about": np.array(json.dumps({"parallel": [[9, 2]]}))},
 }

@@ -24,6 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.limits import DEEPEST
 from neurovis_spec.language.data_files_npy import LONGEST_HEADER, read_header
 from neurovis_spec.language.data_files_table import CellError
 from neurovis_spec.runtime.files import regular_size, replacing
@@ -121,6 +122,7 @@ def _small(recording: Recording) -> dict[str, Array]:
         "network": recording.network,
         "hash": recording.hash,
         "views": {name: [list(members), single] for name, (members, single) in recording.views.items()},
+        "counted": dict(recording.counted),
         "parallel": [[int(index), int(recording.ranks[index])] for index in parallel],
     }
     return {
@@ -217,6 +219,7 @@ def _recording(arrays: Mapping[str, Array]) -> Recording:
         views=_views(about, n),
         network=str(about.get("network", "")),
         hash=str(about.get("hash", "")),
+        counted=_counted(about, n),
     )
 
 
@@ -247,6 +250,16 @@ def _views(about: Mapping[str, object], n: int) -> dict[str, tuple[tuple[int, ..
             raise RecordingError(f"'about': '{name}' names neurons that are not there")
         checked[str(name)] = (tuple(members), bool(single))
     return checked
+
+
+def _counted(about: Mapping[str, object], n: int) -> dict[str, int]:
+    """How many instances names stand for; more than n neurons can be in are refused."""
+    counted = about.get("counted", {})
+    if not isinstance(counted, dict) or not all(type(one) is int and one > 0 for one in counted.values()):
+        raise RecordingError("'about' counts no instances")
+    if sum(counted.values()) > n * DEEPEST:
+        raise RecordingError("'about' counts more instances than there is room for")
+    return {str(name): number for name, number in counted.items()}
 
 
 def _ranks(about: Mapping[str, object], sources: IntArray, targets: IntArray) -> IntArray:

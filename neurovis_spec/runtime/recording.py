@@ -15,7 +15,7 @@ import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.diagnostics import suggest
+from neurovis_spec.runtime.names import Names, unknown_text
 
 
 class RecordingError(ValueError):
@@ -49,7 +49,7 @@ class Recording:
     ``step`` (rows,) are the steps recorded, ``activity`` (rows, n) is a[t], ``weights`` (rows, p) is w[t], before the
     step's update; ``plastic`` (p,) are the indices of the changing connections, ``weights_static`` (m − p,) those of
     the others, in their order. All arrays are read-only. ``recording["O"]`` is the activity of a neuron (rows,), of a
-    group or output (rows, size).
+    group, an output or any other reference of a spec (``K3..K5``, ``K1 + O``, ``left.K``) (rows, size).
     """
 
     activity: FloatArray
@@ -68,6 +68,8 @@ class Recording:
     views: Mapping[str, tuple[tuple[int, ...], bool]] = field(default_factory=dict)
     network: str = ""
     hash: str = ""
+    #: how many instances a name stands for: ``left`` for ``left1``, ``left2``, …
+    counted: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for array in (self.activity, self.weights, self.weights_static, self.plastic, self.sources, self.targets,
@@ -78,20 +80,19 @@ class Recording:
         return len(self.step)
 
     def __getitem__(self, name: str) -> FloatArray:
-        """Activities by the name of a neuron, a group or an output. Raises KeyError with the nearest names."""
-        if name in self._neuron_index:
-            return self.activity[:, self._neuron_index[name]]
-        if name in self.views:
-            members, single = self.views[name]
-            return self.activity[:, members[0]] if single else self.activity[:, list(members)]
-        raise unknown("neuron, group or output", name, [*self.neurons, *self.views])
+        """Activities by the name of a neuron, a group or an output, or by another reference. Raises KeyError with the
+        nearest names."""
+        found = self._names.find(name)
+        if isinstance(found, str):
+            raise UnknownNameError(found)
+        return self.activity[:, found.neurons[0]] if found.single else self.activity[:, list(found.neurons)]
 
     def __contains__(self, name: object) -> bool:
-        return name in self._neuron_index or name in self.views
+        return isinstance(name, str) and not isinstance(self._names.find(name), str)
 
     @cached_property
-    def _neuron_index(self) -> Mapping[str, int]:
-        return {name: index for index, name in enumerate(self.neurons)}
+    def _names(self) -> Names:
+        return Names({name: index for index, name in enumerate(self.neurons)}, self.views, self.counted)
 
     @cached_property
     def connection_names(self) -> tuple[str, ...]:
@@ -156,8 +157,7 @@ class Recording:
 
 def unknown(what: str, name: str, known: Iterable[str]) -> UnknownNameError:
     """An error that offers the nearest known names."""
-    hint = suggest(name, known)
-    return UnknownNameError(f"no {what} '{name}'" + (f"; {hint}" if hint else ""))
+    return UnknownNameError(unknown_text(what, name, known))
 
 
 def recording_of(
@@ -183,6 +183,7 @@ def recording_of(
         views=outputs | groups,
         network=network.name,
         hash=network.hash,
+        counted={one.declared: number for one in network.instances if (number := one.number)},
     )
 
 

@@ -1,0 +1,117 @@
+"""References in a recording: ``K``, ``K3``, ``K3..K5``, ``K1 + O``, ``left.K``, as a spec writes them.
+
+In: the names of neurons, groups and outputs, how many there are of counted instances, and a reference. Out: indices of
+neurons, or a text that says why there are none. It goes by names alone, which a file holds.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from itertools import count
+from typing import NamedTuple
+
+from neurovis_spec.diagnostics import suggest
+
+_RANGE = re.compile(
+    r"(?P<way>(?:[^.\s]+\.)*)(?P<stem>[^.\s]*[^.\s\d])(?P<low>0|[1-9]\d*)\s*\.\.\s*"
+    r"(?P<again>(?:[^.\s]+\.)*)(?P=stem)(?P<high>0|[1-9]\d*)",
+    re.ASCII,
+)
+
+
+class Found(NamedTuple):
+    """Neurons by index; ``single`` where one is meant, not a list of one."""
+
+    neurons: tuple[int, ...]
+    single: bool
+
+
+@dataclass(frozen=True)
+class Names:
+    """Who is called what in a recording."""
+
+    neurons: Mapping[str, int]
+    #: groups and outputs
+    views: Mapping[str, tuple[tuple[int, ...], bool]] = field(default_factory=dict)
+    #: how many instances a name stands for: ``left`` for ``left1``, ``left2``, …
+    counted: Mapping[str, int] = field(default_factory=dict)
+
+    def find(self, reference: str) -> Found | str:
+        """The neurons of a reference, in the order written; a text says what is wrong."""
+        parts = [part.strip() for part in reference.split("+")]
+        if len(parts) == 1:
+            return self._one(parts[0])
+        result: list[int] = []
+        for part in parts:
+            found = self._one(part)
+            if isinstance(found, str):
+                return found
+            if not set(result).isdisjoint(found.neurons):
+                return f"'{part}' names neurons that are named before it in '{reference}'"
+            result.extend(found.neurons)
+        return Found(tuple(result), False)
+
+    def _one(self, name: str) -> Found | str:
+        found = self._plain(name)
+        if found is None and (match := _RANGE.fullmatch(name)) and match["again"] in ("", match["way"]):
+            found = self._range(match["way"], match["stem"], int(match["low"]), int(match["high"]))
+        if found is None:
+            return unknown_text("neuron, group or output", name, [*self.neurons, *self.views])
+        return found
+
+    def _plain(self, name: str) -> Found | None:
+        found = self._known(name)
+        if found is None and "." in name:
+            way, _, own = name.rpartition(".")
+            found = _joined([self._known(f"{path}.{own}") for path in self._paths(way)])
+        return found
+
+    def _known(self, name: str) -> Found | None:
+        if name in self.neurons:
+            return Found((self.neurons[name],), True)
+        return Found(*self.views[name]) if name in self.views else None
+
+    def _range(self, way: str, stem: str, low: int, high: int) -> Found | None:
+        paths = [""] if not way else [f"{path}." for path in self._paths(way[:-1])]
+        return None if low > high else _joined([self._run(f"{path}{stem}", low, high) for path in paths])
+
+    def _run(self, stem: str, low: int, high: int) -> Found | None:
+        indices: list[int] = []
+        for number in count(low):
+            index = self.neurons.get(f"{stem}{number}")
+            if index is None:
+                return None
+            indices.append(index)
+            if number == high:
+                break
+        return Found(tuple(indices), False)
+
+    def _paths(self, way: str) -> list[str]:
+        """The instances that a way leads to."""
+        paths = [""]
+        for step in way.split("."):
+            ahead = [f"{path}.{step}" if path else step for path in paths]
+            paths = [one for path in ahead for one in self._numbered(path)]
+        return paths
+
+    def _numbered(self, path: str) -> list[str]:
+        number = self.counted.get(path)
+        return [path] if number is None else [f"{path}{k + 1}" for k in range(number)]
+
+
+def _joined(found: Iterable[Found | None]) -> Found | None:
+    """All of them, None where there are none or one is missing."""
+    result: list[int] = []
+    for one in found:
+        if one is None:
+            return None
+        result.extend(one.neurons)
+    return Found(tuple(result), False) if result else None
+
+
+def unknown_text(what: str, name: str, known: Iterable[str]) -> str:
+    """That there is none of that name, and which are nearest."""
+    hint = suggest(name, known)
+    return f"no {what} '{name}'" + (f"; {hint}" if hint else "")
