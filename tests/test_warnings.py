@@ -229,6 +229,21 @@ def test_a_rule_that_may_learn_is_let_be(rule: str) -> None:
     assert warnings(body) == []
 
 
+def test_a_rule_for_episodes_without_episodes() -> None:
+    body = "neurons: {A: {bias: 1}, P: {bias: 1}, R: {bias: 1}, O: {}}\nconnections:\n"
+    body += "  A -> O: {plasticity: {reward_modulated: {policy: P, reward: R}}}\n"
+    assert warnings(body) == [("no-effect", "reward_modulated")]
+    assert warnings(f"{body}time: {{episode: 5}}\n") == []
+    own = "rules: {mine: {weight: {each_episode: weight / 2}}, both: {weight: {each_step: weight, each_episode: 0}}}\n"
+    assert warnings(f"{own}{body}  R -> O: {{plasticity: mine}}\n  O -> O: {{plasticity: both}}\n") == [
+        ("no-effect", "reward_modulated"),
+        ("no-effect", "mine"),
+    ]
+    leg = "modules: {leg: {neurons: {A: {bias: 1}, B: {}}, connections: {A -> B: {plasticity: mine}}}}\n"
+    rule = "rules: {mine: {weight: {each_episode: weight / 2}}}\n"
+    assert warnings(f"{rule}{leg}instances: {{x: {{module: leg, count: 3}}}}\n") == [("no-effect", "mine")]
+
+
 # Where there is an error there are no warnings of these kinds
 
 

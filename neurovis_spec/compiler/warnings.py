@@ -62,6 +62,7 @@ def warn(compiled: Compiled, findings: Findings) -> None:
     _modules(compiled, findings)
     _neurons(compiled, findings)
     _rates(compiled, findings)
+    _episodes(compiled, findings)
     _vain(compiled, findings)
 
 
@@ -180,6 +181,22 @@ def _rates(compiled: Compiled, findings: Findings) -> None:
         if constant:
             message = f"the rate of '{learning.rule.name}' is 0: no weight will change"
             findings.warning("zero-rate", span, message, "give it a rate, or leave the plasticity out")
+
+
+def _episodes(compiled: Compiled, findings: Findings) -> None:
+    """Rules that change weights at the end of an episode alone, where there are no episodes."""
+    if compiled.network.episode is not None:
+        return
+    late = {bundle.key: bundle.learning.rule for bundle in compiled.bundles if bundle.learning is not None}
+    for section, _ in compiled.sections():
+        for key, body in section.connections:
+            rule = late.get(key.span)
+            if rule is not None and rule.each_step is None and body.plasticity is not None:
+                message = (
+                    f"'{rule.name}' changes weights at the end of an episode, and there are none: no weight will change"
+                )
+                hint = "say how many steps an episode has, as in time: {episode: 100}"
+                findings.warning("no-effect", body.plasticity.name.span, message, hint)
 
 
 def _vain(compiled: Compiled, findings: Findings) -> None:

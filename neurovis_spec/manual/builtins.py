@@ -24,7 +24,8 @@ _Definition: TypeAlias = ActivationModel | ModelModel | RuleModel
 @dataclass(frozen=True, slots=True)
 class Builtin:
     """A definition that needs no declaration. ``parameters``: name, default, meaning; ``yaml``: the definition as it
-    stands in its file, its description left out; ``origin``: the entry point that brings it, ``builtin`` for ours."""
+    stands in its file, its description left out; ``origin``: the entry point that brings it, ``builtin`` for ours;
+    ``episodes``: it is a rule that changes weights at the end of an episode alone."""
 
     kind: Kind
     name: str
@@ -33,6 +34,7 @@ class Builtin:
     signals: tuple[str, ...]
     yaml: str
     origin: str
+    episodes: bool = False
 
     @property
     def use(self) -> str:
@@ -41,7 +43,8 @@ class Builtin:
         settings += [f"{signal}: T" for signal in self.signals]
         choice = f"{{{self.name}: {{{', '.join(settings)}}}}}" if settings else self.name
         if self.kind == "rule":
-            return f"connections: {{K -> O: {{weight: 0.1, plasticity: {choice}}}}}"
+            time = "time: {episode: 100}\n" if self.episodes else ""
+            return f"{time}connections: {{K -> O: {{weight: 0.1, plasticity: {choice}}}}}"
         return f"neurons: {{K: {{{self.kind}: {choice}}}}}"
 
 
@@ -82,7 +85,8 @@ def _builtin(
     about = "" if model.description is None else " ".join(model.description.value.split())
     parameters = tuple((key, *_shown(parameter)) for key, parameter in model.parameters.items())
     origin = library.source.span.file.partition("/")[0]
-    return Builtin(kind, name, about, parameters, signals, _excerpt(entry, text), origin)
+    episodes = isinstance(model, RuleModel) and model.weight.each_step is None
+    return Builtin(kind, name, about, parameters, signals, _excerpt(entry, text), origin, episodes)
 
 
 def _shown(parameter: Parameter) -> tuple[str, str]:
