@@ -39,7 +39,7 @@ from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.includes import Includes, read_includes
 from neurovis_spec.language.model import opening
-from neurovis_spec.language.spec import Spec
+from neurovis_spec.language.spec import Spec, is_library
 
 if TYPE_CHECKING:
     from neurovis_spec.compiler.events import Event
@@ -235,6 +235,10 @@ def _report_no_neurons(spec: Spec, population: Population, findings: Findings) -
     node = spec.source.entry("neurons")
     span = opening(spec.source) if node is None else node.key.span
     message, hint = "a network needs at least one neuron", "add a group under 'neurons'"
+    if is_library(spec.source):
+        if spec.source.entry("name") is None:
+            return  # which is said, with what the file is good for
+        hint += "; or leave out its name: specs use what it holds with include: [FILE]"
     findings.error("no-neurons", span, message, hint, several=True)  # also where the name is missing there
 
 

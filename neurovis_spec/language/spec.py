@@ -80,8 +80,12 @@ class Spec(Library):
 
     @classmethod
     def _without(cls, name: str, data: Mapping) -> str | None:
-        """A file of modules or definitions alone is no spec, but may be one that specs include."""
-        there = {entry.name for entry in data.entries}
-        if name == "name" and there & set(INCLUDED) and not there & {"neurons", "instances", "connections"}:
+        if name == "name" and is_library(data):
             return "this is a file to be included: a spec uses what it holds with include: [FILE]"
         return None
+
+
+def is_library(data: Mapping) -> bool:
+    """Whether this holds modules or definitions alone: then it is no spec, but may be a file that specs include."""
+    there = {entry.name for entry in data.entries}
+    return bool(there & set(INCLUDED)) and not there & {"neurons", "instances", "connections"}
