@@ -366,6 +366,8 @@ def test_what_is_set_to_some_effect_is_no_warning(rest: str) -> None:
 def test_what_is_set_twice_at_a_step_names_both_places() -> None:
     text = HEAD + "parameters: {g: 1}\nneurons: {A: {bias: g}}\nevents:\n"
     found = warnings(text + "  - {at: 2, set: {g: 2*g}}\n  - {at: 1, set: {g: 4}}\n  - {at: 2, set: {g: g + 1}}\n")
+    beside = warnings(text + "  [{at: 2, set: {g: 2*g}}, {at: 2, set: {g: g + 1}}]\n")
+    assert beside == [("no-effect", 7, 18, "'g' is set again at this step (column 42): what is set here is lost")]
     assert found == [("no-effect", 7, 19, "'g' is set again at this step (line 9): what is set here is lost")]
 
 

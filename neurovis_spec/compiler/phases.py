@@ -101,8 +101,10 @@ class _Settings:
             for name, formula in event.set.items():
                 key = event.keys[name]
                 if name in due:
-                    message = f"'{name}' is set again at this step (line {key.line}): what is set here is lost"
-                    self._constants.findings.warning("no-effect", due[name][1], message, "set it once")
+                    first = due[name][1]
+                    where = f"line {key.line}" if key.line != first.line else f"column {key.column}"
+                    message = f"'{name}' is set again at this step ({where}): what is set here is lost"
+                    self._constants.findings.warning("no-effect", first, message, "set it once")
                 due[name] = formula, key
         if not due:
             return
