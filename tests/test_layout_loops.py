@@ -79,3 +79,12 @@ layout: {{engine: layered, mirror: [[left, right], [C1, C2]], direction: right}}
     later = network.layout(earlier=earlier.value)
     assert suite.through_frames(later.value, problem_of(network.network)) == []
     assert later.positions["C1"] == earlier.positions["C1"]
+
+
+def test_a_new_loop_keeps_off_the_old_one() -> None:
+    text = "neurovis: 1\nname: more\nneurons: {A: {bias: 1}, B: {}}\nconnections:\n  - {A -> A: 0.5, A -> B: 1}\n"
+    earlier = nv.compile_text(text).layout(engine="layered")
+    network = nv.compile_text(text + "  - {A -> A: {weight: 1, delay: 4}, B -> A: 1}\n")
+    later = network.layout(engine="layered", earlier=earlier.value)
+    assert later.routes["A -> A"] == earlier.routes["A -> A"]
+    assert least_between_loops(later.value, problem_of(network.network)) >= 0.12

@@ -14,7 +14,7 @@ import numpy as np
 from neurovis_layouts.alike import Alike, Move
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.memory import remembered
-from neurovis_layouts.routing import route_all, told_apart
+from neurovis_layouts.routing import route_all
 from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
 from neurovis_layouts.routing.walls import Frame, Walls
 from neurovis_spec.layout.frames import Frames, bounds
@@ -108,13 +108,10 @@ def _found(problem: LayoutProblem, ways: _Ways, rest: Sequence[int], routes: Map
     walls = [(own, bounds([flat(rect[:2]), flat(rect[2:])])) for own, rect in walls]
     edges, centres = [problem.edges[i] for i in shown], [flat(point) for point in ways.centres]
     others = [tuple(map(flat, routes[i])) for i in sorted(routes.keys() - set(shown))]
-    made = dict(enumerate(route_all(edges, centres, {}, frames=walls, drawn=others)))
-    made.update({k: tuple(map(flat, routes[i])) for k, i in enumerate(shown) if i in routes})
-    new = {k for k, i in enumerate(shown) if i not in routes}
-    if len(shown) <= _CAREFULLY:
-        between = {k: route for k, route in made.items() if edges[k].source != edges[k].target}
-        made.update(told_apart(edges, centres, between, new & between.keys(), walls, others))
-    return {shown[k]: tuple(to_picture(point, problem.direction) for point in made[k]) for k in sorted(new)}
+    there = {k: tuple(map(flat, routes[i])) for k, i in enumerate(shown) if i in routes}
+    made = route_all(edges, centres, {}, frames=walls, drawn=others, there=there)
+    new = [k for k in range(len(shown)) if k not in there]
+    return {shown[k]: tuple(to_picture(point, problem.direction) for point in made[k]) for k in new}
 
 
 def _old_routes(problem: LayoutProblem, memory: Layout, ways: _Ways) -> dict[int, Route]:

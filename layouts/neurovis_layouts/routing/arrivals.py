@@ -33,6 +33,8 @@ _SHORT = 1.0
 _SLACK = 0.02
 #: With more ends than this at a disc there is no room for all.
 _MOST = 12
+#: With more routes than this nobody counts how often they cross.
+_MOST_CROSSED = 300
 _T = np.arange(1, 33, dtype=np.float64) / 32
 #: Turned by ``_STEP`` times −``_STEPS``, …, ``_STEPS``: cosine and sine.
 _TURNS = tuple(turn(number * _STEP) for number in range(-_STEPS, _STEPS + 1))
@@ -189,7 +191,8 @@ class _Disc:
         pieces = [self._turning(end, route) for (end, _), route in lines.items()]
         clear = picture.obstacles.clearances(pieces, own)
         enters = picture.walls.entered(pieces, own) if picture.walls is not None else [False] * len(routes)
-        crossed = picture.lines.crossed(edges, pieces, self._centre)
+        few = len(picture.routes) <= _MOST_CROSSED
+        crossed = picture.lines.crossed(edges, pieces, self._centre) if few else [0] * len(edges)
         costs = [
             _NEARING * (REACH - clearance)
             + _ENTERING * (entering + (clearance < TOUCH + _SLACK))

@@ -49,13 +49,15 @@ def route_all(
     careful: int = _MOST_CAREFULLY,
     frames: Sequence[Frame] = (),
     drawn: Sequence[Route] = (),
+    there: Mapping[int, Route] | None = None,
 ) -> list[Route]:
     """Routes by edge index.
 
     Without ``waypoints`` every edge runs from anywhere to anywhere; with them, edges not in ``bowed`` run along the
     direction (through their waypoints, if they have any). Those in ``lateral`` run across it, through waypoints with x
     and y exchanged. With more than ``careful`` edges, discs in the way are not gone round. No route enters one of the
-    ``frames`` that holds neither of its ends, if there is a way round. ``drawn`` are other routes, which are there.
+    ``frames`` that holds neither of its ends, if there is a way round. ``drawn`` are other routes, which are
+    there, as are those of these edges that are ``there``.
     """
     near = Obstacles(centres)
     obstacles = near if len(edges) <= careful else Obstacles(())
@@ -75,10 +77,13 @@ def route_all(
     detoured = {} if walls is None else _round_frames(edges, centres, routes, walls)
     routes.update(detoured)
     if len(edges) <= min(careful, _MOST_AT_LENGTH):
-        routes.update(
-            told_apart(edges, centres, routes, routes.keys(), frames, drawn, frozenset(rest) - detoured.keys())
-        )
-    routes.update(_loops(edges, centres, routes, near, walls))
+        bows = frozenset(rest) - detoured.keys()
+        if there:
+            routes.update((i, route) for i, route in there.items() if i in routes)
+            bows = frozenset()
+        free = routes.keys() - there.keys() if there else routes.keys()
+        routes.update(told_apart(edges, centres, routes, free, frames, drawn, bows))
+    routes.update(_loops(edges, centres, routes, near, walls, there or {}))
     return [routes[i] for i in range(len(edges))]
 
 
@@ -270,6 +275,7 @@ def _loops(
     routes: Mapping[int, Route],
     obstacles: Obstacles,
     walls: Walls | None,
+    there: Mapping[int, Route],
 ) -> dict[int, Route]:
     looping = [i for i, edge in enumerate(edges) if edge.source == edge.target]
     tangents: dict[int, list[Point]] = {edges[i].source: [] for i in looping}
@@ -288,9 +294,11 @@ def _loops(
 
         return best_loop(centres[own], own, before, near[own], tangents[own], obstacles, enters)
 
-    result: dict[int, Route] = {}
+    result = {i: there[i] for i in looping if i in there}
     drawn: dict[int, list[Route]] = {}
-    for i in looping:
+    for i in result:
+        drawn.setdefault(edges[i].source, []).append(result[i])
+    for i in (i for i in looping if i not in result):
         own = edges[i].source
         before = drawn.setdefault(own, [])
         result[i] = best(i, before, None)

@@ -26,12 +26,22 @@ _NEAR = 2.5
 
 def line_of(route: Route) -> FloatArray:
     """(n, 2) points on a route, between what discs and arrowheads hide."""
-    pieces = np.array(cubics(route), dtype=np.float64)
-    points, _ = points_on(pieces, np.zeros(len(pieces), dtype=np.int64), _STEP)
-    ends = np.array([route[0], route[-1]], dtype=np.float64)
-    away = points[:, None, :] - ends[None, :, :]
-    line: FloatArray = points[((away * away).sum(axis=2) > _END * _END).all(axis=1)]
-    return line
+    return _lines([route])[0]
+
+
+def _lines(routes: Sequence[Route]) -> list[FloatArray]:
+    """The line of each route."""
+    if not routes:
+        return []
+    pieces = [(i, piece) for i, route in enumerate(routes) for piece in cubics(route)]
+    owner = np.array([i for i, _ in pieces], dtype=np.int64)
+    points, owner = points_on(np.array([piece for _, piece in pieces], dtype=np.float64), owner, _STEP)
+    ends = np.array([(route[0], route[-1]) for route in routes], dtype=np.float64)
+    away = points[:, None, :] - ends[owner]
+    seen = ((away * away).sum(axis=2) > _END * _END).all(axis=1)
+    points, owner = points[seen], owner[seen]
+    cuts = np.searchsorted(owner, np.arange(1, len(routes)))
+    return np.split(points, cuts)
 
 
 def together(line: FloatArray, mates: Sequence[FloatArray]) -> float:
@@ -60,8 +70,9 @@ class Strokes:
     """Lines by the number of their edge, and others, which stay."""
 
     def __init__(self, routes: Mapping[int, Route], others: Sequence[Route]) -> None:
-        self.lines = {i: line_of(route) for i, route in sorted(routes.items())}
-        first = _segments([*self.lines.items(), *((-1, line_of(route)) for route in others)])
+        chosen = sorted(routes)
+        self.lines = dict(zip(chosen, _lines([routes[i] for i in chosen]), strict=True))
+        first = _segments([*self.lines.items(), *((-1, line) for line in _lines(others))])
         # from left to right, so that what is near a place is found soon
         order = np.argsort(first[0][:, 0], kind="stable")
         self._from, self._to, self._owner = (figures[order] for figures in first)
@@ -74,9 +85,7 @@ class Strokes:
 
     def crossed(self, edges: Sequence[int], routes: Sequence[Route], place: Point) -> list[int]:
         """How often each of these routes, of these edges, crosses lines of other edges near a place."""
-        lines = [line_of(route) for route in routes]
-        near = [line[_close(line, place)] for line in lines]
-        a, b, number = _segments(list(enumerate(near)))
+        a, b, number = _segments(list(enumerate(line[_close(line, place)] for line in _lines(routes))))
         if not len(a):
             return [0] * len(edges)
         low, high = np.minimum(a, b).min(axis=0) - 2 * _STEP, np.maximum(a, b).max(axis=0) + 2 * _STEP

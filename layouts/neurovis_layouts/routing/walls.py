@@ -54,7 +54,10 @@ class Walls:
             _STEP,
         )
         x, y = np.ascontiguousarray(points.T)
-        for number, (x0, y0, x1, y1) in enumerate(self.rects.tolist()):
+        low, high = points.min(axis=0), points.max(axis=0)
+        near = np.flatnonzero(((self.rects[:, :2] < high) & (self.rects[:, 2:] > low)).all(axis=1))
+        for number in near.tolist():
+            x0, y0, x1, y1 = self.rects[number].tolist()
             within = owner[np.flatnonzero((x > x0) & (x < x1) & (y > y0) & (y < y1))]
             foreign = ~(self.inside[ends[within, 0], number] | self.inside[ends[within, 1], number])
             result[within[foreign]] = True
