@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.conflicts import look_for_conflicts
 from neurovis_spec.compiler.constants import Constants, Randomness
 from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.edges import EdgeReader, End, delay_of
@@ -103,7 +104,7 @@ class EntryBuilder:
     def build(self) -> Bundle | None:
         """The connections; None where anything of the entry is at fault, which is noted."""
         before = self.constants.findings.errors
-        self._conflicts()
+        look_for_conflicts(self.body, self.constants.findings)
         if self.constants.findings.errors == before:
             return self._built(before)
         # which of the keys is meant is not known, so nothing is held against the sizes of the ends
@@ -144,34 +145,6 @@ class EntryBuilder:
             None if body.description is None else body.description.value,
             not np.isin(self.sources, self.targets).any(),
         )
-
-    def _conflicts(self) -> None:
-        """What excludes each other: each pair is one finding, at the second key."""
-        body, findings = self.body, self.constants.findings
-        pairs = [
-            ("matrix", "weight"),
-            ("matrix", "edges"),
-            ("matrix", "pattern"),
-            ("edges", "weight"),
-            ("edges", "pattern"),
-        ]
-        table = isinstance(body.centre, (Rows, FileReference))
-        if table:
-            pairs += [("edges", "centre"), ("centre", "pattern")]
-        for first, second in pairs:
-            one, other = body.source.entry(first), body.source.entry(second)
-            if one is not None and other is not None:
-                later = max(one, other, key=lambda entry: entry.key.span)
-                message = f"'{second}' beside '{first}': the {first} says it already"
-                findings.error("conflicting-keys", later.key.span, message, f"remove '{second}'")
-        rows = body.source.entry("rows")
-        if rows is not None and body.matrix is None and not table and self._kept("matrix", "centre"):
-            message = "'rows' says how a matrix is read; there is no matrix"
-            findings.error("useless-key", rows.key.span, message)
-        loops = body.source.entry("self")
-        if loops is not None and (body.matrix is not None or body.edges is not None or table):
-            message = "'self' says what a pattern may do; here every connection is written"
-            findings.error("useless-key", loops.key.span, message)
 
     def _fits(self, count: int) -> bool:
         """Whether there is room for so many connections; a finding where there is not."""
