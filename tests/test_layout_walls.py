@@ -20,6 +20,7 @@ from neurovis_spec.layout import Direction, Layout, LayoutEdge, LayoutProblem, L
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.geometry import distance, sampled
 from neurovis_spec.layout.metrics import metrics
+from neurovis_spec.layout.model import Route
 from neurovis_spec.layout.problem import canonical, problem_of
 
 ROOT = Path(__file__).parent.parent
@@ -210,3 +211,18 @@ layout: {{engine: layered, mirror: [[left, right], [C1, C2]], direction: left}}
 """
     problem = problem_of(nv.compile_text(text).network)
     check(lay_out_problem(problem, "layered"), problem)
+
+
+def test_what_is_remembered_of_corners_changes_no_detour(monkeypatch: pytest.MonkeyPatch) -> None:
+    centres = [(2.6 * i, 2.2 * j) for i in range(5) for j in range(4)]
+    frames = [(frozenset({k}), (x - 0.7, y - 0.7, x + 0.7, y + 0.7)) for k, (x, y) in enumerate(centres)]
+    pairs = [(a, b) for a in range(0, 20, 3) for b in range(1, 20, 4) if a != b]
+
+    def routes() -> list[Route | None]:
+        found = Detours(Walls(frames, len(centres)), centres)
+        return [found.route(a, b, True) for a, b in pairs]
+
+    remembered = routes()
+    monkeypatch.setattr("neurovis_layouts.routing.detours.MOST", 0)
+    assert routes() == remembered
+    assert sum(route is not None and len(route) > 4 for route in remembered) > 10
