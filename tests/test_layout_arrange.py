@@ -51,6 +51,28 @@ def grouped(groups: str, size: int, pairs: list[tuple[str, str]]) -> LayoutProbl
     return canonical("grouped", [neuron for _, of in members for neuron in of], members, suite.named(pairs))
 
 
+def test_auto_keeps_the_flow_of_long_chains_and_of_trees() -> None:
+    count = 1200
+
+    def made(*pairs: tuple[int, int]) -> LayoutProblem:
+        return grouped("A", count, [(f"A{a}", f"A{b}") for a, b in sorted(set(pairs))])
+
+    chain = [(i, i + 1) for i in range(count - 1)]
+    tree = [((i - 1) // 3, i) for i in range(1, count)]
+    halves = [(i, i + 1) for i in range(count - 1) if i != count // 2]
+    upwards, more = [(b, a) for a, b in tree], [*chain, (3, 9), (5, 7)]
+    for branches in (chain, [*chain, (count - 1, 0)], tree, upwards, halves, more):
+        assert choose_engine(made(*branches))[0] == "layered"
+    assert "chains or trees" in choose_engine(made(*chain))[1]
+    # as many connections, but they merge everywhere, or all at one
+    crossed = [(i, (7 * i + k) % count) if i % 2 else ((7 * i + k) % count, i) for i in range(count) for k in (1, 300)]
+    for tangled in (crossed, [(0, i) for i in range(1, count)]):
+        assert choose_engine(made(*tangled))[0] == "large"
+    layout = lay_out_problem(made(*tree))
+    ranks = layout.positions
+    assert all(ranks[f"A{a}"][1] < ranks[f"A{b}"][1] for a, b in tree)
+
+
 def test_auto_takes_large_where_connections_are_many_and_groups_no_layers() -> None:
     forward = [(f"{a}{i}", f"{b}{j}") for a, b in ("AB", "BC") for i in range(30) for j in range(30)]
     assert choose_engine(grouped("ABC", 30, forward))[0] == "layered"

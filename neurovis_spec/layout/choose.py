@@ -5,6 +5,8 @@ In: a LayoutProblem. Out: an engine's name, and why, in words for ``inspect``.
 
 from __future__ import annotations
 
+from collections import Counter
+
 from neurovis_spec.layout.model import LayoutProblem
 
 #: A component of so many neurons, with so many connections each within their group, is a tangle.
@@ -16,8 +18,13 @@ _COMPLETE, _MOST_IN_RING = 0.25, 120
 _MOST_BY_DISTANCE = 500
 #: With more connections nobody can follow one.
 _MOST_IN_RANKS = 1000
-#: Layers of neurons, and frames of instances, show something nevertheless, up to so many.
+#: Layers of neurons, frames of instances, and chains and trees, show something nevertheless, up to so many.
 _MOST_IN_LAYERS = 20_000
+#: In chains and trees so small a share of the neurons have more than one source each, or target where they converge; none
+#: has more connections than these: those to the far end of a rank would run along it.
+_MERGING, _MOST_AT_ONE = 0.1, 40
+#: So many parts that hang together by themselves are drawn in ranks before it gets slow.
+_MOST_PARTS = 200
 
 
 def choose_engine(problem: LayoutProblem) -> tuple[str, str]:
@@ -36,10 +43,29 @@ def choose_engine(problem: LayoutProblem) -> tuple[str, str]:
         if len(problem.neurons) <= _MOST_BY_DISTANCE:
             return "organic", why
         return "large", why
+    if edges > _MOST_IN_RANKS and _in_branches(problem):
+        return "layered", f"its {edges} connections form chains or trees, whose flow ranks keep"
     if edges > _MOST_IN_RANKS and not _in_layers(problem):
         shown = ", and instances show as such, not as frames drawn alike" if problem.modules else ""
         return "large", f"its {edges} connections are too many to follow each: clusters say more{shown}"
     return "layered", "the default for networks whose positions are not all given"
+
+
+def _in_branches(problem: LayoutProblem) -> bool:
+    """Whether the connections form chains and trees, or nearly: each neuron has one source, or, where branches
+    converge, one target. Then one can follow each connection, however many there are."""
+    if len(problem.edges) > _MOST_IN_LAYERS:
+        return False
+    pairs = {(edge.source, edge.target) for edge in problem.edges if edge.source != edge.target}
+    sources, targets = Counter(target for _, target in pairs), Counter(source for source, _ in pairs)
+    wired = sources.keys() | targets.keys()
+    if len(pairs) > (1 + _MERGING) * len(wired) or max((sources + targets).values(), default=0) > _MOST_AT_ONE:
+        return False
+    import networkx as nx  # only here, for few networks
+
+    parts = list(nx.connected_components(nx.Graph(sorted(pairs))))
+    merging = sum(min(sum(max(times[i] - 1, 0) for i in part) for times in (sources, targets)) for part in parts)
+    return len(parts) <= _MOST_PARTS and merging <= _MERGING * len(wired)
 
 
 def _in_layers(problem: LayoutProblem) -> bool:
