@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import networkx as nx
 
@@ -49,7 +49,8 @@ def units_of(
     Raises LayoutRefusalError where a neuron is arranged twice.
     """
     framed = {member for unit in frames for member in unit.members} | absent
-    found = [*frames, *_arranged(problem, framed)]
+    asked = [*frames, *_arranged(problem, framed)]
+    found = list(asked)
     taken = framed | {member for unit in found for member in unit.members}
     lone: list[int] = []
     for group in problem.groups:
@@ -62,6 +63,7 @@ def units_of(
     lone += [i for i in range(len(problem.neurons)) if i not in taken]
     found += _of_lone(problem, sorted(lone))
     lines = _lines(problem)
+    found = _loops_on_lines(found, asked, lines, max(problem.neuron_spacing, 0.65))
     found = _without_needless_loops(problem, _off_lines(problem, found, lines), lines)
     return tuple(sorted(found, key=lambda unit: min(unit.members)))
 
@@ -178,6 +180,36 @@ def _lines(problem: LayoutProblem) -> dict[int, int]:
     found = {member: min(tied) for tied in nx.connected_components(ties) for member in tied}
     found.update({b: found[a] for b, a in original.items() if a in found})
     return found
+
+
+def _loops_on_lines(
+    found: Sequence[Unit], asked: Sequence[Unit], lines: Mapping[int, int], spacing: float
+) -> list[Unit]:
+    """Loops that were made blocks although nobody ``asked`` for it give way to lines that they would contradict: a loop
+    whose neurons are all on one line is a row; of others those on one line share a rank, and the rest find their own.
+    """
+    rigid = {member: i for i, unit in enumerate(found) if unit.places is not None for member in unit.members}
+    reach: dict[int, set[int]] = {}
+    for member, line in lines.items():
+        if member in rigid:
+            reach.setdefault(line, set()).add(rigid[member])
+    result: list[Unit] = list(asked)
+    for unit in found[len(asked) :]:
+        bound: dict[int, list[Point]] = {}
+        for member, place in zip(unit.members, unit.places or (), strict=False):
+            if member in lines:
+                bound.setdefault(lines[member], []).append(place)
+        bent = any(len({along for _, along in places}) > 1 for places in bound.values())
+        if not bent and sum(len(reach[line]) > 1 for line in bound) <= 1:
+            result.append(unit)
+        elif len(bound) == 1 and all(member in lines for member in unit.members):
+            result.append(replace(unit, places=tuple(offsets("row", len(unit.members), spacing * _LINE))))
+        else:
+            together: dict[int, list[int]] = {}
+            for member in sorted(unit.members):
+                together.setdefault(lines.get(member, -1 - member), []).append(member)
+            result += [Unit(tuple(members)) for members in together.values()]
+    return result
 
 
 def _off_lines(problem: LayoutProblem, found: Sequence[Unit], lines: Mapping[int, int]) -> list[Unit]:
