@@ -5,12 +5,15 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from neurovis_layouts.routing.channels import channels
 from neurovis_layouts.routing.lines import Lines, crossed
 
+import neurovis_spec as nv
 from neurovis_spec.layout import LayoutEdge
+from neurovis_spec.layout.geometry import sampled
 
 points = st.tuples(st.integers(-9, 9), st.integers(-9, 9)).map(lambda p: (float(p[0]), float(p[1])))
 
@@ -80,3 +83,17 @@ def test_ways_are_found_anew_when_all_are_known() -> None:
         if a[1] < b[1]
     )
     assert total <= 1
+
+
+@pytest.mark.parametrize(("sources", "targets"), [(4, 8), (3, 5), (5, 5), (8, 4)])
+def test_full_layers_beside_a_frame_run_as_if_there_were_none(sources: int, targets: int) -> None:
+    network = nv.compile_text(
+        "neurovis: 1\nname: x\nmodules: {m: {neurons: {a: {}}}}\ninstances: {x: {module: m}}\n"
+        f"neurons: {{I: {{count: {sources}, bias: 1}}, H: {{count: {targets}}}}}\n"
+        "connections: {I -> H: {pattern: all_to_all, weight: 1}, H -> x.a: 1}\n"
+    )
+    layout = network.layout("layered")
+    for name, route in layout.routes.items():
+        if not name.endswith("x.a"):
+            high, low = route[0][1], route[-1][1]
+            assert all(high - 0.5 <= y <= low + 0.5 for _, y in sampled(route, 0.1)), name

@@ -10,16 +10,21 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 from neurovis_layouts.routing.curves import Waypoint
 from neurovis_layouts.routing.rows import Rows
 from neurovis_layouts.routing.walls import Frame
-from neurovis_layouts.routing.ways import knots, straight, through, way
+from neurovis_layouts.routing.ways import WALLED, knots, straight, through, way
 from neurovis_spec.layout.geometry import sampled
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
 #: What it costs to run across rather than along.
 _ACROSS = 1.25
+#: What is hardly longer, and what is much longer.
+_HARDLY, _MUCH = 1.1, 1.2
+#: How far beyond both of its ends a way leads that turns back.
+_BEYOND = 0.5
 #: With more edges than this nobody can follow one: they take the straight way.
 _MOST = 1500
 #: With more edges than this nobody counts how often they cross.
@@ -55,6 +60,10 @@ def channels(
 def _length(edge: LayoutEdge, centres: Sequence[Point]) -> float:
     (ax, ay), (bx, by) = centres[edge.source], centres[edge.target]
     return abs(ax - bx) + abs(ay - by)
+
+
+def _length_of(path: Sequence[Point]) -> float:
+    return sum(math.dist(a, b) for a, b in pairwise(path))
 
 
 def _walled(edge: LayoutEdge, gates: Sequence[Waypoint], frames: Sequence[Frame]) -> bool:
@@ -129,7 +138,7 @@ class _Network:
             other, aside = way(self._side, ends) if cost > least else (math.inf, [])
             if math.isinf(min(cost, other)):
                 return  # and then so it is for those with the same ends
-            along = cost <= other * _ACROSS
+            along = cost <= other * _ACROSS or self._round_it_all(ends, aside)
             path = path if along else aside
         rows = self._down if along else self._side
         rows.use(path[1:-1])
@@ -140,6 +149,16 @@ class _Network:
             if self.careful and one in self._ways:
                 found = self._ways[one]
                 self._ways[one] = replace(found, notes=self._note(found.line, found.along))
+
+    def _round_it_all(self, ends: tuple[int, int], aside: Sequence[Point]) -> bool:
+        """Whether a way across leads out beyond its ends, and is much longer than one along, whatever that crosses,
+        which is hardly longer than the straight line: crossings are followed more easily than a way round it all."""
+        first, last = sorted((aside[0][0], aside[-1][0]))
+        if all(first - _BEYOND <= x <= last + _BEYOND for x, _ in aside):
+            return False
+        cost, path = way(self._down, ends, 0.0)
+        length = _length_of(path)
+        return cost < WALLED and length <= _HARDLY * math.dist(path[0], path[-1]) and _length_of(aside) > _MUCH * length
 
     def _note(self, line: Sequence[Point], along: bool) -> tuple[Sequence[int], Sequence[int]]:
         other = [(y, x) for x, y in line]

@@ -27,6 +27,8 @@ _APART = 0.22
 #: What it costs to share a gap, to squeeze between two discs, to run through a wall, and to cross a line.
 _SHARED, _SQUEEZED, _WALL, _CROSSING = 1.5, 0.4, 60.0, 4.0
 _LEAST = 0.75
+#: What costs more leads through a wall.
+WALLED = _WALL
 #: Places tried in a row, about; ways closer than this to the straight line are kept apart from, but for so many on
 #: either side.
 _CHOICES, _NEAR, _MOST_NEAR, _KEPT = 24, 2.0, 8, 2
@@ -39,16 +41,17 @@ def straight(a: Point, b: Point) -> float:
     return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2) * (1 - 1e-9)
 
 
-def way(rows: Rows, ends: tuple[int, int]) -> tuple[float, list[Point]]:
-    """The cost of the best way, infinite where the ends are level, and its points: both ends, one in each row."""
+def way(rows: Rows, ends: tuple[int, int], crossing: float = _CROSSING) -> tuple[float, list[Point]]:
+    """The cost of the best way, infinite where the ends are level, and its points: both ends, one in each row.
+    ``crossing`` is what it costs to cross a line."""
     start, end = rows.centres[ends[0]], rows.centres[ends[1]]
     if abs(end[1] - start[1]) < _LEAST:
         return math.inf, []
     own = rows.own(*ends)
     if start[1] > end[1]:
-        cost, path = _down(rows, end, start, own)
+        cost, path = _down(rows, end, start, own, crossing)
         return cost, path[::-1]
-    return _down(rows, start, end, own)
+    return _down(rows, start, end, own, crossing)
 
 
 def through(rows: Rows, ends: tuple[int, int], gates: Sequence[Waypoint]) -> list[Point]:
@@ -67,7 +70,7 @@ def through(rows: Rows, ends: tuple[int, int], gates: Sequence[Waypoint]) -> lis
     return [*path, *_down(rows, path[-1], end, own)[1][1:]]
 
 
-def _down(rows: Rows, start: Point, end: Point, own: Own) -> tuple[float, list[Point]]:
+def _down(rows: Rows, start: Point, end: Point, own: Own, crossing: float = _CROSSING) -> tuple[float, list[Point]]:
     """The cost of the best way down from one point to another, and its points: both ends, one in each row."""
     heights = [*rows.between(start[1], end[1], own), end[1]]
     line = [(_at(start, end, y), y) for y in heights]
@@ -87,8 +90,8 @@ def _down(rows: Rows, start: Point, end: Point, own: Own) -> tuple[float, list[P
         if walls:
             ways = ways + _WALL * _sides(np.array(across), np.array(places), walls)
         lines = rows.lines.between(before, y)
-        if len(lines[0]):
-            ways = ways + _CROSSING * crossed(np.array(across), np.array(places), lines)
+        if len(lines[0]) and crossing:
+            ways = ways + crossing * crossed(np.array(across), np.array(places), lines)
         chosen = np.argmin(ways, axis=1)
         layers.append((places, chosen))
         cost, across, before = ways[np.arange(len(places)), chosen] + np.array(extra), places, y
