@@ -20,8 +20,8 @@ _MOST_BY_DISTANCE = 500
 _MOST_IN_RANKS = 1000
 #: Layers of neurons, frames of instances, and chains and trees, show something nevertheless, up to so many.
 _MOST_IN_LAYERS = 20_000
-#: In chains and trees so small a share of the neurons have more than one source each, or target where they converge; none
-#: has more connections than these: those to the far end of a rank would run along it.
+#: In chains and trees so few of the neurons have several sources, or targets where branches converge, and none has more
+#: connections than these: those to the far end of a rank would run along it.
 _MERGING, _MOST_AT_ONE = 0.1, 40
 #: So many parts that hang together by themselves are drawn in ranks before it gets slow.
 _MOST_PARTS = 200
