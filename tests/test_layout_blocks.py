@@ -9,10 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import neurovis_spec as nv
 from neurovis_spec.layout import Direction, Layout, LayoutProblem, Point
 from neurovis_spec.layout.arrange import lay_out_problem
+from neurovis_spec.layout.clashes import clashes
 from neurovis_spec.layout.metrics import metrics
-from neurovis_spec.layout.problem import canonical
+from neurovis_spec.layout.problem import canonical, problem_of
 
 
 @st.composite
@@ -100,3 +102,24 @@ def test_an_instance_that_no_pin_touches_keeps_its_drawing() -> None:
         assert now.positions["m2.N1"] == (40.0, 40.0)
         for number in (0, 2, 3):
             assert drawn(now, pinned, number) == drawn(before, free, number)
+
+
+@pytest.mark.parametrize("engine", ["grid", "circular"])
+def test_the_rest_stands_around_what_is_pinned_and_in_no_frame(engine: str) -> None:
+    text = """\
+neurovis: 1
+name: around
+modules:
+  col: {neurons: {a: {bias: 1}, b: {}, c: {}}, connections: {a -> b: 1, b -> c: 1, c -> a: 0.3}}
+instances: {x: {module: col, count: 4}}
+neurons: {O: {}, I: {}, Z: {count: 3}}
+connections: {I -> x.a: 1, x.c -> O: 1, x1.c -> x2.a: 1, Z -> O: 1}
+layout: {positions: {x2: [10, 3], x3.b: [-3, 1], x4.a: [0, 10], x4.c: [2, 10], O: [20, 20], Z2: [5, 8]}}
+"""
+    network = nv.compile_text(text)
+    problem = problem_of(network.network)
+    layout = lay_out_problem(problem, engine)
+    assert clashes(problem, layout) == []
+    assert all(layout.positions[problem.neurons[i]] == point for i, point in problem.pins.items())
+    shapes = [drawn(layout, problem, number) for number in range(3)]
+    assert shapes[0] == shapes[1] == shapes[2], "one pin in an instance takes the rest of it along"

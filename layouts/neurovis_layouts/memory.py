@@ -61,6 +61,11 @@ def _not_on_pins(problem: LayoutProblem, placed: dict[int, Point]) -> dict[int, 
     return {i: point for i, point in placed.items() if i in problem.pins or pinned.free(point, 2 * RADIUS)}
 
 
+def _innermost(problem: LayoutProblem) -> dict[int, LayoutModule]:
+    """For each neuron of an instance the smallest that it is in: instances come before those within them."""
+    return {member: module for module in problem.modules for member in module.members}
+
+
 class _Wishes:
     """Where the fresh layout would have something new, seen from what is placed."""
 
@@ -71,6 +76,7 @@ class _Wishes:
             if edge.source != edge.target:
                 self._near.setdefault(edge.source, []).append(edge.target)
                 self._near.setdefault(edge.target, []).append(edge.source)
+        self._own = _innermost(problem)
         #: by axis and coordinate in the fresh layout: how many are placed, and on which lines
         self._ranks: dict[tuple[int, float], tuple[int, set[float]]] = {}
         for neuron, point in placed.items():
@@ -88,6 +94,10 @@ class _Wishes:
         """Where the fresh layout puts the anchor, moved as the neighbours have been moved, or, without any, all
         others."""
         mates = sorted({mate for neuron, _ in copy.offsets for mate in self._near.get(neuron, ()) if mate in placed})
+        if copy.instance < 0 and copy.offsets[0][0] in self._own:
+            # what its instance is drawn like goes before what is outside
+            own = sorted(i for i in self._own[copy.offsets[0][0]].members if i in placed)
+            mates = sorted(set(mates).intersection(own)) or own or mates
         dx, dy = _drift(self._fresh, placed, mates) if mates else self._drift
         neuron = copy.offsets[0][0]
         wish = self._fresh[neuron][0] + dx, self._fresh[neuron][1] + dy
@@ -180,10 +190,21 @@ def _pieces(
     wanted: frozenset[int],
 ) -> Iterator[tuple[Copy, ...]]:
     """What is placed together, each with its copies: instances as a piece, then neurons one by one; what has been
-    there before comes first."""
+    there before comes first, then what instances lack of which a part is there."""
     done = set(placed)
     alike = Alike(problem, before)
+
+    def single(neuron: int) -> tuple[Copy, ...]:
+        found = [(mate, move) for mate, move in alike.of(neuron) if mate not in done]
+        singles = [Copy(((mate, (0.0, 0.0)),), flip=move.flip, origin=move.shift) for mate, move in found]
+        done.update(i for copy in singles for i in copy.members)
+        return tuple(singles)
+
     for again in (True, False):
+        own = {} if again else _innermost(problem)
+        for neuron in sorted(i for i, module in own.items() if not done.isdisjoint(module.members)):
+            if neuron not in done:
+                yield single(neuron)
         for number, module in enumerate(problem.modules):
             if not module.members or any(i in done for i in module.members):
                 continue
@@ -198,12 +219,8 @@ def _pieces(
             done.update(i for copy in copies for i in copy.members)
             yield tuple(copies)
         for neuron in range(len(problem.neurons)):
-            if neuron in done or (again and neuron not in wanted):
-                continue
-            found = [(mate, move) for mate, move in alike.of(neuron) if mate not in done]
-            singles = [Copy(((mate, (0.0, 0.0)),), flip=move.flip, origin=move.shift) for mate, move in found]
-            done.update(i for copy in singles for i in copy.members)
-            yield tuple(singles)
+            if neuron not in done and (neuron in wanted or not again):
+                yield single(neuron)
 
 
 def _copies(alike: Alike, module: LayoutModule) -> Iterator[tuple[tuple[int, ...], Move]]:

@@ -5,7 +5,8 @@ In: a problem and a formation. Out: a Layout: instances as frames, pins kept, di
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from neurovis_layouts.blocks import Blocks, Drawing, keys_of, routed
 from neurovis_layouts.formations import offsets
@@ -13,6 +14,9 @@ from neurovis_layouts.frame import to_picture
 from neurovis_layouts.kept import kept
 from neurovis_layouts.pins import fit, with_origins
 from neurovis_spec.layout.model import Arrangement, Layout, LayoutProblem, Point
+
+#: So many neurons are arranged around pins frame by frame.
+_MOST_AROUND_PINS = 5000
 
 
 def boxes_together(problem: LayoutProblem) -> list[int]:
@@ -48,22 +52,34 @@ def place(problem: LayoutProblem, engine: str, how: Arrangement, spacing: float)
         return [found[neuron] for neuron in neurons]
 
     if problem.modules:
-        drawing = Blocks(problem, formation).whole()
+        free = Blocks(problem, formation).whole()
     else:
-        drawing = Drawing(tuple(formation(range(len(problem.neurons)))), {}, ())
-    drawing = routed(_pinned(drawing, problem), problem.edges)
-    fresh = Layout(
+        free = Drawing(tuple(formation(range(len(problem.neurons)))), {}, ())
+    pins = with_origins(problem, free.places)
+    if problem.modules and pins and problem.memory is None and len(problem.neurons) <= _MOST_AROUND_PINS:
+        return _around_pins(problem, pins, _layout(problem, engine, routed(free, problem.edges)))
+    return kept(problem, _layout(problem, engine, routed(_pinned(free, pins), problem.edges)))
+
+
+def _layout(problem: LayoutProblem, engine: str, drawing: Drawing) -> Layout:
+    return Layout(
         problem.network,
         engine,
         dict(zip(problem.neurons, drawing.places, strict=True)),
         {edge.name: drawing.routes[key] for edge, key in zip(problem.edges, keys_of(problem.edges), strict=True)},
     )
-    return kept(problem, fresh)
 
 
-def _pinned(drawing: Drawing, problem: LayoutProblem) -> Drawing:
+def _around_pins(problem: LayoutProblem, pins: Mapping[int, Point], free: Layout) -> Layout:
+    """The free layout arranged around the pins as if an earlier layout had known these and nothing else: frames keep
+    off each other, and nobody foreign comes into one."""
+    known = Layout(problem.network, free.engine, {problem.neurons[i]: point for i, point in pins.items()}, {})
+    placed = tuple(replace(module, origin=None) for module in problem.modules)  # as pins now
+    return kept(replace(problem, pins=pins, modules=placed, memory=known), free)
+
+
+def _pinned(drawing: Drawing, pins: Mapping[int, Point]) -> Drawing:
     """The drawing moved to the pins; of what these bend no frame and no route is left."""
-    pins = with_origins(problem, drawing.places)
     if not pins:
         return drawing
     centres, (dx, dy), bent = fit(drawing.places, pins)
