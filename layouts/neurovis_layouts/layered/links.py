@@ -12,6 +12,7 @@ from neurovis_layouts.layered.settle import Settled
 from neurovis_layouts.layered.sheet import Plan
 from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.routing import Waypoint, route_all, told_apart
+from neurovis_layouts.routing.arcs import Arcs, even
 from neurovis_layouts.routing.channels import channels
 from neurovis_spec.layout.frames import Rect
 from neurovis_spec.layout.geometry import snap
@@ -49,6 +50,8 @@ def linked(
     if not pair:
         return found
     found = _reflected(found, rests, pair)
+    if len(found) <= _MOST:
+        found.update(_mended(found, rests, pair, framed, drawn))
     # what has no image may now meet the image of another
     here = {i: found[keys[link]] for i, link in enumerate(links) if edges[i].source != edges[i].target}
     single = {i for i in here if not _imaged(keys[links[i]], found, rests, pair)}
@@ -98,7 +101,7 @@ def _reflected(routes: dict[Key, Route], rests: Settled, pair: Mapping[int, int]
         source, target, number = key
         image = _image(source, rests, pair), _image(target, rests, pair), number
         if pair.get(source) == target and (target, source, 0) in routes:
-            result[key] = _even(route, twice)
+            result[key] = even(route, twice)
         if key in result or image == key or image not in routes:
             result.setdefault(key, route)
             continue
@@ -108,17 +111,28 @@ def _reflected(routes: dict[Key, Route], rests: Settled, pair: Mapping[int, int]
     return result
 
 
+def _mended(
+    routes: Mapping[Key, Route],
+    rests: Settled,
+    pair: Mapping[int, int],
+    frames: Sequence[tuple[frozenset[int], Rect]],
+    drawn: Sequence[Route],
+) -> dict[Key, Route]:
+    """Routes there and back between images of each other, clear of what is in the way and of each other."""
+    between: dict[tuple[int, int], list[Key]] = {}
+    for source, target, number in sorted(routes):
+        if pair.get(source) == target and (target, source, 0) in routes:
+            between.setdefault((min(source, target), max(source, target)), []).append((source, target, number))
+    result = dict(routes)
+    arcs = Arcs(rests.places, frames, pair, 2 * rests.axis) if between else None
+    for keys in between.values():
+        if arcs is not None:
+            others = [*drawn, *(result[key] for key in sorted(result.keys() - set(keys)))]
+            mended = arcs.mended([key[:2] for key in keys], [result[key] for key in keys], others)
+            result.update(zip(keys, mended, strict=True))
+    return result
+
+
 def _image(neuron: int, rests: Settled, pair: Mapping[int, int]) -> int:
     """The mirror image of a neuron: itself on the axis, −1 where it has none."""
     return pair.get(neuron, neuron if rests.places[neuron][0] == rests.axis else -1)
-
-
-def _even(route: Route, twice: float) -> Route:
-    """A route from a neuron to its mirror image, as it would be on both sides of the axis (at half of ``twice``)."""
-    half = len(route) // 2
-    before = [
-        (snap((x + twice - other) / 2), snap((y + height) / 2))
-        for (x, y), (other, height) in zip(route[1:half], route[-2 : -half - 1 : -1], strict=True)
-    ]
-    middle = [(twice / 2, before[-1][1])] if len(route) % 2 else []
-    return route[0], *before, *middle, *((twice - x, y) for x, y in before[::-1]), route[-1]

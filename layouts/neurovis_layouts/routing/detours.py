@@ -122,6 +122,25 @@ class Detours:
         same += path[1:-1]
         return rounded(path, ground.clears)
 
+    def folded(self, source: int, target: int, twice: float) -> Route | None:
+        """A way round from a neuron to its mirror image (the axis is at half of ``twice``, and what is in the way is
+        the same on both sides) that is its own reflection, None where there is none; each keeps off those before it."""
+        same = self._between.setdefault((min(source, target), max(source, target)), [])
+        path, ground = self._way(source, target, same, False)
+        if path is None:
+            return None
+        side = path[0][0] < twice / 2
+        last = next(k for k, point in enumerate(path) if (point[0] < twice / 2) != side) - 1
+        (ax, ay), (bx, by) = path[last : last + 2]
+        half = path[: last + 1]
+        across = np.array([[ax, ay], [twice - ax, ay]])
+        if not ground.free(across[:1], across[1:]).all():
+            half = [*half, (twice / 2, ay + (by - ay) * (twice / 2 - ax) / (bx - ax))]
+        path = [*half, *((twice - x, y) for x, y in half[::-1] if 2 * x != twice)]
+        self._taken.add(path)
+        same += path[1:-1]
+        return rounded(path, ground.clears)
+
     def longer(self, source: int, target: int) -> float:
         """By how much the way round is longer than the straight one; 0 where there is none."""
         path, _ = self._way(source, target, (), True)

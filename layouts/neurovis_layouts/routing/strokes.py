@@ -49,6 +49,13 @@ def together(line: FloatArray, mates: Sequence[FloatArray]) -> float:
     return max(_near(line, mate) for mate in mates)
 
 
+def crossings(line: FloatArray, others: Sequence[FloatArray]) -> int:
+    """How often a line crosses others."""
+    a, b, _ = _segments([(0, line)])
+    c, d, _ = _segments(list(enumerate(others)))
+    return int(_crossing(a, b, c, d).sum())
+
+
 def _near(line: FloatArray, points: FloatArray) -> float:
     """The share of a line that is close to some of these points."""
     if not len(line) or not len(points):
