@@ -10,6 +10,7 @@ from test_layout_reciprocal import pairs, together
 
 import neurovis_spec as nv
 from neurovis_spec.layout import Layout, LayoutProblem
+from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.geometry import distance, sampled
 from neurovis_spec.layout.problem import problem_of
 
@@ -93,9 +94,8 @@ def halves(layout: Layout, problem: LayoutProblem) -> list[tuple[str, str]]:
 
 @pytest.mark.parametrize("text", HALVES.values(), ids=HALVES)
 def test_arcs_are_clear_of_what_is_in_the_way_and_of_each_other(text: str) -> None:
-    network = nv.compile_text(text)
-    problem = problem_of(network.network)
-    layout = network.layout()
+    problem = problem_of(nv.compile_text(text).network)
+    layout = lay_out_problem(problem, "layered")
     across = 1 if problem.direction in ("left", "right") else 0
     assert over_discs(layout) == []
     assert suite.through_frames(layout, problem) == []
