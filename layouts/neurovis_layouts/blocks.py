@@ -105,19 +105,35 @@ class Blocks:
         places, whole, bent = fit(free, {place[m]: point for m, point in pins.items()})
         routes: dict[Key, Route] = {}
         frames: list[tuple[tuple[int, ...], Rect]] = []
-        for (own, drawing), shift in zip(blocks, shifts, strict=True):
+        kinds = [*((-1,) if loose else ()), *within]
+        for inner, (own, drawing), shift in zip(kinds, blocks, shifts, strict=True):
             here = [place[m] for m in own]
             if bent.intersection(here):
+                routes.update(self._bent(inner, here, places))
                 continue
             (sx, sy), rect = (shift[0] + whole[0], shift[1] + whole[1]), drawing.rect()
             for (a, b, k), route in drawing.routes.items():
                 routes[here[a], here[b], k] = tuple((x + sx, y + sy) for x, y in route)
-            inner = [*drawing.frames] if own is loose else [(tuple(range(len(own))), rect), *drawing.frames]
+            around = [] if inner < 0 else [(tuple(range(len(own))), rect)]
             frames += [
-                (tuple(here[m] for m in inside), (r[0] + sx, r[1] + sy, r[2] + sx, r[3] + sy)) for inside, r in inner
+                (tuple(here[m] for m in inside), (r[0] + sx, r[1] + sy, r[2] + sx, r[3] + sy))
+                for inside, r in (*around, *drawing.frames)
             ]
         local = [LayoutEdge(e.name, place[e.source], place[e.target], e.delay) for e in edges]
         return routed(Drawing(tuple(places), routes, tuple(frames)), local)
+
+    def _bent(self, number: int, here: Sequence[int], places: Sequence[Point]) -> dict[Key, Route]:
+        """Routes within an instance that pins around it have bent: by themselves, so that others bent so are alike."""
+        if number < 0:
+            return {}
+        at = {member: i for i, member in enumerate(self._problem.modules[number].members)}
+        x, y = places[here[0]]
+        there = tuple((places[i][0] - x, places[i][1] - y) for i in here)
+        inside = [LayoutEdge(e.name, at[e.source], at[e.target], e.delay) for e in self._inside.get(number, ())]
+        return {
+            (here[a], here[b], k): tuple((px + x, py + y) for px, py in route)
+            for (a, b, k), route in routed(Drawing(there, {}, ()), inside).routes.items()
+        }
 
 
 def routed(drawing: Drawing, edges: Sequence[LayoutEdge]) -> Drawing:

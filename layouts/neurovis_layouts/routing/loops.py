@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from neurovis_layouts.routing.obstacles import REACH, Obstacles, points_on
+from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles, points_on
 from neurovis_layouts.routing.walls import FloatArray
 from neurovis_spec.layout.geometry import cubics, distance
 from neurovis_spec.layout.model import Point, Route
@@ -35,8 +35,8 @@ _WAYS: tuple[tuple[Point, float], ...] = (
     ((-_DIAGONAL, _DIAGONAL), 0.2),
 )
 _CROWDED = 0.35
-#: What it costs to enter a foreign frame.
-_ENTERING = 8.0
+#: What it costs to enter a foreign frame, and to run over a disc, which is worse than all else.
+_ENTERING, _OVER = 8.0, 20.0
 #: An edge within some 50° of a loop's way runs along one of its legs, which stand 30° to either side.
 _LEGS = 0.64
 #: Shapes, the first of equals wins: how long the handles are (three quarters of it is how far the loop reaches) and how
@@ -80,7 +80,7 @@ def best_loop(
     for number, route in enumerate(routes):
         way, cost = _WAYS[number // len(shapes)]
         crowd = _crowd(centre, way, near) + _traffic(way, tangents) + cost + 0.12 * (number % len(shapes))
-        crowd += 8 * max(0.0, REACH - clear[number]) + _ENTERING * entering[number]
+        crowd += 8 * max(0.0, REACH - clear[number]) + _ENTERING * entering[number] + _OVER * (clear[number] <= TOUCH)
         costs.append(crowd + _TOGETHER * max((_APART - _between(_seen(route), other) for other in others), default=0.0))
     return routes[min(range(len(routes)), key=lambda number: (costs[number], number // len(shapes)))]
 
