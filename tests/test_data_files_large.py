@@ -93,6 +93,12 @@ def test_stretches_do_not_show_in_the_edges(edges: list[tuple[str, str, str, str
     assert got.rows.tolist() == list(range(2, 2 + len(edges)))
 
 
+@pytest.mark.parametrize("end", LINE_ENDS)
+def test_a_header_ends_with_its_line_however_lines_end(end: str) -> None:
+    got = parse_edges(end.join(["from,to,weight,delay", *["A,B,1,0"] * 50]).encode())
+    assert (len(got.sources), got.fault) == (50, None)
+
+
 @pytest.mark.parametrize("edge", ["A", "A,B,x,1", "A,,1,1", "A,B,1,1.5", "A,B,1,-1", "A,B,1,3000000000", "A,B,nan,1"])
 def test_a_fault_of_an_edge_is_found_among_many(edge: str) -> None:
     lines = ["from,to,weight,delay", *["A,B,1,1"] * 20, edge, *["A,B,1,1"] * 20, "B"]

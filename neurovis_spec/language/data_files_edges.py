@@ -51,7 +51,8 @@ def parse_edges(data: bytes, room: Room | None = None) -> EdgeTable:
     data = data.rstrip(b"\r\n")
     if room is not None:
         room(max(data.count(b"\n"), data.count(b"\r")))
-    separators = data.count(b",", 0, data.find(b"\n") % (len(data) + 1))
+    header = min(data.find(end) % (len(data) + 1) for end in (b"\n", b"\r"))
+    separators = data.count(b",", 0, header)
     if separators > _MOST_SEPARATORS:
         raise CellError("file-format", f"row 1 has {separators + 1:,} cells", _hint())
     if b'"' in data:
