@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import layout_conformance as suite
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from neurovis_layouts.routing import told_apart
 from test_layout_compound import attempt, walkers
 
 import neurovis_spec as nv
-from neurovis_spec.layout import Direction, LayoutProblem
+from neurovis_spec.layout import Direction, LayoutEdge, LayoutProblem
 from neurovis_spec.layout.arrange import lay_out_problem
-from neurovis_spec.layout.geometry import distance, sampled
-from neurovis_spec.layout.model import Route
+from neurovis_spec.layout.geometry import distance, sampled, straight
+from neurovis_spec.layout.metrics import metrics
+from neurovis_spec.layout.model import Point, Route
 from neurovis_spec.layout.problem import canonical
 
 HEAD = "neurovis: 1\nname: pair\nneurons: {L: {count: 2, bias: 1}, R: {count: 2}, M: {}}\n"
@@ -89,6 +91,29 @@ layout: {{mirror: [[l, r], [C1, C2]], boxes: {{q: [D]}}}}
         assert len(pairs(routes)) > 4
         for one, other in pairs(routes):
             assert together(routes[one], routes[other], 0.11) <= 0.2, (one, other)
+
+
+def test_long_ways_there_and_back_do_not_share_a_stretch() -> None:
+    """A small part of a long way is a line to look at."""
+    corners: list[Point] = [(40.0, 0.0), (36.0, 3.0), (10.0, 3.0), (5.0, 0.0), (0.0, 0.0)]
+    back = (corners[0], *(p for a, b in pairwise(corners) for p in straight(a, b)[1:]))
+    there = straight((0.0, 0.0), (40.0, 0.0))
+    assert 0.1 < together(back, there, 0.08) < 0.2
+    edges = [LayoutEdge("A -> B", 0, 1, 0), LayoutEdge("B -> A", 1, 0, 0)]
+    routes = {0: there, 1: back}
+    routes.update(told_apart(edges, [there[0], there[-1]], routes, {0, 1}))
+    assert together(routes[1], routes[0], 0.08) == 0.0
+
+
+def test_bows_over_a_row_are_nested() -> None:
+    """What leads over a neuron in a row is not on what leads to the next one."""
+    pins = {name: (float(x), 0.0) for x, name in enumerate("ABCD")}
+    wired = [("A", "B"), ("B", "C"), ("A", "C"), ("A", "D"), ("D", "A"), ("C", "C"), ("C", "A")]
+    problem = canonical("row", list("ABCD"), edges=suite.named(wired), pins=pins)
+    routes = lay_out_problem(problem, "manual").routes
+    for one, other in (("A -> D", "A -> C"), ("D -> A", "C -> A")):
+        assert together(routes[other], routes[one], 0.08) == 0.0
+    assert metrics(lay_out_problem(problem, "manual"), problem)["edges_over_neurons"] == 0
 
 
 @st.composite

@@ -16,7 +16,7 @@ import numpy as np
 from neurovis_layouts.routing.bows import bow
 from neurovis_layouts.routing.detours import Detours
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
-from neurovis_layouts.routing.strokes import crossings, line_of, together
+from neurovis_layouts.routing.strokes import crossings, line_of, together, tolerable
 from neurovis_layouts.routing.walls import FloatArray, Frame, Walls
 from neurovis_spec.layout.geometry import distance, snap
 from neurovis_spec.layout.model import Point, Route
@@ -152,7 +152,7 @@ class Arcs:
 def _apart(one: FloatArray, other: FloatArray) -> float:
     """What it costs that two arcs between the same ends meet."""
     share = together(one, [other])
-    return _SAME * max(0.0, share - _SHARE) + _CROSSED * crossings(one, [other])
+    return _SAME * max(0.0, share - tolerable(one, _SHARE)) + _CROSSED * crossings(one, [other])
 
 
 def _aside(level: float, line: FloatArray) -> tuple[float, float]:

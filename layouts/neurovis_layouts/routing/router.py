@@ -14,6 +14,7 @@ from neurovis_layouts.routing.bows import FEW_TRIES, MANY_TRIES, Wish, clear_bow
 from neurovis_layouts.routing.curves import Waypoint, curve
 from neurovis_layouts.routing.detours import Detours
 from neurovis_layouts.routing.loops import best_loop
+from neurovis_layouts.routing.nests import nested
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
 from neurovis_layouts.routing.ports import Port, leanings
 from neurovis_layouts.routing.sheaves import spread_out
@@ -72,7 +73,10 @@ def route_all(
         along = [i for i, edge in enumerate(edges) if i not in chosen and _runs_along(edge, centres)]
         routes.update(_curves(edges, centres, along, waypoints, obstacles))
     rest = [i for i, edge in enumerate(edges) if i not in routes and edge.source != edge.target]
-    routes.update(_bows(edges, centres, rest, obstacles))
+    bowed_over = _bows(edges, centres, rest, obstacles)
+    if len(edges) <= min(careful, _MOST_AT_LENGTH):
+        bowed_over.update(nested(edges, centres, bowed_over, obstacles))
+    routes.update(bowed_over)
     walls = Walls(frames, len(centres)) if frames else None
     detoured = {} if walls is None else _round_frames(edges, centres, routes, walls)
     routes.update(detoured)

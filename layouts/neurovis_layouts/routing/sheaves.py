@@ -13,7 +13,7 @@ from collections.abc import Set as AbstractSet
 import numpy as np
 
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
-from neurovis_layouts.routing.strokes import line_of, together
+from neurovis_layouts.routing.strokes import line_of, together, tolerable
 from neurovis_layouts.routing.walls import FloatArray, IntArray, Walls
 from neurovis_spec.layout.model import LayoutEdge, Route
 
@@ -60,7 +60,7 @@ def spread_out(
                 if i not in free:
                     continue
                 mates = [lines[k] for k in group if k != i]
-                if together(lines[i], mates) <= _SHARE:
+                if together(lines[i], mates) <= tolerable(lines[i], _SHARE):
                     continue
                 own = np.sort(np.concatenate([_cells(lines[k]) for k in group]))
                 best = _shifted(drawn[i], edges[i], mates, (drawing, own), obstacles, walls)
@@ -89,7 +89,7 @@ def _shifted(
         _FAR * abs(shift)
         + _ENTERING * (entering + (clearance < TOUCH + _SLACK))
         + _NEARING * (REACH - clearance)
-        + _SAME * max(0.0, together(line, mates) - _SHARE / 2)
+        + _SAME * _SHARE / tolerable(line, _SHARE) * max(0.0, together(line, mates) - tolerable(line, _SHARE) / 2)
         + _OTHER * _crowded(line, drawn)
         for shift, line, clearance, entering in zip(shifts, map(line_of, tried), clear, enters, strict=True)
     ]

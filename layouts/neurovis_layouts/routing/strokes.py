@@ -20,6 +20,8 @@ _CLOSE = 0.12
 #: Hidden by the disc and the arrowhead.
 _END = 0.4
 _STEP = 0.1
+#: How far lines may run on each other, about.
+_RUN = 0.4
 #: How far from a place crossings are counted.
 _NEAR = 2.5
 
@@ -42,6 +44,11 @@ def _lines(routes: Sequence[Route]) -> list[FloatArray]:
     points, owner = points[seen], owner[seen]
     cuts = np.searchsorted(owner, np.arange(1, len(routes)))
     return np.split(points, cuts)
+
+
+def tolerable(line: FloatArray, share: float) -> float:
+    """The share of a line that may run on another: this one, or less where that would be a long way."""
+    return min(share, _RUN / max(_STEP * len(line), _STEP))
 
 
 def together(line: FloatArray, mates: Sequence[FloatArray]) -> float:
