@@ -58,6 +58,43 @@ def after(earlier: nv.CompiledNetwork, later: nv.CompiledNetwork, engine: str = 
     return before, later.layout(engine, earlier=before).value
 
 
+ROW = """\
+neurovis: 1
+name: row
+modules:
+  col: {neurons: {a: {bias: 1}, b: {}, c: {}}, connections: {a -> b: 1, b -> c: 1, c -> a: 0.3}}
+instances: {x: {module: col, count: 3}}
+neurons: {O: {}, I: {count: 3, bias: 1}, H: {count: COUNT}NEW}
+connections: {I -> H: {pattern: all_to_all, weight: 1}, H -> x1.a: 1, x1.c -> x2.a: 1, x2.c -> O: 1, x3.c -> O: 1MORE}
+layout: {direction: DIRECTION}
+"""
+
+
+@pytest.mark.parametrize("direction", ["down", "right"])
+@pytest.mark.parametrize(("new", "more"), [("", ""), (", N: {}", ", N -> O: 1, I2 -> N: 1")])
+def test_new_members_go_on_with_the_row_of_their_group(direction: str, new: str, more: str) -> None:
+    text = ROW.replace("DIRECTION", direction)
+    spec = text.replace("NEW", "").replace("MORE", "").replace("COUNT", "5")
+    grown = text.replace("NEW", new).replace("MORE", more).replace("COUNT", "7")
+    before, now = after(nv.compile_text(spec), nv.compile_text(grown))
+    at = now.positions
+    assert all(at[name] == point for name, point in before.positions.items())
+    dx, dy = at["H5"][0] - at["H4"][0], at["H5"][1] - at["H4"][1]
+    assert at["H6"] == (at["H5"][0] + dx, at["H5"][1] + dy)
+    assert at["H7"] == (at["H6"][0] + dx, at["H6"][1] + dy)
+
+
+@pytest.mark.parametrize(("lost", "back"), [("H3", (2.0, 2.0)), ("H1", (0.0, 2.0))])
+def test_a_new_member_fills_the_gap_in_the_row_of_its_group(lost: str, back: Point) -> None:
+    network = nv.compile_text(
+        ROW.replace("NEW", "").replace("MORE", "").replace("COUNT", "5").replace("DIRECTION", "down")
+    )
+    before = network.layout().value
+    assert before.positions[lost] == back
+    gap = replace(before, positions={name: point for name, point in before.positions.items() if name != lost})
+    assert network.layout(earlier=gap).value.positions == before.positions
+
+
 def apart(layout: Layout) -> bool:
     return all(distance(a, b) >= 0.6 for a, b in combinations(layout.positions.values(), 2))
 

@@ -16,6 +16,7 @@ from neurovis_layouts.edited import by_hand, giving_way, moved_routes
 from neurovis_layouts.pins import Cells
 from neurovis_layouts.resolved import resolved, whole
 from neurovis_layouts.room import Copy, Room, Side
+from neurovis_layouts.rows import Rows
 from neurovis_spec.layout.frames import Frames, Rect, bounds
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import RADIUS, LayoutMirror, LayoutModule, LayoutProblem, Point, Route
@@ -77,6 +78,7 @@ class _Wishes:
                 self._near.setdefault(edge.source, []).append(edge.target)
                 self._near.setdefault(edge.target, []).append(edge.source)
         self._own = _innermost(problem)
+        self._rows = Rows(problem, fresh)
         #: by axis and coordinate in the fresh layout: how many are placed, and on which lines
         self._ranks: dict[tuple[int, float], tuple[int, set[float]]] = {}
         for neuron, point in placed.items():
@@ -92,7 +94,10 @@ class _Wishes:
 
     def wish(self, copy: Copy, placed: Mapping[int, Point]) -> Point:
         """Where the fresh layout puts the anchor, moved as the neighbours have been moved, or, without any, all
-        others."""
+        others; a member of a group goes on with its row."""
+        row = self._rows.next(copy.offsets[0][0], placed) if len(copy.offsets) == 1 else None
+        if row is not None:
+            return snap(row[0]), snap(row[1])
         mates = sorted({mate for neuron, _ in copy.offsets for mate in self._near.get(neuron, ()) if mate in placed})
         if copy.instance < 0 and copy.offsets[0][0] in self._own:
             # what its instance is drawn like goes before what is outside
