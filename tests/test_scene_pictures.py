@@ -218,6 +218,30 @@ def test_a_box_that_foreign_neurons_stand_in_has_no_frame() -> None:
         assert bool([g for g in scene.groups if g.id == "box:both"]) == shown
 
 
+NEST = """\
+neurovis: 1
+name: nest
+modules:
+  a: {neurons: {n: {bias: 1}, m: {}}, connections: {n -> m: 1}}
+  b: {instances: {i: {module: a, count: 2}}, connections: {i1.m -> i2.n: 1}}
+  c: {instances: {i: {module: b, count: 2}}, connections: {i1.i2.m -> i2.i1.n: 1}}
+  d: {instances: {i: {module: c, count: 2}}, connections: {i1.i2.i2.m -> i2.i1.i1.n: 1}}
+instances: {z: {module: d, count: 2}}
+connections: {z1.i1.i1.i1.m -> z2.i2.i2.i2.n: 1, z2.i1.i1.i1.m -> z1.i2.i2.i2.n: 1}
+"""
+
+
+def test_titles_find_a_place_that_no_line_crosses_in_narrow_frames_within_frames() -> None:
+    scene = drawn(nv.compile_text(NEST)).scene
+    titles = [s for g in scene.groups if g.id.startswith("title:") for s in g.shapes if isinstance(s, Text)]
+    assert {title.text for title in titles} == {"z1", "z2", "i1", "i2"}
+    lines = np.concatenate([sample(s.points, 200) for s in scene.shapes() if isinstance(s, Spline)])
+    for number, title in enumerate(titles):
+        x0, y0, x1, y1 = text_rect(title)
+        assert not ((lines > (x0, y0)) & (lines < (x1, y1))).all(axis=1).any()
+        assert not any(overlap(text_rect(title), text_rect(other)) for other in titles[:number])
+
+
 def test_a_title_does_not_stand_in_the_frame_of_another_box() -> None:
     """Where frames stand close together there is room beside one only within the other."""
     words = "neurovis: 1\nname: b\nneurons:\n  A: {count: 3, box: wide title}\n  B: {count: 3, box: other title}\n"

@@ -51,7 +51,8 @@ class Obstacles:
 
     def near(self, rect: Rect) -> Obstacles:
         """Only what lies in a rectangle, and all texts, also those that will be added."""
-        result = Obstacles([], [], self._centres, self._radius)
+        reach = self._radius + 1
+        result = Obstacles([], [], self._centres[_inside(self._centres, rect, reach)], self._radius)
         inside = _inside(self._dots, rect)
         result._dots, result._reaches = self._dots[inside], self._reaches[inside]
         result._frames = self._frames[_inside(self._frames, rect)]
@@ -74,9 +75,11 @@ class Obstacles:
         """How many texts a rectangle touches."""
         return sum(overlap(rect, other) for other in self._texts)
 
-    def hits(self, rect: Rect) -> int:
-        """How much is in the way: a text or a disc weighs more than all lines."""
-        return 10_000 * (self.text_hits(rect) + self.disc_hits(rect)) + self.line_hits(rect) + self.frame_hits(rect)
+    def hits(self, rect: Rect, crossed: int = 1) -> int:
+        """How much is in the way: a text or a disc weighs more than all lines, and a line ``crossed`` times as much as
+        that of a box."""
+        covered = 10_000 * (self.text_hits(rect) + self.disc_hits(rect))
+        return covered + crossed * self.line_hits(rect) + self.frame_hits(rect)
 
     def path_hits(self, dots: FloatArray, ends: tuple[int, ...]) -> int:
         """How much a line through these points would cross: discs other than ``ends`` weigh more than lines."""

@@ -8,7 +8,7 @@ worded alike, and stand in the same place or in its mirror image.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +26,8 @@ _WEIGHTS = {"box": 400, "instance": 600}
 _TOO_MUCH = 10_000
 #: how bad it is to stand in a frame that does not hold the box: worse than lines
 _FOREIGN = 2_000
+#: how much worse than the line of a frame it is to cover a connection
+_CROSSED = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,53 +90,95 @@ _WORDINGS = (
 )
 
 
+@dataclass(frozen=True, slots=True)
+class _Title:
+    """What a title says, how large, and where."""
+
+    text: str
+    size: float
+    place: _Place
+
+
 def _together(boxes: list[Titled], obstacles: Obstacles, theme: Theme) -> list[Text | None]:
-    """The titles of boxes that are alike."""
+    """The titles of boxes that are alike; where no place is free for all, those that would cover something find their
+    own."""
     weight = _WEIGHTS[boxes[0].box.kind]
-    around = [obstacles.near(_grown(item, weight)) for item in boxes]
-    best: tuple[int, float, list[str], list[_Place]] | None = None
-    for wording in _WORDINGS:
-        said = [wording.of(item, weight) for item in boxes]
-        widths = [texts.width(text, wording.size, weight) for text in said]
-        for slot in range(_SLOTS) if all(said) else ():
-            found = [
-                _best(item, slot, width, wording.size, nearby)
-                for item, width, nearby in zip(boxes, widths, around, strict=True)
-            ]
-            places = [place for place in found if place is not None]
-            hits = sum(place.hits for place in places)
-            if len(places) == len(boxes) and (best is None or hits < best[0]):
-                best = (hits, wording.size, said, places)
-            if best is not None and best[0] == 0:
-                return _drawn(*best[1:], weight, obstacles, theme)
-    return [None] * len(boxes) if best is None else _drawn(*best[1:], weight, obstacles, theme)
-
-
-def _drawn(
-    size: float, said: list[str], places: list[_Place], weight: int, obstacles: Obstacles, theme: Theme
-) -> list[Text | None]:
-    """The titles where they have room; lines that cross them keep away from their letters."""
-    result: list[Text | None] = []
-    for text, place in zip(said, places, strict=True):
-        if place.hits < _TOO_MUCH:
-            obstacles.add_text(place.taken)
-            halo = theme.box_fill if place.hits else ""
-            result.append(Text(place.start, text, size, theme.muted, weight=weight, halo=halo))
-        else:
-            result.append(None)
+    reach = [_grown(item, weight) for item in boxes]
+    around = [obstacles.near(rect) for rect in reach]
+    boxes = [
+        replace(item, foreign=tuple(other for other in item.foreign if overlap(rect, other)))
+        for item, rect in zip(boxes, reach, strict=True)
+    ]
+    found = _found(boxes, around, weight)
+    if found is None:
+        return [None] * len(boxes)
+    result: list[Text | None] = [None] * len(boxes)
+    for index, title in sorted(enumerate(found), key=lambda item: item[1].place.hits > 0):
+        hits = title.place.hits + _TOO_MUCH * obstacles.text_hits(title.place.taken)
+        own = _found([boxes[index]], [around[index]], weight) if hits else None
+        if own is not None and own[0].place.hits < hits:
+            title, hits = own[0], own[0].place.hits
+        result[index] = _drawn(title, hits, weight, obstacles, theme)
     return result
 
 
+def _found(boxes: Sequence[Titled], around: Sequence[Obstacles], weight: int) -> list[_Title] | None:
+    """Titles worded alike in the place that covers least; None where there is no place for all."""
+    best: tuple[int, list[_Title]] | None = None
+    tried: set[tuple[float, tuple[str, ...]]] = set()
+    for wording in _WORDINGS:
+        said = tuple(wording.of(item, weight) for item in boxes)
+        if not all(said) or (wording.size, said) in tried:
+            continue
+        tried.add((wording.size, said))
+        widths = [texts.width(text, wording.size, weight) for text in said]
+        for slot in range(_SLOTS):
+            places: list[_Place] = []
+            hits = 0
+            for item, width, nearby in zip(boxes, widths, around, strict=True):
+                place = _best(item, slot, width, wording.size, nearby)
+                if place is None or (best is not None and hits + place.hits >= best[0]):
+                    break
+                places.append(place)
+                hits += place.hits
+            if len(places) == len(boxes):
+                best = hits, [_Title(text, wording.size, at) for text, at in zip(said, places, strict=True)]
+            if best is not None and best[0] == 0:
+                return best[1]
+    return None if best is None else best[1]
+
+
+def _drawn(title: _Title, hits: int, weight: int, obstacles: Obstacles, theme: Theme) -> Text | None:
+    """The title where it has room; lines that cross it keep away from its letters."""
+    if hits >= _TOO_MUCH:
+        return None
+    obstacles.add_text(title.place.taken)
+    halo = theme.box_fill if hits else ""
+    return Text(title.place.start, title.text, title.size, theme.muted, weight=weight, halo=halo)
+
+
+#: how far letters reach above and below their baseline, by their size
+_HEIGHT, _DEPTH = 0.78, 0.22
 #: rows: inside at the top and at the bottom, above, below
 _ROWS = 4
 #: how far a title slides along a row, as shares of the way from one corner to the other
 _SLIDES = (1, 2, 3, 4, 5, 6)
-_SLOTS = _ROWS + 2 + _ROWS * len(_SLIDES) + 2
+_FARTHER = _ROWS + 2 + _ROWS * len(_SLIDES) + 2
+#: then close to the frame, in steps from the edge, for what is narrow or crossed by many lines
+_CLOSE, _CLOSER_STEPS = 5.0, 12
+_SLOTS = _FARTHER + _ROWS * _CLOSER_STEPS
 
 
-def _starts(rect: Rect, width: float, slot: int) -> tuple[Point, ...]:
+def _starts(rect: Rect, width: float, size: float, slot: int) -> tuple[Point, ...]:
     """Starts of the baseline in a place, and in its mirror image; slots count from the best on."""
     x0, y0, x1, y1 = rect
+    if slot >= _FARTHER:
+        row, place = divmod(slot - _FARTHER, _CLOSER_STEPS)
+        y = (y0 + 3 + _HEIGHT * size, y1 - 3 - _DEPTH * size, y0 - 5, y1 + 3 + _HEIGHT * size)[row]
+        inset = _CLOSE if row < 2 else -_CLOSE - 0.5 * width  # outside, beyond the corners
+        left, right = x0 + inset, x1 - inset - width
+        slid = 0.5 * (right - left) * place / (_CLOSER_STEPS - 1)
+        return ((right - slid, y), (left + slid, y)) if right > left else ()
     rows = (y0 + 14, y1 - 6, y0 - 6, y1 + 15)
     left, right = x0 + 10, x1 - 10 - width
     if slot < _ROWS:  # the corners
@@ -155,15 +199,18 @@ def _best(item: Titled, slot: int, width: float, size: float, obstacles: Obstacl
     """The better of a place and its mirror image; None where neither lies in the room."""
     best: _Place | None = None
     x0, y0, x1, y1 = item.room
-    beside = slot >= _SLOTS - 2
-    for x, y in _starts(item.rect, width, slot):
+    beside = _FARTHER - 2 <= slot < _FARTHER
+    for x, y in _starts(item.rect, width, size, slot):
         if beside and not x0 <= x <= x1 - width:
             continue
         x = min(max(x, x0), x1 - width)
         taken = (x - 2, y - size, x + width + 2, y + 0.3 * size)
+        if slot >= _FARTHER:
+            taken = (x - 1, y - _HEIGHT * size, x + width + 1, y + _DEPTH * size)
         if taken[1] < y0 or taken[3] > y1:
             continue
-        hits = obstacles.hits(taken) + _FOREIGN * sum(overlap(taken, other) for other in item.foreign)
+        hits = obstacles.hits(taken, _CROSSED)
+        hits += _FOREIGN * sum(overlap(taken, other) for other in item.foreign)
         if best is None or hits < best.hits:
             best = _Place((x, y), taken, hits)
     return best
