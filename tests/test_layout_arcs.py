@@ -1,4 +1,5 @@
-"""Mirror images that drive each other are joined by arcs: clear of discs, of foreign frames, and of each other."""
+"""Mirror images that drive each other are joined by arcs: clear of discs, of foreign frames, and of each other. What no
+arc gets round takes a detour."""
 
 from __future__ import annotations
 
@@ -110,6 +111,24 @@ def test_arcs_are_clear_of_what_is_in_the_way_and_of_each_other(text: str) -> No
             twice = route[0][across] + route[-1][across]
             assert [point[across] for point in route] == [twice - point[across] for point in route[::-1]]
             assert [point[1 - across] for point in route] == [point[1 - across] for point in route[::-1]]
+
+
+@pytest.mark.parametrize("direction", ["left", "right"])
+def test_what_no_bow_gets_round_takes_a_detour(direction: str) -> None:
+    """Grids, rings and columns, where ranks hold discs at all heights."""
+    sparse = "{pattern: {random: {probability: 0.3}}, weight: 1}"
+    text = f"""neurovis: 1
+name: arr{direction}
+neurons: {{A: {{count: 4, bias: 1}}, B: {{count: 6}}, C: {{count: 9}}, D: {{count: 7}}, E: {{count: 5}}, O: {{}}}}
+connections:
+  A -> B: {{pattern: all_to_all, weight: 1}}
+  B -> C: {sparse}
+  C -> D: {sparse}
+  D -> E: {sparse}
+  E -> O: 1
+layout: {{direction: {direction}, arrange: {{A: row, B: column, C: grid, D: ring, E: arc}}}}
+"""
+    assert over_discs(lay_out_problem(problem_of(nv.compile_text(text).network), "layered")) == []
 
 
 @settings(max_examples=60, deadline=None)

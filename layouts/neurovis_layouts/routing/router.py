@@ -11,8 +11,8 @@ from collections.abc import Set as AbstractSet
 
 from neurovis_layouts.routing.arrivals import parted
 from neurovis_layouts.routing.bows import FEW_TRIES, MANY_TRIES, Wish, clear_bow, clear_bows
+from neurovis_layouts.routing.bypasses import round_discs, round_frames, shared_ends
 from neurovis_layouts.routing.curves import Waypoint, curve
-from neurovis_layouts.routing.detours import Detours
 from neurovis_layouts.routing.loops import best_loop
 from neurovis_layouts.routing.nests import nested
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
@@ -78,7 +78,9 @@ def route_all(
         bowed_over.update(nested(edges, centres, bowed_over, obstacles))
     routes.update(bowed_over)
     walls = Walls(frames, len(centres)) if frames else None
-    detoured = {} if walls is None else _round_frames(edges, centres, routes, walls)
+    detoured = {} if walls is None else round_frames(edges, centres, routes, walls)
+    if len(edges) <= min(careful, _MOST_AT_LENGTH):
+        detoured.update(round_discs(edges, centres, {**routes, **detoured}, obstacles, walls))
     routes.update(detoured)
     if len(edges) <= min(careful, _MOST_AT_LENGTH):
         bows = frozenset(rest) - detoured.keys()
@@ -108,29 +110,6 @@ def told_apart(
     return {**found, **parted(edges, centres, {**routes, **found}, free, drawn, obstacles, walls)}
 
 
-def _round_frames(
-    edges: Sequence[LayoutEdge], centres: Sequence[Point], routes: Mapping[int, Route], walls: Walls
-) -> dict[int, Route]:
-    """Detours for the routes that enter foreign frames: first those that are longest by their straight way, which so
-    take the inner lanes round what they share with others."""
-    chosen = sorted(routes)
-    entered = walls.entered([routes[i] for i in chosen], [(edges[i].source, edges[i].target) for i in chosen])
-    through = [i for i, enters in zip(chosen, entered, strict=True) if enters]
-    if not through:
-        return {}
-    shared = _shared(edges)
-    first = Detours(walls, centres, 1, ways=len(through))
-    detours = Detours(walls, centres, ways=len(through))
-    longer = {i: first.longer(edges[i].source, edges[i].target) for i in through}
-    found: dict[int, Route] = {}
-    for i in sorted(through, key=lambda i: (-longer[i], i)):
-        own = edges[i].source, edges[i].target
-        route = detours.route(*own, own not in shared)
-        if route is not None:
-            found[i] = route
-    return found
-
-
 def _runs_along(edge: LayoutEdge, centres: Sequence[Point]) -> bool:
     (ax, ay), (bx, by) = centres[edge.source], centres[edge.target]
     return abs(by - ay) >= max(_STEEP_ENOUGH, abs(bx - ax) / 40)
@@ -144,7 +123,7 @@ def _curves(
     obstacles: Obstacles,
 ) -> dict[int, Route]:
     lean = _lean(edges, centres, chosen, waypoints)
-    shared = _shared(edges)
+    shared = shared_ends(edges)
     heights: dict[tuple[int, int], float] = {}
     routes: dict[int, Route] = {}
     owns = [(edges[i].source, edges[i].target) for i in chosen]
@@ -184,15 +163,6 @@ def _curves(
                 best, heights[owns[k]] = bowed, height
         routes[chosen[k]] = best
     return routes
-
-
-def _shared(edges: Sequence[LayoutEdge]) -> frozenset[tuple[int, int]]:
-    """Ends that several edges share, in either direction: these must not leave their side."""
-    times: dict[tuple[int, int], int] = {}
-    for edge in edges:
-        for ends in ((edge.source, edge.target), (edge.target, edge.source)):
-            times[ends] = times.get(ends, 0) + 1
-    return frozenset(ends for ends, count in times.items() if count > 1)
 
 
 def _lean(
