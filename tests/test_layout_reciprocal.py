@@ -116,6 +116,14 @@ def test_bows_over_a_row_are_nested() -> None:
     assert metrics(lay_out_problem(problem, "manual"), problem)["edges_over_neurons"] == 0
 
 
+def test_a_bow_is_not_raised_on_to_another_between_the_same_ends() -> None:
+    wired = [("A", "A")] * 2 + [("A", "B")] * 2 + [("A", "C"), ("A", "D")] + [("B", "A")] * 5 + [("C", "B")] * 2
+    wired += [("C", "C")] * 2 + [("D", "A")] * 3
+    pins = {"A": (0.0, -0.9), "C": (0.0, 2.7)}
+    problem = canonical("raised", list("ABCD"), edges=suite.named(wired), pins=pins, boxes=[("frame", list("ABCD"))])
+    suite.check(problem, "large")
+
+
 @st.composite
 def sheaves(draw: st.DrawFn) -> LayoutProblem:
     """Up to six connections between two neurons, there and back, among others."""

@@ -32,11 +32,13 @@ def nested(
     found: dict[int, Route] = {}
     lengths = {i: distance(route[0], route[-1]) for i, route in routes.items()}
     for i in sorted(routes, key=lambda i: (lengths[i], i)):
-        ends = {edges[i].source, edges[i].target}
+        ends = _ends(edges[i])
         near = {k for end in ends for k in at[end] if len(at[end]) <= _MOST}
         spanned = [k for k in sorted(near) if lengths[k] < lengths[i] and _spans(routes[i], centres, ends, edges[k])]
         mates = [line_of(found.get(k, routes[k])) for k in spanned]
         if mates and _shared(routes[i], mates) > 0:
+            # not on to what it shares both ends with
+            mates += [line_of(found.get(k, routes[k])) for k in sorted(near - {i}) if ends == _ends(edges[k])]
             raised = [_raised(routes[i], more) for more in _RAISED]
             clear = obstacles.clearances(raised, [(edges[i].source, edges[i].target)] * len(raised))
             enough = min(REACH - 0.03, obstacles.clearance(routes[i], (edges[i].source, edges[i].target)))
@@ -55,6 +57,10 @@ def _spans(route: Route, centres: Sequence[Point], ends: set[int], other: Layout
     (ax, ay), (bx, by), (x, y) = route[0], route[-1], centres[far[0]]
     across = (x - ax) * (by - ay) - (y - ay) * (bx - ax)
     return abs(across) < _NEAR * distance(route[0], route[-1])
+
+
+def _ends(edge: LayoutEdge) -> set[int]:
+    return {edge.source, edge.target}
 
 
 def _shared(route: Route, mates: Sequence[FloatArray]) -> float:
