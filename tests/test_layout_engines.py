@@ -257,7 +257,15 @@ def test_the_order_of_the_spec_does_not_show(problem: LayoutProblem, random: obj
     )
     assert shuffled == problem
     for engine in ("layered", "organic", "large"):
-        assert dump(lay_out_problem(shuffled, engine)) == dump(lay_out_problem(problem, engine))
+        assert _made(shuffled, engine) == _made(problem, engine)
+
+
+def _made(problem: LayoutProblem, engine: str) -> str:
+    """The layout file, or why there is none: pins may put a neuron into a frame that is not its own."""
+    try:
+        return dump(lay_out_problem(problem, engine))
+    except LayoutRefusalError as refusal:
+        return str(refusal)
 
 
 def test_the_same_network_under_other_names_in_the_same_order_lies_the_same() -> None:
