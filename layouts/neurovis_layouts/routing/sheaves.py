@@ -70,6 +70,12 @@ def spread_out(
     return {i: drawn[i] for i in sorted(moved)}
 
 
+def _shared(line: FloatArray, mates: Sequence[FloatArray]) -> float:
+    """What it costs that a line runs on one of its mates; less than to enter a frame or to run over a disc."""
+    most = tolerable(line, _SHARE)
+    return min(_ENTERING / 2, _SAME * _SHARE / most * max(0.0, together(line, mates) - most / 2))
+
+
 def _shifted(
     route: Route,
     edge: LayoutEdge,
@@ -89,7 +95,7 @@ def _shifted(
         _FAR * abs(shift)
         + _ENTERING * (entering + (clearance < TOUCH + _SLACK))
         + _NEARING * (REACH - clearance)
-        + _SAME * _SHARE / tolerable(line, _SHARE) * max(0.0, together(line, mates) - tolerable(line, _SHARE) / 2)
+        + _shared(line, mates)
         + _OTHER * _crowded(line, drawn)
         for shift, line, clearance, entering in zip(shifts, map(line_of, tried), clear, enters, strict=True)
     ]
