@@ -27,6 +27,7 @@ from neurovis_spec.runtime.files import replacing
 
 if TYPE_CHECKING:
     from neurovis_spec.layout import Layout, Point, Route
+    from neurovis_spec.runtime.record import Course
     from neurovis_spec.runtime.recording import Recording, Snapshot
     from neurovis_spec.runtime.simulation import Simulation
     from neurovis_spec.scene.gains import Gains
@@ -95,7 +96,7 @@ class CompiledNetwork:
         ``inputs`` replace the sources of inputs: arrays of (steps,) or (steps, size). Raises InputError, BackendError,
         RecordingError.
         """
-        return pipeline.simulate(self.network, steps, inputs, backend, every, start, progress)
+        return pipeline.simulate(self.network, self._course(steps, inputs, backend, every), start, progress)
 
     def run_to(
         self,
@@ -111,10 +112,15 @@ class CompiledNetwork:
         """Run as ``run`` does and write the recording to a file while it is made, in memory that does not grow with the
         steps. What was there stays until the end. Raises what ``run`` and ``Recording.save`` raise, RecordingError
         where the disk has not the room, and after Ctrl-C a KeyboardInterrupt; the file holds the steps until then."""
+        course = self._course(steps, inputs, backend, every)
+        pipeline.simulate_to(self.network, Path(path), course, start, progress)
+
+    def _course(
+        self, steps: int | None, inputs: Mapping[str, npt.ArrayLike] | None, backend: str | None, every: int
+    ) -> Course:
         from neurovis_spec.runtime.record import Course
 
-        steps = self.network.steps if steps is None else steps
-        pipeline.simulate_to(self.network, Path(path), Course(steps, every, inputs, backend), start, progress)
+        return Course(self.network.steps if steps is None else steps, every, inputs, backend)
 
     def layout(
         self, engine: str | None = None, *, earlier: Layout | None = None, progress: Progress | None = None

@@ -18,8 +18,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy.typing as npt
-
 from neurovis_spec.compiler.compile import Request, compile_spec
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.wishes import RenderSettings
@@ -75,18 +73,12 @@ def allow(findings: Findings) -> None:
 
 
 def simulate(
-    network: Network,
-    steps: int | None = None,
-    inputs: Mapping[str, npt.ArrayLike] | None = None,
-    backend: str | None = None,
-    every: int = 1,
-    start: Recording | None = None,
-    progress: Progress | None = None,
+    network: Network, course: Course, start: Recording | None = None, progress: Progress | None = None
 ) -> Recording:
     """Run the update program, record activities and weights."""
     from neurovis_spec.runtime.record import record
 
-    return record(network, steps, inputs, backend, every, start, progress)
+    return record(network, course.steps, course.inputs, course.backend, course.every, start, progress)
 
 
 def simulate_to(
