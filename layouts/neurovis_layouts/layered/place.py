@@ -32,7 +32,7 @@ _BESIDE_PASSAGE = 0.25
 _BETWEEN_BOXES = 0.6
 _MOST_STRETCH = 2.0
 _NARROW = 0.4
-_FLAT = 14.0
+_FLAT, _FANNED = 14.0, 5.0
 _HARDLY = 1e-7
 
 
@@ -43,12 +43,13 @@ def placed(
     rank_spacing: float,
     partner: Sequence[int] | None = None,
     columns: AbstractSet[int] = frozenset(),
+    fanned: AbstractSet[int] = frozenset(),
 ) -> list[Point]:
     """x across (the middle of the whole is 0) and y along (the first rank is at 0) of every node.
 
     With ``partner``, for each node the one that is its mirror image (each rank's order turned round is that of the
     partners), the axis is at 0, and places are mirror images to the last bit. ``columns`` are boxes that get a strip
-    for themselves.
+    for themselves; from ``fanned`` ranks, where frames stand in rows, connections fan out to others.
     """
     neuron_spacing = max(neuron_spacing, 0.65)
     gaps = _gaps(levels, order, neuron_spacing)
@@ -60,7 +61,7 @@ def placed(
         across = strips.kept(across, _pulls(levels)) if strips.fit() else across
     if partner is not None:
         across = [(x - across[partner[node]]) / 2 for node, x in enumerate(across)]
-    along = _along(levels, order, across, rank_spacing)
+    along = _along(levels, order, across, rank_spacing, fanned)
     if not across:
         return []
     xs = [across[i] for i, node in enumerate(levels.nodes) if node.members]
@@ -177,7 +178,9 @@ def reaches(levels: Levels, order: Sequence[Sequence[int]]) -> tuple[list[float]
     return before, behind
 
 
-def _along(levels: Levels, order: Sequence[Sequence[int]], x: Sequence[float], spacing: float) -> list[float]:
+def _along(
+    levels: Levels, order: Sequence[Sequence[int]], x: Sequence[float], spacing: float, fanned: AbstractSet[int]
+) -> list[float]:
     before, behind = reaches(levels, order)
     result: list[float] = []
     for r in range(len(order)):
@@ -185,6 +188,6 @@ def _along(levels: Levels, order: Sequence[Sequence[int]], x: Sequence[float], s
             result.append(0.0)
             continue
         longest = max((abs(x[s.upper] + s.a - x[s.lower] - s.b) for s in levels.segments[r - 1]), default=0.0)
-        wide = max(1.0, min(2.5, longest / _FLAT))
+        wide = max(1.0, min(2.5, longest / (_FANNED if (r in fanned) != (r - 1 in fanned) else _FLAT)))
         result.append(snap(result[-1] + behind[r - 1] + before[r] + max(spacing, 0.75) * wide))
     return result

@@ -13,6 +13,8 @@ from itertools import pairwise
 from neurovis_layouts.formations import columns, grid
 from neurovis_layouts.layered.columns import straightened, tied, with_spines
 from neurovis_layouts.layered.components import components_of, packed
+from neurovis_layouts.layered.exits import with_exits
+from neurovis_layouts.layered.folds import folded, interleaved, stacked
 from neurovis_layouts.layered.levels import Levels, levels_of
 from neurovis_layouts.layered.mirror import mirrored, symmetric
 from neurovis_layouts.layered.order import ordered
@@ -119,8 +121,11 @@ def _component(
     rank = _ranks(problem, units, bonds, edges)
     if pair:
         rank = _one_on_axis(units, bonds, rank, pair)
+    folds = folded(problem, units, bonds, rank, edges, pair)
+    rank = folds.rank
     rank += [max(rank)] * len(guests)
     levels = levels_of(problem, everyone, rank, edges, columns)
+    interleaved(levels, problem, folds)
     with_spines(problem, levels, columns)
     partner: list[int] | None = None
     if pair:
@@ -133,7 +138,9 @@ def _component(
         else:
             levels, order = tied(levels, straight, columns)
     levels, flipped = turned(levels, order, {min(unit.members) for unit in units if unit.turns})
-    places = placed(levels, order, problem.neuron_spacing, problem.rank_spacing, partner, columns)
+    places = placed(
+        stacked(levels, folds), order, problem.neuron_spacing, problem.rank_spacing, partner, columns, folds.ranks
+    )
     _draw_in(levels, order, places, {m for unit in guests for m in unit.members}, problem.neuron_spacing)
     plan = Plan(turned=flipped)
     for node, (x, y) in zip(levels.nodes, places, strict=True):
@@ -144,6 +151,7 @@ def _component(
     spans = list(zip(*reaches(levels, order), strict=True))
     for i, passages in levels.passages.items():
         plan.ways[i] = [_passage(places[n], *spans[levels.nodes[n].rank]) for n in passages]
+    plan.ways = with_exits(problem, edges, levels, places, spans, folds, plan.ways)
     return plan
 
 

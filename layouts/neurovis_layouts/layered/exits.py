@@ -1,0 +1,66 @@
+"""Exits: where connections leave the frames of folds, so that they fan out from there without bending.
+
+In: levels with their places, folds. Out: for connections of frames in folds waypoints on the far line of the rank,
+straight before the neuron; those that leave a frame side by side stand in the order in which they go apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from neurovis_layouts.layered.folds import Folds
+from neurovis_layouts.layered.levels import Levels
+from neurovis_layouts.routing import Waypoint
+from neurovis_spec.layout.model import LayoutProblem, Point
+
+#: How close a neuron of the same frame may stand to the line out of it, and how far apart such lines are.
+_CLEAR, _APART = 0.5, 0.16
+
+
+def with_exits(
+    problem: LayoutProblem,
+    edges: Sequence[int],
+    levels: Levels,
+    places: Sequence[Point],
+    spans: Sequence[tuple[float, float]],
+    folds: Folds,
+    ways: Mapping[int, list[Waypoint]],
+) -> dict[int, list[Waypoint]]:
+    """The waypoints of each edge, from above to below, those at the exits among them; ``spans`` say how far each rank
+    reaches before its line and behind it."""
+    found = {i: list(line) for i, line in ways.items()}
+    if not folds.slots:
+        return found
+    node = {m: n for n, each in enumerate(levels.nodes) for m, _, _ in each.members}
+    rank = {m: levels.nodes[n].rank for m, n in node.items()}
+    leaving: dict[tuple[int, bool], list[tuple[float, int]]] = {}
+    for i in edges:
+        ends = sorted((problem.edges[i].source, problem.edges[i].target), key=lambda m: rank[m])
+        line = [way.x for way in ways.get(i, ())]
+        for end, other, down in ((ends[0], ends[1], True), (ends[1], ends[0], False)):
+            if rank[end] != rank[other] and end in folds.slots and _open(levels, node[end], end, down):
+                towards = [*(line if down else line[::-1]), _at(levels, places, node[other], other)][0]
+                leaving.setdefault((end, down), []).append((towards, i))
+    for (end, down), lines in sorted(leaving.items()):
+        n = node[end]
+        before, behind = spans[rank[end]]
+        y = places[n][1] - levels.nodes[n].lift + (behind if down else -before)
+        middle = _at(levels, places, n, end)
+        for place, (_, i) in enumerate(sorted(lines)):
+            gate = Waypoint(middle + (place - (len(lines) - 1) / 2) * _APART, y)
+            found[i] = [gate, *found.get(i, [])] if down else [*found.get(i, []), gate]
+    return found
+
+
+def _at(levels: Levels, places: Sequence[Point], node: int, member: int) -> float:
+    """Where a neuron stands across."""
+    return places[node][0] + next(dx for m, dx, _ in levels.nodes[node].members if m == member)
+
+
+def _open(levels: Levels, node: int, member: int, down: bool) -> bool:
+    """Whether nothing of its own frame stands between a neuron and the line of the rank."""
+    x, y = next((dx, dy) for m, dx, dy in levels.nodes[node].members if m == member)
+    return not any(
+        m != member and abs(dx - x) < _CLEAR and (dy > y if down else dy < y)
+        for m, dx, dy in levels.nodes[node].members
+    )
