@@ -137,7 +137,8 @@ def test_differences_are_what_sifting_saves(levels: Levels) -> None:
     for rank in levels.ranks:
         place[rank] = np.arange(len(rank))
     for r, rank in enumerate(levels.ranks):
-        costs = segments.differences(len(rank), (segments.above[r], segments.below[r]), place)
+        sides = segments.above[r], segments.below[r]
+        costs = sum((segments.differences(len(rank), side, place) for side in sides), np.zeros((1, 1), np.int64))
         boxes: Ints = np.array([levels.nodes[node].box for node in rank], dtype=np.int64)
         start = np.lexsort((np.arange(len(rank)), boxes))
         first = [[*other] for other in levels.ranks]

@@ -72,17 +72,21 @@ class Segments:
         end = self.gap * wide + place[self.lower] * self.ports + self.lower_port
         return inversions(end[np.argsort(start * (int(end.max(initial=0)) + 1) + end)])
 
-    def differences(self, size: int, sides: Sequence[Side], place: Ints) -> Ints:
+    def differences(self, size: int, side: Side, place: Ints) -> Ints:
         """For the nodes of a rank, by their places in ``ranks[r]``: (i, j) is how many more crossings they have with
-        each other if i stands before j than if j stands before i."""
+        each other on this side if i stands before j than if j stands before i."""
         result = np.zeros((size, size), dtype=np.int64)
-        for side in sides:
-            if not len(side.other):
-                continue
-            key = place[side.other] * self.ports + side.port
-            behind = (key[:, None] > key).astype(np.int64)
-            pairs = np.add.reduceat(np.add.reduceat(behind, side.starts, axis=0), side.starts, axis=1)
-            result[side.who[:, None], side.who] += pairs - pairs.T
+        count = len(side.other)
+        if not count:
+            return result
+        key = place[side.other] * self.ports + side.port
+        along = np.argsort(key, kind="stable")
+        # (k, j): how many of the first k segments, in the order of their other ends, are of the j-th node
+        before = np.zeros((count + 1, len(side.starts)), dtype=np.int64)
+        before[np.arange(1, count + 1), np.repeat(np.arange(len(side.starts)), side.sizes())[along]] = 1
+        np.cumsum(before, axis=0, out=before)
+        pairs = np.add.reduceat(before[np.searchsorted(key[along], key)], side.starts, axis=0)
+        result[side.who[:, None], side.who] = pairs - pairs.T
         return result
 
     def means(self, size: int, side: Side, place: Ints) -> Floats:

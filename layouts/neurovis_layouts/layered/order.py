@@ -125,9 +125,13 @@ class _State:
     def __init__(self, search: _Search, order: list[Ints]) -> None:
         self.search, self.order = search, order
         self.place = places(len(search.levels.nodes), order)
+        # by rank and side: the order beside it, and what its nodes cost each other with regard to that
+        self.known: dict[tuple[int, bool], tuple[Ints, Ints]] = {}
 
     def copy(self) -> _State:
-        return _State(self.search, list(self.order))
+        state = _State(self.search, list(self.order))
+        state.known = dict(self.known)
+        return state
 
     def count(self) -> int:
         return self.search.segments.count(self.place)
@@ -184,13 +188,22 @@ class _State:
 
     def _sifted(self, r: int, order: Ints, both: bool, down: bool) -> tuple[Ints, int]:
         search = self.search
-        sides = [search.segments.above[r]] if both or down else []
-        sides += [search.segments.below[r]] if both or not down else []
-        costs = search.segments.differences(len(order), sides, self.place)
+        costs = self._costs(r, True) + self._costs(r, False) if both else self._costs(r, down).copy()
         for mates in search.kin[r]:
             costs[mates[:, None], mates] = np.sign(mates[:, None] - mates) * HELD
         boxes = search.boxes[r]
         return sifted(costs, order) if boxes is None else sifted_in_boxes(costs, order, boxes)
+
+    def _costs(self, r: int, above: bool) -> Ints:
+        """What the nodes of a rank cost each other with regard to the rank above, else below, as long as that keeps its
+        order."""
+        segments, beside = self.search.segments, r - 1 if above else r + 1
+        order = self.order[beside] if 0 <= beside < len(self.order) else self.order[r][:0]
+        known = self.known.get((r, above))
+        if known is None or not (known[0] is order or np.array_equal(known[0], order)):
+            side = (segments.above if above else segments.below)[r]
+            known = self.known[r, above] = (order, segments.differences(len(self.order[r]), side, self.place))
+        return known[1]
 
     def _settled(self, r: int, order: Ints, value: Floats) -> Ints:
         """Sorted by value, boxes as a whole; neurons of a group take the places that they got in natural order."""

@@ -26,17 +26,18 @@ def sifted(costs: Ints, order: Ints) -> tuple[Ints, int]:
     saved, count = 0, len(order)
     if count < 2:
         return order, 0
-    left = np.tri(count, k=-1, dtype=np.int64)
+    at = np.arange(count)
+    behind = at[:, None] > at
+    line, here = order, costs[order].take(order, axis=1)
     while True:
-        here = costs[order[:, None], order]
+        # (i, j): what the i-th has with those up to the j-th, itself among them; with those it passes if it goes there
         sums = np.cumsum(here, axis=1)
-        # (i, j): what is added if the i-th takes the place of the j-th: it passes all between and that one
-        added = sums.diagonal()[:, None] - sums + here * left
-        best = added.argmin(axis=1)
-        gain = -added[np.arange(count), best]
+        passed = np.where(behind, sums - here, sums)
+        best = passed.argmax(axis=1)
+        gain = passed[at, best] - sums.diagonal()
         if not (gain > 0).any():
-            return order, saved
-        line = order.tolist()
+            return line, saved
+        places = list(range(count))
         taken = np.zeros(count, dtype=np.bool_)
         for i in np.argsort(-gain, kind="stable").tolist():
             if gain[i] <= 0:
@@ -46,8 +47,9 @@ def sifted(costs: Ints, order: Ints) -> tuple[Ints, int]:
             if not taken[span].any():
                 taken[span] = True
                 saved += int(gain[i])
-                line.insert(j, line.pop(i))
-        order = np.array(line, dtype=np.int64)
+                places.insert(j, places.pop(i))
+        moved = np.array(places, dtype=np.int64)
+        line, here = line[moved], here[moved].take(moved, axis=1)
 
 
 def sifted_in_boxes(costs: Ints, order: Ints, boxes: Ints) -> tuple[Ints, int]:
