@@ -31,6 +31,8 @@ _SHAKES = ((100, 0), (200, 2), (400, 0), (100, 2), (200, 0), (400, 2))
 #: In a short rank nodes are shaken at least so many 1024ths of a place.
 _LEAST_SHAKE = 2048
 _PATIENCE = 24
+#: Beyond this the order that keeps groups in theirs is not shaken where another is clearly better.
+_LONG = 100_000
 
 
 def ordered(levels: Levels) -> Order:
@@ -45,8 +47,13 @@ def ordered(levels: Levels) -> Order:
         starts.append([rank[::-1] for rank in natural])
     strict = held.best(starts)
     if strict[0] == 0 or not any(held.kin):
-        return strict[1]
-    free = _Search(levels, segments, False).best([natural, strict[1]])
+        return held.shaken(*strict)[1]
+    loose = _Search(levels, segments, False)
+    if held.work > _LONG:
+        free = loose.shaken(*loose.best([natural, strict[1]]))
+        return free[1] if free[0] < _CLEARLY * strict[0] else held.shaken(*strict)[1]
+    strict = held.shaken(*strict)
+    free = loose.shaken(*loose.best([natural, strict[1]]))
     return free[1] if free[0] < _CLEARLY * strict[0] else strict[1]
 
 
@@ -73,25 +80,50 @@ class _Search:
         self.boxes = [_shared(boxes[ids]) for ids in self.ids]
         self.kin = [_kin(levels, rank) if strict else [] for rank in levels.ranks]
         self.work = sum(len(side.other) ** 2 + _A_RANK for side in (*segments.above, *segments.below)) // 2
+        # by order: what sifting makes of it, and a sweep; different starts lead to the same orders
+        self._settled: dict[bytes, tuple[int, list[Ints]]] = {}
+        self._swept: dict[tuple[bytes, bool], list[Ints]] = {}
+
+        self.sifts = self.work <= _SIFTED and max(len(rank) for rank in self.ids) ** 2 <= _SIFTED
 
     def best(self, starts: Sequence[Order]) -> tuple[int, Order]:
-        sift = self.work <= _SIFTED and max(len(rank) for rank in self.ids) ** 2 <= _SIFTED
+        """The best order that sweeps and sifting lead to, and its crossings."""
+        sift = self.sifts
         best: tuple[int, list[Ints]] | None = None
         for start in starts if sift else starts[1:2]:
             state = _State(self, [np.array(rank, dtype=np.int64) for rank in start])
             state.shake(repeat(0), 0)
             for sweep in range((_SWEEPS if sift else _PLAIN_SWEEPS) + 1):
-                if sweep:
-                    state.sweep(sweep % 2 == 1, sift)
-                now = state.copy()
-                crossings = now.count() - (now.sift() if sift else 0)
+                if sweep and sift:
+                    state = self._after(state, sweep % 2 == 1)
+                elif sweep:
+                    state.sweep(sweep % 2 == 1, False)
+                crossings, order = self._sifted(state.copy()) if sift else (state.count(), list(state.order))
                 if best is None or crossings < best[0]:
-                    best = crossings, now.order
+                    best = crossings, order
                 if crossings == 0:
-                    return 0, [rank.tolist() for rank in now.order]
+                    return 0, [rank.tolist() for rank in order]
         assert best is not None
-        best = self._shaken(*best) if sift else Exchange(self.segments, self._classes()).improved(*best)
+        if not sift:
+            best = Exchange(self.segments, self._classes()).improved(*best)
         return best[0], [rank.tolist() for rank in best[1]]
+
+    def _sifted(self, state: _State) -> tuple[int, list[Ints]]:
+        """The order of a state after all of its ranks are sifted, and its crossings."""
+        key = state.key()
+        if key not in self._settled:
+            crossings = state.count() - state.sift()
+            self._settled[key] = crossings, list(state.order)
+        return self._settled[key]
+
+    def _after(self, state: _State, down: bool) -> _State:
+        """The state after a sweep."""
+        key = state.key(), down
+        if key not in self._swept:
+            state.sweep(down, True)
+            self._swept[key] = list(state.order)
+            return state
+        return _State(self, list(self._swept[key]))
 
     def _classes(self) -> tuple[Ints, Ints]:
         """Boxes and, where their order is kept, groups by node."""
@@ -99,24 +131,26 @@ class _Search:
         box = np.array([node.box for node in nodes], dtype=np.int64)
         return box, np.array([node.kin if self.strict else -1 for node in nodes], dtype=np.int64)
 
-    def _shaken(self, crossings: int, order: list[Ints]) -> tuple[int, list[Ints]]:
-        best, now = (crossings, order), (crossings, order)
+    def shaken(self, crossings: int, order: Order) -> tuple[int, Order]:
+        """The best of what that order is shaken into."""
+        arrays = [np.array(rank, dtype=np.int64) for rank in order]
+        best, now = (crossings, arrays), (crossings, arrays)
         dice, since = _dice(), 0
-        for turn in range(min(_MOST_TIMES, _SHAKEN // self.work)):
+        for turn in range(min(_MOST_TIMES, _SHAKEN // self.work) if self.sifts and crossings else 0):
             far, sweeps = _SHAKES[turn % len(_SHAKES)]
             state = _State(self, list(now[1]))
             state.shake(dice, far)
             for sweep in range(sweeps):
-                state.sweep((sweep + turn) % 2 == 0, True)
-            found = state.count() - state.sift()
+                state = self._after(state, (sweep + turn) % 2 == 0)
+            found, shaken = self._sifted(state)
             since = 0 if found < best[0] else since + 1
             if found <= now[0]:
-                now = found, state.order
+                now = found, shaken
             if found < best[0]:
                 best = now
             if found == 0 or since > _PATIENCE:
                 break
-        return best
+        return best[0], [rank.tolist() for rank in best[1]]
 
 
 class _State:
@@ -132,6 +166,9 @@ class _State:
         state = _State(self.search, list(self.order))
         state.known = dict(self.known)
         return state
+
+    def key(self) -> bytes:
+        return np.concatenate(self.order).tobytes()
 
     def count(self) -> int:
         return self.search.segments.count(self.place)

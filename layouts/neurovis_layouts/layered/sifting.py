@@ -27,26 +27,25 @@ def sifted(costs: Ints, order: Ints) -> tuple[Ints, int]:
     if count < 2:
         return order, 0
     at = np.arange(count)
-    behind = at[:, None] > at
+    ahead = at[:, None] <= at
     line, here = order, costs[order].take(order, axis=1)
     while True:
         # (i, j): what the i-th has with those up to the j-th, itself among them; with those it passes if it goes there
         sums = np.cumsum(here, axis=1)
-        passed = np.where(behind, sums - here, sums)
+        passed = sums - here
+        np.copyto(passed, sums, where=ahead)
         best = passed.argmax(axis=1)
         gain = passed[at, best] - sums.diagonal()
-        if not (gain > 0).any():
+        better = np.flatnonzero(gain > 0)
+        if not len(better):
             return line, saved
-        places = list(range(count))
-        taken = np.zeros(count, dtype=np.bool_)
-        for i in np.argsort(-gain, kind="stable").tolist():
-            if gain[i] <= 0:
-                break
-            j = int(best[i])
-            span = slice(min(i, j), max(i, j) + 1)
-            if not taken[span].any():
-                taken[span] = True
-                saved += int(gain[i])
+        better = better[np.argsort(-gain[better], kind="stable")]
+        places, taken = list(range(count)), bytearray(count)
+        for i, j, gained in zip(better.tolist(), best[better].tolist(), gain[better].tolist(), strict=True):
+            first, last = min(i, j), max(i, j)
+            if taken.find(1, first, last + 1) < 0:
+                taken[first : last + 1] = b"\1" * (last + 1 - first)
+                saved += gained
                 places.insert(j, places.pop(i))
         moved = np.array(places, dtype=np.int64)
         line, here = line[moved], here[moved].take(moved, axis=1)
