@@ -14,6 +14,8 @@ from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.routing import Waypoint, route_all, told_apart
 from neurovis_layouts.routing.arcs import Arcs, even
 from neurovis_layouts.routing.channels import channels
+from neurovis_layouts.routing.easing import eased
+from neurovis_layouts.routing.judge import Judge
 from neurovis_spec.layout.frames import Rect
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import LayoutEdge, LayoutProblem, Point, Route
@@ -42,16 +44,19 @@ def linked(
         planned = _passing(problem, plan, rests)
         gates = {k: planned[i] for k, i in enumerate(links) if i in planned}
         ways, lateral = channels(dict(enumerate(edges)), rests.places, framed, gates, drawn)
-        routes = route_all(edges, rests.places, ways, _bowed(edges, units), lateral, frames=framed, drawn=drawn)
+        bowed = _bowed(edges, units)
+        routes = route_all(edges, rests.places, ways, bowed, lateral, frames=framed, drawn=drawn, ease=not pair)
     else:
         ways = _passing(problem, plan, rests)
-        routes = route_all(edges, rests.places, ways, _bowed(edges, units), frames=framed, drawn=drawn)
+        bowed = _bowed(edges, units)
+        routes = route_all(edges, rests.places, ways, bowed, frames=framed, drawn=drawn, ease=not pair)
     found = {keys[i]: tuple(_snapped(route)) for i, route in zip(links, routes, strict=True)}
     if not pair:
         return found
     found = _reflected(found, rests, pair)
     if len(found) <= _MOST:
         found.update(_mended(found, rests, pair, framed, drawn))
+        found.update(_eased(found, edges, [keys[i] for i in links], rests, pair, framed, drawn))
     # what has no image may now meet the image of another
     here = {i: found[keys[link]] for i, link in enumerate(links) if edges[i].source != edges[i].target}
     single = {i for i in here if not _imaged(keys[links[i]], found, rests, pair)}
@@ -59,6 +64,34 @@ def linked(
         moved = told_apart(edges, rests.places, here, single, framed, drawn)
         found.update({keys[links[i]]: tuple(_snapped(route)) for i, route in moved.items()})
     return found
+
+
+def _eased(
+    routes: Mapping[Key, Route],
+    edges: Sequence[LayoutEdge],
+    keys: Sequence[Key],
+    rests: Settled,
+    pair: Mapping[int, int],
+    frames: Sequence[tuple[frozenset[int], Rect]],
+    drawn: Sequence[Route],
+) -> dict[Key, Route]:
+    """Routes with fewer bends, those of mirror images reflections of each other."""
+    number = {key: i for i, key in enumerate(keys)}
+    image: dict[int, int] = {}
+    free: set[int] = set()
+    for key, i in number.items():
+        source, target, count = key
+        other = number.get((_image(source, rests, pair), _image(target, rests, pair), count), -1) if pair else -1
+        if source == target or other == i or pair.get(source) == target:
+            continue
+        if other >= 0:
+            image[i] = other
+        if other < 0 or i < other:
+            free.add(i)
+    here = {i: routes[key] for key, i in number.items() if key[0] != key[1]}
+    loops = [routes[key] for key in keys if key[0] == key[1]]
+    judge = Judge(edges, rests.places, here, frames, [*drawn, *loops], image, 2 * rests.axis if pair else 0.0)
+    return {keys[i]: route for i, route in eased(judge, free).items()}
 
 
 def _imaged(key: Key, routes: Mapping[Key, Route], rests: Settled, pair: Mapping[int, int]) -> bool:

@@ -26,23 +26,24 @@ def rounded(line: Sequence[Point], free: Callable[[Route], bool]) -> Route:
         lead = distance(before, corner) * (0.8 if number == 1 else 0.5)
         tail = distance(corner, after) * (0.8 if number == len(line) - 2 else 0.5)
         for cut in _CUTS:
-            arc = _arc(corner, before, after, min(cut, lead), min(cut, tail))
-            if free(arc):
+            piece = arc(corner, before, after, min(cut, lead), min(cut, tail))
+            if free(piece):
                 break
-        if arc[0] != points[-1]:
-            points += straight(points[-1], arc[0])[1:]
-        points += arc[1:]
+        if piece[0] != points[-1]:
+            points += straight(points[-1], piece[0])[1:]
+        points += piece[1:]
     if points[-1] != line[-1]:
         points += straight(points[-1], line[-1])[1:]
     return tuple(points)
 
 
-def _arc(corner: Point, before: Point, after: Point, lead: float, tail: float) -> Route:
+def arc(corner: Point, before: Point, after: Point, lead: float, tail: float, hold: float = _HOLD) -> Route:
+    """A corner as a round one, between what is cut off before it and behind it."""
     start, end = _towards(corner, before, lead), _towards(corner, after, tail)
     return (
         start,
-        (start[0] + _HOLD * (corner[0] - start[0]), start[1] + _HOLD * (corner[1] - start[1])),
-        (end[0] + _HOLD * (corner[0] - end[0]), end[1] + _HOLD * (corner[1] - end[1])),
+        (start[0] + hold * (corner[0] - start[0]), start[1] + hold * (corner[1] - start[1])),
+        (end[0] + hold * (corner[0] - end[0]), end[1] + hold * (corner[1] - end[1])),
         end,
     )
 

@@ -13,6 +13,8 @@ from neurovis_layouts.routing.arrivals import parted
 from neurovis_layouts.routing.bows import FEW_TRIES, MANY_TRIES, Wish, clear_bow, clear_bows
 from neurovis_layouts.routing.bypasses import round_discs, round_frames, shared_ends
 from neurovis_layouts.routing.curves import Waypoint, curve
+from neurovis_layouts.routing.easing import eased
+from neurovis_layouts.routing.judge import Judge
 from neurovis_layouts.routing.loops import best_loop
 from neurovis_layouts.routing.nests import nested
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
@@ -51,6 +53,7 @@ def route_all(
     frames: Sequence[Frame] = (),
     drawn: Sequence[Route] = (),
     there: Mapping[int, Route] | None = None,
+    ease: bool = True,
 ) -> list[Route]:
     """Routes by edge index.
 
@@ -88,6 +91,10 @@ def route_all(
             routes.update((i, route) for i, route in there.items() if i in routes)
             bows = frozenset()
         free = routes.keys() - there.keys() if there else routes.keys()
+        if ease and free:
+            gentle = eased(Judge(edges, centres, routes, frames, drawn), free)
+            routes.update(gentle)
+            bows -= gentle.keys()
         routes.update(told_apart(edges, centres, routes, free, frames, drawn, bows))
     routes.update(_loops(edges, centres, routes, near, walls, there or {}))
     return [routes[i] for i in range(len(edges))]

@@ -1,0 +1,150 @@
+"""Easing: routes with needless bends are drawn anew, as seldom and as gently bent as what stands around allows.
+
+In: routes that are drawn, what is in the way. Out: for those that wind, a better route where there is one: with fewer
+corners or with its corners elsewhere, judged by all that makes a line hard to follow (``Judge``).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import overload
+
+from neurovis_layouts.routing.corners import corners, smooth
+from neurovis_layouts.routing.judge import Judge, Pen
+from neurovis_spec.layout.geometry import distance
+from neurovis_spec.layout.model import RADIUS, Point, Route
+
+#: A route is looked at that bends by more than this (in chords of the unit circle) and is no single curve, or is longer
+#: than the straight way by this factor.
+_WINDS, _LONG = 1.2, 1.35
+#: How much of a corner is cut off, at most.
+_CUTS = (4.0, 1.0)
+#: How far corners are moved, and how far off the straight way a lone one is tried.
+_MOVES = (1.0, 0.45, 0.2)
+_BOWS = (0.35, 0.7, 1.2, 2.0, 3.2, 5.0)
+#: A new route is better than the old one by this at least.
+_BETTER = 0.4
+#: How many routes are looked at, at most: in a crowd nobody follows one.
+_MOST = 60
+_ROUNDS, _PASSES = 2, 4
+#: A step on the way there is worth this at least.
+_GAIN = 0.05
+#: Of all ways that are tried from there so many are looked at closely.
+_SOME = 24
+_DIAGONAL = 0.7071067811865476
+_AROUND = (
+    (1.0, 0.0), (_DIAGONAL, _DIAGONAL), (0.0, 1.0), (-_DIAGONAL, _DIAGONAL),
+    (-1.0, 0.0), (-_DIAGONAL, -_DIAGONAL), (0.0, -1.0), (_DIAGONAL, -_DIAGONAL),
+)  # fmt: skip
+
+
+def eased(judge: Judge, free: AbstractSet[int], most: int = _MOST) -> dict[int, Route]:
+    """Routes by edge index for those that are eased, of those that are ``free`` to be and of which at most so many are
+    looked at, the worst first."""
+    changed: set[int] = set()
+    looked = sorted(free)
+    for _ in range(_ROUNDS):
+        winding = judge.winding()
+        chosen = [i for i in looked if winding[i][1] > _LONG or (winding[i][0] > _WINDS and len(judge.routes[i]) > 4)]
+        chosen.sort(key=lambda i: (-winding[i][0] - 2 * winding[i][1], i))
+        looked = []
+        for i in chosen[:most]:
+            found = _better(Pen(judge, i))
+            if found is not None:
+                judge.draw(i, found)
+                looked.append(i)
+        changed.update(looked)
+        looked.sort()
+    return {i: judge.routes[i] for k in sorted(changed) for i in judge.both(k)}
+
+
+@dataclass(frozen=True, slots=True)
+class _Try:
+    """A route, the line that it follows, how much is cut off its corners, and what it costs."""
+
+    cost: float
+    line: tuple[Point, ...]
+    cut: float
+    route: Route
+
+
+def _better(pen: Pen) -> Route | None:
+    """A route that is clearly better than the one that is there, if one is found."""
+    if distance(pen.route[0], pen.route[-1]) < 2 * RADIUS:
+        return None  # between discs that overlap, as pins may have it
+    now = pen.cost()
+    line = corners(pen.route)
+    starts = [line, *_fewer(line), *_bowed(line[0], line[-1])]
+    best = _best(pen, [(way, cut) for way in starts for cut in _CUTS], None)
+    if best is None:
+        return None
+    for far in _MOVES:
+        for _ in range(_PASSES):
+            tried = _best(pen, [(way, best.cut) for way in (*_moved(best.line, far), *_fewer(best.line))], best)
+            if tried is best:
+                break
+            best = tried
+    best = _best(pen, [(best.line, cut) for cut in _CUTS], best)
+    return best.route if best.cost <= now - _BETTER else None
+
+
+@overload
+def _best(pen: Pen, ways: Sequence[tuple[tuple[Point, ...], float]], best: _Try) -> _Try: ...
+@overload
+def _best(pen: Pen, ways: Sequence[tuple[tuple[Point, ...], float]], best: None) -> _Try | None: ...
+def _best(pen: Pen, ways: Sequence[tuple[tuple[Point, ...], float]], best: _Try | None) -> _Try | None:
+    """The best of these lines, with so much cut off their corners, if it is better than the best so far."""
+    routes = [smooth(line, cut) for line, cut in ways]
+    found = pen.cheapest(routes, math.inf if best is None else best.cost - _GAIN, 1000 if best is None else _SOME)
+    if found is None:
+        return best
+    number, cost = found
+    return _Try(cost, *ways[number], routes[number])
+
+
+def _fewer(line: tuple[Point, ...]) -> Iterator[tuple[Point, ...]]:
+    inner = range(1, len(line) - 1)
+    for first in inner:
+        for last in range(first, len(line) - 1):
+            yield line[:first] + line[last + 1 :]
+            # or one corner in place of several
+            if last > first:
+                x = sum(p[0] for p in line[first : last + 1]) / (last + 1 - first)
+                y = sum(p[1] for p in line[first : last + 1]) / (last + 1 - first)
+                yield (*line[:first], (x, y), *line[last + 1 :])
+
+
+def _moved(line: tuple[Point, ...], far: float) -> Iterator[tuple[Point, ...]]:
+    for k in range(1, len(line) - 1):
+        x, y = line[k]
+        for dx, dy in _AROUND:
+            yield (*line[:k], (x + far * dx, y + far * dy), *line[k + 1 :])
+    for k, (a, b) in enumerate(pairwise(line[1:-1]), 1) if far == _MOVES[0] else ():
+        for dx, dy in _AROUND:
+            yield (
+                *line[:k], (a[0] + far * dx, a[1] + far * dy), (b[0] + far * dx, b[1] + far * dy), *line[k + 2 :],
+            )  # fmt: skip
+
+
+def _bowed(start: Point, end: Point) -> Iterator[tuple[Point, ...]]:
+    """The straight way, and lines with a corner or two beside it."""
+    yield start, end
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    length = distance(start, end)
+    if not length:
+        return
+    for high in _BOWS:
+        for side in (high, -high):
+            nx, ny = dy / length * side, -dx / length * side
+            for share in (0.25, 0.5, 0.75):
+                yield start, (start[0] + share * dx + nx, start[1] + share * dy + ny), end
+            yield (
+                start,
+                (start[0] + 0.2 * dx + nx, start[1] + 0.2 * dy + ny),
+                (start[0] + 0.8 * dx + nx, start[1] + 0.8 * dy + ny),
+                end,
+            )

@@ -1,0 +1,194 @@
+"""Polylines: many routes as lines of few points, measured all at once.
+
+In: routes. Out: how long they are, how much they bend, where they leave a disc, what cells they run through, how often
+they cross segments; one figure a line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from neurovis_layouts.routing.walls import BoolArray, FloatArray, IntArray
+from neurovis_spec.layout.geometry import cubics
+from neurovis_spec.layout.model import Point, Route
+
+#: Into how many segments a piece is cut that is not straight, and how far off its chord such a piece reaches, by the
+#: length of that.
+_PARTS, _STRAIGHT = 8, 0.01
+#: How far apart points are that are looked at for what else runs there, how large their cells; those this close to the
+#: ends of a line are left out.
+STEP, CELL, _END = 0.15, 0.16, 0.6
+_ROW = 1 << 31
+#: Crossings this close to an end of a line are how it meets others at a disc.
+_HIDDEN = 0.4
+#: A bend is no tighter than this for a turn of one.
+_TIGHTEST, _LEAST = 4.0, 0.05
+_T = np.arange(1, _PARTS + 1, dtype=np.float64)[None, :, None] / _PARTS
+
+
+class Polylines:
+    """Lines: all ``points`` (m, 2), and where each line starts among them (n + 1,)."""
+
+    def __init__(self, points: FloatArray, starts: IntArray) -> None:
+        self.points, self.starts = points, starts
+        self._lines: IntArray = np.repeat(np.arange(len(starts) - 1, dtype=np.int64), np.diff(starts))
+        # segments: all steps from point to point but those from line to line
+        self._first = np.flatnonzero(self._lines[1:] == self._lines[:-1])
+        self.owner: IntArray = self._lines[self._first]
+        self.a, self.b = points[self._first], points[self._first + 1]
+        way = self.b - self.a
+        self._way, self._lengths = way, np.sqrt(way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1])
+
+    def __len__(self) -> int:
+        return len(self.starts) - 1
+
+    def some(self, chosen: IntArray) -> Polylines:
+        """Those of these numbers."""
+        counts = (self.starts[1:] - self.starts[:-1])[chosen]
+        ends = np.cumsum(counts)
+        place = np.arange(int(ends[-1]) if len(ends) else 0, dtype=np.int64)
+        return Polylines(
+            self.points[place + np.repeat(self.starts[chosen] - ends + counts, counts)],
+            np.concatenate([np.zeros(1, dtype=np.int64), ends]),
+        )
+
+    def lengths(self) -> FloatArray:
+        """(n,) how long they are."""
+        return self._sums(self._lengths, self.owner)
+
+    def bends(self) -> tuple[FloatArray, FloatArray]:
+        """(n,) and (n,) how much they turn, in chords of the unit circle, and how much of that where they bend tightly:
+        by a radius r it counts 1 / r times."""
+        some = np.flatnonzero(self._lengths > 1e-9)
+        unit, lengths, owner = self._way[some] / self._lengths[some, None], self._lengths[some], self.owner[some]
+        turn = unit[1:] - unit[:-1]
+        chords = np.sqrt(turn[:, 0] * turn[:, 0] + turn[:, 1] * turn[:, 1])
+        chords[owner[1:] != owner[:-1]] = 0.0
+        near = np.maximum(np.minimum(lengths[1:], lengths[:-1]), _LEAST)
+        tight = chords * np.minimum(chords / near, _TIGHTEST)
+        return self._sums(chords, owner[1:]), self._sums(tight, owner[1:])
+
+    def extents(self) -> tuple[FloatArray, FloatArray]:
+        """(n, 2) and (n, 2) their low and their high corners."""
+        return np.minimum.reduceat(self.points, self.starts[:-1]), np.maximum.reduceat(self.points, self.starts[:-1])
+
+    def backward(self) -> FloatArray:
+        """(n,) how far they run back along the direction."""
+        down = self._way[:, 1]
+        back: FloatArray = (self._sums(np.abs(down), self.owner) - np.abs(self._sums(down, self.owner))) / 2
+        return back
+
+    def _sums(self, figures: FloatArray, owner: IntArray) -> FloatArray:
+        """(n,) the sums of figures by line."""
+        return np.bincount(owner, figures, len(self)).astype(np.float64)
+
+    def leave(self, ring: float) -> FloatArray:
+        """(n, 2) where they leave the ring round their first points."""
+        return _left(self.points, self.starts, self._lines, ring)
+
+    def arrive(self, ring: float) -> FloatArray:
+        """(n, 2) where they enter the ring round their last points."""
+        starts = len(self.points) - self.starts[::-1]
+        return _left(self.points[::-1], starts, (len(self) - 1 - self._lines)[::-1], ring)[::-1]
+
+    def cells(self) -> tuple[IntArray, IntArray]:
+        """(k,) and (k,) the cells that they run through, their ends apart, and which line does."""
+        total = self.lengths()
+        before = np.concatenate([np.zeros(1), np.cumsum(self._lengths)])
+        # of each line its first segment
+        offset = before[np.searchsorted(self.owner, np.arange(len(self)))]
+        counts = np.maximum(np.ceil((total - 2 * _END) / STEP), 0).astype(np.int64)
+        owner = np.repeat(np.arange(len(self), dtype=np.int64), counts)
+        number = np.arange(len(owner), dtype=np.int64) - np.repeat(np.cumsum(counts) - counts, counts)
+        at = offset[owner] + _END + STEP * number
+        segment = np.clip(np.searchsorted(before, at, side="right") - 1, 0, len(self._lengths) - 1)
+        share = (at - before[segment]) / np.maximum(self._lengths[segment], 1e-9)
+        place = np.floor((self.a[segment] + share[:, None] * self._way[segment]) / CELL).astype(np.int64)
+        cells: IntArray = place[:, 0] * _ROW + place[:, 1]
+        return cells, owner
+
+    def passed(self, rects: FloatArray, least: IntArray) -> IntArray:
+        """(n,) how often they pass the borders of rectangles (f, 4) more than the ``least`` (f,) each."""
+        x, y, (x0, y0, x1, y1) = self.points[:, 0, None], self.points[:, 1, None], rects.T
+        within = (x > x0) & (x < x1) & (y > y0) & (y < y1)
+        passing = (within[self._first] != within[self._first + 1]).astype(np.int64)
+        count = np.zeros((len(self), len(rects)), dtype=np.int64)
+        np.add.at(count, self.owner, passing)
+        more: IntArray = np.maximum(count - least, 0).sum(axis=1)
+        return more
+
+    def crossed(self, c: FloatArray, d: FloatArray) -> IntArray:
+        """(n,) how often they cross segments from ``c`` to ``d`` (k, 2), but for where lines meet at their ends."""
+        low, high = self.points.min(axis=0), self.points.max(axis=0)
+        near = ((np.maximum(c, d) >= low) & (np.minimum(c, d) <= high)).all(axis=1)
+        i, share = _meetings(self.a, self.b, c[near], d[near])
+        where, line = self.a[i] + share[:, None] * self._way[i], self.owner[i]
+        seen = np.ones(len(i), dtype=np.bool_)
+        for end in (self.points[self.starts[:-1]], self.points[self.starts[1:] - 1]):
+            x, y = (where - end[line]).T
+            seen &= x * x + y * y >= _HIDDEN * _HIDDEN
+        return np.bincount(line[seen], minlength=len(self))
+
+
+def polylines(routes: Sequence[Route]) -> Polylines:
+    """Routes as lines: a straight piece is one step."""
+    pieces = np.array([piece for route in routes for piece in cubics(route)], dtype=np.float64).reshape(-1, 4, 2)
+    many = np.array([(len(route) - 1) // 3 for route in routes], dtype=np.int64)
+    a, b, c, d = (pieces[:, k] for k in range(4))
+    way, one, other = d - a, b - a, c - a
+    squared = way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1]
+    off = np.maximum(
+        np.abs(way[:, 0] * one[:, 1] - way[:, 1] * one[:, 0]), np.abs(way[:, 0] * other[:, 1] - way[:, 1] * other[:, 0])
+    )
+    t, s = _T, 1 - _T
+    points = s * s * s * a[:, None] + 3 * s * s * t * b[:, None] + 3 * s * t * t * c[:, None] + t * t * t * d[:, None]
+    keep: BoolArray = np.zeros((len(pieces), _PARTS), dtype=np.bool_)
+    keep[off > _STRAIGHT * np.maximum(squared, 1e-9)] = True
+    keep[:, -1] = True
+    # each line begins with the first point of its first piece
+    ends = np.cumsum(many)
+    counts = np.add.reduceat(keep.sum(axis=1), ends - many) + 1
+    starts = np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(counts)])
+    whole = np.empty((int(starts[-1]), 2))
+    inner = np.ones(len(whole), dtype=np.bool_)
+    inner[starts[:-1]] = False
+    whole[starts[:-1]], whole[inner] = a[ends - many], points[keep]
+    return Polylines(whole, starts)
+
+
+def cells_of(points: Sequence[Point]) -> IntArray:
+    """(n,) the cells that points are in."""
+    place = np.floor(np.array(points, dtype=np.float64).reshape(-1, 2) / CELL).astype(np.int64)
+    cells: IntArray = place[:, 0] * _ROW + place[:, 1]
+    return cells
+
+
+def _left(points: FloatArray, starts: IntArray, lines: IntArray, ring: float) -> FloatArray:
+    first = points[starts[:-1]]
+    x, y = (points - first[lines]).T
+    far = np.sqrt(x * x + y * y)
+    number = np.arange(len(points), dtype=np.int64)
+    beyond = np.where(far >= ring, number, len(points))
+    k = np.minimum(np.minimum.reduceat(beyond, starts[:-1]), starts[1:] - 1)
+    before = far[k - 1]
+    share = np.clip((ring - before) / np.maximum(far[k] - before, 1e-9), 0.0, 1.0)
+    left: FloatArray = points[k - 1] + share[:, None] * (points[k] - points[k - 1])
+    return left
+
+
+def _meetings(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Which segments from ``a`` to ``b`` cross one from ``c`` to ``d``, once for each, and at what share of their
+    way."""
+    low, high = np.minimum(a, b), np.maximum(a, b)
+    least, most = np.minimum(c, d), np.maximum(c, d)
+    near = (least[None, :, 0] <= high[:, None, 0]) & (most[None, :, 0] >= low[:, None, 0])
+    near &= (least[None, :, 1] <= high[:, None, 1]) & (most[None, :, 1] >= low[:, None, 1])
+    i, j = np.nonzero(near)
+    (ux, uy), (vx, vy), (wx, wy) = (b[i] - a[i]).T, (d[j] - c[j]).T, (c[j] - a[i]).T
+    cross = ux * vy - uy * vx
+    sign, whole = np.sign(cross), np.abs(cross)
+    t, s = (wx * vy - wy * vx) * sign, (wx * uy - wy * ux) * sign
+    hit = (t >= 0) & (t < whole) & (s >= 0) & (s < whole)
+    return i[hit], t[hit] / whole[hit]
