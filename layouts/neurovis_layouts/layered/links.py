@@ -16,6 +16,7 @@ from neurovis_layouts.routing.arcs import Arcs, even
 from neurovis_layouts.routing.channels import channels
 from neurovis_layouts.routing.easing import eased
 from neurovis_layouts.routing.judge import Judge
+from neurovis_layouts.routing.router import MOST_EASED
 from neurovis_spec.layout.frames import Rect
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import LayoutEdge, LayoutProblem, Point, Route
@@ -56,6 +57,7 @@ def linked(
     found = _reflected(found, rests, pair)
     if len(found) <= _MOST:
         found.update(_mended(found, rests, pair, framed, drawn))
+    if len(found) <= MOST_EASED:
         found.update(_eased(found, edges, [keys[i] for i in links], rests, pair, framed, drawn))
     # what has no image may now meet the image of another
     here = {i: found[keys[link]] for i, link in enumerate(links) if edges[i].source != edges[i].target}

@@ -28,6 +28,8 @@ _MOVES = (1.0, 0.45, 0.2)
 _BOWS = (0.35, 0.7, 1.2, 2.0, 3.2, 5.0)
 #: A new route is better than the old one by this at least.
 _BETTER = 0.4
+#: What is worse than the old one by this, where the search begins, will not become better.
+_HOPELESS = 2.0
 #: How many routes are looked at, at most: in a crowd nobody follows one.
 _MOST = 60
 _ROUNDS, _PASSES = 2, 4
@@ -80,7 +82,7 @@ def _better(pen: Pen) -> Route | None:
     line = corners(pen.route)
     starts = [line, *_fewer(line), *_bowed(line[0], line[-1])]
     best = _best(pen, [(way, cut) for way in starts for cut in _CUTS], None)
-    if best is None:
+    if best is None or best.cost > now + _HOPELESS:
         return None
     for far in _MOVES:
         for _ in range(_PASSES):

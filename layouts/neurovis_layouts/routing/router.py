@@ -33,6 +33,8 @@ _MOST_CAREFULLY = 4000
 _MOST_AT_LENGTH = 1000
 #: Nor where all of them together are longer than this by the heights tried.
 _MOST_LENGTH = 250_000.0
+#: Nor are those that wind drawn anew: they cross too much to be followed.
+MOST_EASED = 300
 _STEEP_ENOUGH = 0.75
 #: Bows of more than three equal connections are wider by this share of the way, each than the one in it, since their
 #: legs would be as steep.
@@ -91,7 +93,7 @@ def route_all(
             routes.update((i, route) for i, route in there.items() if i in routes)
             bows = frozenset()
         free = routes.keys() - there.keys() if there else routes.keys()
-        if ease and free:
+        if ease and free and len(edges) <= MOST_EASED:
             gentle = eased(Judge(edges, centres, routes, frames, drawn), free)
             routes.update(gentle)
             bows -= gentle.keys()
