@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from neurovis_layouts.apart import LEAST, apart, jitter, near_pairs
 from neurovis_layouts.large import LargeEngine
 from neurovis_layouts.large.field import GridField, PairField
+from neurovis_layouts.large.flow import downward, heights, in_flow
 from neurovis_layouts.large.levels import levels_of
 from neurovis_layouts.packing import packed
 from neurovis_layouts.wiring import parts_of, wiring_of
@@ -51,6 +52,45 @@ def test_clusters_show_and_connections_run_along_the_direction(direction: Direct
     own = np.sqrt(((places - places.mean(axis=1, keepdims=True)) ** 2).sum(axis=2)).mean()
     whole = np.sqrt(((places.reshape(-1, 2) - places.mean(axis=(0, 1))) ** 2).sum(axis=1)).mean()
     assert own < whole / 4
+
+
+def along(kind: str) -> list[tuple[int, int]]:
+    """Connections of a sparse network in which every one can run along the direction."""
+    random = Random(2)
+    if kind == "tree":
+        pairs = [(int(random.random() * i), i) for i in range(1, 400)]
+        return [pair if random.random() < 0.5 else (pair[1], pair[0]) for pair in pairs]
+    if kind == "ladder":
+        return [(i, i + 2) for i in range(798)] + [(i, i + 1) for i in range(0, 800, 2)]
+    return [(i, i + 1) for i in range(2000)] + [(i, i + 40) for i in range(0, 1960, 20) if kind == "skips"]
+
+
+@pytest.mark.parametrize("kind", ["chain", "skips", "ladder", "tree"])
+def test_all_connections_of_sparse_networks_run_along_the_direction(kind: str) -> None:
+    pairs = along(kind)
+    names = [f"N{i}" for i in range(max(max(pair) for pair in pairs) + 1)]
+    problem = canonical(kind, names, edges=suite.named((names[a], names[b]) for a, b in pairs))
+    layout = lay_out_problem(problem, "large")
+    suite.check_positions(problem, layout)
+    assert metrics(layout, problem)["flow"] == 1
+
+
+def test_heights_count_steps_and_are_one_for_all_of_a_loop() -> None:
+    pairs = [("A", "B"), ("B", "C"), ("C", "B"), ("C", "D"), ("X", "D")]
+    wiring = wiring_of(canonical("x", "ABCDX", edges=suite.named(pairs), boxes=[("box", ["A", "D"])]))
+    high = heights(wiring)
+    assert (high[[1, 2, 3, 4]] - high[0]).tolist() == pytest.approx([1, 1, 2, 1], abs=0.01)
+    assert high[5] == pytest.approx((high[0] + high[3]) / 2)
+
+
+@given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, 9)), max_size=30), st.lists(st.floats(-9, 9), min_size=10))
+def test_heights_in_flow_are_the_given_ones_where_these_are(pairs: list[tuple[int, int]], high: list[float]) -> None:
+    ends = np.array([(min(pair), max(pair)) for pair in pairs if pair[0] != pair[1]], dtype=np.int64).reshape(-1, 2)
+    arcs = downward(10, ends[:, 0], ends[:, 1])
+    assert sorted(arcs) == sorted(map(tuple, ends.tolist()))
+    found = in_flow(np.array(high[:10]), arcs, 0.5)
+    assert all(found[b] >= found[a] + 0.5 - 1e-9 for a, b in arcs)
+    assert in_flow(found, arcs, 0.5 - 1e-9) == pytest.approx(found)
 
 
 def test_instances_of_modules_are_drawn_together_even_if_nothing_connects_them() -> None:

@@ -9,15 +9,19 @@ from __future__ import annotations
 import numpy as np
 
 from neurovis_layouts.wiring import FloatArray, IntArray
-from neurovis_spec.layout.model import RADIUS
+from neurovis_spec.layout.model import GRID, RADIUS
 
 #: Centres are kept this far apart at least: rounding to the grid of coordinates takes some of it.
 LEAST = 2 * RADIUS + 0.005
 #: How far beyond half of what is missing a step goes, and after how many steps the whole grows by how much.
 _EAGER, _PATIENCE, _GROWTH = 1.5, 10, 1.03
 _ROUNDS = 1000
+#: So many steps are made for arcs alone.
+_LATE = 200
 #: How far below its source the target of an arc stays, at least.
 _BELOW = 0.05
+#: Less than this is lost in rounding to the grid of coordinates.
+_LEVEL = 2 * GRID
 
 
 def jitter(count: int) -> FloatArray:
@@ -73,7 +77,8 @@ def apart(
         arcs = arcs[0][kept], arcs[1][kept]
     for step in range(1, _ROUNDS):
         one, other, way, far = near_pairs(places, want)
-        if not len(far) or far.min() >= LEAST:
+        clear = not len(far) or far.min() >= LEAST
+        if clear and (step > _LATE or arcs is None or (places[arcs[1], 1] > places[arcs[0], 1] + _LEVEL).all()):
             break
         push = way * ((want - far) / (2 * np.maximum(far, 1e-6)))[:, None]
         moves = _collected(count, one, other, push)

@@ -1,7 +1,8 @@
 """The large engine: forces over levels of detail, for thousands of connections.
 
 The modules: ``levels`` (coarser and coarser networks), ``field`` (how all push each other off, on a grid), ``settle``
-(forces, step by step, at one level), ``spread`` (the levels from coarse to fine), ``engine``.
+(forces, step by step, at one level), ``flow`` (what runs along the direction), ``spread`` (the levels from coarse to
+fine), ``engine``.
 """
 
 from neurovis_layouts.large.engine import LargeEngine

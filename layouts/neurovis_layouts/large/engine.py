@@ -14,8 +14,9 @@ import numpy as np
 from neurovis_layouts.apart import apart
 from neurovis_layouts.finish import drawn, nearest, pinned_places
 from neurovis_layouts.large.field import GridField
+from neurovis_layouts.large.flow import downward, in_flow
 from neurovis_layouts.large.settle import Cooling, settle
-from neurovis_layouts.large.spread import SMALL, spread, spread_small
+from neurovis_layouts.large.spread import SMALL, SPARSE, spread, spread_small
 from neurovis_layouts.packing import packed
 from neurovis_layouts.wiring import FloatArray, IntArray, Wiring, parts_of, wiring_of
 from neurovis_spec.layout import Capabilities, Layout, LayoutProblem, Progress
@@ -24,6 +25,9 @@ from neurovis_spec.layout import Capabilities, Layout, LayoutProblem, Progress
 #: discs are kept apart, and parts.
 _NEXT, _LINK, _APART, _GAP = 1.0, 0.9, 0.75, 1.5
 _MOST = 0.75
+#: How far an arc leads down at least, and how much too high its target may be to be put there: others would move many
+#: neurons far, and make crossings.
+_STEP, _NEARLY = 0.1, 3.0
 #: A neuron's share of the picture, in square spacings, at most: discs have to stay in sight.
 _ROOM = 7.0
 #: A part wider than this by its height is stretched, but not farther than this.
@@ -102,7 +106,9 @@ def _packed(wiring: Wiring, places: FloatArray, part: IntArray, spacing: float) 
     places = places * _scales(wiring, places + shift, part, spacing)[:, None]
     reach = float(np.abs(places).max()) + 10.0
     shift = np.stack([8 * reach * part, np.zeros(len(part))], axis=1)
-    moved = apart(places[real] + shift[real], _APART * spacing, None, (wiring.above, wiring.below), part[real])
+    places = places + shift
+    places[:, 1] = _in_flow(wiring, places[:, 1], part, spacing)
+    moved = apart(places[real], _APART * spacing, None, (wiring.above, wiring.below), part[real])
     low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
     np.minimum.at(low, part[real], moved)
     np.maximum.at(high, part[real], moved)
@@ -113,6 +119,15 @@ def _packed(wiring: Wiring, places: FloatArray, part: IntArray, spacing: float) 
     low[~np.isfinite(low)] = 0.0
     places[real] = moved + (corners - low)[part[real]]
     return places
+
+
+def _in_flow(wiring: Wiring, high: FloatArray, part: IntArray, spacing: float) -> FloatArray:
+    """Heights (count,) at which arcs run down: all of a sparse part, of others those that do so nearly."""
+    count = int(part.max()) + 1
+    sparse = np.bincount(part[wiring.a], minlength=count) <= SPARSE * np.bincount(part)
+    chosen = sparse[part[wiring.above]] | (high[wiring.above] - high[wiring.below] <= _NEARLY * spacing)
+    arcs = downward(wiring.count, wiring.above[chosen], wiring.below[chosen])
+    return in_flow(high, arcs, _STEP * spacing)
 
 
 def _stretched(places: FloatArray, part: IntArray) -> FloatArray:

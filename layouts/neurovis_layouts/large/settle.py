@@ -17,19 +17,17 @@ from neurovis_layouts.wiring import FloatArray, IntArray, Wiring
 
 #: How strongly points push each other off, and the power of length with which links pull.
 _PUSH, _POWER = 0.2, 0.7
-#: How strongly an arc presses as long as its target is less than this below its source.
-_PRESS, _BELOW = 10.0, 1.0
+#: How strongly an arc presses as long as its target is too little below its source.
+_PRESS = 5.0
 
 
 @dataclass(frozen=True, slots=True)
 class Cooling:
-    """How many steps, and the longest move in the first and in the last; ``unit`` is the length that an arc is
-    measured by: points of a coarse level stand for many."""
+    """How many steps, and the longest move in the first and in the last."""
 
     steps: int
     first: float
     last: float
-    unit: float = 1.0
 
 
 def settle(
@@ -39,8 +37,10 @@ def settle(
     cooling: Cooling,
     fixed: IntArray | None = None,
     tick: Callable[[int], None] | None = None,
+    drop: FloatArray | float = 1.0,
 ) -> FloatArray:
-    """Places (count, 2) at rest; ``fixed`` ones stay; ``tick`` is called after every step with their number."""
+    """Places (count, 2) at rest; ``fixed`` ones stay; ``tick`` is called after every step with their number. An arc
+    presses as long as its target is less than ``drop`` below its source, one for all or (m,)."""
     count = wiring.count
     for step in range(cooling.steps):
         force = _PUSH * field(places)
@@ -51,7 +51,7 @@ def settle(
         for k in (0, 1):
             force[:, k] += np.bincount(wiring.a, pull[:, k], count) - np.bincount(wiring.b, pull[:, k], count)
         held = np.bincount(wiring.a, stiffness, count) + np.bincount(wiring.b, stiffness, count)
-        missing = _BELOW * cooling.unit - (places[wiring.below, 1] - places[wiring.above, 1])
+        missing = drop - (places[wiring.below, 1] - places[wiring.above, 1])
         press = _PRESS * wiring.pull * np.maximum(missing, 0)
         force[:, 1] += np.bincount(wiring.below, press, count) - np.bincount(wiring.above, press, count)
         active = _PRESS * wiring.pull * (missing > 0)

@@ -12,16 +12,19 @@ import numpy as np
 
 from neurovis_layouts.apart import jitter
 from neurovis_layouts.large.field import Field, GridField, PairField
-from neurovis_layouts.large.levels import levels_of
+from neurovis_layouts.large.flow import heights
+from neurovis_layouts.large.levels import Level, levels_of
 from neurovis_layouts.large.settle import Cooling, settle
 from neurovis_layouts.wiring import FloatArray, IntArray, Wiring
 
 #: Parts of at most so many points are laid out together, pair by pair.
 SMALL = 64
+#: With at most so many links for each point a network is sparse: one can follow its chains.
+SPARSE = 1.6
 #: Up to so many points, forces are taken pair by pair.
 _BY_PAIRS = 250
 #: Steps at the finest level, where points are few and where they are many.
-_STEPS, _FEWER_STEPS, _MANY = 200, 100, 3000
+_STEPS, _FEWER_STEPS, _MANY = 200, 160, 3000
 #: How far crowded stretches are evened out, and how many stretches there are by the root of the points.
 _EVEN, _BINS = 0.6, 0.2
 
@@ -35,15 +38,30 @@ def spread(wiring: Wiring, report: Report | None = None) -> FloatArray:
     whole = float(wiring.count)
     steps = [_STEPS if level.wiring.count <= _MANY else _FEWER_STEPS for level in levels]
     tick = _tick(sum(n * level.wiring.count for n, level in zip(steps, levels, strict=True)), report)
+    drops = _drops(wiring, levels, coarsest)
     unit = np.sqrt(whole / coarsest.count)
     places = jitter(coarsest.count) * np.sqrt(whole)
-    places = settle(coarsest, places, _field(coarsest), Cooling(2 * _STEPS, np.sqrt(whole) / 4, 0.02 * unit, unit))
+    cooling = Cooling(2 * _STEPS, np.sqrt(whole) / 4, 0.02 * unit)
+    places = settle(coarsest, places, _field(coarsest), cooling, drop=drops.pop())
     for level, n in zip(reversed(levels), reversed(steps), strict=True):
         unit = np.sqrt(whole / level.wiring.count)
         places = places[level.part_of] + 0.3 * unit * jitter(level.wiring.count)
-        cooling = Cooling(n, unit, 0.02 * unit, unit)
-        places = settle(level.wiring, places, _field(level.wiring), cooling, None, tick)
+        cooling = Cooling(n, unit, 0.02 * unit)
+        places = settle(level.wiring, places, _field(level.wiring), cooling, None, tick, drops.pop())
     return np.stack([_evened(places[:, 0]), _evened(places[:, 1])], axis=1)
+
+
+def _drops(wiring: Wiring, levels: list[Level], coarsest: Wiring) -> list[FloatArray]:
+    """How far the target of each arc is to be below its source, level by level: as far as points of this level are from
+    each other, and in sparse networks as far as the arcs that the points stand for take, or a chain would have to be
+    folded that is longer than the network is wide."""
+    high = heights(wiring) if len(wiring.a) <= SPARSE * wiring.count else np.zeros(wiring.count)
+    drops: list[FloatArray] = []
+    for level in [*levels, Level(coarsest, np.arange(coarsest.count))]:
+        at = level.wiring
+        drops.append(np.maximum(np.sqrt(wiring.count / at.count), high[at.below] - high[at.above]))
+        high = np.bincount(level.part_of, at.mass * high) / np.bincount(level.part_of, at.mass)
+    return drops
 
 
 def _tick(total: int, report: Report | None) -> Callable[[int], None]:
