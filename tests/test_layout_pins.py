@@ -181,3 +181,21 @@ def test_pins_are_kept_and_what_they_put_on_each_other_is_told(problem: LayoutPr
         return
     check_pins(problem, layout)
     assert clashes(problem, layout) or not suite.frames_meet(layout, problem)
+
+
+@pytest.mark.parametrize("engine", ["large", "organic"])
+def test_instances_without_a_pin_keep_off_the_frames_of_those_that_have_one(engine: str) -> None:
+    names = [f"x{i}.{n}" for i in range(1, 5) for n in "abc"]
+    loops = [(f"x{i}.{a}", f"x{i}.{b}") for i in range(1, 5) for a, b in ("ab", "bc", "ca")]
+    pairs = [
+        *loops,
+        *(("I", f"x{i}.a") for i in range(1, 5)),
+        *((f"x{i}.c", "O") for i in range(1, 5)),
+        ("x1.c", "x2.a"),
+    ]
+    paths = [(f"x{i}", "col") for i in range(1, 5)]
+    pins = {"x2.a": (10.0, 3.0), "x3.b": (-3.0, 1.0), "x4.a": (0.0, 10.0), "x4.c": (2.0, 10.0), "O": (20.0, 20.0)}
+    problem = canonical("x", [*names, "I", "O"], edges=suite.named(pairs), pins=pins, modules=paths)
+    layout = suite.check(problem, engine)
+    assert layout is not None
+    assert not clashes(problem, layout)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from neurovis_layouts.apart import near_pairs
+from neurovis_layouts.around import around_pins, gives_way
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.kept import kept
 from neurovis_layouts.pins import fit, with_origins
@@ -19,10 +20,13 @@ from neurovis_spec.layout.model import Layout, LayoutProblem, Point
 
 #: With more connections than this, going round discs only moves the crowd.
 _CAREFUL = 1000
+#: So many neurons are arranged around pins frame by frame: of more, frames lie upon too many others to be quick.
+_MOST_AROUND_PINS = 300
 
 
-def drawn(problem: LayoutProblem, engine: str, places: FloatArray) -> Layout:
-    """The layout with the neurons at the first of ``places`` (n, 2), where no pin says otherwise."""
+def drawn(problem: LayoutProblem, engine: str, places: FloatArray, frames: bool = True) -> Layout:
+    """The layout with the neurons at the first of ``places`` (n, 2), where no pin says otherwise. Instances without a
+    pin are kept off the ``frames`` of those that have one."""
     flat: list[Point] = [(snap(x), snap(y)) for x, y in places[: len(problem.neurons)].tolist()]
     pins = with_origins(problem, [to_picture(point, problem.direction) for point in flat])
     centres, _, _ = fit(flat, {i: from_picture(point, problem.direction) for i, point in pins.items()})
@@ -37,6 +41,8 @@ def drawn(problem: LayoutProblem, engine: str, places: FloatArray) -> Layout:
             for edge, route in zip(problem.edges, routes, strict=True)
         },
     )
+    if frames and gives_way(problem, pins, _MOST_AROUND_PINS):
+        return around_pins(problem, pins, fresh)
     return kept(problem, fresh)
 
 

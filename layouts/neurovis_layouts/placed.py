@@ -6,8 +6,8 @@ In: a problem and a formation. Out: a Layout: instances as frames, pins kept, di
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
+from neurovis_layouts.around import around_pins, gives_way
 from neurovis_layouts.blocks import Blocks, Drawing, keys_of, routed
 from neurovis_layouts.formations import offsets
 from neurovis_layouts.frame import to_picture
@@ -56,8 +56,8 @@ def place(problem: LayoutProblem, engine: str, how: Arrangement, spacing: float)
     else:
         free = Drawing(tuple(formation(range(len(problem.neurons)))), {}, ())
     pins = with_origins(problem, free.places)
-    if problem.modules and pins and problem.memory is None and len(problem.neurons) <= _MOST_AROUND_PINS:
-        return _around_pins(problem, pins, _layout(problem, engine, routed(free, problem.edges)))
+    if gives_way(problem, pins, _MOST_AROUND_PINS):
+        return around_pins(problem, pins, _layout(problem, engine, routed(free, problem.edges)))
     return kept(problem, _layout(problem, engine, routed(_pinned(free, pins), problem.edges)))
 
 
@@ -68,14 +68,6 @@ def _layout(problem: LayoutProblem, engine: str, drawing: Drawing) -> Layout:
         dict(zip(problem.neurons, drawing.places, strict=True)),
         {edge.name: drawing.routes[key] for edge, key in zip(problem.edges, keys_of(problem.edges), strict=True)},
     )
-
-
-def _around_pins(problem: LayoutProblem, pins: Mapping[int, Point], free: Layout) -> Layout:
-    """The free layout arranged around the pins as if an earlier layout had known these and nothing else: frames keep
-    off each other, and nobody foreign comes into one."""
-    known = Layout(problem.network, free.engine, {problem.neurons[i]: point for i, point in pins.items()}, {})
-    placed = tuple(replace(module, origin=None) for module in problem.modules)  # as pins now
-    return kept(replace(problem, pins=pins, modules=placed, memory=known), free)
 
 
 def _pinned(drawing: Drawing, pins: Mapping[int, Point]) -> Drawing:

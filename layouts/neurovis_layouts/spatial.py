@@ -44,7 +44,7 @@ class SpatialEngine:
         places[fixed] = there
         places = _fanned(places, _CROWD * problem.neuron_spacing)
         places[fixed] = there
-        return drawn(problem, self.name, apart(places, _APART * problem.neuron_spacing, fixed))
+        return drawn(problem, self.name, apart(places, _APART * problem.neuron_spacing, fixed), frames=False)
 
 
 def _data(problem: LayoutProblem) -> FloatArray:
