@@ -61,16 +61,39 @@ def test_auto_keeps_the_flow_of_long_chains_and_of_trees() -> None:
     tree = [((i - 1) // 3, i) for i in range(1, count)]
     halves = [(i, i + 1) for i in range(count - 1) if i != count // 2]
     upwards, more = [(b, a) for a, b in tree], [*chain, (3, 9), (5, 7)]
-    for branches in (chain, [*chain, (count - 1, 0)], tree, upwards, halves, more):
+    for branches in (chain, [*chain, (count - 1, 0)], tree[:900], halves, more, [*tree, (3, 9), (5, 7)]):
         assert choose_engine(made(*branches))[0] == "layered"
+    for branches in (tree, upwards):
+        assert "without a crossing" in choose_engine(made(*branches))[1]
     assert "chains or trees" in choose_engine(made(*chain))[1]
     # as many connections, but they merge everywhere, or all at one
     crossed = [(i, (7 * i + k) % count) if i % 2 else ((7 * i + k) % count, i) for i in range(count) for k in (1, 300)]
     for tangled in (crossed, [(0, i) for i in range(1, count)]):
         assert choose_engine(made(*tangled))[0] == "large"
-    layout = lay_out_problem(made(*tree))
-    ranks = layout.positions
-    assert all(ranks[f"A{a}"][1] < ranks[f"A{b}"][1] for a, b in tree)
+    for branches in (tree, [*tree, (3, 9), (5, 7)]):
+        ranks = lay_out_problem(made(*branches)).positions
+        assert all(ranks[f"A{a}"][1] < ranks[f"A{b}"][1] for a, b in branches)
+
+
+def test_auto_draws_trees_to_and_fro_and_wide_stars_as_such() -> None:
+    def made(*pairs: tuple[int, int]) -> LayoutProblem:
+        return grouped("A", 150, [(f"A{a}", f"A{b}") for a, b in sorted(set(pairs))])
+
+    tree = [((i - 1) // 3, i) for i in range(1, 150)]
+    to_and_fro = made(*((a, b) if b % 2 else (b, a) for a, b in tree))
+    for trees in (to_and_fro, made(*((0, i) for i in range(1, 150))), made(*((i, 0) for i in range(1, 150)))):
+        engine, why = choose_engine(trees)
+        assert engine == "large"
+        assert "trees" in why
+    for others in (
+        made(*tree),
+        made(*((0, i) for i in range(1, 90))),
+        made(*((i, i + 1) if i % 2 else (i + 1, i) for i in range(149))),
+        made(*((0, i) for i in range(1, 150)), (1, 2)),
+        replace(to_and_fro, pins={0: (0.0, 0.0)}),
+        replace(to_and_fro, boxes=(("box", (0, 1)),)),
+    ):
+        assert choose_engine(others)[0] == "layered"
 
 
 def test_auto_takes_large_where_connections_are_many_and_groups_no_layers() -> None:

@@ -3,6 +3,7 @@ from __future__ import annotations
 import layout_conformance as suite
 import networkx as nx
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from neurovis_layouts.organic.paths import distances
@@ -74,3 +75,10 @@ def test_boxes_are_compact_and_pins_stay() -> None:
     loose, close = (spread([layout.positions[problem.neurons[i]] for i in boxed]) for layout in layouts)
     assert close < 0.7 * loose
     assert all(layout.positions[problem.neurons[5]] == (3.3, 4.4) for layout in layouts)
+
+
+@pytest.mark.parametrize("engine", ["organic", "large"])
+def test_parts_do_not_overlap_however_small_the_spacing(engine: str) -> None:
+    names = suite.members("N", 12)
+    edges = suite.named([("N1", "N2"), ("N3", "N4"), ("N4", "N5"), ("N5", "N3")])
+    suite.check(canonical("parts", names, edges=edges, spacing=(0.2, 0.5)), engine)

@@ -6,6 +6,8 @@ the direction, what is remembered kept.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from neurovis_layouts.apart import near_pairs
@@ -15,7 +17,7 @@ from neurovis_layouts.kept import kept
 from neurovis_layouts.pins import fit, with_origins
 from neurovis_layouts.routing import route_all
 from neurovis_layouts.wiring import FloatArray, IntArray
-from neurovis_spec.layout.geometry import snap
+from neurovis_spec.layout.geometry import snap, straight
 from neurovis_spec.layout.model import Layout, LayoutProblem, Point
 
 #: With more connections than this, going round discs only moves the crowd.
@@ -24,13 +26,17 @@ _CAREFUL = 1000
 _MOST_AROUND_PINS = 300
 
 
-def drawn(problem: LayoutProblem, engine: str, places: FloatArray, frames: bool = True) -> Layout:
+def drawn(
+    problem: LayoutProblem, engine: str, places: FloatArray, frames: bool = True, clear: Iterable[int] = ()
+) -> Layout:
     """The layout with the neurons at the first of ``places`` (n, 2), where no pin says otherwise. Instances without a
-    pin are kept off the ``frames`` of those that have one."""
+    pin are kept off the ``frames`` of those that have one. Nothing is in the way of the edges ``clear``, by index, and
+    they run straight."""
     flat: list[Point] = [(snap(x), snap(y)) for x, y in places[: len(problem.neurons)].tolist()]
     pins = with_origins(problem, [to_picture(point, problem.direction) for point in flat])
     centres, _, _ = fit(flat, {i: from_picture(point, problem.direction) for i, point in pins.items()})
-    routes = route_all(problem.edges, centres, careful=_CAREFUL)
+    there = {i: straight(centres[problem.edges[i].source], centres[problem.edges[i].target]) for i in clear}
+    routes = route_all(problem.edges, centres, careful=_CAREFUL, there=there)
     turned = problem.direction
     fresh = Layout(
         problem.network,

@@ -16,6 +16,7 @@ from neurovis_spec.layout.model import LayoutProblem
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
 
 #: How heavy a hub is, and its links.
 _HUB, _SPOKE = 0.2, 1.0

@@ -6,6 +6,7 @@ In: a LayoutProblem. Out: an engine's name, and why, in words for ``inspect``.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence, Set
 
 from neurovis_spec.layout.model import LayoutProblem
 
@@ -24,7 +25,11 @@ _MOST_IN_LAYERS = 20_000
 #: connections than these: those to the far end of a rank would run along it.
 _MERGING, _MOST_AT_ONE = 0.1, 40
 #: So many parts that hang together by themselves are drawn in ranks before it gets slow.
-_MOST_PARTS = 200
+_MOST_PARTS = 500
+#: Trees of more connections than this are drawn as such if these run to and fro: in ranks they would cross. So are
+#: others, if a neuron has more than this, as the rank of its targets would be a line; and all that have too many for
+#: ranks. But at least this share of the neurons have one neighbour: what is mostly chains is long, and ranks it is.
+_MOST_TO_AND_FRO, _MOST_IN_ROW, _ENDS = 60, 120, 0.1
 
 
 def choose_engine(problem: LayoutProblem) -> tuple[str, str]:
@@ -43,6 +48,8 @@ def choose_engine(problem: LayoutProblem) -> tuple[str, str]:
         if len(problem.neurons) <= _MOST_BY_DISTANCE:
             return "organic", why
         return "large", why
+    if not (problem.pins or problem.boxes or problem.modules) and _as_trees(problem):
+        return "large", f"its {edges} connections form trees, which it draws without a crossing"
     if edges > _MOST_IN_RANKS and _in_branches(problem):
         return "layered", f"its {edges} connections form chains or trees, whose flow ranks keep"
     if edges > _MOST_IN_RANKS and not _in_layers(problem):
@@ -57,15 +64,46 @@ def _in_branches(problem: LayoutProblem) -> bool:
     if len(problem.edges) > _MOST_IN_LAYERS:
         return False
     pairs = {(edge.source, edge.target) for edge in problem.edges if edge.source != edge.target}
-    sources, targets = Counter(target for _, target in pairs), Counter(source for source, _ in pairs)
+    sources, targets = _times(pairs)
     wired = sources.keys() | targets.keys()
     if len(pairs) > (1 + _MERGING) * len(wired) or max((sources + targets).values(), default=0) > _MOST_AT_ONE:
         return False
+    parts = _parts(pairs)
+    return len(parts) <= _MOST_PARTS and _merging(parts, sources, targets) <= _MERGING * len(wired)
+
+
+def _as_trees(problem: LayoutProblem) -> bool:
+    """Whether the connections form nothing but trees, and ranks would show that badly: branches converge as well as
+    divide, or one neuron has very many, or all of them are."""
+    pairs = {(min(e.source, e.target), max(e.source, e.target)) for e in problem.edges if e.source != e.target}
+    if not _MOST_TO_AND_FRO < len(pairs) < len(problem.neurons):
+        return False
+    parts = _parts(pairs)
+    if len(pairs) != sum(map(len, parts)) - len(parts):
+        return False
+    sources, targets = _times({(e.source, e.target) for e in problem.edges if e.source != e.target})
+    near = (sources + targets).values()
+    if sum(times == 1 for times in near) < _ENDS * len(near):
+        return False
+    wide = max(near) > _MOST_IN_ROW or len(pairs) > _MOST_IN_RANKS
+    return wide or _merging(parts, sources, targets) > _MERGING * len(pairs)
+
+
+def _times(pairs: Set[tuple[int, int]]) -> tuple[Counter[int], Counter[int]]:
+    """How many sources each neuron has, and how many targets."""
+    return Counter(target for _, target in pairs), Counter(source for source, _ in pairs)
+
+
+def _parts(pairs: Set[tuple[int, int]]) -> list[set[int]]:
+    """The neurons of each part that hangs together."""
     import networkx as nx  # only here, for few networks
 
-    parts = list(nx.connected_components(nx.Graph(sorted(pairs))))
-    merging = sum(min(sum(max(times[i] - 1, 0) for i in part) for times in (sources, targets)) for part in parts)
-    return len(parts) <= _MOST_PARTS and merging <= _MERGING * len(wired)
+    return list(nx.connected_components(nx.Graph(sorted(pairs))))
+
+
+def _merging(parts: Sequence[Set[int]], sources: Counter[int], targets: Counter[int]) -> int:
+    """How many sources, or targets where that is less, neurons have beyond their first, part by part."""
+    return sum(min(sum(max(times[i] - 1, 0) for i in part) for times in (sources, targets)) for part in parts)
 
 
 def _in_layers(problem: LayoutProblem) -> bool:

@@ -7,6 +7,7 @@ spacing apart, their discs pushed off each other, packed; then pins are put wher
 
 from __future__ import annotations
 
+from collections import Counter
 from functools import partial
 
 import numpy as np
@@ -17,8 +18,9 @@ from neurovis_layouts.large.field import GridField
 from neurovis_layouts.large.flow import downward, in_flow
 from neurovis_layouts.large.settle import Cooling, settle
 from neurovis_layouts.large.spread import SMALL, SPARSE, spread, spread_small
+from neurovis_layouts.large.trees import trees_of
 from neurovis_layouts.packing import packed
-from neurovis_layouts.wiring import FloatArray, IntArray, Wiring, parts_of, wiring_of
+from neurovis_layouts.wiring import BoolArray, FloatArray, IntArray, Wiring, parts_of, wiring_of
 from neurovis_spec.layout import Capabilities, Layout, LayoutProblem, Progress
 
 #: In spacings: how far three quarters are from their next at most, how long links are in the mean at least, how far
@@ -33,6 +35,8 @@ _ROOM = 7.0
 #: A part wider than this by its height is stretched, but not farther than this.
 _FLATTEST, _STRETCH = 1.3, 3.0
 _PINNED_STEPS = 60
+#: Steps of trees, and gaps between parts, are not shorter than this, for links to pass between discs.
+_LEAST = 0.85
 
 
 class LargeEngine:
@@ -46,28 +50,41 @@ class LargeEngine:
     def lay_out(self, problem: LayoutProblem, progress: Progress | None = None) -> Layout:
         """Place the neurons by forces, route the edges straight."""
         wiring = wiring_of(problem)
-        places = _free(wiring, problem.neuron_spacing, progress)
+        places, planar = _free(wiring, problem.neuron_spacing, progress)
         if problem.pins:
             places = _around_pins(problem, wiring, places)
-        return drawn(problem, self.name, places)
+            return drawn(problem, self.name, places)
+        clear = [i for i, edge in enumerate(problem.edges) if planar[edge.source] and edge.source != edge.target]
+        return drawn(problem, self.name, places, clear=_once(problem, clear))
 
 
-def _free(wiring: Wiring, spacing: float, progress: Progress | None = None) -> FloatArray:
-    """Places (count, 2) without pins: every part laid out, then all packed."""
+def _once(problem: LayoutProblem, chosen: list[int]) -> list[int]:
+    """Of these edges those that are alone between their ends."""
+    ends = [frozenset((problem.edges[i].source, problem.edges[i].target)) for i in chosen]
+    times = Counter(ends)
+    return [i for i, pair in zip(chosen, ends, strict=True) if times[pair] == 1]
+
+
+def _free(wiring: Wiring, spacing: float, progress: Progress | None = None) -> tuple[FloatArray, BoolArray]:
+    """Places (count, 2) without pins: every part laid out, then all packed; and who is in a tree drawn as such."""
     part = parts_of(wiring.count, wiring.a, wiring.b)
     sizes = np.bincount(part)
     places = np.zeros((wiring.count, 2))
-    small = np.flatnonzero(sizes[part] <= SMALL)
+    planar = np.zeros(wiring.count, dtype=np.bool_)
+    for chosen, drawing in trees_of(wiring, part):
+        places[chosen] = drawing * max(spacing, _LEAST)
+        planar[chosen] = True
+    small = np.flatnonzero((sizes[part] <= SMALL) & ~planar)
     if len(small):
         within = np.unique(part[small], return_inverse=True)[1]
         places[small] = spread_small(_only(wiring, small), within)
-    done = len(small)
-    for number in np.flatnonzero(sizes > SMALL).tolist():
+    done = len(small) + int(planar.sum())
+    for number in np.unique(part[(sizes[part] > SMALL) & ~planar]).tolist():
         chosen = np.flatnonzero(part == number)
         reported = partial(_report, progress, done, len(chosen), wiring.count)
         places[chosen] = spread(_only(wiring, chosen), reported)
         done += len(chosen)
-    return _packed(wiring, places, part, spacing)
+    return _packed(wiring, places, part, planar, spacing), planar
 
 
 def _report(progress: Progress | None, before: int, size: int, count: int, share: float) -> None:
@@ -93,29 +110,31 @@ def _only(wiring: Wiring, chosen: IntArray) -> Wiring:
     )
 
 
-def _packed(wiring: Wiring, places: FloatArray, part: IntArray, spacing: float) -> FloatArray:
-    """Every part scaled, its discs kept apart, and all packed; what holds no neuron goes nowhere."""
+def _packed(wiring: Wiring, places: FloatArray, part: IntArray, ready: BoolArray, spacing: float) -> FloatArray:
+    """Every part scaled, its discs kept apart, but for those that are ready, and all packed; what holds no neuron goes
+    nowhere."""
     count = int(part.max(initial=-1)) + 1
     real = slice(0, wiring.neurons)
     if not wiring.neurons:
         return places
     # far from each other, so that all parts can be worked on at once
-    places = _stretched(places, part)
+    places = np.where(ready[:, None], places, _stretched(places, part))
     reach = float(np.abs(places).max()) + 1.0
     shift = np.stack([8 * reach * part, np.zeros(len(part))], axis=1)
-    places = places * _scales(wiring, places + shift, part, spacing)[:, None]
+    places = places * np.where(ready, 1.0, _scales(wiring, places + shift, part, spacing))[:, None]
     reach = float(np.abs(places).max()) + 10.0
     shift = np.stack([8 * reach * part, np.zeros(len(part))], axis=1)
     places = places + shift
     places[:, 1] = _in_flow(wiring, places[:, 1], part, spacing)
-    moved = apart(places[real], _APART * spacing, None, (wiring.above, wiring.below), part[real])
+    arcs = wiring.above, wiring.below
+    moved = apart(places[real], _APART * spacing, np.flatnonzero(ready[real]), arcs, part[real])
     low, high = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
     np.minimum.at(low, part[real], moved)
     np.maximum.at(high, part[real], moved)
     filled = np.flatnonzero(np.isfinite(low[:, 0]))
     sizes = [(float(w), float(h)) for w, h in (high - low)[filled].tolist()]
     corners = np.zeros((count, 2))
-    corners[filled] = packed(sizes, _GAP * spacing)
+    corners[filled] = packed(sizes, max(_GAP * spacing, _LEAST))
     low[~np.isfinite(low)] = 0.0
     places[real] = moved + (corners - low)[part[real]]
     return places

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from neurovis_layouts.apart import apart, jitter
+from neurovis_layouts.apart import LEAST, apart, jitter
 from neurovis_layouts.finish import drawn, nearest, pinned_places
 from neurovis_layouts.organic.paths import distances
 from neurovis_layouts.organic.stress import Arcs, least_stress
@@ -51,7 +51,7 @@ class OrganicEngine:
             chosen = np.flatnonzero(part == number)
             places[chosen] = _placed(problem, wiring, chosen, fixed, there)
             sizes.append(tuple((places[chosen].max(axis=0) - places[chosen].min(axis=0)).tolist()))
-        _pack(places, part, numbers, sizes, _GAP * problem.neuron_spacing)
+        _pack(places, part, numbers, sizes, max(_GAP * problem.neuron_spacing, LEAST))
         return drawn(problem, self.name, places)
 
 
