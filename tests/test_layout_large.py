@@ -161,6 +161,15 @@ def test_discs_are_kept_apart_and_arcs_down(points: list[tuple[float, float]]) -
     assert not len(one) or far.min() >= LEAST
 
 
+def test_where_there_is_no_room_between_pins_arcs_give_way_to_discs() -> None:
+    row = [(0.7 * i, 0.15) for i in range(-40, 41)]
+    places = np.array([*row, (-40.0, 0.1), (-40.0, 0.2), (0.35, 0.15)])
+    arcs = np.array([81, 83]), np.array([83, 82])
+    moved = apart(places, 0.75, np.arange(83), arcs)
+    assert (moved[:83] == places[:83]).all()
+    assert np.sqrt(((moved[:83] - moved[83]) ** 2).sum(axis=1)).min() >= LEAST
+
+
 def test_what_is_far_apart_already_stays() -> None:
     places = 2.0 * np.array([(i, j) for i in range(5) for j in range(5)], dtype=np.float64)
     assert np.abs(apart(places, 0.75) - places).max() < 0.001

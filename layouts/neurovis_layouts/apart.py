@@ -16,8 +16,8 @@ LEAST = 2 * RADIUS + 0.005
 #: How far beyond half of what is missing a step goes, and after how many steps the whole grows by how much.
 _EAGER, _PATIENCE, _GROWTH = 1.5, 10, 1.03
 _ROUNDS = 1000
-#: So many steps are made for arcs alone.
-_LATE = 200
+#: So many steps are made for arcs alone; where discs still overlap after so many, arcs give way.
+_LATE, _LATEST = 200, 500
 #: How far below its source the target of an arc stays, at least.
 _BELOW = 0.05
 #: Less than this is lost in rounding to the grid of coordinates.
@@ -82,7 +82,7 @@ def apart(
             break
         push = way * ((want - far) / (2 * np.maximum(far, 1e-6)))[:, None]
         moves = _collected(count, one, other, push)
-        if arcs is not None:
+        if arcs is not None and step < _LATEST:
             moves[:, 1] += _below(places[:, 1], *arcs)
         places = places + hold * moves
         if step % _PATIENCE == 0:
