@@ -17,7 +17,7 @@ MODULE = "neurovis: 1\nname: rows\nmodules: {m: {neurons: {a: {bias: 1}, b: {}},
 STAR = MODULE + "instances: {x: {module: m, count: 40}}\nneurons: {O: {}}\nconnections: {x.b -> O: 1}\n"
 #: Driven from one neuron, and driving another.
 BOTH = "neurons: {I: {bias: 1}, O: {}}\n"
-BETWEEN = MODULE + BOTH + "instances: {x: {module: m, count: 20}}\nconnections: {I -> x.a: 1, x.b -> O: 1}\n"
+BETWEEN = MODULE + BOTH + "instances: {x: {module: m, count: 40}}\nconnections: {I -> x.a: 1, x.b -> O: 1}\n"
 MIRRORED = (
     MODULE
     + BOTH
@@ -101,7 +101,7 @@ def test_what_drives_one_another_stays_together() -> None:
 
 @pytest.mark.parametrize("direction", ["up", "left", "right"])
 def test_ranks_are_folded_in_every_direction(direction: str) -> None:
-    problem, layout = drawn(f"{STAR.replace('40', '20')}layout: {{direction: {direction}}}\n")
+    problem, layout = drawn(f"{STAR}layout: {{direction: {direction}}}\n")
     assert metrics(layout, problem)["crossings"] == 0
     assert 1 / 3 <= proportions(layout) <= 3
 

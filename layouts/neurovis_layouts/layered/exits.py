@@ -1,7 +1,8 @@
 """Exits: where connections leave the frames of folds, so that they fan out from there without bending.
 
 In: levels with their places, folds. Out: for connections of frames in folds waypoints on the far line of the rank,
-straight before the neuron; those that leave a frame side by side stand in the order in which they go apart.
+straight before the neuron; those that leave a frame side by side stand in the order in which they go apart. Where
+nothing crosses, these and the passages are all that a connection needs.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from neurovis_spec.layout.model import LayoutProblem, Point
 
 #: How close a neuron of the same frame may stand to the line out of it, and how far apart such lines are.
 _CLEAR, _APART = 0.5, 0.16
+#: What in a rank reaches less far than this is in nobody's way.
+_LOW = 0.5
 
 
 def with_exits(
@@ -25,22 +28,33 @@ def with_exits(
     spans: Sequence[tuple[float, float]],
     folds: Folds,
     ways: Mapping[int, list[Waypoint]],
-) -> dict[int, list[Waypoint]]:
-    """The waypoints of each edge, from above to below, those at the exits among them; ``spans`` say how far each rank
-    reaches before its line and behind it."""
+) -> tuple[dict[int, list[Waypoint]], set[int]]:
+    """The waypoints of each edge, from above to below, those at the exits among them, and which edges need no others
+    to pass all frames; ``spans`` say how far each rank reaches before its line and behind it."""
     found = {i: list(line) for i, line in ways.items()}
     if not folds.slots:
-        return found
+        return found, set()
+    whole: set[int] = set()
     node = {m: n for n, each in enumerate(levels.nodes) for m, _, _ in each.members}
     rank = {m: levels.nodes[n].rank for m, n in node.items()}
     leaving: dict[tuple[int, bool], list[tuple[float, int]]] = {}
     for i in edges:
         ends = sorted((problem.edges[i].source, problem.edges[i].target), key=lambda m: rank[m])
         line = [way.x for way in ways.get(i, ())]
+        clear = rank[ends[1]] - rank[ends[0]] == len(line) + 1
         for end, other, down in ((ends[0], ends[1], True), (ends[1], ends[0], False)):
-            if rank[end] != rank[other] and end in folds.slots and _open(levels, node[end], end, down):
+            if rank[end] == rank[other]:
+                continue
+            if end not in folds.slots:
+                # beside what is high a flat line would run through that
+                clear = clear and max(spans[rank[end]]) < _LOW
+            elif _open(levels, node[end], end, down):
                 towards = [*(line if down else line[::-1]), _at(levels, places, node[other], other)][0]
                 leaving.setdefault((end, down), []).append((towards, i))
+            else:
+                clear = False
+        if clear:
+            whole.add(i)
     for (end, down), lines in sorted(leaving.items()):
         n = node[end]
         before, behind = spans[rank[end]]
@@ -49,7 +63,7 @@ def with_exits(
         for place, (_, i) in enumerate(sorted(lines)):
             gate = Waypoint(middle + (place - (len(lines) - 1) / 2) * _APART, y)
             found[i] = [gate, *found.get(i, [])] if down else [*found.get(i, []), gate]
-    return found
+    return found, whole
 
 
 def _at(levels: Levels, places: Sequence[Point], node: int, member: int) -> float:

@@ -6,6 +6,7 @@ In: places, frames, the plan's waypoints. Out: a route for each; those of mirror
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 from neurovis_layouts.layered.book import Key
 from neurovis_layouts.layered.settle import Settled
@@ -41,12 +42,18 @@ def linked(
     routes within the frames."""
     edges = [problem.edges[i] for i in links]
     framed = [(frozenset(members), rect) for members, rect in (*frames, *boxes)]
+    # what has its waypoints from the plan crosses nothing, and what would be drawn anew beside it might
+    firm: dict[int, list[Waypoint]] = {}
     if frames:
         planned = _passing(problem, plan, rests)
         gates = {k: planned[i] for k, i in enumerate(links) if i in planned}
-        ways, lateral = channels(dict(enumerate(edges)), rests.places, framed, gates, drawn)
-        bowed = _bowed(edges, units)
-        routes = route_all(edges, rests.places, ways, bowed, lateral, frames=framed, drawn=drawn, ease=not pair)
+        firm = {k: gates[k] for k, i in enumerate(links) if k in gates and i in plan.firm and not rests.moved}
+        lines = [*drawn, *(_through(rests.places, edges[k], line) for k, line in firm.items())]
+        free = {k: edge for k, edge in enumerate(edges) if k not in firm}
+        ways, lateral = channels(free, rests.places, framed, gates, lines)
+        ways.update(firm)
+        bowed, ease = _bowed(edges, units), not pair and not firm
+        routes = route_all(edges, rests.places, ways, bowed, lateral, frames=framed, drawn=drawn, ease=ease)
     else:
         ways = _passing(problem, plan, rests)
         bowed = _bowed(edges, units)
@@ -57,7 +64,7 @@ def linked(
     found = _reflected(found, rests, pair)
     if len(found) <= _MOST:
         found.update(_mended(found, rests, pair, framed, drawn))
-    if len(found) <= MOST_EASED:
+    if len(found) <= MOST_EASED and not firm:
         found.update(_eased(found, edges, [keys[i] for i in links], rests, pair, framed, drawn))
     # what has no image may now meet the image of another
     here = {i: found[keys[link]] for i, link in enumerate(links) if edges[i].source != edges[i].target}
@@ -94,6 +101,12 @@ def _eased(
     loops = [routes[key] for key in keys if key[0] == key[1]]
     judge = Judge(edges, rests.places, here, frames, [*drawn, *loops], image, 2 * rests.axis if pair else 0.0)
     return {keys[i]: route for i, route in eased(judge, free).items()}
+
+
+def _through(places: Sequence[Point], edge: LayoutEdge, line: Sequence[Waypoint]) -> Route:
+    """A route straight from waypoint to waypoint."""
+    stops = [places[edge.source], *((way.x, way.y) for way in line), places[edge.target]]
+    return (stops[0], *(point for a, b in pairwise(stops) for point in (a, b, b)))
 
 
 def _imaged(key: Key, routes: Mapping[Key, Route], rests: Settled, pair: Mapping[int, int]) -> bool:

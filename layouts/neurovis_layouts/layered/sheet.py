@@ -17,7 +17,7 @@ from neurovis_layouts.layered.exits import with_exits
 from neurovis_layouts.layered.folds import folded, interleaved, stacked
 from neurovis_layouts.layered.levels import Levels, levels_of
 from neurovis_layouts.layered.mirror import mirrored, symmetric
-from neurovis_layouts.layered.order import ordered
+from neurovis_layouts.layered.order import crossings, ordered
 from neurovis_layouts.layered.place import placed, reaches
 from neurovis_layouts.layered.ranks import INSTANT, ranks_of
 from neurovis_layouts.layered.turned import turned
@@ -34,6 +34,8 @@ class Plan:
 
     places: dict[int, Point] = field(default_factory=dict)
     ways: dict[int, list[Waypoint]] = field(default_factory=dict)
+    #: edges whose waypoints are all that they need
+    firm: set[int] = field(default_factory=set)
     turned: set[int] = field(default_factory=set)
     #: how far the frames and the passages reach
     corners: list[Point] = field(default_factory=list)
@@ -51,6 +53,7 @@ class Plan:
         self.places.update({i: (x + dx, y + dy) for i, (x, y) in other.places.items()})
         self.corners += [(x + dx, y + dy) for x, y in other.corners]
         self.turned |= other.turned
+        self.firm |= other.firm
         for i, ways in other.ways.items():
             self.ways[i] = [Waypoint(way.x + dx, way.y + dy, way.half) for way in ways]
 
@@ -151,7 +154,9 @@ def _component(
     spans = list(zip(*reaches(levels, order), strict=True))
     for i, passages in levels.passages.items():
         plan.ways[i] = [_passage(places[n], *spans[levels.nodes[n].rank]) for n in passages]
-    plan.ways = with_exits(problem, edges, levels, places, spans, folds, plan.ways)
+    plan.ways, whole = with_exits(problem, edges, levels, places, spans, folds, plan.ways)
+    if whole and not crossings(levels, order):
+        plan.firm |= whole
     return plan
 
 
