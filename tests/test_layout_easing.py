@@ -262,3 +262,23 @@ def test_a_layout_has_no_route_left_that_easing_would_change_much(direction: str
     # nothing goes round all of it
     assert float((lines.lengths() / straightest).max()) < 3.0
     assert float(lines.bends()[0].max()) < 6.5
+
+
+@pytest.mark.parametrize("engine", ["layered", "circular", "grid"])
+def test_routes_between_pins_far_apart_are_looked_at_within_memory(engine: str) -> None:
+    text = (
+        "neurovis: 1\nname: far\nneurons: {A: {bias: 1, count: 3}, B: {}}\n"
+        "connections: {A -> B: {pattern: all_to_all, weight: 1}, B -> A1: 1}\n"
+        f"layout: {{engine: {engine}, positions: {{A1: [-1000000, 0], B: [1000000, 5]}}}}\n"
+    )
+    measures = nv.compile_text(text).layout().metrics()
+    assert measures["pins_moved"] == 0
+    assert measures["overlaps"] == 0
+
+
+def test_in_a_fan_of_many_each_stays_where_it_is() -> None:
+    fan = [straight((0, 0), (0, 8)), *(kink((0, 0), (k, 1), (k, 7), (0, 8)) for k in (2, 4, -3))]
+    edges = [LayoutEdge(f"fan ({k})", 0, 1, 1) for k in range(4)]
+    judge_of_all = Judge(edges, [(0, 0), (0, 8)], dict(enumerate(fan)))
+    assert eased(judge_of_all, {0, 1, 2, 3}) == {}
+    assert eased(Judge(edges[:2], [(0, 0), (0, 8)], dict(enumerate(fan[:2]))), {0, 1}).keys() == {1}

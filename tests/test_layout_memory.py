@@ -495,3 +495,18 @@ def test_update_and_output_exclude_each_other(tmp_path: Path) -> None:
     spec = tmp_path / "x.yaml"
     spec.write_text(SPEC)
     assert run("layout", spec, "--update", tmp_path / "a", "-o", tmp_path / "b").exit_code == 2
+
+
+@pytest.mark.parametrize("engine", ["layered", "circular", "grid", "organic"])
+@pytest.mark.parametrize("count", [3, 30])
+def test_what_a_file_edited_by_hand_puts_on_each_other_gives_way(engine: str, count: int) -> None:
+    text = (
+        f"neurovis: 1\nname: heap\nneurons: {{A: {{bias: 1, count: {count}}}}}\n"
+        f"connections: {{A -> A: {{pattern: chain}}, A1 -> A3: 1, A3 -> A1: 1}}\nlayout: {{engine: {engine}}}\n"
+    )
+    network = nv.compile_text(text)
+    fresh = network.layout().value
+    heap = replace(fresh, positions=dict.fromkeys(fresh.positions, (2.0, 2.0)), routes={})
+    laid = network.layout(earlier=heap)
+    assert laid.metrics()["overlaps"] == 0
+    assert laid.value.positions["A1"] == (2.0, 2.0)

@@ -21,6 +21,9 @@ from neurovis_spec.layout.frames import Frames, Rect, bounds
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import RADIUS, LayoutMirror, LayoutModule, LayoutProblem, Point, Route
 
+#: Discs that touch do not overlap, whatever rounding says.
+_SLACK = 1e-6
+
 
 def remembered(problem: LayoutProblem, fresh: Sequence[Point], routes: Mapping[int, Route]) -> list[Point]:
     """Positions by neuron: earlier ones where there are such, pins before them, new ones found; ``routes`` are the
@@ -39,7 +42,7 @@ def remembered(problem: LayoutProblem, fresh: Sequence[Point], routes: Mapping[i
     for i in whole(problem, giving_way(problem, frames, before, newly, old)) & before.keys():
         if i not in problem.pins and i not in put:
             wanted.setdefault(i, before[i])
-    placed = _not_on_pins(problem, {i: point for i, point in before.items() if i not in wanted})
+    placed = _apart(problem, {i: point for i, point in before.items() if i not in wanted})
     shapes = _Shapes(problem, frames, fresh, routes, before, old)
     room = Room(frames, placed, frames.rects(placed, old), _sides(problem, fresh, before))
     wishes = _Wishes(problem, fresh, placed)
@@ -52,14 +55,20 @@ def remembered(problem: LayoutProblem, fresh: Sequence[Point], routes: Mapping[i
     return [room.placed[i] for i in range(len(problem.neurons))]
 
 
-def _not_on_pins(problem: LayoutProblem, placed: dict[int, Point]) -> dict[int, Point]:
-    """Without what stood where a pin is now: that has to find another place, like what is new."""
-    if not problem.pins:
-        return placed
-    pinned = Cells()
+def _apart(problem: LayoutProblem, placed: dict[int, Point]) -> dict[int, Point]:
+    """Without what stands on a pin, or in a file edited by hand on one before it: that has to find another place, like
+    what is new."""
+    taken = Cells()
     for point in problem.pins.values():
-        pinned.add(point)
-    return {i: point for i, point in placed.items() if i in problem.pins or pinned.free(point, 2 * RADIUS)}
+        taken.add(point)
+    found: dict[int, Point] = {}
+    for i in sorted(placed):
+        if i in problem.pins:
+            found[i] = placed[i]
+        elif taken.free(placed[i], 2 * RADIUS - _SLACK):
+            found[i] = placed[i]
+            taken.add(placed[i])
+    return found
 
 
 def _innermost(problem: LayoutProblem) -> dict[int, LayoutModule]:

@@ -21,7 +21,7 @@ _ENOUGH = REACH - 0.03
 
 def bow(start: Point, end: Point, height: float, hold: float = 0.3) -> Route:
     """A curve whose control points stand ``height`` to the left of the way, ``hold`` of it from the ends."""
-    if height == 0:
+    if height == 0 or start == end:
         return straight(start, end)
     dx, dy = end[0] - start[0], end[1] - start[1]
     length = distance(start, end)

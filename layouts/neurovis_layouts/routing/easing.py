@@ -30,8 +30,10 @@ _BOWS = (0.35, 0.7, 1.2, 2.0, 3.2, 5.0)
 _BETTER = 0.4
 #: What is worse than the old one by this, where the search begins, will not become better.
 _HOPELESS = 2.0
-#: How many routes are looked at, at most: in a crowd nobody follows one.
-_MOST = 60
+#: More than so many connections between two neurons are a fan, in which each has its place.
+_FAN = 3
+#: How many routes are looked at, at most, and how many in vain: in a crowd nobody follows one.
+_MOST, _VAIN = 60, 12
 _ROUNDS, _PASSES = 2, 4
 #: A step on the way there is worth this at least.
 _GAIN = 0.05
@@ -48,17 +50,21 @@ def eased(judge: Judge, free: AbstractSet[int], most: int = _MOST) -> dict[int, 
     """Routes by edge index for those that are eased, of those that are ``free`` to be and of which at most so many are
     looked at, the worst first."""
     changed: set[int] = set()
-    looked = sorted(free)
+    looked = sorted(free - judge.in_fans(_FAN))
     for _ in range(_ROUNDS):
         winding = judge.winding()
         chosen = [i for i in looked if winding[i][1] > _LONG or (winding[i][0] > _WINDS and len(judge.routes[i]) > 4)]
         chosen.sort(key=lambda i: (-winding[i][0] - 2 * winding[i][1], i))
-        looked = []
+        looked, vain = [], 0
         for i in chosen[:most]:
             found = _better(Pen(judge, i))
+            vain += 1
             if found is not None:
                 judge.draw(i, found)
                 looked.append(i)
+                vain = 0
+            elif vain == _VAIN:
+                break
         changed.update(looked)
         looked.sort()
     return {i: judge.routes[i] for k in sorted(changed) for i in judge.both(k)}

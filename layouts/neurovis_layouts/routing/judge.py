@@ -71,6 +71,13 @@ class Judge:
             for i, bend, length in zip(sorted(self.routes), bends.tolist(), lengths, strict=False)
         }
 
+    def in_fans(self, most: int) -> set[int]:
+        """The edges that share both ends, in either direction, with so many others at least."""
+        between: dict[frozenset[int], list[int]] = {}
+        for i in sorted(self.routes):
+            between.setdefault(frozenset((self.edges[i].source, self.edges[i].target)), []).append(i)
+        return {i for fan in between.values() if len(fan) > most for i in fan}
+
     def both(self, i: int) -> tuple[int, ...]:
         """An edge and its mirror image, if it has one."""
         other = self._image.get(i, i)

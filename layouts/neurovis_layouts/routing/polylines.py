@@ -20,6 +20,8 @@ _PARTS, _STRAIGHT = 8, 0.01
 #: How far apart points are that are looked at for what else runs there, how large their cells; those this close to the
 #: ends of a line are left out.
 STEP, CELL, _END = 0.15, 0.16, 0.6
+#: On a line so many are looked at, at most: memory has an end.
+_MOST = 2000
 _ROW = 1 << 31
 #: Crossings this close to an end of a line are how it meets others at a disc.
 _HIDDEN = 0.4
@@ -99,10 +101,11 @@ class Polylines:
         before = np.concatenate([np.zeros(1), np.cumsum(self._lengths)])
         # of each line its first segment
         offset = before[np.searchsorted(self.owner, np.arange(len(self)))]
-        counts = np.maximum(np.ceil((total - 2 * _END) / STEP), 0).astype(np.int64)
+        step = np.maximum(STEP, total / _MOST)
+        counts = np.maximum(np.ceil((total - 2 * _END) / step), 0).astype(np.int64)
         owner = np.repeat(np.arange(len(self), dtype=np.int64), counts)
         number = np.arange(len(owner), dtype=np.int64) - np.repeat(np.cumsum(counts) - counts, counts)
-        at = offset[owner] + _END + STEP * number
+        at = offset[owner] + _END + step[owner] * number
         segment = np.clip(np.searchsorted(before, at, side="right") - 1, 0, len(self._lengths) - 1)
         share = (at - before[segment]) / np.maximum(self._lengths[segment], 1e-9)
         place = np.floor((self.a[segment] + share[:, None] * self._way[segment]) / CELL).astype(np.int64)
