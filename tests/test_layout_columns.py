@@ -17,6 +17,7 @@ import neurovis_spec as nv
 from neurovis_spec.layout import Layout, LayoutEdge, LayoutProblem
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.metrics import metrics
+from neurovis_spec.layout.model import LayoutGroup, LayoutModule
 
 HEXAPOD = Path(__file__).resolve().parent.parent / "specs" / "hexapod" / "hexapod.yaml"
 
@@ -61,6 +62,24 @@ def test_a_box_left_and_entered_again_is_one_column() -> None:
         x, y = layout.positions[name]
         if i not in (0, 2, 4) and y0 <= y <= y1:
             assert x < x0 - 0.6 or x > x1 + 0.6, name
+
+
+def test_a_box_that_holds_some_of_a_ring_is_no_column() -> None:
+    group = LayoutGroup("C", (0, 1, 2))
+    legs = tuple(LayoutModule(name, "leg", -1, (n,), "leg", {}, None) for n, name in ((3, "left1"), (4, "right1")))
+    problem = LayoutProblem(
+        "ring",
+        ("C1", "C2", "C3", "left1.S1", "right1.S1"),
+        (group, LayoutGroup("left1.S", (3,)), LayoutGroup("right1.S", (4,))),
+        (LayoutEdge("C1 -> C3", 0, 2, 0), LayoutEdge("C2 -> C3", 1, 2, 0), LayoutEdge("C3 -> C1", 2, 0, 0)),
+        boxes=(("frame", (0, 1)),),
+        modules=legs,
+    )
+    layout = lay_out_problem(problem, "layered")
+    assert metrics(layout, problem)["overlaps"] == 0
+    x0, y0, x1, y1 = strip(layout, problem, 0)
+    x, y = layout.positions["C3"]
+    assert not (x0 - 0.6 < x < x1 + 0.6 and y0 - 0.6 < y < y1 + 0.6)
 
 
 def test_the_hexapod_without_hints_runs_along() -> None:

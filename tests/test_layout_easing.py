@@ -107,6 +107,26 @@ def meeting(a: list[float], b: list[float], c: list[float], d: list[float]) -> P
     return (a[0] + t / whole * ux, a[1] + t / whole * uy) if 0 <= t < whole and 0 <= s < whole else None
 
 
+@given(st.lists(routes(), min_size=1, max_size=5), st.lists(point, max_size=6), st.tuples(point, point))
+@settings(deadline=None)
+def test_what_is_in_the_way_of_lines_is_found(
+    drawn: list[Route], centres: list[Point], corner: tuple[Point, Point]
+) -> None:
+    lines = polylines(drawn)
+    clear = lines.clearances(np.array(centres, dtype=np.float64).reshape(-1, 2), 0.45)
+    (x0, y0), (x1, y1) = corner[0], (corner[0][0] + abs(corner[1][0]), corner[0][1] + abs(corner[1][1]))
+    entering = lines.enter(np.array([(x0, y0, x1, y1)]))
+    for k in range(len(drawn)):
+        line = list(pairwise(lines.points[lines.starts[k] : lines.starts[k + 1]].tolist()))
+        far = [segment_distance(centre, (a[0], a[1]), (b[0], b[1])) for centre in centres for a, b in line]
+        assert clear[k] == pytest.approx(min([0.45, *far]))
+        dense = [(a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1])) for a, b in line for s in np.linspace(0, 1, 60)]
+        if any(x0 < x < x1 and y0 < y < y1 for x, y in dense):
+            assert entering[k]
+        elif all(max(x0 - x, x - x1, y0 - y, y - y1) > 0.5 for x, y in dense):
+            assert not entering[k]
+
+
 @given(st.lists(routes(), min_size=2, max_size=5), st.data())
 @settings(deadline=None)
 def test_some_lines_are_those(drawn: list[Route], data: st.DataObject) -> None:
@@ -202,10 +222,14 @@ def test_an_eased_route_crosses_less_even_if_it_is_longer() -> None:
 
 
 def test_a_line_that_runs_along_does_not_run_back_for_a_crossing() -> None:
-    winding = kink((0, 0), (3, 1), (0, 2), (3, 3), (1, 4))
-    crossed = judge([], ((-2, 2.5), (8, 2.5)), first=winding)
-    route = eased(crossed, {0})[0]
+    fence = [((1.6 + 0.3 * k, -0.8), (1.6 + 0.3 * k, 9.0)) for k in range(4)]
+    winding = kink((0, 0), (3, 0.5), (0, 1), (3, 1.5), (4, 2))
+    route = eased(judge([], *fence, first=winding), {0})[0]
     assert polylines([route]).backward()[0] < 0.05
+    # what runs to and fro already may go round the fence
+    wandering = kink((0, 0), (3, 1.5), (0, 1), (3, 0.5), (4, 2))
+    route = eased(judge([], *fence, first=wandering), {0})[0]
+    assert polylines([route]).backward()[0] > 0.5
 
 
 def test_the_image_of_an_eased_route_is_its_reflection() -> None:

@@ -110,6 +110,8 @@ class Composer:
             if piece.part.family:
                 families.setdefault((piece.part.family, piece.part.kind), []).append(min(piece.part.members))
         units, bonds = bonded(problem, units, pair, list(families.values()))
+        # a ring or a line of which a box holds some alone can be in no strip of its own
+        columns = {box for box in columns if _whole(units, problem.boxes[box][1])}
         plan = planned(problem, units, bonds, pair, columns)
 
         def redraw(piece: Piece, pins: Mapping[int, Point]) -> Piece:
@@ -235,6 +237,12 @@ def _boxes_within(rests: Settled) -> Iterator[tuple[tuple[int, ...], Move, Rect]
 def _box(places: Sequence[Point], members: Sequence[int]) -> Rect:
     xs, ys = [places[m][0] for m in members], [places[m][1] for m in members]
     return snap(min(xs) - BOX_DOWN), snap(min(ys) - BOX_DOWN), snap(max(xs) + BOX_DOWN), snap(max(ys) + BOX_DOWN)
+
+
+def _whole(units: Sequence[Unit], members: Sequence[int]) -> bool:
+    """Whether every unit is either all of these neurons' or none of it is."""
+    own = set(members)
+    return all(own.isdisjoint(unit.members) or own.issuperset(unit.members) for unit in units)
 
 
 def _entered(drawing: Drawing, members: Sequence[int]) -> bool:

@@ -32,8 +32,8 @@ _BETTER = 0.4
 _HOPELESS = 2.0
 #: More than so many connections between two neurons are a fan, in which each has its place.
 _FAN = 3
-#: How many routes are looked at, at most, and how many in vain: in a crowd nobody follows one.
-_MOST, _VAIN = 60, 12
+#: How many routes are looked at, at most, by how many there are: in a crowd nobody follows one. How many in vain.
+_LEAST, _MOST, _WORK, _VAIN = 15, 40, 5000, 12
 _ROUNDS, _PASSES = 2, 4
 #: A step on the way there is worth this at least.
 _GAIN = 0.05
@@ -46,9 +46,9 @@ _AROUND = (
 )  # fmt: skip
 
 
-def eased(judge: Judge, free: AbstractSet[int], most: int = _MOST) -> dict[int, Route]:
-    """Routes by edge index for those that are eased, of those that are ``free`` to be and of which at most so many are
-    looked at, the worst first."""
+def eased(judge: Judge, free: AbstractSet[int]) -> dict[int, Route]:
+    """Routes by edge index for those that are eased, of those that are ``free`` to be; the worst first."""
+    most = max(_LEAST, min(_MOST, _WORK // max(1, len(judge.routes))))
     changed: set[int] = set()
     looked = sorted(free - judge.in_fans(_FAN))
     for _ in range(_ROUNDS):
@@ -97,7 +97,9 @@ def _better(pen: Pen) -> Route | None:
                 break
             best = tried
     best = _best(pen, [(best.line, cut) for cut in _CUTS], best)
-    return best.route if best.cost <= now - _BETTER else None
+    if best.cost > now - _BETTER:
+        return None
+    return best.route if pen.free(best.route) or not pen.free(pen.route) else None
 
 
 @overload

@@ -57,9 +57,9 @@ class Judge:
         self._drawn, self._image = list(drawn), dict(image or {})
         wide = [(own, (x0 - _OFF, y0 - _OFF, x1 + _OFF, y1 + _OFF)) for own, (x0, y0, x1, y1) in frames]
         self.obstacles, self.walls = Obstacles(centres), Walls(wide, len(centres))
-        points: FloatArray = np.array(centres, dtype=np.float64).reshape(-1, 2)
-        self.low: FloatArray = np.concatenate([points, self.walls.rects[:, :2]]).min(axis=0) - _MARGIN
-        self.high: FloatArray = np.concatenate([points, self.walls.rects[:, 2:]]).max(axis=0) + _MARGIN
+        self.discs: FloatArray = np.array(centres, dtype=np.float64).reshape(-1, 2)
+        self.low: FloatArray = np.concatenate([self.discs, self.walls.rects[:, :2]]).min(axis=0) - _MARGIN
+        self.high: FloatArray = np.concatenate([self.discs, self.walls.rects[:, 2:]]).max(axis=0) + _MARGIN
         self._number = {centre: k for k, centre in enumerate(centres)}
         self._look()
 
@@ -130,9 +130,16 @@ class Pen:
         self._ends = [(leaves, *judge.ends(n, both)) for n, leaves in zip(self._own, (True, False), strict=True)]
         walls = judge.walls
         inside = walls.inside[self._own[0]].astype(np.int64) + walls.inside[self._own[1]]
+        self._foreign: FloatArray = walls.rects[walls.foreign(*self._own)]
+        self._discs: FloatArray = np.delete(judge.discs, self._own, axis=0)
         # into or out of those that hold one end a route has to go once
         self._rects: FloatArray = walls.rects[inside > 0]
         self._least: IntArray = (inside[inside > 0] == 1).astype(np.int64)
+
+    def free(self, route: Route) -> bool:
+        """Whether a route is clear of discs and foreign frames, looked at as closely as any."""
+        clear = self._judge.obstacles.clearance(route, self._own)
+        return clear >= TOUCH + _SLACK and not self._judge.walls.entered([route], [self._own])[0]
 
     def cost(self) -> float:
         """What the route costs that the edge has."""
@@ -154,8 +161,8 @@ class Pen:
             chosen = chosen[plain[chosen] < limit]
             if not len(chosen):
                 break
-            costs = plain[chosen] + self._in_the_way([routes[k] for k in chosen.tolist()])
-            for add in (self._beside, self._across):
+            costs = plain[chosen]
+            for add in (self._in_the_way, self._beside, self._across):
                 near = np.flatnonzero(costs < limit)
                 chosen, costs = chosen[near], costs[near]
                 if len(chosen):
@@ -175,11 +182,10 @@ class Pen:
             cost += _BACK * lines.backward()
         return cost
 
-    def _in_the_way(self, routes: Sequence[Route]) -> FloatArray:
+    def _in_the_way(self, lines: Polylines) -> FloatArray:
         """(n,) what the discs and frames cost that they come close to or enter."""
-        judge, own = self._judge, [self._own] * len(routes)
-        clear = np.array(judge.obstacles.clearances(routes, own))
-        entering = np.array(judge.walls.entered(routes, own), dtype=np.float64)
+        clear = lines.clearances(self._discs, REACH)
+        entering = lines.enter(self._foreign).astype(np.float64)
         cost: FloatArray = _NEARING * (REACH - clear) + _ENTERING * (entering + (clear < TOUCH + _SLACK))
         return cost
 

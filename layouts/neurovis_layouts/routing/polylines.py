@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from neurovis_layouts.routing.walls import BoolArray, FloatArray, IntArray
+from neurovis_layouts.routing.walls import BoolArray, FloatArray, IntArray, blocked
 from neurovis_spec.layout.geometry import cubics
 from neurovis_spec.layout.model import Point, Route
 
@@ -40,6 +40,8 @@ class Polylines:
         self._first = np.flatnonzero(self._lines[1:] == self._lines[:-1])
         self.owner: IntArray = self._lines[self._first]
         self.a, self.b = points[self._first], points[self._first + 1]
+        #: of each line its first segment
+        self._segments: IntArray = starts[:-1] - np.arange(len(starts) - 1, dtype=np.int64)
         way = self.b - self.a
         self._way, self._lengths = way, np.sqrt(way[:, 0] * way[:, 0] + way[:, 1] * way[:, 1])
 
@@ -99,8 +101,7 @@ class Polylines:
         """(k,) and (k,) the cells that they run through, their ends apart, and which line does."""
         total = self.lengths()
         before = np.concatenate([np.zeros(1), np.cumsum(self._lengths)])
-        # of each line its first segment
-        offset = before[np.searchsorted(self.owner, np.arange(len(self)))]
+        offset = before[self._segments]
         step = np.maximum(STEP, total / _MOST)
         counts = np.maximum(np.ceil((total - 2 * _END) / step), 0).astype(np.int64)
         owner = np.repeat(np.arange(len(self), dtype=np.int64), counts)
@@ -121,6 +122,23 @@ class Polylines:
         np.add.at(count, self.owner, passing)
         more: IntArray = np.maximum(count - least, 0).sum(axis=1)
         return more
+
+    def clearances(self, centres: FloatArray, most: float) -> FloatArray:
+        """(n,) how close they come to the nearest of centres (c, 2), at most so far."""
+        near = ((centres > self.points.min(axis=0) - most) & (centres < self.points.max(axis=0) + most)).all(axis=1)
+        if not near.any():
+            return np.full(len(self), most)
+        (x, y), (ux, uy) = (centres[near][:, None, :] - self.a[None, :, :]).transpose(2, 0, 1), self._way.T
+        along = np.clip((x * ux + y * uy) / np.maximum(ux * ux + uy * uy, 1e-12), 0.0, 1.0)
+        dx, dy = x - along * ux, y - along * uy
+        least = np.sqrt((dx * dx + dy * dy).min(axis=0))
+        clear: FloatArray = np.minimum(np.minimum.reduceat(least, self._segments), most)
+        return clear
+
+    def enter(self, rects: FloatArray) -> BoolArray:
+        """(n,) whether they run through any of these rectangles (f, 4)."""
+        through: BoolArray = np.logical_or.reduceat(blocked(self.a, self.b, rects), self._segments)
+        return through
 
     def crossed(self, c: FloatArray, d: FloatArray) -> IntArray:
         """(n,) how often they cross segments from ``c`` to ``d`` (k, 2), but for where lines meet at their ends."""
