@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
+import layout_conformance as suite
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,11 +14,12 @@ from neurovis_layouts.routing.corners import corners, smooth
 from neurovis_layouts.routing.easing import eased
 from neurovis_layouts.routing.judge import Judge, Pen
 from neurovis_layouts.routing.polylines import polylines
-from neurovis_layouts.routing.walls import Frame
+from neurovis_layouts.routing.walls import FloatArray, Frame
 
 import neurovis_spec as nv
 from neurovis_spec.layout.geometry import distance, sampled, segment_distance, straight
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
+from neurovis_spec.layout.problem import problem_of
 
 number = st.integers(-40, 40).map(lambda at: at / 4)
 point = st.tuples(number, number)
@@ -183,6 +185,11 @@ def test_corners_are_few_and_on_the_route(route: Route) -> None:
     assert all(min(distance(p, q) for q in samples) < 0.3 for p in line)
 
 
+def segments(route: Route) -> tuple[FloatArray, FloatArray]:
+    line = polylines([route])
+    return line.a, line.b
+
+
 HOOKED = kink((0, 0), (0, 3), (2, 3), (2, 1), (4, 1), (4, 6))
 
 
@@ -210,6 +217,24 @@ def test_an_eased_route_keeps_off_frames_and_discs() -> None:
     assert not walled.walls.entered([route], [(0, 1)])[0]
     assert walled.obstacles.clearance(route, (0, 1)) >= 0.4
     assert polylines([route]).lengths()[0] < 9
+
+
+def test_a_route_that_only_grazes_a_frame_is_not_led_through_it() -> None:
+    # along the frame, closer than it should be, and back and forth; through it would be shorter and cross nothing
+    grazing = kink((0, 0), (0.98, 0), (0.98, 5), (5, 5), (5, 6.5), (2, 6.5), (2, 8))
+    fence = [((-0.5 - 0.5 * k, 2.5), (0.99, 2.5 + 0.2 * k)) for k in range(4)]
+    frames: list[Frame] = [(frozenset({2}), (1.0, 1.0, 4.0, 4.0)), (frozenset({4}), (-9.0, 1.0, -7.0, 4.0))]
+    walled = judge(frames, *fence, first=grazing)
+    route = eased(walled, {0}).get(0, grazing)
+    lines = polylines([grazing, route])
+    assert lines.enter(np.array([(1.0, 1.0, 4.0, 4.0)])).tolist() == [False, False]
+
+
+def test_two_lines_from_one_neuron_do_not_cross_for_a_shorter_way() -> None:
+    centres: list[Point] = [(0, 0), (4, 8), (0.5, 8)]
+    known = {0: kink((0, 0), (-3, 2), (-3, 4), (4, 4), (4, 8)), 1: straight((0, 0), (0.5, 8))}
+    route = eased(Judge([edge(0, 1), edge(0, 2)], centres, known), {0})[0]
+    assert polylines([known[0], route]).crossed(*segments(known[1])).tolist() == [1, 0]
 
 
 def test_an_eased_route_crosses_less_even_if_it_is_longer() -> None:
@@ -252,6 +277,36 @@ def test_a_route_that_meets_its_own_image_pays_for_it() -> None:
         alone = Judge([edge(0, 1), edge(2, 3)], centres, {0: route, 1: straight((9, 9), (9, 12))})
         paired = Judge([edge(0, 1), edge(2, 3)], centres, known, image={0: 1, 1: 0}, twice=0.0)
         assert Pen(paired, 0).cost() - Pen(alone, 0).cost() == pytest.approx(1.2 * crossings, abs=1e-6)
+
+
+#: the way of `r2.y -> l1.x` is only just clear of the frame of `l2`
+ASIDE = """
+neurovis: 1
+name: aside
+modules:
+  leaf: {neurons: {s: {}, t: {}, u: {}}, connections: {s -> t: 1, u -> s: {weight: -1, delay: 3}}}
+  mid:
+    neurons: {x: {}, y: {}}
+    instances: {p: {module: leaf}, q: {module: leaf}}
+    connections: {x -> q.s: 1, p.s -> q.u: 1, q.u -> p.s: 1, q.u -> y: 1}
+    layout: {mirror: [[p, q]]}
+instances: {l: {module: mid, count: 2}, r: {module: mid, count: 2}}
+neurons: {A: {bias: 0.1}, B: {count: 2}, O: {}}
+layout: {mirror: [[l, r]]}
+connections:
+  A -> B2: 1
+  B1 -> l2.y: 1
+  r1.x -> A: {weight: -1, delay: 3}
+  l2.p.s -> B2: 1
+  l2.y -> O: 1
+  r2.y -> B1: 1
+  r2.y -> l1.x: 1
+"""
+
+
+def test_no_route_is_eased_into_a_frame() -> None:
+    network = nv.compile_text(ASIDE)
+    assert suite.through_frames(network.layout("layered").value, problem_of(network.network)) == []
 
 
 SPEC = """

@@ -184,7 +184,8 @@ class _Sheet:
                 continue
             lines = through * (rows - 1) / rows * _LINE + columns * sides * _FIRST_LINE if rows > 1 else 0.0
             wide, tall = max(free * columns / count + lines + beside, most), high + (rows - 1) * each
-            worse = abs(math.log(wide / tall / self._aim)) + max(0.0, math.log(wide * tall / area))
+            # rounded, since the last bits of a logarithm are the machine's
+            worse = round(abs(math.log(wide / tall / self._aim)) + max(0.0, math.log(wide * tall / area)), 6)
             best = min(best, (worse + _RAGGED * (rows * columns - count) / columns, rows))
         return best[1]
 

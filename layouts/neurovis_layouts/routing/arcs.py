@@ -16,6 +16,7 @@ import numpy as np
 from neurovis_layouts.routing.bows import bow
 from neurovis_layouts.routing.detours import Detours
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
+from neurovis_layouts.routing.polylines import polylines
 from neurovis_layouts.routing.strokes import crossings, line_of, together, tolerable
 from neurovis_layouts.routing.walls import FloatArray, Frame, Walls
 from neurovis_spec.layout.geometry import distance, snap
@@ -47,6 +48,20 @@ def even(route: Route, twice: float) -> Route:
     return route[0], *before, *middle, *((twice - x, y) for x, y in before[::-1]), route[-1]
 
 
+class _Drawn:
+    """What else is drawn: points on it, and how often routes cross it."""
+
+    def __init__(self, routes: Sequence[Route]) -> None:
+        self.points: FloatArray = np.concatenate([np.zeros((0, 2)), *(line_of(route) for route in routes)])
+        self._lines = polylines(routes) if routes else None
+
+    def crossed(self, routes: Sequence[Route]) -> list[int]:
+        """How often each of these crosses it."""
+        if self._lines is None:
+            return [0] * len(routes)
+        return [int(count) for count in polylines(routes).crossed(self._lines.a, self._lines.b)]
+
+
 class Arcs:
     """Mends routes between mirror images among ``centres`` and ``frames``; ``pair`` says whose image a neuron is."""
 
@@ -72,7 +87,7 @@ class Arcs:
         lines = [line_of(route) for route in routes]
         if not self._wrong(own, routes, lines):
             return list(routes)
-        drawn = [line_of(route) for route in others]
+        drawn = _Drawn(others)
         there = [route if ends == own[0] else route[::-1] for ends, route in zip(own, routes, strict=True)]
         tried = [*there, *self._candidates(*own[0])]
         lines = [line_of(route) for route in tried]
@@ -112,21 +127,21 @@ class Arcs:
         routes: Sequence[Route],
         own: tuple[int, int],
         lines: Sequence[FloatArray],
-        drawn: Sequence[FloatArray],
+        drawn: _Drawn,
     ) -> list[float]:
         """What each route costs by itself."""
         ends = [own] * len(routes)
         clear, enters = self._obstacles.clearances(routes, ends), self._walls.entered(routes, ends)
         straight = distance(self._centres[own[0]], self._centres[own[1]])
-        everything = np.concatenate([np.zeros((0, 2)), *drawn])
+        crossed = drawn.crossed(routes)
         result = []
-        for route, line, clearance, entering in zip(routes, lines, clear, enters, strict=True):
+        for route, line, clearance, entering, crossing in zip(routes, lines, clear, enters, crossed, strict=True):
             cost = _ENTERING * (entering + (clearance < TOUCH + _SLACK)) + _NEARING * (REACH - clearance)
             cost += _LONGER * (_length(line) / straight - 1) + _CORNERS * (len(route) > 4)
             height, wavering = _aside(route[0][1], line)
             cost += _ASIDE * height + _WAVERING * wavering
             if cost < _ENTERING:
-                cost += _OTHER * together(line, [everything]) + _CROSSING * crossings(line, drawn)
+                cost += _OTHER * together(line, [drawn.points]) + _CROSSING * crossing
             result.append(cost)
         return result
 

@@ -12,7 +12,7 @@ from neurovis_spec.layout.geometry import cubics, distance, point_on, segment_di
 from neurovis_spec.layout.model import Point, Route
 
 #: Corners closer to the line than this are none; there are so many at most, else more is none.
-_FLAT, _MOST, _MORE = 0.12, 9, 1.6
+_FLAT, _MOST, _MORE = 0.12, 6, 1.6
 #: Where on a piece corners are looked for.
 _ON = (0.25, 0.5, 0.75, 1.0)
 #: How much of the first and of the last leg stays straight, for the arrowhead, and what share of a short one.

@@ -11,7 +11,6 @@ from collections.abc import Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import overload
 
 from neurovis_layouts.routing.corners import corners, smooth
 from neurovis_layouts.routing.judge import Judge, Pen
@@ -23,13 +22,15 @@ from neurovis_spec.layout.model import RADIUS, Point, Route
 _WINDS, _LONG = 1.2, 1.35
 #: How much of a corner is cut off, at most.
 _CUTS = (4.0, 1.0)
+#: So many corners in a row are left out at once, at first and later on.
+_MOST_CORNERS, _FEW_CORNERS = 9, 2
 #: How far corners are moved, and how far off the straight way a lone one is tried.
 _MOVES = (1.0, 0.45, 0.2)
 _BOWS = (0.35, 0.7, 1.2, 2.0, 3.2, 5.0)
 #: A new route is better than the old one by this at least.
 _BETTER = 0.4
 #: What is worse than the old one by this, where the search begins, will not become better.
-_HOPELESS = 2.0
+_HOPELESS = 0.7
 #: More than so many connections between two neurons are a fan, in which each has its place.
 _FAN = 3
 #: How many routes are looked at, at most, by how many there are: in a crowd nobody follows one. How many in vain.
@@ -87,44 +88,47 @@ def _better(pen: Pen) -> Route | None:
     now = pen.cost()
     line = corners(pen.route)
     starts = [line, *_fewer(line), *_bowed(line[0], line[-1])]
-    best = _best(pen, [(way, cut) for way in starts for cut in _CUTS], None)
-    if best is None or best.cost > now + _HOPELESS:
+    best = _first(pen, starts, now + _HOPELESS)
+    if best is None:
         return None
     for far in _MOVES:
         for _ in range(_PASSES):
-            tried = _best(pen, [(way, best.cut) for way in (*_moved(best.line, far), *_fewer(best.line))], best)
+            lines = *_moved(best.line, far), *_fewer(best.line, _FEW_CORNERS)
+            tried = _next(pen, [(line, best.cut) for line in lines], best)
             if tried is best:
                 break
             best = tried
-    best = _best(pen, [(best.line, cut) for cut in _CUTS], best)
+    best = _next(pen, [(best.line, cut) for cut in _CUTS], best)
     if best.cost > now - _BETTER:
         return None
-    return best.route if pen.free(best.route) or not pen.free(pen.route) else None
+    entered, close = pen.trespass(best.route)
+    before = pen.trespass(pen.route)
+    return best.route if entered <= before[0] and close <= before[1] else None
 
 
-@overload
-def _best(pen: Pen, ways: Sequence[tuple[tuple[Point, ...], float]], best: _Try) -> _Try: ...
-@overload
-def _best(pen: Pen, ways: Sequence[tuple[tuple[Point, ...], float]], best: None) -> _Try | None: ...
-def _best(pen: Pen, ways: Sequence[tuple[tuple[Point, ...], float]], best: _Try | None) -> _Try | None:
+def _first(pen: Pen, lines: Sequence[tuple[Point, ...]], limit: float) -> _Try | None:
+    """The best of these lines to begin with, None where all cost more than the limit."""
+    ways = [(line, cut) for line in lines for cut in _CUTS]
+    routes = [smooth(line, cut) for line, cut in ways]
+    found = pen.cheapest(routes, limit)
+    return None if found is None else _Try(found[1], *ways[found[0]], routes[found[0]])
+
+
+def _next(pen: Pen, ways: Sequence[tuple[tuple[Point, ...], float]], best: _Try) -> _Try:
     """The best of these lines, with so much cut off their corners, if it is better than the best so far."""
     routes = [smooth(line, cut) for line, cut in ways]
-    found = pen.cheapest(routes, math.inf if best is None else best.cost - _GAIN, 1000 if best is None else _SOME)
-    if found is None:
-        return best
-    number, cost = found
-    return _Try(cost, *ways[number], routes[number])
+    found = pen.cheapest(routes, best.cost - _GAIN, _SOME)
+    return best if found is None else _Try(found[1], *ways[found[0]], routes[found[0]])
 
 
-def _fewer(line: tuple[Point, ...]) -> Iterator[tuple[Point, ...]]:
-    inner = range(1, len(line) - 1)
-    for first in inner:
-        for last in range(first, len(line) - 1):
+def _fewer(line: tuple[Point, ...], most: int = _MOST_CORNERS) -> Iterator[tuple[Point, ...]]:
+    """The line without some corners in a row, up to so many, and with one in their middle."""
+    for first in range(1, len(line) - 1):
+        for last in range(first, min(first + most, len(line) - 1)):
             yield line[:first] + line[last + 1 :]
-            # or one corner in place of several
             if last > first:
-                x = sum(p[0] for p in line[first : last + 1]) / (last + 1 - first)
-                y = sum(p[1] for p in line[first : last + 1]) / (last + 1 - first)
+                left_out = line[first : last + 1]
+                x, y = (math.fsum(part) / len(left_out) for part in zip(*left_out, strict=True))
                 yield (*line[:first], (x, y), *line[last + 1 :])
 
 
@@ -134,7 +138,7 @@ def _moved(line: tuple[Point, ...], far: float) -> Iterator[tuple[Point, ...]]:
         for dx, dy in _AROUND:
             yield (*line[:k], (x + far * dx, y + far * dy), *line[k + 1 :])
     for k, (a, b) in enumerate(pairwise(line[1:-1]), 1) if far == _MOVES[0] else ():
-        for dx, dy in _AROUND:
+        for dx, dy in _AROUND[::2]:
             yield (
                 *line[:k], (a[0] + far * dx, a[1] + far * dy), (b[0] + far * dx, b[1] + far * dy), *line[k + 2 :],
             )  # fmt: skip

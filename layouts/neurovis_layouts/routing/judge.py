@@ -12,13 +12,15 @@ import numpy as np
 
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
 from neurovis_layouts.routing.polylines import STEP, Polylines, polylines
-from neurovis_layouts.routing.walls import FloatArray, Frame, IntArray, Walls
+from neurovis_layouts.routing.walls import FloatArray, Frame, IntArray, Walls, meet
 from neurovis_spec.layout.geometry import distance
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
 #: What it costs to enter a foreign frame or a disc, to come a unit closer to a disc than ``REACH``, to cross a line, to
 #: run on others for a unit.
 _ENTERING, _NEARING, _CROSSING, _ALONG = 1000.0, 10.0, 1.2, 1.5
+#: To come too close to a foreign frame, and to cross a line that leads from or to the same neuron, besides.
+_GRAZING, _KIN = 6.0, 2.4
 #: To be a unit longer, to be longer by the straight way, to turn by a chord of 1, the same in a bend of radius 1.
 _LONGER, _RATIO, _BENDING, _TIGHT = 0.1, 1.0, 0.5, 0.25
 #: To run back a unit along the direction, where the route did not, to lead a unit beyond all that is drawn, and to pass
@@ -126,20 +128,31 @@ class Pen:
         self._reflect = len(both) > 1
         others = ~np.isin(judge.segment_edges, both)
         self._a, self._b = judge.a[others], judge.b[others]
+        kin = np.array([i for i in sorted(judge.routes) if not self._apart_from(i)], dtype=np.int64)
+        self._kin = np.isin(judge.segment_edges[others], kin)
         self._cells = judge.cells[~np.isin(judge.cell_edges, both)]
         self._ends = [(leaves, *judge.ends(n, both)) for n, leaves in zip(self._own, (True, False), strict=True)]
         walls = judge.walls
         inside = walls.inside[self._own[0]].astype(np.int64) + walls.inside[self._own[1]]
-        self._foreign: FloatArray = walls.rects[walls.foreign(*self._own)]
+        foreign = walls.foreign(*self._own)
+        self._margins: FloatArray = walls.rects[foreign]
+        self._foreign: FloatArray = self._margins + np.array([_OFF, _OFF, -_OFF, -_OFF])
         self._discs: FloatArray = np.delete(judge.discs, self._own, axis=0)
         # into or out of those that hold one end a route has to go once
         self._rects: FloatArray = walls.rects[inside > 0]
         self._least: IntArray = (inside[inside > 0] == 1).astype(np.int64)
 
-    def free(self, route: Route) -> bool:
-        """Whether a route is clear of discs and foreign frames, looked at as closely as any."""
-        clear = self._judge.obstacles.clearance(route, self._own)
-        return clear >= TOUCH + _SLACK and not self._judge.walls.entered([route], [self._own])[0]
+    def _apart_from(self, other: int) -> bool:
+        """Whether an edge has no neuron in common with this one."""
+        edge = self._judge.edges[other]
+        return {edge.source, edge.target}.isdisjoint(self._own)
+
+    def trespass(self, route: Route) -> tuple[int, float]:
+        """How many foreign frames a route enters, and by how much it is too close to a disc, looked at as closely as
+        any."""
+        lines = polylines([route])
+        entered = int(meet(lines.a, lines.b, self._foreign).any(axis=0).sum())
+        return entered, max(0.0, TOUCH + _SLACK - self._judge.obstacles.clearance(route, self._own))
 
     def cost(self) -> float:
         """What the route costs that the edge has."""
@@ -185,8 +198,9 @@ class Pen:
     def _in_the_way(self, lines: Polylines) -> FloatArray:
         """(n,) what the discs and frames cost that they come close to or enter."""
         clear = lines.clearances(self._discs, REACH)
-        entering = lines.enter(self._foreign).astype(np.float64)
-        cost: FloatArray = _NEARING * (REACH - clear) + _ENTERING * (entering + (clear < TOUCH + _SLACK))
+        grazing, entering = lines.enter(self._margins), lines.enter(self._foreign)
+        cost: FloatArray = _NEARING * (REACH - clear) + _GRAZING * grazing.astype(np.float64)
+        cost += _ENTERING * (entering.astype(np.float64) + (clear < TOUCH + _SLACK))
         return cost
 
     def _beside(self, lines: Polylines) -> FloatArray:
@@ -205,12 +219,15 @@ class Pen:
 
     def _across(self, lines: Polylines) -> FloatArray:
         """(n,) what it costs to cross others."""
-        crossings = lines.crossed(self._a, self._b)
+        crossings = lines.crossed(self._a, self._b).astype(np.float64)
+        cost: FloatArray = _CROSSING * crossings
+        if self._kin.any():
+            cost += _KIN * lines.crossed(self._a[self._kin], self._b[self._kin])
         if self._reflect:
+            (low, high), axis = lines.extents(), self._judge.twice / 2
             flip, shift = np.array([-1.0, 1.0]), np.array([self._judge.twice, 0.0])
-            for k in range(len(lines)):
-                points = lines.points[lines.starts[k] : lines.starts[k + 1]]
-                one = Polylines(points, np.array([0, len(points)], dtype=np.int64))
-                crossings[k] += one.crossed(one.a * flip + shift, one.b * flip + shift)[0]
-        cost: FloatArray = _CROSSING * crossings.astype(np.float64)
+            # only what reaches over the axis meets its own image
+            for k in np.flatnonzero((low[:, 0] <= axis) & (high[:, 0] >= axis)).tolist():
+                one = lines.some(np.array([k], dtype=np.int64))
+                cost[k] += _CROSSING * float(one.crossed(one.a * flip + shift, one.b * flip + shift)[0])
         return cost
