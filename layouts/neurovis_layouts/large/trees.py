@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from neurovis_layouts.wiring import FloatArray, IntArray, Wiring
+from neurovis_spec.layout.geometry import turn
 
 #: In steps: how far rows are apart at least, and how far links keep off the discs beside their ends.
 _ROW, _CLEAR = 1.2, 0.36
@@ -95,8 +96,8 @@ def _fan(hub: int, near: Neighbours) -> FloatArray:
         others = [other for other, way in near[hub] if (way or 1) == side]
         radius = max(_CLEAR * (len(others) + 1) / math.pi, 2 * _ROW)
         for i, other in enumerate(others):
-            angle, reach = math.pi * (i + 1) / (len(others) + 1), radius + _TIERS * (i % 2)
-            places[other] = (-reach * math.cos(angle), side * reach * math.sin(angle))
+            (cosine, sine), reach = turn((i + 1) / (2 * len(others) + 2)), radius + _TIERS * (i % 2)
+            places[other] = (-reach * cosine, side * reach * sine)
     return places
 
 
