@@ -19,7 +19,7 @@ from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.file import dump, parse
-from neurovis_spec.layout.geometry import distance
+from neurovis_spec.layout.geometry import distance, sampled
 from neurovis_spec.layout.metrics import metrics
 from neurovis_spec.layout.model import Layout, LayoutProblem, Point
 from neurovis_spec.layout.problem import canonical, problem_of
@@ -510,3 +510,26 @@ def test_what_a_file_edited_by_hand_puts_on_each_other_gives_way(engine: str, co
     laid = network.layout(earlier=heap)
     assert laid.metrics()["overlaps"] == 0
     assert laid.value.positions["A1"] == (2.0, 2.0)
+
+
+def test_a_new_neuron_stands_off_the_lines_that_are_drawn() -> None:
+    text = """
+neurovis: 1
+name: lines
+modules: {leg: {neurons: {s: {}, u: {}, v: {}}, connections: {s -> u: 1, u -> v: 1}}}
+instances: {l: {module: leg}, r: {module: leg}}
+neurons: {A: {bias: 1}, O: {}MORE}
+connections:
+  A -> l.s + r.s + O: 1
+  l.v -> O: 1
+  r.v -> O: 1
+  LINKED
+layout: {mirror: [[l, r]]}
+"""
+    before = nv.compile_text(text.replace("MORE", "").replace("LINKED", "")).layout("layered").value
+    network = nv.compile_text(text.replace("MORE", ", Z: {}").replace("LINKED", "Z -> O: 1"))
+    now = network.layout("layered", earlier=before).value
+    assert now.positions.items() >= before.positions.items()
+    assert {name: route for name, route in now.routes.items() if name in before.routes} == before.routes
+    z = now.positions["Z"]
+    assert all(distance(z, point) >= 0.45 for route in before.routes.values() for point in sampled(route))

@@ -44,12 +44,15 @@ def remembered(problem: LayoutProblem, fresh: Sequence[Point], routes: Mapping[i
             wanted.setdefault(i, before[i])
     placed = _apart(problem, {i: point for i, point in before.items() if i not in wanted})
     shapes = _Shapes(problem, frames, fresh, routes, before, old)
-    room = Room(frames, placed, frames.rects(placed, old), _sides(problem, fresh, before))
+    room = Room(frames, placed, frames.rects(placed, old), _sides(problem, fresh, before), old.values())
     wishes = _Wishes(problem, fresh, placed)
     for piece in _pieces(problem, shapes, before, frozenset(placed), frozenset(wanted)):
         first = piece[0].offsets[0]
-        wish = wanted.get(first[0])
-        room.put(piece, wishes.wish(piece[0], room.placed) if wish is None else wish, wish is not None)
+        wish, row = wanted.get(first[0]), wishes.row(piece[0], room.placed)
+        if wish is None:
+            room.put(piece, wishes.wish(piece[0], room.placed) if row is None else row, in_row=row is not None)
+        else:
+            room.put(piece, wish, stay=True)
         for neuron in (i for copy in piece for i in copy.members):
             wishes.note(neuron, room.placed[neuron])
     return [room.placed[i] for i in range(len(problem.neurons))]
@@ -101,12 +104,14 @@ class _Wishes:
             lines.add(point[axis])
             self._ranks[axis, self._fresh[neuron][axis]] = count + 1, lines
 
+    def row(self, copy: Copy, placed: Mapping[int, Point]) -> Point | None:
+        """Where a member of a group goes on with its row."""
+        row = self._rows.next(copy.offsets[0][0], placed) if len(copy.offsets) == 1 else None
+        return None if row is None else (snap(row[0]), snap(row[1]))
+
     def wish(self, copy: Copy, placed: Mapping[int, Point]) -> Point:
         """Where the fresh layout puts the anchor, moved as the neighbours have been moved, or, without any, all
-        others; a member of a group goes on with its row."""
-        row = self._rows.next(copy.offsets[0][0], placed) if len(copy.offsets) == 1 else None
-        if row is not None:
-            return snap(row[0]), snap(row[1])
+        others."""
         mates = sorted({mate for neuron, _ in copy.offsets for mate in self._near.get(neuron, ()) if mate in placed})
         if copy.instance < 0 and copy.offsets[0][0] in self._own:
             # what its instance is drawn like goes before what is outside

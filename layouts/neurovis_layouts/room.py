@@ -7,16 +7,19 @@ a wish: off all discs, its frame off those of others, nobody foreign in any, mir
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from neurovis_layouts.pins import Cells
 from neurovis_spec.layout.frames import Frames, Rect, bounds, meet, padded, titled, united, untitled
-from neurovis_spec.layout.geometry import snap
-from neurovis_spec.layout.model import RADIUS, Point
+from neurovis_spec.layout.geometry import sampled, snap
+from neurovis_spec.layout.model import RADIUS, Point, Route
 
 #: Steps of the search and how many of them it goes: near first, then far, then beyond everything.
 _REACHES = ((0.25, 4), (0.25, 16), (0.5, 32), (1.0, 64))
+#: How far off the wish a place off all lines may be, how far off lines that is, and how far apart points on them are
+#: looked at, of which there are so many at most.
+_ASIDE, _OFF, _STEP, _MOST = 4.0, 0.5, 0.25, 50_000
 _CELL = 4.0
 
 
@@ -64,14 +67,16 @@ class Copy:
 @dataclass(frozen=True, slots=True)
 class _Rules:
     """What a place has to keep: from disc to disc, from a neuron to a foreign frame and between frames; without frames
-    only the discs."""
+    only the discs; whether it is off the lines that are drawn."""
 
     clear: float
     margin: float
     between: float
     framed: bool = True
+    off_lines: bool = False
 
 
+_CLEAR = _Rules(0.75, 0.4, 0.5, off_lines=True)
 _AMPLE = _Rules(0.75, 0.4, 0.5)
 _TIGHT = _Rules(2 * RADIUS, 0.0, 0.0)
 _DISCS = _Rules(0.75, 0.0, 0.0, framed=False)
@@ -81,7 +86,12 @@ class Room:
     """What is placed, and the frames around it (``rects``, by number)."""
 
     def __init__(
-        self, frames: Frames, placed: Mapping[int, Point], rects: Sequence[Rect | None], sides: Mapping[int, Side]
+        self,
+        frames: Frames,
+        placed: Mapping[int, Point],
+        rects: Sequence[Rect | None],
+        sides: Mapping[int, Side],
+        routes: Iterable[Route] = (),
     ) -> None:
         self.placed = dict(placed)
         self._frames, self._rects, self._sides = frames, list(rects), sides
@@ -99,11 +109,15 @@ class Room:
             if rect is not None and next(self._strangers(number, rect), None) is not None
         }
         self._steps: list[Point] = []
+        points = [point for route in routes for point in sampled(route, _STEP)]
+        self._lines = Cells()
+        for point in points if len(points) <= _MOST else ():
+            self._lines.add(point)
 
-    def put(self, piece: Sequence[Copy], wish: Point, stay: bool = False) -> None:
-        """Place a piece, all of its copies, as near to the wish as may be; exactly there, if they can and are to
-        ``stay``."""
-        anchor = self._found(piece, wish, stay)
+    def put(self, piece: Sequence[Copy], wish: Point, stay: bool = False, in_row: bool = False) -> None:
+        """Place a piece, all of its copies, as near to the wish as may be, off the lines that are drawn, unless it
+        goes on with a row; exactly there, if they can and are to ``stay``."""
+        anchor = self._found(piece, wish, stay, in_row)
         for copy in piece:
             for number, rect in self._touched(copy, anchor).items():
                 before = self._rects[number]
@@ -123,9 +137,14 @@ class Room:
         self._walls.add(number, rect)
         self._bounds = united([rect, self._bounds or rect])
 
-    def _found(self, piece: Sequence[Copy], wish: Point, stay: bool) -> Point:
+    def _found(self, piece: Sequence[Copy], wish: Point, stay: bool, in_row: bool) -> Point:
         if stay and self._free(piece, wish, _TIGHT):
             return wish
+        for x, y in self._around() if not in_row else ():
+            if x * x + y * y > _ASIDE * _ASIDE:
+                break
+            if self._free(piece, (wish[0] + x, wish[1] + y), _CLEAR):
+                return wish[0] + x, wish[1] + y
         beyond = list(self._beyond(piece[0], wish))
         for rules in (_AMPLE, _TIGHT, _DISCS):
             for x, y in self._around():
@@ -174,6 +193,8 @@ class Room:
             side = self._sides.get(copy.offsets[0][0])
             for neuron, point in copy.spots(anchor):
                 if not self._cells.free(point, rules.clear) or not inside.free(point, rules.clear):
+                    return False
+                if rules.off_lines and copy.instance < 0 and not self._lines.free(point, _OFF):
                     return False
                 if side is not None and (point[side.across] - side.axis) * side.sign <= 0:
                     return False
