@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import layout_conformance as suite
 import pytest
 
 import neurovis_spec as nv
 from neurovis_spec.layout import Layout
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.metrics import metrics
-from neurovis_spec.layout.model import LayoutProblem
+from neurovis_spec.layout.model import LayoutEdge, LayoutModule, LayoutProblem
 from neurovis_spec.layout.problem import problem_of
 
 MODULE = "neurovis: 1\nname: rows\nmodules: {m: {neurons: {a: {bias: 1}, b: {}}, connections: {a -> b: 1}}}\n"
@@ -138,3 +139,21 @@ def test_the_order_of_connections_does_not_show() -> None:
     names = [f"x{i}.b -> O: 1" for i in range(1, 41)]
     one, other = (drawn(STAR.replace("x.b -> O: 1", ", ".join(order)))[1] for order in (names, [*names[::-1]]))
     assert (one.positions, one.routes) == (other.positions, other.routes)
+
+
+def test_a_row_that_is_less_deep_than_the_others_leaves_no_empty_rank() -> None:
+    # seven strands, one of them two frames deep, the last row of single frames
+    paths = [f"{side}{k}" for side in ("left", "right") for k in range(1, 5)]
+    problem = LayoutProblem(
+        "shallow",
+        tuple(f"{path}.S{n}" for path in paths for n in (1, 2, 3)),
+        (),
+        (LayoutEdge("right1.S1 -> left1.S1", 12, 0, 0),),
+        modules=tuple(
+            LayoutModule(path, "leg", -1, tuple(range(3 * k, 3 * k + 3)), "leg", {}, None)
+            for k, path in enumerate(paths)
+        ),
+    )
+    layout = lay_out_problem(problem, "layered")
+    assert metrics(layout, problem)["overlaps"] == 0
+    assert not suite.frames_meet(layout, problem)

@@ -81,7 +81,14 @@ def folded(
         if rows:
             sheet.fold(first, last, rows)
             found = _into_rows(found, units, block, first, last, rows, bool(pair))
-    return found
+    return _closed(found) if found.ranks else found
+
+
+def _closed(found: Folds) -> Folds:
+    """The folds without ranks in which nothing stands, as where strands of one row are less deep than others."""
+    place = {level: number for number, level in enumerate(sorted(set(found.rank)))}
+    ranks = frozenset(place[level] for level in found.ranks if level in place)
+    return replace(found, rank=[place[level] for level in found.rank], ranks=ranks)
 
 
 def _free(problem: LayoutProblem, units: Sequence[Unit], bonds: Sequence[int], pair: Mapping[int, int]) -> set[int]:
