@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain, takewhile
 
 from neurovis_layouts.pins import Cells
 from neurovis_spec.layout.frames import Frames, Rect, bounds, meet, padded, titled, united, untitled
@@ -82,6 +83,11 @@ _TIGHT = _Rules(2 * RADIUS, 0.0, 0.0)
 _DISCS = _Rules(0.75, 0.0, 0.0, framed=False)
 
 
+def _aside(step: Point) -> bool:
+    """Whether a step from a wish is one to which lines are worth keeping off."""
+    return step[0] * step[0] + step[1] * step[1] <= _ASIDE * _ASIDE
+
+
 class Room:
     """What is placed, and the frames around it (``rects``, by number)."""
 
@@ -140,17 +146,11 @@ class Room:
     def _found(self, piece: Sequence[Copy], wish: Point, stay: bool, in_row: bool) -> Point:
         if stay and self._free(piece, wish, _TIGHT):
             return wish
-        for x, y in self._around() if not in_row else ():
-            if x * x + y * y > _ASIDE * _ASIDE:
-                break
-            if self._free(piece, (wish[0] + x, wish[1] + y), _CLEAR):
-                return wish[0] + x, wish[1] + y
+        near = [] if in_row else [(wish[0] + x, wish[1] + y) for x, y in takewhile(_aside, self._around())]
         beyond = list(self._beyond(piece[0], wish))
-        for rules in (_AMPLE, _TIGHT, _DISCS):
-            for x, y in self._around():
-                if self._free(piece, (wish[0] + x, wish[1] + y), rules):
-                    return wish[0] + x, wish[1] + y
-            for anchor in beyond:
+        for rules in (_CLEAR, _AMPLE, _TIGHT, _DISCS):
+            around = ((wish[0] + x, wish[1] + y) for x, y in self._around())
+            for anchor in near if rules.off_lines else chain(around, beyond):
                 if self._free(piece, anchor, rules):
                     return anchor
         # copies that cannot all be free together stand as far out as is needed for their discs

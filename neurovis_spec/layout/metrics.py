@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from neurovis_spec.layout.geometry import cubics, distance
 from neurovis_spec.layout.model import RADIUS, Direction, Layout, LayoutProblem, Point, Route
+from neurovis_spec.layout.segments import meet
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -127,27 +128,13 @@ def _crossings(segments: _Segments, ends: IntArray, centres: FloatArray) -> int:
     for first, second in _pairs(keys):
         other = edge[first] != edge[second]
         i, j = first[other], second[other]
-        share, hit = _meet(a[0][i], a[1][i], u[0][i], u[1][i], a[0][j], a[1][j], u[0][j], u[1][j])
+        share, hit = meet(a[0][i], a[1][i], u[0][i], u[1][i], a[0][j], a[1][j], u[0][j], u[1][j])
         i, j = i[hit], j[hit]
         where = (a[:, i] + share * u[:, i]).T
         # a pair may share several cells: it counts in the one that the point lies in
         once = _key(*np.floor(where / cell).astype(np.int64).T) == keys[i]
         total += int(_outside(where[once], ends[edge[i[once]]], ends[edge[j[once]]], centres).sum())
     return total
-
-
-def _meet(
-    ax: FloatArray, ay: FloatArray, ux: FloatArray, uy: FloatArray,
-    bx: FloatArray, by: FloatArray, vx: FloatArray, vy: FloatArray,
-) -> tuple[FloatArray, npt.NDArray[np.bool_]]:  # fmt: skip
-    """Whether segments a to a + u and b to b + v cross (half-open, so that a corner counts once; parallel ones never
-    do), and for those that do, at what share of u."""
-    bx, by = bx - ax, by - ay
-    cross = ux * vy - uy * vx
-    sign, whole = np.sign(cross), np.abs(cross)
-    s, t = sign * (bx * vy - by * vx), sign * (bx * uy - by * ux)
-    hit = (s >= 0) & (s < whole) & (t >= 0) & (t < whole)
-    return s[hit] / whole[hit], hit
 
 
 def _outside(where: FloatArray, one: IntArray, two: IntArray, centres: FloatArray) -> npt.NDArray[np.bool_]:

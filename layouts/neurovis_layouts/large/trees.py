@@ -118,11 +118,13 @@ def _farthest(near: Neighbours, root: int) -> int:
     return max(far, key=lambda i: (far[i], -i))
 
 
-def _walk(near: Neighbours, root: int) -> list[tuple[int, int]]:
-    """Points in an order in which each comes after the one that it is reached from, with that (the root's own)."""
+def _walk(near: Neighbours, root: int, first: Sequence[tuple[int, int]] | None = None) -> list[tuple[int, int]]:
+    """Points in an order in which each comes after the one that it is reached from, with that (the root's own); from
+    the root to all of its neighbours, or to the ``first`` alone."""
     found = [(root, root)]
     for point, origin in found:
-        found += [(other, point) for other, _ in near[point] if other != origin]
+        ways = near[point] if point != root or first is None else first
+        found += [(other, point) for other, _ in ways if other != origin]
     return found
 
 
@@ -163,9 +165,7 @@ class _Rows:
         put: Callable[[Sequence[float], Sequence[int]], float],
     ) -> None:
         count = len(near)
-        walk = [(root, root)]
-        for point, origin in walk:
-            walk += [(other, point) for other, _ in (first if point == root else near[point]) if other != origin]
+        walk = _walk(near, root, first)
         way = {(point, other): side for point, of in enumerate(near) for other, side in of}
         children: list[list[int]] = [[] for _ in range(count)]
         for point, origin in walk[1:]:

@@ -15,9 +15,9 @@ from neurovis_layouts.layered.units import Unit
 from neurovis_layouts.routing import Waypoint, route_all, told_apart
 from neurovis_layouts.routing.arcs import Arcs, even
 from neurovis_layouts.routing.channels import channels
-from neurovis_layouts.routing.easing import eased
+from neurovis_layouts.routing.corners import reflected
+from neurovis_layouts.routing.easing import MOST_EASED, eased
 from neurovis_layouts.routing.judge import Judge
-from neurovis_layouts.routing.router import MOST_EASED
 from neurovis_spec.layout.frames import Rect
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import LayoutEdge, LayoutProblem, Point, Route
@@ -44,20 +44,19 @@ def linked(
     framed = [(frozenset(members), rect) for members, rect in (*frames, *boxes)]
     # what has its waypoints from the plan crosses nothing, and what would be drawn anew beside it might
     firm: dict[int, list[Waypoint]] = {}
+    lateral: dict[int, list[Waypoint]] = {}
+    planned = _passing(problem, plan, rests)
     if frames:
-        planned = _passing(problem, plan, rests)
         gates = {k: planned[i] for k, i in enumerate(links) if i in planned}
         firm = {k: gates[k] for k, i in enumerate(links) if k in gates and i in plan.firm and not rests.moved}
         lines = [*drawn, *(_through(rests.places, edges[k], line) for k, line in firm.items())]
         free = {k: edge for k, edge in enumerate(edges) if k not in firm}
         ways, lateral = channels(free, rests.places, framed, gates, lines)
         ways.update(firm)
-        bowed, ease = _bowed(edges, units), not pair and not firm
-        routes = route_all(edges, rests.places, ways, bowed, lateral, frames=framed, drawn=drawn, ease=ease)
     else:
-        ways = _passing(problem, plan, rests)
-        bowed = _bowed(edges, units)
-        routes = route_all(edges, rests.places, ways, bowed, frames=framed, drawn=drawn, ease=not pair)
+        ways = planned
+    bowed, ease = _bowed(edges, units), not pair and not firm
+    routes = route_all(edges, rests.places, ways, bowed, lateral, frames=framed, drawn=drawn, ease=ease)
     found = {keys[i]: tuple(_snapped(route)) for i, route in zip(links, routes, strict=True)}
     if not pair:
         return found
@@ -89,8 +88,8 @@ def _eased(
     image: dict[int, int] = {}
     free: set[int] = set()
     for key, i in number.items():
-        source, target, count = key
-        other = number.get((_image(source, rests, pair), _image(target, rests, pair), count), -1) if pair else -1
+        source, target, _ = key
+        other = number.get(_image_of(key, rests, pair), -1)
         if source == target or other == i or pair.get(source) == target:
             continue
         if other >= 0:
@@ -99,7 +98,7 @@ def _eased(
             free.add(i)
     here = {i: routes[key] for key, i in number.items() if key[0] != key[1]}
     loops = [routes[key] for key in keys if key[0] == key[1]]
-    judge = Judge(edges, rests.places, here, frames, [*drawn, *loops], image, 2 * rests.axis if pair else 0.0)
+    judge = Judge(edges, rests.places, here, frames, [*drawn, *loops], image, 2 * rests.axis)
     return {keys[i]: route for i, route in eased(judge, free).items()}
 
 
@@ -111,8 +110,7 @@ def _through(places: Sequence[Point], edge: LayoutEdge, line: Sequence[Waypoint]
 
 def _imaged(key: Key, routes: Mapping[Key, Route], rests: Settled, pair: Mapping[int, int]) -> bool:
     """Whether a route is the reflection of another, or of itself."""
-    source, target, number = key
-    return (_image(source, rests, pair), _image(target, rests, pair), number) in routes or pair.get(source) == target
+    return _image_of(key, rests, pair) in routes or pair.get(key[0]) == key[1]
 
 
 def _snapped(route: Route) -> list[Point]:
@@ -146,16 +144,15 @@ def _reflected(routes: dict[Key, Route], rests: Settled, pair: Mapping[int, int]
     twice = 2 * rests.axis
     result: dict[Key, Route] = {}
     for key, route in sorted(routes.items(), key=lambda item: (sorted(item[0][:2]), item[0])):
-        source, target, number = key
-        image = _image(source, rests, pair), _image(target, rests, pair), number
+        source, target, _ = key
+        image = _image_of(key, rests, pair)
         if pair.get(source) == target and (target, source, 0) in routes:
             result[key] = even(route, twice)
         if key in result or image == key or image not in routes:
             result.setdefault(key, route)
             continue
-        ends = rests.places[image[0]], rests.places[image[1]]
         result[key] = route
-        result[image] = (ends[0], *((twice - x, y) for x, y in route[1:-1]), ends[1])
+        result[image] = reflected(route, twice, rests.places[image[0]], rests.places[image[1]])
     return result
 
 
@@ -179,6 +176,12 @@ def _mended(
             mended = arcs.mended([key[:2] for key in keys], [result[key] for key in keys], others)
             result.update(zip(keys, mended, strict=True))
     return result
+
+
+def _image_of(key: Key, rests: Settled, pair: Mapping[int, int]) -> Key:
+    """The key that the mirror image of a connection has, if there is one."""
+    source, target, number = key
+    return _image(source, rests, pair), _image(target, rests, pair), number
 
 
 def _image(neuron: int, rests: Settled, pair: Mapping[int, int]) -> int:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from neurovis_layouts.routing.ends import by_ends
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
 from neurovis_layouts.routing.strokes import Strokes, line_of, together
 from neurovis_layouts.routing.walls import FloatArray, Walls
@@ -93,9 +94,7 @@ def parted(
         fixed.setdefault(number[line[0]], []).append((_End(-1, leaves), place))
     all_ends = [end for own in ends.values() for end in own]
     places = dict(zip(all_ends, _places([routes[e.edge][:: 1 if e.leaves else -1] for e in all_ends]), strict=True))
-    between: dict[frozenset[int], list[int]] = {}
-    for i in sorted(routes):
-        between.setdefault(frozenset((edges[i].source, edges[i].target)), []).append(i)
+    between = by_ends((i, edges[i]) for i in sorted(routes))
     picture = _Picture(edges, dict(routes), free, Strokes(routes, drawn), between, obstacles, walls)
     turned: set[int] = set()
     for _ in range(_ROUNDS):

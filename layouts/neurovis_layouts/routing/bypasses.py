@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from neurovis_layouts.routing.detours import Detours
+from neurovis_layouts.routing.ends import shared_ends
 from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
 from neurovis_layouts.routing.walls import Walls
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
@@ -63,12 +64,3 @@ def round_discs(
         if route is not None and obstacles.clearance(route, own[i]) > clearance:
             found[i] = route
     return found
-
-
-def shared_ends(edges: Sequence[LayoutEdge]) -> frozenset[tuple[int, int]]:
-    """Ends that several edges share, in either direction: these must not leave their side."""
-    times: dict[tuple[int, int], int] = {}
-    for edge in edges:
-        for ends in ((edge.source, edge.target), (edge.target, edge.source)):
-            times[ends] = times.get(ends, 0) + 1
-    return frozenset(ends for ends, count in times.items() if count > 1)

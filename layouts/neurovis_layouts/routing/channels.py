@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from neurovis_layouts.routing.curves import Waypoint
+from neurovis_layouts.routing.ends import by_ends
 from neurovis_layouts.routing.rows import Rows
 from neurovis_layouts.routing.walls import Frame
 from neurovis_layouts.routing.ways import WALLED, knots, straight, through, way
@@ -105,9 +106,7 @@ class _Network:
         self._down = Rows(centres, frames, len(edges), True)
         self._side = Rows([(y, x) for x, y in centres], across, len(edges))
         self._ways: dict[int, _Way] = {}
-        self._between: dict[frozenset[int], list[int]] = {}
-        for i, edge in sorted(edges.items()):
-            self._between.setdefault(frozenset((edge.source, edge.target)), []).append(i)
+        self._between = by_ends(sorted(edges.items()))
         self.careful = len(edges) <= _MOST_CROSSED
 
     def found(self, along: bool) -> dict[int, list[Waypoint]]:

@@ -7,10 +7,10 @@ corners or with its corners elsewhere, judged by all that makes a line hard to f
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 
 from neurovis_layouts.routing.corners import corners, smooth
 from neurovis_layouts.routing.judge import Judge, Pen
@@ -40,6 +40,8 @@ _ROUNDS, _PASSES = 2, 4
 _GAIN = 0.05
 #: Of all ways that are tried from there so many are looked at closely.
 _SOME = 24
+#: With more routes than this none is drawn anew: they cross too much to be followed.
+MOST_EASED = 300
 _DIAGONAL = 0.7071067811865476
 _AROUND = (
     (1.0, 0.0), (_DIAGONAL, _DIAGONAL), (0.0, 1.0), (-_DIAGONAL, _DIAGONAL),
@@ -59,12 +61,11 @@ def eased(judge: Judge, free: AbstractSet[int]) -> dict[int, Route]:
         looked, vain = [], 0
         for i in chosen[:most]:
             found = _better(Pen(judge, i))
-            vain += 1
             if found is not None:
                 judge.draw(i, found)
                 looked.append(i)
-                vain = 0
-            elif vain == _VAIN:
+            vain = vain + 1 if found is None else 0
+            if vain == _VAIN:
                 break
         changed.update(looked)
         looked.sort()
@@ -88,17 +89,17 @@ def _better(pen: Pen) -> Route | None:
     now = pen.cost()
     line = corners(pen.route)
     starts = [line, *_fewer(line), *_bowed(line[0], line[-1])]
-    best = _first(pen, starts, now + _HOPELESS)
+    best = _best(pen, product(starts, _CUTS), now + _HOPELESS)
     if best is None:
         return None
     for far in _MOVES:
         for _ in range(_PASSES):
             lines = *_moved(best.line, far), *_fewer(best.line, _FEW_CORNERS)
-            tried = _next(pen, [(line, best.cut) for line in lines], best)
-            if tried is best:
+            better = _best(pen, ((line, best.cut) for line in lines), best.cost - _GAIN, _SOME)
+            if better is None:
                 break
-            best = tried
-    best = _next(pen, [(best.line, cut) for cut in _CUTS], best)
+            best = better
+    best = _best(pen, product([best.line], _CUTS), best.cost - _GAIN) or best
     if best.cost > now - _BETTER:
         return None
     entered, close = pen.trespass(best.route)
@@ -106,19 +107,15 @@ def _better(pen: Pen) -> Route | None:
     return best.route if entered <= before[0] and close <= before[1] else None
 
 
-def _first(pen: Pen, lines: Sequence[tuple[Point, ...]], limit: float) -> _Try | None:
-    """The best of these lines to begin with, None where all cost more than the limit."""
-    ways = [(line, cut) for line in lines for cut in _CUTS]
+def _best(
+    pen: Pen, tries: Iterable[tuple[tuple[Point, ...], float]], limit: float, most: int | None = None
+) -> _Try | None:
+    """The best of these lines, with so much cut off their corners, None where all cost more than the limit; at most so
+    many are looked at closely."""
+    ways = list(tries)
     routes = [smooth(line, cut) for line, cut in ways]
-    found = pen.cheapest(routes, limit)
+    found = pen.cheapest(routes, limit, most)
     return None if found is None else _Try(found[1], *ways[found[0]], routes[found[0]])
-
-
-def _next(pen: Pen, ways: Sequence[tuple[tuple[Point, ...], float]], best: _Try) -> _Try:
-    """The best of these lines, with so much cut off their corners, if it is better than the best so far."""
-    routes = [smooth(line, cut) for line, cut in ways]
-    found = pen.cheapest(routes, best.cost - _GAIN, _SOME)
-    return best if found is None else _Try(found[1], *ways[found[0]], routes[found[0]])
 
 
 def _fewer(line: tuple[Point, ...], most: int = _MOST_CORNERS) -> Iterator[tuple[Point, ...]]:
@@ -149,8 +146,6 @@ def _bowed(start: Point, end: Point) -> Iterator[tuple[Point, ...]]:
     yield start, end
     dx, dy = end[0] - start[0], end[1] - start[1]
     length = distance(start, end)
-    if not length:
-        return
     for high in _BOWS:
         for side in (high, -high):
             nx, ny = dy / length * side, -dx / length * side

@@ -10,9 +10,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from neurovis_layouts.routing.corners import reflected
+from neurovis_layouts.routing.ends import by_ends
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
 from neurovis_layouts.routing.polylines import STEP, Polylines, polylines
 from neurovis_layouts.routing.walls import FloatArray, Frame, IntArray, Walls, meet
+from neurovis_spec.layout.frames import padded
 from neurovis_spec.layout.geometry import distance
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
@@ -31,7 +34,7 @@ _MEETING, _BESIDE = 2.0, 1.0
 #: What is this close to a disc may be measured to run over it.
 _SLACK = 0.02
 #: How far off a foreign frame lines stay, at least: it may grow by what is drawn in it.
-_OFF = 0.06
+OFF = 0.06
 #: How far beyond discs and frames a line may lead for nothing; how far back along the direction.
 _MARGIN, _ONWARD = 0.8, 0.05
 #: How far from a centre ends are looked at, how far apart they are to be.
@@ -57,7 +60,8 @@ class Judge:
         self.edges, self.centres, self.twice = edges, centres, twice
         self.routes: dict[int, Route] = dict(routes)
         self._drawn, self._image = list(drawn), dict(image or {})
-        wide = [(own, (x0 - _OFF, y0 - _OFF, x1 + _OFF, y1 + _OFF)) for own, (x0, y0, x1, y1) in frames]
+        wide = [(own, padded(rect, OFF)) for own, rect in frames]
+        self.rects: FloatArray = np.array([rect for _, rect in frames], dtype=np.float64).reshape(-1, 4)
         self.obstacles, self.walls = Obstacles(centres), Walls(wide, len(centres))
         self.discs: FloatArray = np.array(centres, dtype=np.float64).reshape(-1, 2)
         self.low: FloatArray = np.concatenate([self.discs, self.walls.rects[:, :2]]).min(axis=0) - _MARGIN
@@ -74,11 +78,9 @@ class Judge:
         }
 
     def in_fans(self, most: int) -> set[int]:
-        """The edges that share both ends, in either direction, with so many others at least."""
-        between: dict[frozenset[int], list[int]] = {}
-        for i in sorted(self.routes):
-            between.setdefault(frozenset((self.edges[i].source, self.edges[i].target)), []).append(i)
-        return {i for fan in between.values() if len(fan) > most for i in fan}
+        """The edges of which more than so many share both ends, in either direction."""
+        fans = by_ends((i, self.edges[i]) for i in self.routes).values()
+        return {i for fan in fans if len(fan) > most for i in fan}
 
     def both(self, i: int) -> tuple[int, ...]:
         """An edge and its mirror image, if it has one."""
@@ -90,7 +92,7 @@ class Judge:
         self.routes[i] = route
         for other in self.both(i)[1:]:
             ends = self.centres[self.edges[other].source], self.centres[self.edges[other].target]
-            self.routes[other] = (ends[0], *((self.twice - x, y) for x, y in route[1:-1]), ends[1])
+            self.routes[other] = reflected(route, self.twice, *ends)
         self._look()
 
     def _look(self) -> None:
@@ -128,7 +130,7 @@ class Pen:
         self._reflect = len(both) > 1
         others = ~np.isin(judge.segment_edges, both)
         self._a, self._b = judge.a[others], judge.b[others]
-        kin = np.array([i for i in sorted(judge.routes) if not self._apart_from(i)], dtype=np.int64)
+        kin = [i for i in judge.routes if judge.edges[i].source in self._own or judge.edges[i].target in self._own]
         self._kin = np.isin(judge.segment_edges[others], kin)
         self._cells = judge.cells[~np.isin(judge.cell_edges, both)]
         self._ends = [(leaves, *judge.ends(n, both)) for n, leaves in zip(self._own, (True, False), strict=True)]
@@ -136,16 +138,11 @@ class Pen:
         inside = walls.inside[self._own[0]].astype(np.int64) + walls.inside[self._own[1]]
         foreign = walls.foreign(*self._own)
         self._margins: FloatArray = walls.rects[foreign]
-        self._foreign: FloatArray = self._margins + np.array([_OFF, _OFF, -_OFF, -_OFF])
+        self._foreign: FloatArray = judge.rects[foreign]
         self._discs: FloatArray = np.delete(judge.discs, self._own, axis=0)
         # into or out of those that hold one end a route has to go once
         self._rects: FloatArray = walls.rects[inside > 0]
         self._least: IntArray = (inside[inside > 0] == 1).astype(np.int64)
-
-    def _apart_from(self, other: int) -> bool:
-        """Whether an edge has no neuron in common with this one."""
-        edge = self._judge.edges[other]
-        return {edge.source, edge.target}.isdisjoint(self._own)
 
     def trespass(self, route: Route) -> tuple[int, float]:
         """How many foreign frames a route enters, and by how much it is too close to a disc, looked at as closely as
@@ -159,7 +156,7 @@ class Pen:
         found = self.cheapest([self.route], np.inf)
         return found[1] if found is not None else np.inf
 
-    def cheapest(self, routes: Sequence[Route], limit: float, most: int = 1000) -> tuple[int, float] | None:
+    def cheapest(self, routes: Sequence[Route], limit: float, most: int | None = None) -> tuple[int, float] | None:
         """The cheapest of these routes and its cost, if that is below the limit; no more than so many are looked at
         closely, those first that are cheap by themselves."""
         if not routes:

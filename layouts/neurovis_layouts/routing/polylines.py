@@ -12,14 +12,15 @@ import numpy as np
 
 from neurovis_layouts.routing.walls import BoolArray, FloatArray, IntArray, blocked
 from neurovis_spec.layout.geometry import cubics
-from neurovis_spec.layout.model import Point, Route
+from neurovis_spec.layout.model import Route
+from neurovis_spec.layout.segments import meet
 
 #: Into how many segments a piece is cut that is not straight, and how far off its chord such a piece reaches, by the
 #: length of that.
 _PARTS, _STRAIGHT = 8, 0.01
 #: How far apart points are that are looked at for what else runs there, how large their cells; those this close to the
 #: ends of a line are left out.
-STEP, CELL, _END = 0.15, 0.16, 0.6
+STEP, _CELL, _END = 0.15, 0.16, 0.6
 #: On a line so many are looked at, at most: memory has an end.
 _MOST = 2000
 _ROW = 1 << 31
@@ -109,7 +110,7 @@ class Polylines:
         at = offset[owner] + _END + step[owner] * number
         segment = np.clip(np.searchsorted(before, at, side="right") - 1, 0, len(self._lengths) - 1)
         share = (at - before[segment]) / np.maximum(self._lengths[segment], 1e-9)
-        place = np.floor((self.a[segment] + share[:, None] * self._way[segment]) / CELL).astype(np.int64)
+        place = np.floor((self.a[segment] + share[:, None] * self._way[segment]) / _CELL).astype(np.int64)
         cells: IntArray = place[:, 0] * _ROW + place[:, 1]
         return cells, owner
 
@@ -179,13 +180,6 @@ def polylines(routes: Sequence[Route]) -> Polylines:
     return Polylines(whole, starts)
 
 
-def cells_of(points: Sequence[Point]) -> IntArray:
-    """(n,) the cells that points are in."""
-    place = np.floor(np.array(points, dtype=np.float64).reshape(-1, 2) / CELL).astype(np.int64)
-    cells: IntArray = place[:, 0] * _ROW + place[:, 1]
-    return cells
-
-
 def _left(points: FloatArray, starts: IntArray, lines: IntArray, ring: float) -> FloatArray:
     first = points[starts[:-1]]
     x, y = (points - first[lines]).T
@@ -207,9 +201,5 @@ def _meetings(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> tup
     near = (least[None, :, 0] <= high[:, None, 0]) & (most[None, :, 0] >= low[:, None, 0])
     near &= (least[None, :, 1] <= high[:, None, 1]) & (most[None, :, 1] >= low[:, None, 1])
     i, j = np.nonzero(near)
-    (ux, uy), (vx, vy), (wx, wy) = (b[i] - a[i]).T, (d[j] - c[j]).T, (c[j] - a[i]).T
-    cross = ux * vy - uy * vx
-    sign, whole = np.sign(cross), np.abs(cross)
-    t, s = (wx * vy - wy * vx) * sign, (wx * uy - wy * ux) * sign
-    hit = (t >= 0) & (t < whole) & (s >= 0) & (s < whole)
-    return i[hit], t[hit] / whole[hit]
+    share, hit = meet(*a[i].T, *(b - a)[i].T, *c[j].T, *(d - c)[j].T)
+    return i[hit], share

@@ -11,16 +11,18 @@ from collections.abc import Set as AbstractSet
 
 from neurovis_layouts.routing.arrivals import parted
 from neurovis_layouts.routing.bows import FEW_TRIES, MANY_TRIES, Wish, clear_bow, clear_bows
-from neurovis_layouts.routing.bypasses import round_discs, round_frames, shared_ends
+from neurovis_layouts.routing.bypasses import round_discs, round_frames
 from neurovis_layouts.routing.curves import Waypoint, curve
-from neurovis_layouts.routing.easing import eased
-from neurovis_layouts.routing.judge import Judge
+from neurovis_layouts.routing.easing import MOST_EASED, eased
+from neurovis_layouts.routing.ends import shared_ends
+from neurovis_layouts.routing.judge import OFF, Judge
 from neurovis_layouts.routing.loops import best_loop
 from neurovis_layouts.routing.nests import nested
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
 from neurovis_layouts.routing.ports import Port, leanings
 from neurovis_layouts.routing.sheaves import spread_out
 from neurovis_layouts.routing.walls import Frame, Walls
+from neurovis_spec.layout.frames import padded
 from neurovis_spec.layout.geometry import distance
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
@@ -33,14 +35,10 @@ _MOST_CAREFULLY = 4000
 _MOST_AT_LENGTH = 1000
 #: Nor where all of them together are longer than this by the heights tried.
 _MOST_LENGTH = 250_000.0
-#: Nor are those that wind drawn anew: they cross too much to be followed.
-MOST_EASED = 300
 _STEEP_ENOUGH = 0.75
 #: Bows of more than three equal connections are wider by this share of the way, each than the one in it, since their
 #: legs would be as steep.
 _WIDER = 0.12
-#: How far off a foreign frame one stays that makes room for another between the same ends.
-_OFF = 0.06
 #: Handles, leanings and slopes for a curve that comes too close to a disc.
 _OTHERWISE = ((0.75, 1.0, 1.0), (0.95, 1.0, 1.0), (0.75, 0.4, 1.0), (0.95, 0.4, 1.0), (0.0, 1.0, 0.3), (0.5, 1.0, 0.0))
 
@@ -113,7 +111,7 @@ def told_apart(
 ) -> dict[int, Route]:
     """Routes by edge index for those that have to give way, of those that are ``free`` to, so that connections can be
     told apart; ``routes`` are of edges between two neurons, ``bows`` those that are apart from each other."""
-    wide = [(own, (x0 - _OFF, y0 - _OFF, x1 + _OFF, y1 + _OFF)) for own, (x0, y0, x1, y1) in frames]
+    wide = [(own, padded(rect, OFF)) for own, rect in frames]
     obstacles, walls = Obstacles(centres), Walls(wide, len(centres)) if wide else None
     found = spread_out(edges, routes, free, bows, obstacles, walls)
     return {**found, **parted(edges, centres, {**routes, **found}, free, drawn, obstacles, walls)}

@@ -12,6 +12,7 @@ from collections.abc import Set as AbstractSet
 
 import numpy as np
 
+from neurovis_layouts.routing.ends import by_ends
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
 from neurovis_layouts.routing.strokes import line_of, together, tolerable
 from neurovis_layouts.routing.walls import FloatArray, IntArray, Walls
@@ -41,10 +42,7 @@ def spread_out(
 ) -> dict[int, Route]:
     """Routes by edge index for those that have to move, of those that are ``free`` to; the ``fixed`` are apart from
     each other as they are."""
-    between: dict[tuple[int, int], list[int]] = {}
-    for i in sorted(routes):
-        source, target = edges[i].source, edges[i].target
-        between.setdefault((min(source, target), max(source, target)), []).append(i)
+    between = by_ends((i, edges[i]) for i in sorted(routes))
     groups = [
         group for group in between.values() if len(group) > 1 and not fixed >= set(group) and not free.isdisjoint(group)
     ]

@@ -14,6 +14,7 @@ from neurovis_layouts.routing.obstacles import points_on
 from neurovis_layouts.routing.walls import BoolArray, FloatArray, IntArray
 from neurovis_spec.layout.geometry import cubics
 from neurovis_spec.layout.model import Point, Route
+from neurovis_spec.layout.segments import meet
 
 #: Closer than this two lines are one to the eye.
 _CLOSE = 0.12
@@ -134,10 +135,6 @@ def _segments(lines: Sequence[tuple[int, FloatArray]]) -> tuple[FloatArray, Floa
 
 def _crossing(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> BoolArray:
     """(k, n) which of the segments from a to b (k, 2) cross which of those from c to d (n, 2)."""
-    (ux, uy), (vx, vy) = (b - a).T[:, :, None], (d - c).T[:, None, :]
-    wx, wy = (c[None, :, :] - a[:, None, :]).transpose(2, 0, 1)
-    cross = ux * vy - uy * vx
-    sign, whole = np.sign(cross), np.abs(cross)
-    t, s = (wx * vy - wy * vx) * sign, (wx * uy - wy * ux) * sign
-    crossing: BoolArray = (t >= 0) & (t < whole) & (s >= 0) & (s < whole)
-    return crossing
+    (ax, ay), (ux, uy) = a.T[:, :, None], (b - a).T[:, :, None]
+    (cx, cy), (vx, vy) = c.T[:, None, :], (d - c).T[:, None, :]
+    return meet(ax, ay, ux, uy, cx, cy, vx, vy)[1]

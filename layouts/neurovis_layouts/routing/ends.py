@@ -1,0 +1,27 @@
+"""Ends: connections that share both of theirs.
+
+In: edges. Out: by ends, in either direction, which they are; the ends that several share.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from neurovis_spec.layout.model import LayoutEdge
+
+
+def by_ends(edges: Iterable[tuple[int, LayoutEdge]]) -> dict[frozenset[int], list[int]]:
+    """The numbers of edges by the neurons that they are between, whichever way they lead, in the order given."""
+    found: dict[frozenset[int], list[int]] = {}
+    for number, edge in edges:
+        found.setdefault(frozenset((edge.source, edge.target)), []).append(number)
+    return found
+
+
+def shared_ends(edges: Sequence[LayoutEdge]) -> frozenset[tuple[int, int]]:
+    """Ends that several edges share, in either direction: these must not leave their side."""
+    times: dict[tuple[int, int], int] = {}
+    for edge in edges:
+        for ends in ((edge.source, edge.target), (edge.target, edge.source)):
+            times[ends] = times.get(ends, 0) + 1
+    return frozenset(ends for ends, count in times.items() if count > 1)
