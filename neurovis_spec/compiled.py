@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec import pipeline
-from neurovis_spec.compiler.compile import Request, rebind
+from neurovis_spec.compiler.compile import Request
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.diagnostics import Diagnostic, suggest
@@ -74,12 +74,7 @@ class CompiledNetwork:
         """Step by step, for a control loop; ``start`` is a recording to go on from."""
         from neurovis_spec.runtime.simulation import Simulation
 
-        return Simulation(
-            self.network,
-            backend,
-            start,
-            lambda values, since: rebind(self.spec, self.request, self.network, values, since),
-        )
+        return Simulation(self.network, backend, start)
 
     def run(
         self,

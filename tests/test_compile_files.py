@@ -95,7 +95,7 @@ def test_a_file_is_read_once_for_each_key(folder: Path, monkeypatch: pytest.Monk
 
 
 def test_events_read_no_file_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each parameter that an event sets is a compilation of its own; the files stay as they were read."""
+    """What an event sets is no compilation of its own."""
     opened: list[str] = []
 
     def reading(path: Path, most: int) -> bytes | FileFault:
@@ -111,8 +111,7 @@ def test_events_read_no_file_again(folder: Path, monkeypatch: pytest.MonkeyPatch
     text += "events: [{at: 1, set: {gain: 2}}, {at: 2, set: {gain: 3}}, {at: 3, set: {gain: 4}}]\n"
     text = text.replace("bias: 1", "bias: 1, input: s")
     network = network_of(text, folder)
-    assert [step for step, _ in network.phases] == [1, 2, 3]
-    assert [phase.connections.weights[-1] for _, phase in network.phases] == [2, 3, 4]
+    assert [change.at for change in network.changes] == [1, 2, 3]
     assert sorted(opened) == ["e.csv", "s.csv", "w.mtx"]
 
 

@@ -172,7 +172,7 @@ def _evaluated(
         i, j = pairs.i[places], pairs.j[places]
         extra = {"i": i.astype(np.float64), "j": j.astype(np.float64), **pairs.known}
         randomness = Randomness(pairs.stream, i, j)
-    values = constants.unchecked(formula, extra, randomness)
+    values = constants.unchecked(formula, extra, randomness, places=places)
     if values is None or np.isfinite(values).all():
         return values
     everywhere = np.broadcast_to(values, places.shape)

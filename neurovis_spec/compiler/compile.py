@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from neurovis_spec.compiler.arrays import IntArray
+from neurovis_spec.compiler.bound import make_settable
 from neurovis_spec.compiler.connect import Connected, connect, join
 from neurovis_spec.compiler.constants import Constants, parse_formula
 from neurovis_spec.compiler.crowds import crowded
@@ -29,13 +30,13 @@ from neurovis_spec.compiler.noise import make_noises
 from neurovis_spec.compiler.order import Cycle, levels
 from neurovis_spec.compiler.parameters import make_parameters
 from neurovis_spec.compiler.populate import Population, populate, without_neurons
-from neurovis_spec.compiler.references import Directory, key_span, other_parameter
+from neurovis_spec.compiler.references import Directory, other_parameter
 from neurovis_spec.compiler.sections import check_ros, layout_settings, make_outputs, render_settings
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.compiler.units import Expander, constants_of
 from neurovis_spec.compiler.warnings import Compiled, warn
-from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError
+from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.includes import Includes, read_includes
 from neurovis_spec.language.model import opening
@@ -57,13 +58,9 @@ class Request:
     #: the included files, where they are read already, and the data files by the folder that paths are relative to
     includes: Includes | None = None
     files: Mapping[Path, Files] = field(default_factory=dict)
-    #: whether this is for a run that has begun: a plastic weight is then what it has become, not what it would begin as
-    begun: bool = False
-    #: the step of that run at which ``parameters`` were set: what events set by then is past
-    since: int | None = None
 
 
-def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_events: bool = True) -> Network | None:
+def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | None:
     """The network of a spec; None where it is at fault (the findings say why)."""
     before = findings.errors
     seed = request.seed if request.seed is not None else 0 if spec.seed is None else spec.seed.value
@@ -86,8 +83,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
     expansion = expander.expand(spec, constants, request.base)
     units, inputs = expansion.units, expansion.inputs
     population = populate(units, request.limits, seed)
-    if with_events:
-        _look_at_unused(expander, request.limits, seed)
+    _look_at_unused(expander, request.limits, seed)
     render = render_settings(spec.render, constants)
     check_ros(spec.ros, constants)
     if not len(population.neurons):
@@ -96,7 +92,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
     directory = population.directory
     outputs = make_outputs(spec, directory, findings)
     layout = layout_settings(spec.layout, units, population, findings)
-    made = connect(units, population, request.limits, seed, request.begun)
+    made = connect(units, population, request.limits, seed)
     bundles = made.bundles
     noises = make_noises(units, population, sum(entry.size for entry in inputs))
     expansion.depend()
@@ -113,23 +109,22 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
         return None
     blocks = make_blocks(population, connections.sources, connections.targets, level)
     program = make_program(blocks, plasticity)
-    content = ""  # a phase of a run is asked for no hash of its own
-    if with_events:
-        content = digest(
-            "neurovis 1",
-            spec.name.value,
-            constants.dt,
-            episode,
-            seed,
-            constants.parameters,
-            population.neurons,
-            connections,
-            inputs,
-            outputs,
-            blocks,
-            plasticity,
-            noises,
-        )
+    content = digest(
+        "neurovis 1",
+        spec.name.value,
+        constants.dt,
+        episode,
+        seed,
+        constants.parameters,
+        population.neurons,
+        connections,
+        inputs,
+        outputs,
+        blocks,
+        plasticity,
+        noises,
+    )
+    slots = tuple(constants.slots)
     network = Network(
         name=spec.name.value,
         title=", ".join(text.value for text in spec.title or ()) or spec.name.value,
@@ -153,11 +148,9 @@ def compile_spec(spec: Spec, request: Request, findings: Findings, *, with_event
         hash=content,
         noises=noises,
         instances=_instances(units, population),
-        given=dict(request.parameters),
+        settable=make_settable(slots, population, bundles, connections, inputs, blocks, plasticity),
     )
-    if not with_events:
-        return network
-    eventful = _eventful(spec, replace(request, files=expander.files), network, directory, constants, made)
+    eventful = _eventful(spec, network, directory, constants, made)
     if eventful is not None and not findings.failed:  # the shape may have been at fault
         warn(Compiled(spec, units, library, expander.used, eventful, bundles), findings)
     return eventful
@@ -193,28 +186,19 @@ def _instances(units: tuple[Unit, ...], population: Population) -> tuple[Instanc
 
 
 def _eventful(
-    spec: Spec, request: Request, network: Network, directory: Directory, constants: Constants, connected: Connected
+    spec: Spec, network: Network, directory: Directory, constants: Constants, connected: Connected
 ) -> Network | None:
-    """The network with the phases that its events make; its hash says that they are there."""
+    """The network with what its events change; its hash says that they are there."""
     if not spec.events:
         return network
-    from neurovis_spec.compiler.phases import with_phases
+    from neurovis_spec.compiler.timeline import with_changes
 
-    findings = constants.findings
-    before = findings.errors
+    before = constants.findings.errors
     events = _read_events(spec, connected, directory, constants)
-
-    def again(values: Mapping[str, float]) -> Network | None:
-        parameters = {**request.parameters, **values}
-        changed = replace(request, parameters=parameters, seed=network.seed, begun=True)
-        return compile_spec(spec, changed, findings, with_events=False)
-
-    if findings.errors > before:
+    if constants.findings.errors > before:
         return None
-    entry = spec.source.entry("events")
-    place = opening(spec.source) if entry is None else entry.key.span
-    made = with_phases(network, events, again, constants, place, request.since)
-    return None if findings.errors > before else made
+    made = with_changes(network, events, constants)
+    return None if constants.findings.errors > before else made
 
 
 def _read_events(spec: Spec, connected: Connected, directory: Directory, constants: Constants) -> tuple[Event, ...]:
@@ -307,27 +291,3 @@ def _report_cycle(
     message = f"these neurons wait for each other within one step: {' -> '.join(shown)}"
     hint = "give one of these connections a delay of at least 1"
     findings.error("delay-0-cycle", bundles[int(entry[cycle.connection])].key, message, hint)
-
-
-def rebind(
-    spec: Spec, request: Request, network: Network, changes: Mapping[str, float], since: int | None = None
-) -> Network:
-    """The same network with other parameters, set at step ``since`` of a run: events set them again only after that.
-    Raises SpecError where these are unknown, out of bounds, or where something of the structure depends on them."""
-    findings = Findings()
-    fixed = [name for name in changes if name in network.structural]
-    for name in fixed:
-        span = key_span(spec, "parameters", name)
-        message = f"'{name}' cannot be set in a run: the structure of the network depends on it"
-        findings.error("structural-parameter", span, message)
-    findings.check()
-    parameters = {**request.parameters, **changes}
-    changed = replace(request, parameters=parameters, seed=network.seed, begun=True, since=since)
-    made = compile_spec(spec, changed, findings)
-    findings.check()
-    if made is None:  # pragma: no cover - an error is among the findings where there is no network
-        raise SpecError((Diagnostic("internal", "the network could not be made", opening(spec.source)),))
-    same = np.array_equal(made.connections.sources, network.connections.sources)
-    if not same or not np.array_equal(made.connections.delays, network.connections.delays):
-        raise SpecError((Diagnostic("structural-parameter", "this would change the structure", opening(spec.source)),))
-    return made

@@ -44,9 +44,7 @@ class Connected(NamedTuple):
 _NONE = np.zeros(0, dtype=np.int64)
 
 
-def connect(
-    units: tuple[Unit, ...], population: Population, limits: Limits, seed: int, begun: bool = False
-) -> Connected:
+def connect(units: tuple[Unit, ...], population: Population, limits: Limits, seed: int) -> Connected:
     """The entries of all units, a unit's own before those of the instances within it. What is at fault in one instance
     of a module is so in all: it is said once."""
     result: list[Bundle] = []
@@ -55,7 +53,7 @@ def connect(
     for unit, directory in zip(units, population.directories, strict=True):
         if unit.module is not None and unit.module in failed:
             continue
-        made = Connector(unit, directory, population, limits, seed, begun).connect(total)
+        made = Connector(unit, directory, population, limits, seed).connect(total)
         if not made.complete:
             failed.add(unit.module)
         result += made.bundles
@@ -72,7 +70,6 @@ class Connector:
     population: Population
     limits: Limits
     seed: int
-    begun: bool
 
     @property
     def constants(self) -> Constants:
@@ -107,7 +104,7 @@ class Connector:
         if seen[name] > 1:
             name = f"{name} ({seen[name]})"
         room = self.limits.connections - total
-        place = Place(self.unit, self.directory, self.population, self.limits, self.seed, room, self.begun)
+        place = Place(self.unit, self.directory, self.population, self.limits, self.seed, room)
         bundle = EntryBuilder(place, key, body, name, sources, targets).build()
         return bundle if self.constants.findings.errors == before else None
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import chain
@@ -18,6 +19,7 @@ import numpy as np
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.limits import MOST_HINTS
+from neurovis_spec.compiler.settable import Dependent, ParameterFormula, Part, Slot, places_of
 from neurovis_spec.diagnostics import Findings, shown, suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS, FUNCTIONS
@@ -156,6 +158,55 @@ class Constants:
     broken: set[str] = field(default_factory=set)
     #: whether there may be parameters that could not be read at all
     incomplete: bool = False
+    #: the slots of the whole network, and for each parameter that can be set in a run, or follows one, its slot
+    slots: list[Slot] = field(default_factory=list)
+    settable: dict[str, int] = field(default_factory=dict)
+    #: the path of the instance whose parameters these are, and those that it is given as formulas over others
+    path: str = ""
+    settings: Mapping[str, ParameterFormula] = field(default_factory=dict)
+    #: what follows parameters, of all that is evaluated while somebody asks for it
+    _parts: list[Part] | None = None
+
+    def declare(self, name: str, tree: Tree | None, value: float, bounds: tuple[float | None, float | None]) -> None:
+        """Give a parameter a slot, if it can be set or follows one that can. ``tree``: what it follows."""
+        followed = None if tree is None or names(tree).isdisjoint(self.settable) else self.bound(tree)
+        if self.path and name not in self.settings and followed is None:
+            return
+        formula = self.settings.get(name, followed)
+        low, high = (
+            math.copysign(math.inf, sign) if bound is None else bound
+            for sign, bound in zip((-1, 1), bounds, strict=True)
+        )
+        self.settable[name] = len(self.slots)
+        self.slots.append(Slot(f"{self.path}.{name}" if self.path else name, value, formula, low, high))
+
+    @contextmanager
+    def following(self) -> Iterator[list[Part]]:
+        """Collect what follows parameters, of all that is evaluated within."""
+        outer, self._parts = self._parts, []
+        try:
+            yield self._parts
+        finally:
+            self._parts = outer
+
+    def follow(self, parts: Iterable[Part]) -> None:
+        """Add to what is being collected."""
+        if self._parts is not None:
+            self._parts.extend(parts)
+
+    def bound(
+        self,
+        tree: Tree,
+        extra: Mapping[str, Value | Dependent] | None = None,
+        randomness: Randomness | None = None,
+    ) -> ParameterFormula:
+        """An expression with what its names mean: slots of parameters that can be set, and values."""
+        used = names(tree)
+        extra = extra or {}
+        places = {name: slot for name, slot in places_of(tree, self.settable).items() if name not in extra}
+        known = {name: extra[name] if name in extra else self._known(name, {}) for name in sorted(used - places.keys())}
+        draw = None if randomness is None or not draws(tree) else _Drawing(randomness)
+        return ParameterFormula(tree, places, known, draw)
 
     def tree(
         self,
@@ -179,8 +230,10 @@ class Constants:
         extra: Mapping[str, Value] | None = None,
         randomness: Randomness | None = None,
         structural: bool = False,
+        places: IntArray | None = None,
     ) -> Value | None:
-        """The value of a formula, finite or not: a float, or an array where ``extra`` or the draws hold arrays."""
+        """The value of a formula, finite or not: a float, or an array where ``extra`` or the draws hold arrays.
+        ``places`` is where it is to stand, for who collects what follows parameters."""
         extra = extra or {}
         if not isinstance(formula.value, str):
             return float(formula.value)
@@ -195,6 +248,8 @@ class Constants:
         if drawing is not None and drawing.wrong is not None and np.isnan(result).any():
             self.refuse_draw(formula, *drawing.wrong)
             return None
+        if self._parts is not None and not structural and not names(tree).isdisjoint(self.settable):
+            self._parts.append(Part(self.bound(tree, extra, randomness), places))
         return float(result) if np.ndim(result) == 0 else np.asarray(result, dtype=np.float64)
 
     def _known(self, name: str, extra: Mapping[str, Value]) -> Value:
@@ -222,9 +277,10 @@ class Constants:
         extra: Mapping[str, Value] | None = None,
         randomness: Randomness | None = None,
         structural: bool = False,
+        places: IntArray | None = None,
     ) -> Value | None:
         """The value of a formula, which must be finite everywhere."""
-        result = self.unchecked(formula, extra, randomness, structural)
+        result = self.unchecked(formula, extra, randomness, structural, places)
         return result if result is not None and check_finite(result, formula, self.findings) else None
 
     def look(self, formula: Formula, extra: Collection[str] = (), random: bool = False) -> float | None:

@@ -19,7 +19,22 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 #: Where a node of an expression stood, and what is only shown, is no content.
-_SHOWN = frozenset({"start", "end", "title", "description", "descriptions", "labels", "label", "box", "role", "module"})
+_SHOWN = frozenset(
+    {
+        "start",
+        "end",
+        "title",
+        "description",
+        "descriptions",
+        "labels",
+        "label",
+        "box",
+        "role",
+        "module",
+        "slots",
+        "parts",
+    }
+)
 
 
 #: Pieces that are fed to the hash together.

@@ -85,7 +85,9 @@ class EdgeReader:
         j = self._ends(cells, first[right] + 1, self.targets, "target")
         weighted, delayed = np.flatnonzero(right & (widths >= 3)), np.flatnonzero(right & (widths == 4))
         ends = None if i is None or j is None or len(wrong) else (i[weighted], j[weighted])
-        given = self._given(cells, first[weighted] + 2, ends)
+        with self.constants.following() as parts:
+            given = self._given(cells, first[weighted] + 2, ends)
+        self.constants.follow(part._replace(places=weighted[part.within(len(weighted))]) for part in parts)
         later = self._delays(cells, first[delayed] + 3)
         if i is None or j is None or given is None or later is None or len(wrong) or cells.failed:
             return None

@@ -23,7 +23,8 @@ from neurovis_spec.compiler.matrices import Grid, grid_of
 from neurovis_spec.compiler.patterns import all_to_all, pairs_of
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import Directory
-from neurovis_spec.compiler.scale import look_at_scale, scaled
+from neurovis_spec.compiler.scale import Scaled, look_at_scale, scaled
+from neurovis_spec.compiler.settable import Assembled, Distance, Part
 from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.expressions.tree import names
@@ -54,6 +55,8 @@ class Bundle(NamedTuple):
     description: str | None
     #: whether no neuron is in both ends of the entry
     apart: bool
+    #: what of it follows parameters: ``weights`` of an entry without a rule, ``centres``, ``low``, ``high``, ``rule``
+    parts: tuple[Part, ...] = ()
 
 
 class _Shape(NamedTuple):
@@ -63,11 +66,12 @@ class _Shape(NamedTuple):
     j: IntArray
     weights: FloatArray | None = None
     delays: IntArray | None = None
+    #: what of its weights follows parameters
+    parts: tuple[Part, ...] = ()
 
 
 class Place(NamedTuple):
-    """Where an entry stands: its unit, what is called how there, how many connections it may make, whether the run has
-    begun for which they are made."""
+    """Where an entry stands: its unit, what is called how there, how many connections it may make."""
 
     unit: Unit
     directory: Directory
@@ -75,7 +79,6 @@ class Place(NamedTuple):
     limits: Limits
     seed: int
     room: int
-    begun: bool
 
 
 @dataclass(frozen=True)
@@ -114,16 +117,22 @@ class EntryBuilder:
         body, findings = self.body, self.constants.findings
         delay = 1 if body.delay is None else delay_of(body.delay, self.constants)
         sound = findings.errors
-        centre = self._grid(body.centre, "centre") if isinstance(body.centre, (Rows, FileReference)) else None
+        with self.constants.following() as centre_cells:
+            centre = self._grid(body.centre, "centre") if isinstance(body.centre, (Rows, FileReference)) else None
         shape = self._shape(centre)
         if shape is not None and findings.errors == sound and not len(shape.i):
             findings.error("no-connection", self.key.span, "this entry makes no connection at all")
         if findings.errors > sound or (shape is not None and not self._fits(len(shape.i))):
             shape = None
-        weights = self._weights(shape)
-        centres = self._centres(centre, shape)
-        bounds = self._bounds(weights)
-        learning = self._learning(shape)
+        with self.constants.following() as weighted:
+            weights = self._weights(shape)
+        with self.constants.following() as centred:
+            centres = self._centres(centre, shape)
+            self.constants.follow(self._cells(centre, centre_cells, shape))
+        with self.constants.following() as bounding:
+            bounds = self._bounds(weights)
+        with self.constants.following() as ruled:
+            learning = self._learning(shape)
         if shape is None or weights is None or centres is None or bounds is None or findings.errors > before:
             return None
         if self.sources is None or self.targets is None or body.lost:
@@ -144,6 +153,12 @@ class EntryBuilder:
             learning,
             None if body.description is None else body.description.value,
             not np.isin(self.sources, self.targets).any(),
+            (
+                *(part._replace(field="weights") for part in weighted if learning is None),
+                *(part._replace(field="centres") for part in centred),
+                *bounding,
+                *(part._replace(field="rule") for part in ruled),
+            ),
         )
 
     def _fits(self, count: int) -> bool:
@@ -161,10 +176,21 @@ class EntryBuilder:
         m = None if self.targets is None or not self._kept("rows") else len(self.targets)
         return grid_of(matrix, n, m, by_target, self.constants, self.place.unit.files, self._stream(purpose))
 
+    def _cells(self, grid: Grid | None, parts: list[Part], shape: _Shape | None) -> tuple[Part, ...]:
+        """What of a matrix follows parameters, by connections instead of by cells as they are written."""
+        if grid is None or shape is None or not parts:
+            return ()
+        by_target = self.body.rows is not None and self.body.rows.value == "to"
+        order = np.full(grid.shape, -1, dtype=np.int64)
+        order[shape.i, shape.j] = np.arange(len(shape.i))
+        cells = (order.T if by_target else order).ravel()
+        return tuple(_present(part, cells[part.within(cells.size)]) for part in parts)
+
     def _shape(self, centre: Grid | None) -> _Shape | None:
         """The pairs; every key that may say which they are is looked at."""
         body = self.body
-        grid = None if body.matrix is None else self._grid(body.matrix, "weight")
+        with self.constants.following() as cells:
+            grid = None if body.matrix is None else self._grid(body.matrix, "weight")
         edges = None if body.edges is None else self._edges()
         pattern = None if body.pattern is None else self._pattern()
         if self.sources is None or self.targets is None or not self._kept(*_SHAPING):
@@ -176,7 +202,8 @@ class EntryBuilder:
                 return None
             present = grid.present if centre is None else grid.present & centre.present
             i, j = np.nonzero(present)
-            return _Shape(i, j, np.ascontiguousarray(grid.values[i, j]))
+            shape = _Shape(i, j, np.ascontiguousarray(grid.values[i, j]))
+            return shape._replace(parts=self._cells(grid, cells, shape))
         if isinstance(body.centre, (Rows, FileReference)):
             if centre is None:
                 return None
@@ -224,8 +251,9 @@ class EntryBuilder:
         assert self.body.edges is not None
         ends = (self._named(self.sources), self._named(self.targets))
         reader = EdgeReader(*ends, self.constants, self.place.unit.files, self._stream("weight"), self.place.room)
-        edges = reader.read(self.body.edges)
-        return None if edges is None else _Shape(edges.i, edges.j, edges.weights, edges.delays)
+        with self.constants.following() as parts:
+            edges = reader.read(self.body.edges)
+        return None if edges is None else _Shape(edges.i, edges.j, edges.weights, edges.delays, tuple(parts))
 
     def _named(self, neurons: IntArray | None) -> End:
         """The places of an end's neurons by the names that they have in the unit."""
@@ -260,7 +288,15 @@ class EntryBuilder:
                     self.constants.findings.error("no-position", formula.span, message, "give the groups a 'position'")
                 return None
             extra["distance"] = np.hypot(apart[:, 0], apart[:, 1])
-        value = self.constants.value(formula, extra, Randomness(self._stream(purpose), shape.i, shape.j))
+        randomness = Randomness(self._stream(purpose), shape.i, shape.j)
+        with self.constants.following() as parts:
+            value = self.constants.value(formula, extra, randomness)
+        if tree is not None and "distance" in extra:
+            pairs = self.sources[shape.i], self.targets[shape.j]
+            distance = Distance(self.place.population.moving, *pairs)
+            if distance.slots:
+                parts = [Part(self.constants.bound(tree, {**extra, "distance": distance}, randomness))]
+        self.constants.follow(parts)
         return None if value is None else np.broadcast_to(np.asarray(value, dtype=np.float64), shape.i.shape).copy()
 
     def _misplaced(self) -> bool:
@@ -269,17 +305,31 @@ class EntryBuilder:
         return any(end is not None and bool(misplaced[end].any()) for end in (self.sources, self.targets))
 
     def _weights(self, shape: _Shape | None) -> FloatArray | None:
-        weights = None if shape is None else shape.weights
-        if self.body.weight is not None:
-            weights = self._values(self.body.weight, shape, "weight")
-        elif weights is None and shape is not None and self._kept("weight"):
-            weights = np.ones(len(shape.i))
         if self.body.scale is None:
+            weights = self._plain_weights(shape)
             return weights if self._kept("scale") else None
+        with self.constants.following() as parts:
+            weights = self._plain_weights(shape)
         if weights is None or shape is None or self.sources is None or self.targets is None:
             look_at_scale(self.body.scale, self.constants)
             return None
-        return scaled(self.body.scale, weights, (self.sources, self.targets), (shape.i, shape.j), self.constants)
+        ends, pairs = (self.sources, self.targets), (shape.i, shape.j)
+        scale = Scaled(Assembled(weights, tuple(parts)), self.body.scale, ends, pairs, self.constants)
+        if scale.slots:
+            self.constants.follow([Part(scale)])
+        with self.constants.following():  # followed as a whole
+            return scaled(self.body.scale, weights, ends, pairs, self.constants)
+
+    def _plain_weights(self, shape: _Shape | None) -> FloatArray | None:
+        """The weights before they are scaled."""
+        weights = None if shape is None else shape.weights
+        if self.body.weight is not None:
+            return self._values(self.body.weight, shape, "weight")
+        if weights is None and shape is not None and self._kept("weight"):
+            return np.ones(len(shape.i))
+        if shape is not None:
+            self.constants.follow(shape.parts)
+        return weights
 
     def _centres(self, grid: Grid | None, shape: _Shape | None) -> FloatArray | None:
         centre = self.body.centre
@@ -309,13 +359,21 @@ class EntryBuilder:
         assert entry is not None
         if self.body.plasticity is None and self._kept("plasticity"):
             findings.error("useless-key", entry.key.span, "'bounds' hold plastic weights; there is no 'plasticity'")
-        low, high = self.constants.scalar(bounds[0]), self.constants.scalar(bounds[1])
+        with self.constants.following() as lower:
+            low = self.constants.scalar(bounds[0])
+        with self.constants.following() as upper:
+            high = self.constants.scalar(bounds[1])
+        if low is not None and high is not None and (lower or upper):  # what is below the other one must stay there
+            above = Assembled(np.array(high), tuple(upper))
+            lower = lower or [Part(Assembled(np.array(low), ()))]
+            self.constants.follow(part._replace(field="low", high=above) for part in lower)
+            self.constants.follow(part._replace(field="high") for part in upper)
         if low is None or high is None:
             return None
         if low > high:
             findings.error("out-of-range", entry.value.span, f"the lower bound {low:g} is above the upper one {high:g}")
             return None
-        if weights is not None and not self.place.begun and ((weights < low) | (weights > high)).any():
+        if weights is not None and ((weights < low) | (weights > high)).any():
             first = weights[(weights < low) | (weights > high)][0]
             message = f"the first weight {first:g} lies outside the bounds {low:g} to {high:g}"
             findings.error("weight-outside", entry.value.span, message)
@@ -336,3 +394,11 @@ class EntryBuilder:
             self.place.directory,
             len(self.place.population.neurons),
         )
+
+
+def _present(part: Part, places: IntArray) -> Part:
+    """A part whose numbers stand at these places, without those that stand at none (−1)."""
+    inside = np.flatnonzero(places >= 0)
+    if len(inside) < len(places):
+        part = part.some(inside)
+    return part._replace(places=places[inside])

@@ -6,10 +6,11 @@ network is for ``phases``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 
 from neurovis_spec.compiler.arrays import IntArray
 from neurovis_spec.compiler.connect import Connected
@@ -28,6 +29,9 @@ from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.model import lost_names
 from neurovis_spec.language.sections import EventModel
 
+#: What an event may do.
+_ACTIONS = ("set", "clamp", "lesion", "mend", "learning")
+
 
 @dataclass(frozen=True)
 class Event:
@@ -37,9 +41,13 @@ class Event:
     at: int
     to: int | None = None
     set: Mapping[str, Formula] = field(default_factory=dict)
-    clamp: tuple[tuple[int, Formula], ...] = ()
+    clamp: tuple[tuple[tuple[int, ...], Formula], ...] = ()
     neurons: tuple[int, ...] = ()
     connections: tuple[int, ...] = ()
+    mended_neurons: tuple[int, ...] = ()
+    mended_connections: tuple[int, ...] = ()
+    #: connections whose rules are switched on or off
+    learning: tuple[tuple[tuple[int, ...], bool], ...] = ()
     #: where each parameter that is set is named
     keys: Mapping[str, Span] = field(default_factory=dict)
 
@@ -51,6 +59,8 @@ class Wires:
     sources: IntArray
     targets: IntArray
     names: tuple[str, ...]
+    #: whether each of them learns
+    plastic: npt.NDArray[np.bool_]
 
     def between(self, sources: tuple[int, ...], targets: tuple[int, ...]) -> list[int]:
         """The connections from any of some neurons to any of others."""
@@ -59,7 +69,10 @@ class Wires:
 
 def wires_of(made: Connected) -> Wires | None:
     """The connections of a spec, if all of them are known."""
-    return Wires(made.sources, made.targets, tuple(one.name for one in made.bundles)) if made.complete else None
+    if not made.complete:
+        return None
+    plastic = np.repeat([one.learning is not None for one in made.bundles], [len(one.sources) for one in made.bundles])
+    return Wires(made.sources, made.targets, tuple(one.name for one in made.bundles), plastic)
 
 
 @dataclass(frozen=True)
@@ -96,14 +109,17 @@ class EventReader:
             self.constants.scalar(formula)
         look_at_keys(model.source, "clamp", model.clamp, self.directory, self.findings)
         clamps = [one for name, formula in model.clamp.items() for one in self._clamp(model, name, formula)]
-        neurons: list[int] = []
-        connections: list[int] = []
-        for text in model.lesion:
-            self._lesion(text, neurons, connections)
+        neurons, connections = self._parts(model.lesion)
+        mended, joined = self._parts(model.mend)
+        learning = [
+            one
+            for name, on in model.learning.items()
+            for one in self._learning(key_of(model.source, "learning", name), on.value)
+        ]
         if at is None or self.findings.errors > before:
             return None
         keys = {name: key_of(model.source, "set", name).span for name in model.set}
-        return Event(at, to, model.set, tuple(clamps), tuple(neurons), tuple(connections), keys)
+        return Event(at, to, model.set, tuple(clamps), neurons, connections, mended, joined, tuple(learning), keys)
 
     def _check_keys(self, model: EventModel) -> None:
         """``set`` and ``lesion`` go with ``at``, ``clamp`` with ``from`` and perhaps ``to``."""
@@ -114,10 +130,12 @@ class EventReader:
             span = source.span if entry is None else entry.key.span
             self.findings.error("bad-event", span, message, hint)
 
-        actions = [name for name in ("set", "clamp", "lesion") if source.entry(name) is not None]
+        actions = [name for name in _ACTIONS if source.entry(name) is not None]
         if not actions and not model.lost:
             first = source.entries[0].key.span if source.entries else source.span
-            self.findings.error("bad-event", first, "this event does nothing", "give it set, clamp or lesion")
+            self.findings.error(
+                "bad-event", first, "this event does nothing", "give it set, clamp, lesion, mend or learning"
+            )
         if not actions:
             return
         timed = {name for name in ("at", "from", "to") if source.entry(name) is not None}
@@ -144,23 +162,45 @@ class EventReader:
             message = f"'{name}' cannot be set in a run: the structure of the network depends on it"
             self.findings.error("structural-parameter", span, message)
 
-    def _clamp(self, model: EventModel, name: str, formula: Formula) -> list[tuple[int, Formula]]:
+    def _clamp(self, model: EventModel, name: str, formula: Formula) -> list[tuple[tuple[int, ...], Formula]]:
         neurons = resolve_end(key_of(model.source, "clamp", name), self.directory, self.findings)
         value = self.constants.scalar(formula)
-        return [] if neurons is None or value is None else [(neuron, formula) for neuron in neurons]
+        return [] if neurons is None or value is None else [(neurons, formula)]
 
-    def _lesion(self, text: Located[str], neurons: list[int], connections: list[int]) -> None:
-        if "->" not in text.value:
-            neurons.extend(resolve_end(text, self.directory, self.findings) or ())
-            return
+    def _parts(self, texts: Iterable[Located[str]]) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """The neurons and the connections that are lesioned or mended."""
+        neurons: list[int] = []
+        connections: list[int] = []
+        for text in texts:
+            if "->" in text.value:
+                connections.extend(self._connections(text))
+            else:
+                neurons.extend(resolve_end(text, self.directory, self.findings) or ())
+        return tuple(neurons), tuple(connections)
+
+    def _learning(self, name: Located[str], on: bool) -> list[tuple[tuple[int, ...], bool]]:
+        """The connections whose rules are stopped or started."""
+        if "->" not in name.value:
+            self.findings.error(
+                "bad-connection", name.span, f"'{shown(name.value)}' is no connection", "write FROM -> TO"
+            )
+            return []
+        found = self._connections(name)
+        if found and self.wires is not None and not self.wires.plastic[list(found)].any():
+            message = f"nothing learns at '{shown(name.value)}'"
+            self.findings.error("no-rule", name.span, message, "name a connection that has a 'plasticity'")
+        return [(found, on)]
+
+    def _connections(self, text: Located[str]) -> tuple[int, ...]:
+        """The connections between two ends; a finding where there is none."""
         ends = resolve_ends(text, self.directory, self.findings)
         if ends is None or self.wires is None:
-            return
+            return ()
         found = self.wires.between(*ends)
         if not found:
             message = f"there is no connection '{shown(text.value)}'"
             self.findings.error("no-connection", text.span, message, self._other(text, ends))
-        connections.extend(found)
+        return tuple(found)
 
     def _other(self, text: Located[str], ends: tuple[tuple[int, ...], tuple[int, ...]]) -> str | None:
         """Which connection may be meant: the one the other way, those that are called alike, those of either end."""

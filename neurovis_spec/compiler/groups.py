@@ -21,6 +21,7 @@ from neurovis_spec.compiler.network import Group, Role
 from neurovis_spec.compiler.positions import positions_of
 from neurovis_spec.compiler.program import Activation, Combine, Model
 from neurovis_spec.compiler.references import key_span
+from neurovis_spec.compiler.settable import Part
 from neurovis_spec.compiler.settings import check_initials, choose, look_at_settings, parameters, spread
 from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.diagnostics import meant, shown, suggest
@@ -37,6 +38,8 @@ class Kind(NamedTuple):
     activation_parameters: Mapping[str, FloatArray]
     model: Model
     model_parameters: Mapping[str, FloatArray]
+    #: the parameters that follow those of a run (``activation``, ``model``)
+    parts: tuple[Part, ...] = ()
 
 
 class Built(NamedTuple):
@@ -54,6 +57,8 @@ class Built(NamedTuple):
     input: IntArray
     position: FloatArray | None
     first: int | None
+    #: what of it follows parameters: ``bias``, ``position`` (x, then y), and those of its kind
+    parts: tuple[Part, ...] = ()
 
 
 class _Unsaid(NamedTuple):
@@ -108,10 +113,12 @@ class Builder:
             return None
         n = len(names)
         kind = self._kind(model, n)
-        bias = None if model.bias is None else self._drawn(model.bias, n, "bias", name)
+        with self.constants.following() as biased:
+            bias = None if model.bias is None else self._drawn(model.bias, n, "bias", name)
         initial = None if model.initial is None else self._drawn(model.initial, n, "initial", name)
         input_index = self._input(model, n)
-        position = positions_of(model.position, n, self.constants, self.unit.files)
+        with self.constants.following() as placed:
+            position = positions_of(model.position, n, self.constants, self.unit.files)
         labels = self._labels(model, names)
         group = Group(
             name=self.unit.called(name),
@@ -140,6 +147,11 @@ class Builder:
             input=_unsaid(n).input if input_index is None else input_index,
             position=position,
             first=first_number,
+            parts=(
+                *kind.parts,
+                *(part._replace(field="bias") for part in biased),
+                *(part._replace(field="position") for part in placed),
+            ),
         )
 
     def _look(self, name: str, model: GroupModel) -> None:
@@ -234,22 +246,27 @@ class Builder:
         activation, neuron = self._choices(model)
         activity: dict[str, FloatArray] | None = None
         settings: dict[str, FloatArray] | None = None
+        parts: list[Part] = []
         if activation is not None:
-            activity = parameters(model.activation or _default("identity", model), activation[1], n, self.constants)
+            with self.constants.following() as found:
+                activity = parameters(model.activation or _default("identity", model), activation[1], n, self.constants)
+            parts += (part._replace(field="activation") for part in found)
         elif model.activation is not None:
             look_at_settings(model.activation, self.constants, ("i", "n"))
         if neuron is None and model.model is not None:
             look_at_settings(model.model, self.constants, ("i", "n"))
         if neuron is not None:
             choice = model.model or _default("static", model)
-            settings = parameters(choice, neuron[1], n, self.constants)
+            with self.constants.following() as found:
+                settings = parameters(choice, neuron[1], n, self.constants)
+            parts += (part._replace(field="model") for part in found)
             if settings is not None:
                 check_initials(neuron[0].state, settings, choice, self.constants)
         if activation is None or activity is None:
             activation, activity = self.definitions.activations["identity"], {}
         if neuron is None or settings is None:
             neuron, settings = self.definitions.models["static"], {}
-        return Kind(activation[0], activity, neuron[0], settings)
+        return Kind(activation[0], activity, neuron[0], settings, tuple(parts))
 
     def _drawn(self, formulas: Formula | FormulaList, n: int | None, purpose: str, name: str) -> FloatArray | None:
         return spread(formulas, n, self.constants, f"'{purpose}'", Stream(self.seed, purpose, self.unit.called(name)))

@@ -16,7 +16,9 @@ from typing import Literal
 import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray, IntArray, frozen
+from neurovis_spec.compiler.changes import Change
 from neurovis_spec.compiler.program import Block, Combine, Operation, Plasticity
+from neurovis_spec.compiler.settable import Part, Settable
 from neurovis_spec.compiler.wishes import LayoutSettings, RenderSettings
 from neurovis_spec.language.expressions.tree import Tree
 
@@ -129,6 +131,10 @@ class Input:
     size: int
     expression: Tree | None = None
     table: FloatArray | None = None
+    #: the slots of the parameters in the expression, by the names that these have in it
+    slots: Mapping[str, int] = field(default_factory=dict)
+    #: what of the table follows parameters
+    parts: tuple[Part, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,6 +150,8 @@ class Noise:
     start: int
     expression: Tree
     parameters: Mapping[str, float]
+    #: the slots of those parameters that can be set
+    slots: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -187,12 +195,10 @@ class Network:
     noises: tuple[Noise, ...] = ()
     #: all instances of modules, an instance before those within it
     instances: tuple[Instance, ...] = ()
-    #: neurons whose activity is held at a value, whatever their model says
-    clamped: tuple[tuple[int, float], ...] = ()
-    #: events: the step from which on another network runs, with the same neurons and connections, ascending
-    phases: tuple[tuple[int, Network], ...] = ()
-    #: parameters that have a value from outside, or in a phase from an event, in the place of what the spec says
-    given: Mapping[str, float] = field(default_factory=dict)
+    #: the parameters that can be set in a run, and what depends on them
+    settable: Settable = field(default_factory=Settable)
+    #: what events change, a Change for each step at which something does, ascending
+    changes: tuple[Change, ...] = ()
 
     @cached_property
     def neuron_index(self) -> Mapping[str, int]:
@@ -222,8 +228,11 @@ class Network:
     def changing(self) -> IntArray:
         """Indices of the connections whose weight can change in a run, by a rule or by an event (reached or not)."""
         can = self.connections.rules >= 0
-        for _, phase in self.phases:
-            can = can | (phase.connections.weights != self.connections.weights)
+        events = {slot for change in self.changes for slot, _ in change.parameters}
+        slots = [*events, *self.settable.reached(sorted(events), [False] * len(self.settable.slots))]
+        for number in self.settable.bound_to(slots):
+            if self.settable.bindings[number].weights:
+                can[self.settable.bindings[number].indices] = True
         result = np.flatnonzero(can).astype(np.int64)
         frozen(result)
         return result

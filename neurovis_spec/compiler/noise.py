@@ -13,6 +13,7 @@ from neurovis_spec.compiler.arrays import frozen
 from neurovis_spec.compiler.constants import Constants, Value, width_of
 from neurovis_spec.compiler.network import Noise
 from neurovis_spec.compiler.populate import Population
+from neurovis_spec.compiler.settable import places_of
 from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
@@ -34,7 +35,8 @@ def make_noises(units: tuple[Unit, ...], population: Population, inputs: int) ->
         _check_deviations(tree, formula, group.count, constants)
         members = np.arange(group.start, group.start + group.count, dtype=np.int64)
         frozen(members)
-        result.append(Noise(group.name, members, start, tree, dict(constants.parameters)))
+        slots = places_of(tree, constants.settable)
+        result.append(Noise(group.name, members, start, tree, dict(constants.parameters), slots))
         start += group.count
     for model, owner in population.lost:
         if model.noise is not None:

@@ -24,6 +24,7 @@ from neurovis_spec.compiler.limits import Limits
 from neurovis_spec.compiler.network import Neurons
 from neurovis_spec.compiler.positions import depend_on_positions
 from neurovis_spec.compiler.references import Directory, key_span
+from neurovis_spec.compiler.settable import Assembled, Part
 from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.language.located import IDENTIFIER
 from neurovis_spec.language.sections import GroupModel
@@ -49,6 +50,19 @@ class Population:
     constants: tuple[Constants, ...]
     #: groups of which it is not known which neurons they have, each with the place of its unit
     lost: tuple[tuple[GroupModel, int], ...] = ()
+    #: what of each group follows parameters
+    parts: tuple[tuple[Part, ...], ...] = ()
+
+    @cached_property
+    def moving(self) -> Assembled:
+        """The positions, x and y in turn, of which some may follow parameters."""
+        parts = [
+            part._replace(places=2 * group.start + part.within(2 * group.count))
+            for group, own in zip(self.neurons.groups, self.parts, strict=True)
+            for part in own
+            if part.field == "position"
+        ]
+        return Assembled(self.neurons.position.ravel(), tuple(parts))
 
     @cached_property
     def by_distance(self) -> npt.NDArray[np.bool_]:
@@ -205,7 +219,8 @@ def _join(settled: list[_Settled]) -> Population:
     misplaced = np.repeat(np.array(wrong, dtype=np.bool_), sizes)
     lost = tuple((model, place) for place, one in enumerate(settled) for model in one.lost)
     constants = tuple(one.unit.constants for one in settled)
-    return Population(neurons, directories, kinds, models, owners, misplaced, constants, lost)
+    parts = tuple(item.parts for item in built)
+    return Population(neurons, directories, kinds, models, owners, misplaced, constants, lost, parts)
 
 
 def _placed(item: Built) -> FloatArray:

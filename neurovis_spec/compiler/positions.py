@@ -28,9 +28,11 @@ def _point(node: Node, index: int, n: int, constants: Constants) -> tuple[float,
         constants.findings.error("wrong-type", node.span, "a position is two numbers [x, y]")
         return None
     values = []
-    for item in node.items:
+    for axis, item in enumerate(node.items):
         formula = formula_of(item, constants.findings)
-        value = None if formula is None else constants.value(formula, {"i": float(index), "n": float(n)})
+        extra: dict[str, Value] = {"i": float(index), "n": float(n)}
+        place = np.array([2 * index + axis], dtype=np.int64)
+        value = None if formula is None else constants.value(formula, extra, places=place)
         if value is not None:
             values.append(float(value))
     return (values[0], values[1]) if len(values) == 2 else None
@@ -51,7 +53,7 @@ def _one_for_all(items: Iterable[Node], n: int, constants: Constants) -> FloatAr
     for axis, item in enumerate(items):
         formula = formula_of(item, constants.findings)
         extra: dict[str, Value] = {"i": np.arange(n, dtype=np.float64), "n": float(n)}
-        value = None if formula is None else constants.value(formula, extra)
+        value = None if formula is None else constants.value(formula, extra, places=2 * np.arange(n) + axis)
         if value is None:
             good = False
         else:

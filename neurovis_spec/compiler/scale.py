@@ -7,11 +7,14 @@ matrix of an entry has its sources as rows and its targets as columns; parallel 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.constants import Constants
+from neurovis_spec.compiler.settable import Assembled
+from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.located import Formula
 from neurovis_spec.language.sections import ScaleModel
 
@@ -19,6 +22,33 @@ from neurovis_spec.language.sections import ScaleModel
 MOST = 3000
 #: A radius below this share of the norm is a rounding error of 0.
 _NOTHING = 1e-12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scaled:
+    """Weights that are scaled, where they or what they are scaled to follow parameters of a run."""
+
+    weights: Assembled
+    model: ScaleModel
+    ends: tuple[IntArray, IntArray]
+    pairs: tuple[IntArray, IntArray]
+    constants: Constants
+
+    @property
+    def slots(self) -> frozenset[int]:
+        """The parameters that they read."""
+        with self.constants.following() as parts:
+            look_at_scale(self.model, self.constants)
+        return self.weights.slots.union(*(part.formula.slots for part in parts))
+
+    def values(self, parameters: FloatArray) -> FloatArray:
+        """The scaled weights with these parameters; NaN where there is nothing to scale."""
+        given = self.constants
+        values = given.parameters | {name: float(parameters[slot]) for name, slot in given.settable.items()}
+        quiet = Constants(values, given.dt, Findings())
+        weights = self.weights.values(parameters)
+        result = scaled(self.model, weights, self.ends, self.pairs, quiet) if np.isfinite(weights).all() else None
+        return np.full(len(weights), np.nan) if result is None else result
 
 
 def scaled(

@@ -17,10 +17,11 @@ from neurovis_spec.compiler.definitions import Default, Defaults, Definitions, c
 from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.limits import PATIENCE, plural
 from neurovis_spec.compiler.program import Quantity
+from neurovis_spec.compiler.settable import Assembled, Dependent, ParameterFormula, Part, Subset
 from neurovis_spec.diagnostics import Findings, meant, nearest, shown, suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
-from neurovis_spec.language.expressions.tree import names
+from neurovis_spec.language.expressions.tree import Name, Tree, names
 from neurovis_spec.language.located import IDENTIFIER, Formula, formula_of
 from neurovis_spec.language.source import Entry, Packed, Scalar, Sequence
 from neurovis_spec.language.values import Choice, FormulaList
@@ -160,7 +161,8 @@ def _listed(
             result.append(float(item.value))
             continue
         randomness = None if stream is None else Randomness(stream, position)
-        value = constants.value(item, each.extra(position), randomness)
+        place = np.array([position], dtype=np.int64)
+        value = constants.value(item, each.extra(position), randomness, places=place)
         if value is not None:
             result.append(float(value))
         elif constants.findings.errors - before >= PATIENCE:
@@ -200,16 +202,29 @@ def parameters(
     settled = settled or settle(choice, tuple(default.name for default in defaults), findings)
     values: dict[str, Value] = {**CONSTANTS, "dt": constants.dt}
     result: dict[str, FloatArray] = {}
+    following: dict[str, list[Part]] = {}
     for default in defaults:
         entry = settled.entries.get(default.name)
-        value = _default(default, n, values) if entry is None else _setting(entry, default.name, n, constants, each)
+        with constants.following() as parts:
+            value = _default(default, n, values) if entry is None else _setting(entry, default.name, n, constants, each)
         if value is None:
             continue
         if entry is None and not np.isfinite(value).all():
             message = f"with these settings the default of '{default.name}' is not a finite number"
             findings.error("not-finite", choice.name.span, message)
             return None
+        if entry is None and _follows(default.value, following):
+            parts = [Part(_assembled(default.value, values, following))]
         values[default.name] = value
+        low, high = (
+            None if bound is None or not _bounded(default, values) else _assembled(bound, values, following)
+            for bound in (default.low, default.high)
+        )
+        if not parts and any(bound is not None and bound.slots for bound in (low, high)):
+            parts = [Part(ParameterFormula(Name(default.name), {}, {default.name: value}))]
+        if parts:
+            following[default.name] = parts
+            constants.follow(_between(part, low, high)._replace(name=default.name) for part in parts)
         span = choice.name.span if entry is None else entry.value.span
         # A default that lies outside by itself is a finding of the definition.
         if not settled.entries or (_bounded(default, values) and check_bounds(value, default, values, span, findings)):
@@ -227,6 +242,28 @@ def _default(default: Default, n: int | None, values: Mapping[str, Value]) -> Fl
     if not names(default.value) <= values.keys():
         return None
     return np.broadcast_to(np.asarray(evaluate_array(default.value, values), dtype=np.float64), (n or 1,)).copy()
+
+
+def _between(part: Part, low: Dependent | None, high: Dependent | None) -> Part:
+    """A part that must lie within bounds, which are one for all or one for each."""
+    if part.places is None:
+        return part._replace(low=low, high=high)
+    own = [None if bound is None else Subset(bound, part.places) for bound in (low, high)]
+    return part._replace(low=own[0], high=own[1])
+
+
+def _follows(tree: Tree, following: Mapping[str, list[Part]]) -> bool:
+    """Whether an expression over parameters of a definition depends on one that follows parameters of the run."""
+    return not names(tree).isdisjoint(following)
+
+
+def _assembled(tree: Tree, values: Mapping[str, Value], following: Mapping[str, list[Part]]) -> ParameterFormula:
+    """An expression over parameters of a definition, some of which follow parameters of the run."""
+    known: dict[str, Value | Dependent] = {}
+    for name in names(tree):
+        value = values[name]
+        known[name] = Assembled(np.asarray(value), tuple(following[name])) if name in following else value
+    return ParameterFormula(tree, {}, known)
 
 
 def _bounded(default: Default, values: Mapping[str, Value]) -> bool:

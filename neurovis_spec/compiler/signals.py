@@ -5,6 +5,8 @@ In: the section and Constants. Out: Inputs in the order written, each with its p
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray, frozen
@@ -13,6 +15,7 @@ from neurovis_spec.compiler.constants import ALWAYS, Constants, is_constant
 from neurovis_spec.compiler.limits import PATIENCE, amount, plural
 from neurovis_spec.compiler.network import Input
 from neurovis_spec.compiler.references import Section, key_span
+from neurovis_spec.compiler.settable import places_of
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.expressions.tree import Tree
@@ -49,7 +52,7 @@ def make_input(
 
 def _by_expression(name: str, formula: Formula, start: int, constants: Constants) -> Input | None:
     tree = _expression(formula, constants)
-    return None if tree is None else Input(name, start, 1, expression=tree)
+    return None if tree is None else Input(name, start, 1, expression=tree, slots=places_of(tree, constants.settable))
 
 
 def _by_file(name: str, path: Located[str], start: int, files: Files, findings: Findings) -> Input | None:
@@ -65,8 +68,11 @@ def _by_file(name: str, path: Located[str], start: int, files: Files, findings: 
 
 
 def _by_values(name: str, node: Sequence | Packed, start: int, constants: Constants) -> Input | None:
-    values = _inline(node, constants)
-    return None if values is None else _tabled(name, start, values)
+    with constants.following() as parts:
+        values = _inline(node, constants)
+    if values is None:
+        return None
+    return replace(_tabled(name, start, values), parts=tuple(part._replace(field="table") for part in parts))
 
 
 def _by_size(name: str, model: InputModel, start: int, section: Section, constants: Constants) -> Input | None:

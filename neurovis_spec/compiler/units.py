@@ -22,12 +22,13 @@ from neurovis_spec.compiler.modules import Library, Module
 from neurovis_spec.compiler.network import Input
 from neurovis_spec.compiler.parameters import make_parameters
 from neurovis_spec.compiler.references import Section, key_of, key_span
+from neurovis_spec.compiler.settable import ParameterFormula
 from neurovis_spec.compiler.signals import make_input
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.compiler.unit import Expansion, Unit
 from neurovis_spec.diagnostics import Findings, shown, suggest
 from neurovis_spec.language.expressions.tree import Number, names, substitute
-from neurovis_spec.language.located import NAME_RULE, Formula, too_long
+from neurovis_spec.language.located import NAME_RULE, too_long
 from neurovis_spec.language.model import lost_names
 from neurovis_spec.language.modules import INCLUDED, InstanceModel
 
@@ -207,8 +208,12 @@ class Expander:
                 continue
             if place.path:
                 tree = made.expression
-                if tree is not None:  # the network knows the parameters of the spec alone
-                    values = {key: Number(value) for key, value in constants.parameters.items()}
+                if tree is not None:  # the network knows the parameters of the spec, and those that follow them
+                    values = {
+                        key: Number(value)
+                        for key, value in constants.parameters.items()
+                        if key not in constants.settable
+                    }
                     tree = substitute(tree, values)
                 made = replace(made, name=f"{place.path}.{name}", expression=tree)
             self.inputs.append(made)
@@ -283,9 +288,11 @@ class Expander:
         self, model: InstanceModel, module: Module, unit: Unit, place: _Place
     ) -> tuple[Constants, dict[str, frozenset[str]]]:
         """The constants of one instance, and what its settings depend on."""
-        constants = constants_of(module, self.dt, self.findings)
+        outer = unit.constants
+        constants = replace(constants_of(module, self.dt, self.findings), slots=outer.slots, path=place.path)
         extra = dict(zip(COUNTED, (float(place.position), float(place.count)), strict=True))
         given: dict[str, float] = {}
+        following: dict[str, ParameterFormula] = {}
         settings: dict[str, frozenset[str]] = {}
         for name, formula in model.set.items():
             value = unit.constants.value(formula, extra)
@@ -295,7 +302,11 @@ class Expander:
                 constants.broken.add(name)
                 continue
             given[name] = float(value)
-            settings[name] = _used(formula, unit.constants)
+            tree = unit.constants.tree(formula, COUNTED) if isinstance(formula.value, str) else None
+            settings[name] = frozenset() if tree is None else names(tree)
+            if tree is not None and not names(tree).isdisjoint(outer.settable):
+                following[name] = outer.bound(tree, extra)
+        constants.settings = following
         constants.broken.update(lost_names(model.source, "set", dict(model.set)))
         places = {name: formula.span for name, formula in model.set.items()}
         make_parameters(module.model, constants, given, places)
@@ -306,9 +317,3 @@ def constants_of(module: Module, dt: float, findings: Findings) -> Constants:
     """Constants for the parameters of a module, before these are known."""
     lost, incomplete = set(module.gaps.names["parameters"]), "parameters" in module.gaps.sections
     return Constants({}, dt, findings, broken=lost, incomplete=incomplete)
-
-
-def _used(formula: Formula, constants: Constants) -> frozenset[str]:
-    """The parameters that a formula uses."""
-    tree = constants.tree(formula, COUNTED) if isinstance(formula.value, str) else None
-    return frozenset() if tree is None else frozenset(names(tree))

@@ -64,10 +64,11 @@ CONNECTION: Final = ConfigDict(
     }
 )
 #: A clamp lasts and is an event of its own; what is set or removed is so from one step on.
+_AT_ONCE: Final = ("set", "lesion", "mend", "learning")
 EVENT: Final = ConfigDict(
     json_schema_extra={
         "if": _has("clamp"),
-        "then": {"required": ["from"], "properties": {"at": False, "set": False, "lesion": False}},
-        "else": {"required": ["at"], "properties": {"from": False, "to": False}, **_any([_has("set"), _has("lesion")])},
+        "then": {"required": ["from"], "properties": dict.fromkeys(("at", *_AT_ONCE), False)},
+        "else": {"required": ["at"], "properties": {"from": False, "to": False}, **_any([*map(_has, _AT_ONCE)])},
     }
 )

@@ -17,14 +17,14 @@ _CONNECTION: Final = re.compile(rf"[ \t]*{_END}[ \t]*->[ \t]*{_END}[ \t]*")
 def is_connections(path: Sequence[str]) -> bool:
     """Whether the keys below this path name connections."""
     match tuple(path):
-        case ("connections",) | ("modules", _, "connections"):
+        case ("connections",) | ("modules", _, "connections") | ("events", "learning"):
             return True
     return False
 
 
 def names_connections(path: Sequence[str]) -> bool:
-    """Whether the texts at this path may name connections: those that an event lesions."""
-    return tuple(path) == ("events", "lesion")
+    """Whether the texts at this path may name connections: those that an event lesions or mends."""
+    return tuple(path) in (("events", "lesion"), ("events", "mend"))
 
 
 def normal(key: str) -> str:

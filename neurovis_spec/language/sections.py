@@ -202,7 +202,7 @@ class EventModel(Model):
 
     PLACE: ClassVar[str] = "an event"
 
-    at: FormulaField | None = Field(None, description="The step from which on it applies (set, lesion).")
+    at: FormulaField | None = Field(None, description="The step from which on it applies (all but a clamp).")
     from_: FormulaField | None = Field(None, alias="from", description="The first step of a clamp.")
     to: FormulaField | None = Field(None, description="The step before which a clamp ends; without it, it lasts.")
     set: Annotated[Keyed[FormulaField], KeysAreNames(), Filled("{parameter: value}")] = Field(
@@ -213,6 +213,12 @@ class EventModel(Model):
     )
     lesion: Annotated[PartsField, WithJsonSchema(_LESION), Filled("a neuron or a connection")] = Field(
         default=(), description="Neurons and connections (FROM -> TO) that are removed."
+    )
+    mend: Annotated[PartsField, WithJsonSchema(_LESION), Filled("a neuron or a connection")] = Field(
+        default=(), description="Neurons and connections (FROM -> TO) whose lesion is undone."
+    )
+    learning: Annotated[Keyed[BoolField], Filled("{connections: true or false}")] = Field(
+        default_factory=dict, description="{FROM -> TO: whether its rule is carried out} from this step on."
     )
 
 

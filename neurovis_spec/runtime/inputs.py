@@ -18,7 +18,7 @@ from neurovis_spec.compiler.network import Input, Network, Noise
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.tree import Draw
-from neurovis_spec.runtime.state import constants
+from neurovis_spec.runtime.state import State, constants
 
 #: steps of a stretch
 STRETCH = 256
@@ -38,8 +38,24 @@ class InputReader:
     def __init__(self, network: Network, supplied: Mapping[str, npt.ArrayLike] | None = None) -> None:
         self.network = network
         self._supplied = {name: _whole(_entry(network, name), value) for name, value in (supplied or {}).items()}
+        self._parameters, self._variables, self._drawn_before = network.settable.parameters, network.settable.initial, 0
+        read = (*(entry.slots for entry in network.inputs), *(noise.slots for noise in network.noises))
+        self._read = sorted({slot for slots in read for slot in slots.values()})
+        self._tables = any(name.startswith("table/") for name in network.settable.variables)
         self._first = -1
         self._rows: FloatArray = np.zeros((0, network.vector_size))
+
+    def use(self, state: State) -> None:
+        """Take parameters as a state has them by now."""
+        now = state.conditions
+        old, self._parameters, self._variables = self._parameters, now.parameters, now.variables
+        if (
+            self._tables
+            or self._drawn_before != state.drawn
+            or any(old[slot] != now.parameters[slot] for slot in self._read)
+        ):
+            self._drawn_before = state.drawn
+            self._first, self._rows = -1, self._rows[:0]
 
     def rows(self, first: int, stop: int) -> FloatArray:
         """The vectors of steps ``first`` … ``stop`` − 1, in one stretch: (stop − first, inputs), read-only."""
@@ -68,7 +84,7 @@ class InputReader:
         self._first, self._rows = first, rows
 
     def _source(self, entry: Input, steps: npt.NDArray[np.int64]) -> FloatArray | float:
-        table = self._supplied.get(entry.name, entry.table)
+        table = self._supplied.get(entry.name, self._table(entry))
         if table is not None:
             chosen: FloatArray = table[np.minimum(steps, len(table) - 1)]
             return chosen.reshape(len(steps), -1)
@@ -77,8 +93,21 @@ class InputReader:
         k = steps.astype(np.float64)
         dt = self.network.dt
         known: dict[str, float | FloatArray] = {**constants(dt), **self.network.parameters, "k": k, "t": k * dt}
+        known |= self._set(entry.slots)
         values = np.broadcast_to(evaluate_array(entry.expression, known), (len(steps),))
         return np.asarray(values, dtype=np.float64).reshape(-1, 1)
+
+    def _set(self, slots: Mapping[str, int]) -> dict[str, float]:
+        """The parameters of an expression that can be set, as they are by now."""
+        return {name: float(self._parameters[slot]) for name, slot in slots.items()}
+
+    def _table(self, entry: Input) -> FloatArray | None:
+        """The rows of an input, of which some may follow parameters."""
+        number = self.network.inputs.index(entry) if entry.parts else -1
+        if entry.table is None or number < 0:
+            return entry.table
+        start, size = self.network.settable.variables[f"table/{number}"]
+        return np.broadcast_to(self._variables[start : start + size], (entry.table.size,)).reshape(entry.table.shape)
 
     def _drawn(self, noise: Noise, steps: npt.NDArray[np.int64]) -> FloatArray | float:
         """The noise of a stretch of steps: the counter of a number is (i, 0, step, number of the draw)."""
@@ -88,6 +117,8 @@ class InputReader:
         k, dt = step.astype(np.float64), self.network.dt
         known: dict[str, float | FloatArray] = {**constants(dt), **noise.parameters, "k": k, "t": k * dt}
         known |= {"i": i.astype(np.float64), "n": float(n)}
+        known |= self._set(noise.slots)
+        step = step + self._drawn_before
 
         def draw(node: Draw, first: float | FloatArray, second: float | FloatArray) -> FloatArray:
             return stream.drawn(node.kind, first, second, i, 0, step, node.index)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from itertools import count
 from typing import NamedTuple
 
+from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import suggest
 
 _RANGE = re.compile(
@@ -99,6 +100,14 @@ class Names:
     def _numbered(self, path: str) -> list[str]:
         number = self.counted.get(path)
         return [path] if number is None else [f"{path}{k + 1}" for k in range(number)]
+
+
+def names_of(network: Network) -> Names:
+    """Who is called what in a network."""
+    groups = {g.name: (tuple(g.indices), False) for g in network.neurons.groups if g.name not in network.neuron_index}
+    outputs = {o.name: (tuple(o.neurons.tolist()), o.scalar) for o in network.outputs}
+    counted = {one.declared: number for one in network.instances if (number := one.number)}
+    return Names(network.neuron_index, outputs | groups, counted)
 
 
 def _joined(found: Iterable[Found | None]) -> Found | None:

@@ -25,12 +25,18 @@ def emit_gather(code: Code, network: Network, layout: SignalLayout, operation: G
     if len(block.incoming):
         drive = code.let("u", _combined(code, block, network, _signals(code, network, layout, operation.block)))
         # a sum that begins with 0.0 is never −0.0, so adding 0.0 changes nothing; a product may be
-        if any_given(bias) or block.combine == "product":
-            drive = code.let("u", f"{drive} + {code.constant(bias.copy())}")
+        if code.is_set("bias") or any_given(bias) or block.combine == "product":
+            drive = code.let("u", f"{drive} + {_bias(code, network, block)}")
+    elif code.is_set("bias"):
+        drive = code.let("u", f"{'1.0' if block.combine == 'product' else '0.0'} + {_bias(code, network, block)}")
     else:
         drive = code.constant((1.0 if block.combine == "product" else 0.0) + bias)
     drive = _with(code, network, network.neurons.input[block.members], drive)
     return _with(code, network, network.noise_index[block.members], drive)
+
+
+def _bias(code: Code, network: Network, block: Block) -> str:
+    return code.numbers("bias", network.neurons.bias, block.members, share=False)
 
 
 def _with(code: Code, network: Network, fed: IntArray, drive: str) -> str:
@@ -89,8 +95,9 @@ def _combined(code: Code, block: Block, network: Network, signals: str) -> str:
     if block.combine == "sum":
         return f"bincount({slots}, {signals}, {count})"
     centres = network.connections.centres[block.incoming]
-    if any_given(centres):
-        signals = code.let("g", f"{signals} - {code.constant(centres.copy())}")
+    if code.is_set("centres") or any_given(centres):
+        taken = code.numbers("centres", network.connections.centres, block.incoming, share=False)
+        signals = code.let("g", f"{signals} - {taken}")
     return f"np.sqrt(bincount({slots}, {signals} * {signals}, {count}))"
 
 
@@ -110,8 +117,8 @@ def emit_update(code: Code, network: Network, operation: Update, drive: str) -> 
     """The states of a block from old states and the drive; activities from the new ones; the episode's end."""
     block, number = network.blocks[operation.block], operation.block
     model = block.model
-    own = code.parameters(block.model_parameters) | {"drive": drive}
-    functions = {"f": lambda argument: _activation(code, block, argument)}
+    own = code.parameters(f"model/{number}", block.model_parameters) | {"drive": drive}
+    functions = {"f": lambda argument: _activation(code, number, block, argument)}
     old = {q.name: code.let("v", f"cells[{number}][{i}]") for i, q in enumerate(model.state)}
     known = emit_let(code, model.let, own | old, [q.each_step for q in model.state] + [model.activity])
     steps = {q.name: q.each_step for q in model.state}
@@ -121,11 +128,7 @@ def emit_update(code: Code, network: Network, operation: Update, drive: str) -> 
     for name, value in new.items():
         code.line(f"{old[name]}[:] = {value}")
     code.line(f"activity{code.position(block.members, len(network.neurons))} = {activity}")
-    held = [(neuron, value) for neuron, value in network.clamped if neuron in block.members]
-    if held:
-        where = np.array([neuron for neuron, _ in held], dtype=np.int64)
-        values = code.constant(np.array([value for _, value in held], dtype=np.float64))
-        code.line(f"activity{code.position(where, len(network.neurons))} = {values}")
+    code.line(f"if holds and holds[{number}]: activity[holds[{number}][0]] = holds[{number}][1]")
     ends = {q.name: q.each_episode for q in model.state if q.each_episode is not None}
     if network.episode is not None and ends:
         _end_episode(code, network, block, own | old, ends)
@@ -172,10 +175,12 @@ def emit_let(
     return known
 
 
-def _activation(code: Code, block: Block, argument: str) -> str:
+def _activation(code: Code, number: int, block: Block, argument: str) -> str:
     """f of an argument, which gets an identifier of its own so that it is computed once."""
     x = argument if argument.isidentifier() else code.let("x", argument)
-    return code.expression(block.activation.value, code.parameters(block.activation_parameters) | {"x": x})
+    return code.expression(
+        block.activation.value, code.parameters(f"activation/{number}", block.activation_parameters) | {"x": x}
+    )
 
 
 def emit_send(code: Code, network: Network, layout: SignalLayout) -> None:

@@ -13,20 +13,25 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.settable import Variable
 from neurovis_spec.language.expressions.emit import emit
 from neurovis_spec.language.expressions.tree import Name, Tree, Unary, names
 from neurovis_spec.runtime.state import constants
 
+_NONE: Mapping[str, Variable] = {}
 Functions: TypeAlias = Mapping[str, Callable[[str], str]]
 
 
 _PARTS = ("activity", "weights", "signals", "history", "cells", "traces")
+#: the numbers that can be set, in the state
+_VARIABLES = "variables"
 
 
 class Code:
     """Lines of the step function, one level deep, and what they need."""
 
-    def __init__(self, dt: float) -> None:
+    def __init__(self, dt: float, variables: Mapping[str, Variable] = _NONE) -> None:
+        self._variables = variables
         self.namespace: dict[str, object] = {"np": np, "bincount": np.bincount, "multiply": np.multiply}
         self.lines: list[str] = []
         self.indent = 1
@@ -58,9 +63,26 @@ class Code:
         self.namespace[name] = value
         return name
 
-    def parameters(self, values: Mapping[str, FloatArray]) -> dict[str, str]:
-        """Parameters as constants: one number where all members share it."""
-        return {name: self.constant(shared(array)) for name, array in values.items()}
+    def parameters(self, owner: str, values: Mapping[str, FloatArray], some: IntArray | None = None) -> dict[str, str]:
+        """The parameters of a definition in use, of ``some`` of its members or of all."""
+        return {name: self.numbers(f"{owner}/{name}", array, some) for name, array in values.items()}
+
+    def numbers(self, array: str, values: FloatArray, some: IntArray | None = None, share: bool = True) -> str:
+        """An array of the network, or ``some`` of it: where it can be set as it is by now, else a constant; with
+        ``share`` one number where all are the same."""
+        variable = self._variables.get(array)
+        if variable is None:
+            own = values if some is None else values[some]
+            return self.constant(shared(own) if share else np.array(own, dtype=np.float64))
+        start, size = variable
+        if size == 1:
+            return self.view(_VARIABLES, f"{start}:{start + 1}")
+        whole = self.view(_VARIABLES, f"{start}:{start + size}")
+        return whole if some is None else self.select(whole, some, size)
+
+    def is_set(self, array: str) -> bool:
+        """Whether an array can be set in a run."""
+        return array in self._variables
 
     def select(self, array: str, indices: IntArray, size: int, broadcast: bool = False) -> str:
         """Elements of a vector of this size: a slice where they lie in a row, which costs no copy.
@@ -76,7 +98,7 @@ class Code:
 
     def view(self, array: str, part: str) -> str:
         """A slice. Slices of the state's own arrays are taken once a step, at its head: they follow all changes."""
-        if array not in _PARTS:
+        if array not in (*_PARTS, _VARIABLES):
             return f"{array}[{part}]"
         return self._views.setdefault(f"{array}[{part}]", f"{array[0]}{len(self._views)}_")
 
@@ -109,6 +131,11 @@ class Code:
         views = [f"    {name} = {code}" for code, name in self._views.items()]
         body = [*views, *self.lines, "    state.k = k + 1", ""]
         taken = [f"    {name} = state.{name}" for name in _PARTS if any(name in line for line in body)]
+        taken += [
+            f"    {name} = state.conditions.{name}"
+            for name in (_VARIABLES, "holds")
+            if any(name in line for line in body)
+        ]
         used = [f"    {text}" for text in sorted(self.used)]
         return "\n".join(["def step(state, s):", "    k = state.k", *taken, *used, *body])
 

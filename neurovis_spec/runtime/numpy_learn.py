@@ -6,6 +6,7 @@ In: a Plasticity. Out: lines in a ``Code``. New values are all computed before t
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from neurovis_spec.compiler.arrays import IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Plasticity
 from neurovis_spec.language.expressions.tree import Tree
+from neurovis_spec.runtime.conditions import Mask
 from neurovis_spec.runtime.numpy_blocks import emit_let
 from neurovis_spec.runtime.numpy_code import Code
 from neurovis_spec.runtime.state import rule_names
@@ -24,21 +26,33 @@ def emit_history(code: Code, depth: int) -> None:
         code.line(f"history[k % {depth}] = activity")
 
 
-def emit_learn(code: Code, network: Network, number: int, depth: int) -> None:
-    """The rule of a plasticity at a step and, where it has one, at an episode's end."""
-    plasticity = network.plasticity[number]
+def emit_learn(code: Code, network: Network, number: int, depth: int, still: Mask) -> None:
+    """The rule of a plasticity at a step and, where it has one, at an episode's end; not of connections that are
+    ``still`` (m,)."""
+    plasticity, some = network.plasticity[number], None
+    moving = ~still[plasticity.members]
+    if not moving.all():
+        some = np.flatnonzero(moving)
+        if not len(some):
+            return
+        signals = {name: indices[some] for name, indices in plasticity.signals.items()}
+        plasticity = replace(plasticity, members=plasticity.members[some], signals=signals)
     rule = plasticity.rule
-    known = code.parameters(plasticity.parameters) | _seen(code, network, plasticity, depth)
-    traces = {q.name: code.let("v", f"traces[{number}][{i}]") for i, q in enumerate(rule.state)}
+    known = code.parameters(f"rule/{number}", plasticity.parameters, some) | _seen(code, network, plasticity, depth)
+    place = "" if some is None else f"[{code.constant(some)}]"
+    traces = {q.name: code.let("v", f"traces[{number}][{i}]{place}") for i, q in enumerate(rule.state)}
+    stored = {q.name: f"traces[{number}][{i}]{place}" if place else "" for i, q in enumerate(rule.state)}
     weight = _weight(code, network, plasticity)
     steps = {q.name: q.each_step for q in rule.state} | {"weight": rule.each_step}
     ends = {q.name: q.each_episode for q in rule.state} | {"weight": rule.each_episode}
-    _change(code, network, plasticity, known | traces | {"weight": weight}, steps)
+    _change(code, network, plasticity, known | traces | {"weight": weight}, steps, stored)
     if network.episode is not None and any(tree is not None for tree in ends.values()):
         code.line(f"if (k + 1) % {network.episode} == 0:")
         code.indent += 1
         weight = _weight(code, network, plasticity)
-        _change(code, network, plasticity, known | traces | {"weight": weight}, ends)
+        if place:  # copies, which the step has not changed
+            traces = {name: code.let("v", stored[name]) for name in traces}
+        _change(code, network, plasticity, known | traces | {"weight": weight}, ends, stored)
         code.indent -= 1
 
 
@@ -47,25 +61,33 @@ def _weight(code: Code, network: Network, plasticity: Plasticity) -> str:
 
 
 def _change(
-    code: Code, network: Network, plasticity: Plasticity, known: dict[str, str], trees: dict[str, Tree | None]
+    code: Code,
+    network: Network,
+    plasticity: Plasticity,
+    known: dict[str, str],
+    trees: dict[str, Tree | None],
+    stored: dict[str, str],
 ) -> None:
-    """All right-hand sides, then all changes, the weight within its bounds."""
+    """All right-hand sides, then all changes, the weight within its bounds. ``stored``: where states are kept, if what
+    is known of them is a copy."""
     values = emit_let(code, plasticity.rule.let, known, list(trees.values()))
     new = {name: code.fresh("n", tree, values) for name, tree in trees.items() if tree is not None}
     for name, value in new.items():
         if name != "weight":
-            code.line(f"{known[name]}[:] = {value}")
+            code.line(f"{stored[name] or known[name] + '[:]'} = {value}")
     if "weight" in new:
         place = code.position(plasticity.members, len(network.connections))
         code.line(f"weights{place} = {_bounded(code, network, plasticity, new['weight'])}")
 
 
 def _bounded(code: Code, network: Network, plasticity: Plasticity, weight: str) -> str:
-    low, high = network.connections.low[plasticity.members], network.connections.high[plasticity.members]
-    if (low > -np.inf).any():
-        weight = f"np.maximum({weight}, {code.constant(low.copy())})"
-    if (high < np.inf).any():
-        weight = f"np.minimum({weight}, {code.constant(high.copy())})"
+    members = plasticity.members
+    for function, array, values in (
+        ("maximum", "low", network.connections.low),
+        ("minimum", "high", network.connections.high),
+    ):
+        if code.is_set(array) or np.isfinite(values[members]).any():
+            weight = f"np.{function}({weight}, {code.numbers(array, values, members, share=False)})"
     return weight
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -17,9 +18,9 @@ from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.backend import Backend, prepare
+from neurovis_spec.runtime.conditions import Controls
 from neurovis_spec.runtime.inputs import STRETCH, InputReader
 from neurovis_spec.runtime.memory import check_room
-from neurovis_spec.runtime.phases import go_over, segments
 from neurovis_spec.runtime.recording import Recording, recording_of
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.state import State, initial_state
@@ -100,12 +101,14 @@ def go(network: Network, state: State, course: Course, rows: Rows, progress: Pro
     """Run a network from a state, and hand on the rows that are kept."""
     every, steps = course.every, course.steps
     changing = _subscript(network.changing)
-    look, before = Watch(network).look, network
+    look, step, reader = Watch(network).look, prepare(network, course.backend).step, InputReader(network, course.inputs)
+    controls, changes = Controls(network), {change.at: change for change in network.changes}
+    edges = [0, *(at for at in changes if 0 < at < steps), steps]
     with np.errstate(all="ignore"):
-        for phase, begin, end in segments(network, steps):
-            step, reader = prepare(phase, course.backend).step, InputReader(phase, course.inputs)
-            go_over(state, before, phase)
-            before = phase
+        for begin, end in pairwise(edges):
+            if begin in changes:
+                controls.apply(state.conditions, state.weights, state.signals, changes[begin])
+            reader.use(state)
             for first, stop in _stretches(begin, end):
                 activity, weights = rows.begin((stop - 1) // every - (first - 1) // every)
                 row = 0

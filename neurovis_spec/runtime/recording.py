@@ -15,7 +15,7 @@ import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.runtime.names import Names, unknown_text
+from neurovis_spec.runtime.names import Names, names_of, unknown_text
 
 
 class RecordingError(ValueError):
@@ -166,8 +166,7 @@ def recording_of(
     """A recording with the structure of a network; ``all_weights`` (m,) gives those that stay."""
     connections = network.connections
     static = np.setdiff1d(np.arange(len(connections)), network.changing, assume_unique=True)
-    groups = {g.name: (tuple(g.indices), False) for g in network.neurons.groups if g.name not in network.neuron_index}
-    outputs = {o.name: (tuple(o.neurons.tolist()), o.scalar) for o in network.outputs}
+    names = names_of(network)
     return Recording(
         activity=activity,
         neurons=network.neurons.names,
@@ -180,10 +179,10 @@ def recording_of(
         dt=network.dt,
         step=step,
         ranks=_ranks(network),
-        views=outputs | groups,
+        views=names.views,
         network=network.name,
         hash=network.hash,
-        counted={one.declared: number for one in network.instances if (number := one.number)},
+        counted=names.counted,
     )
 
 

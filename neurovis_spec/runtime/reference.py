@@ -7,11 +7,11 @@ right: every other backend is tested against it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.program import Block, Gather, Learn, Plasticity, ReadInputs, Send, Update
+from neurovis_spec.compiler.program import Block, Gather, Learn, ReadInputs, Send, Update
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.runtime.backend import Availability, Capabilities
@@ -63,17 +63,29 @@ class ReferenceStepper:
         connections, neurons = self.network.connections, self.network.neurons
         arriving: list[list[tuple[float, float]]] = [[] for _ in block.members]
         for connection, slot in zip(block.incoming.tolist(), block.slots.tolist(), strict=True):
-            signal = self.arriving(connection, state)
-            arriving[slot].append((signal, float(connections.centres[connection])))
+            if not state.conditions.structure.gone[connection]:
+                signal = self.arriving(connection, state)
+                arriving[slot].append((signal, self.number("centres", connections.centres, connection, state)))
         drives = []
         for neuron, signals in zip(block.members.tolist(), arriving, strict=True):
-            drive = combined(block.combine, signals) + float(neurons.bias[neuron])
+            drive = combined(block.combine, signals) + self.number("bias", neurons.bias, neuron, state)
             if neurons.input[neuron] >= 0:
                 drive += float(inputs[neurons.input[neuron]])
             if self.network.noise_index[neuron] >= 0:
                 drive += float(inputs[self.network.noise_index[neuron]])
             drives.append(drive)
         return drives
+
+    def number(self, array: str, values: FloatArray, place: int, state: State) -> float:
+        """A number of the network; of an array that can be set, as it is by now."""
+        variable = self.network.settable.variables.get(array)
+        if variable is None:
+            return float(values[place])
+        return float(state.conditions.variables[variable.start + (place if variable.size > 1 else 0)])
+
+    def numbers(self, owner: str, arrays: Mapping[str, FloatArray], place: int, state: State) -> dict[str, float]:
+        """The parameters of a definition in use, for one of its neurons or connections."""
+        return {name: self.number(f"{owner}/{name}", values, place, state) for name, values in arrays.items()}
 
     def arriving(self, connection: int, state: State) -> float:
         """w[t−d]·a[t−d]: of this step for d = 0, else what was sent d steps ago."""
@@ -92,19 +104,18 @@ class ReferenceStepper:
                 state.activity[neuron] = initial
             else:
                 state.activity[neuron] = self.advance(number, position, drives[position], state)
-        for neuron, value in self.network.clamped:
-            if neuron in block.members:
-                state.activity[neuron] = value
+            held = state.conditions.held_at(neuron)
+            if held is not None:
+                state.activity[neuron] = held
 
     def advance(self, number: int, position: int, drive: float, state: State) -> float:
         """One neuron's step: its states are replaced, its activity is returned."""
         block = self.network.blocks[number]
         model, cells = block.model, state.cells[number]
-        own = self.clock(state) | {name: float(values[position]) for name, values in block.model_parameters.items()}
+        own = self.clock(state) | self.numbers(f"model/{number}", block.model_parameters, position, state)
         own["drive"] = drive
-        shape = self.clock(state) | {
-            name: float(values[position]) for name, values in block.activation_parameters.items()
-        }
+        shape = self.clock(state)
+        shape |= self.numbers(f"activation/{number}", block.activation_parameters, position, state)
         functions = {"f": lambda x: evaluate(block.activation.value, shape | {"x": x})}
         old = {quantity.name: float(cells[i][position]) for i, quantity in enumerate(model.state)}
         known = with_let(own | old, model.let)
@@ -131,21 +142,20 @@ class ReferenceStepper:
         """w[t+1] and the states of a rule from old values; at an episode's end, once more from what these gave."""
         plasticity = self.network.plasticity[number]
         for position, connection in enumerate(plasticity.members.tolist()):
-            self.learn_one(plasticity, position, connection, state.traces[number], state, inputs)
+            if not state.conditions.structure.still[connection]:
+                self.learn_one(number, position, connection, state, inputs)
 
-    def learn_one(
-        self,
-        plasticity: Plasticity,
-        position: int,
-        connection: int,
-        traces: tuple[FloatArray, ...],
-        state: State,
-        inputs: FloatArray,
-    ) -> None:
+    def learn_one(self, number: int, position: int, connection: int, state: State, inputs: FloatArray) -> None:
         """The weight and the states of one connection."""
-        rule, connections = plasticity.rule, self.network.connections
-        low, high = float(connections.low[connection]), float(connections.high[connection])
-        own = self.clock(state) | {name: float(values[position]) for name, values in plasticity.parameters.items()}
+        plasticity, traces, connections = (
+            self.network.plasticity[number],
+            state.traces[number],
+            self.network.connections,
+        )
+        rule = plasticity.rule
+        low = self.number("low", connections.low, connection, state)
+        high = self.number("high", connections.high, connection, state)
+        own = self.clock(state) | self.numbers(f"rule/{number}", plasticity.parameters, position, state)
         own |= self.seen(connection, state)
         both = (*state.activity.tolist(), *inputs.tolist())
         own |= {signal: both[plasticity.signals[signal][position]] for signal in rule.signals}

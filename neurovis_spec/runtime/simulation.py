@@ -1,69 +1,68 @@
 """The Simulation: a network run step by step, for a control loop.
 
 In: values for inputs, at each step. Out: the outputs of the step; activities and weights to look at; parameters that
-can be set from now on; states that can be kept and gone back to.
+can be set, neurons that can be clamped, parts that can be lesioned, rules that can be stopped from now on; states that
+can be kept and gone back to.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TypeAlias
+from collections.abc import Mapping
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.changes import Clamp
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.patch import PatchError
+from neurovis_spec.compiler.settable import ParameterFormula
 from neurovis_spec.diagnostics import suggest
+from neurovis_spec.language.expressions.tree import Number
 from neurovis_spec.runtime.backend import Backend, prepare
+from neurovis_spec.runtime.conditions import Controls
 from neurovis_spec.runtime.inputs import InputReader
-from neurovis_spec.runtime.phases import go_over, network_at
-from neurovis_spec.runtime.recording import Recording, unknown
+from neurovis_spec.runtime.names import Names, names_of
+from neurovis_spec.runtime.recording import Recording, UnknownNameError, unknown
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.runtime.watch import Watch
 
-Rebind: TypeAlias = Callable[[Mapping[str, float], int | None], Network]
+#: Clamps by hand come after those of events.
+_BY_HAND = 1 << 62
 
 
 class ParameterError(ValueError):
-    """A parameter that does not exist, or cannot be set in a run."""
+    """A parameter that does not exist, cannot be set in a run, or cannot have this value."""
 
 
 class Simulation:
-    """A run in the making.
-
-    ``start`` is a recording to go on from (see ``resume``); ``rebind`` makes the network with other values of
-    parameters, those that it has at a step (None: before the first), without it ``set`` is refused. Raises
-    BackendError, RecordingError.
+    """A run in the making; ``start`` is a recording to go on from (see ``resume``). Events of the spec apply at their
+    steps; what is done by hand between two steps comes after the events of the step to come. Raises BackendError,
+    RecordingError.
     """
 
-    def __init__(
-        self,
-        network: Network,
-        backend: str | Backend | None = None,
-        start: Recording | None = None,
-        rebind: Rebind | None = None,
-    ) -> None:
-        self._original, self._backend, self._rebind = network, backend, rebind
-        self._begin = initial_state(network) if start is None else resumed_state(network, start)
-        go_over(self._begin, network, network_at(network, 0))
-        #: what was set by hand, and the step of the last time
-        self._chosen: dict[str, float] = {}
-        self._since = 0
-        self._use(network)
-        self._watch = Watch(network)
-        self._state = self._begin.copy()
-
-    def _use(self, network: Network, step: int = 0) -> None:
-        """Run a network from a step on."""
+    def __init__(self, network: Network, backend: str | Backend | None = None, start: Recording | None = None) -> None:
         self.network = network
-        self._enter(network_at(network, step))
+        self._stepper = prepare(network, backend)
+        self._reader = InputReader(network)
+        self._controls = Controls(network)
+        self._changes = {change.at: change for change in network.changes}
+        self._begin = initial_state(network) if start is None else resumed_state(network, start)
+        self._apply(self._begin)
+        self.reset()
 
-    def _enter(self, phase: Network) -> None:
-        self._stepper = prepare(phase, self._backend)
-        self._reader = InputReader(phase)
-        self._phase = phase
+    @cached_property
+    def _names(self) -> Names:
+        return names_of(self.network)
+
+    def _apply(self, state: State) -> None:
+        """What events change at the step to come."""
+        change = self._changes.get(state.k)
+        if change is not None:
+            with np.errstate(all="ignore"):
+                self._controls.apply(state.conditions, state.weights, state.signals, change)
 
     @property
     def k(self) -> int:
@@ -80,7 +79,13 @@ class Simulation:
     @property
     def weights(self) -> FloatArray:
         """w[k], for the next step, of the connections that can change, in the order of a ``.npz``; a copy."""
-        return self._state.weights[self._original.changing]
+        return self._state.weights[self.network.changing]
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """The parameters of the spec, as they are for the next step."""
+        slots = self.network.settable.index
+        return {name: float(self._state.conditions.parameters[slots[name]]) for name in self.network.parameters}
 
     def weight(self, name: str) -> float:
         """w[k] of any connection by name. Raises KeyError with the nearest names."""
@@ -97,16 +102,15 @@ class Simulation:
         Gives the outputs by name: a number for a single neuron, else an array; an empty mapping where the spec declares
         none. Raises InputError, and then no step was made.
         """
-        vector = self._reader.at(self._state.k, {**(values or {}), **inputs})
+        state = self._state
+        vector = self._reader.at(state.k, {**(values or {}), **inputs})
         with np.errstate(all="ignore"):
-            self._stepper.step(self._state, vector)
-            self._watch.look(self._state)
-        # The events of the next step apply now, so that ``weights`` are those of the next step.
-        phase = network_at(self.network, self._state.k)
-        if phase is not self._phase:
-            go_over(self._state, self._phase, phase)
-            self._enter(phase)
-        activity = self._state.activity
+            self._stepper.step(state, vector)
+            self._watch.look(state)
+        if state.k in self._changes:  # those of the next step apply now, so that ``weights`` are those of the next step
+            self._apply(state)
+            self._reader.use(state)
+        activity = state.activity
         return {
             entry.name: np.float64(activity[entry.neurons[0]]) if entry.scalar else activity[entry.neurons]
             for entry in self.network.outputs
@@ -115,27 +119,20 @@ class Simulation:
     def set(self, values: Mapping[str, float] | None = None, /, **parameters: float) -> None:
         """Give parameters other values from step k on, until an event of a later step sets them again.
 
-        Fixed weights, biases, inputs and parameters of models and rules follow; plastic weights, states and signals
-        under way stay. Raises ParameterError, and then nothing has changed.
+        Fixed weights, biases, inputs, clamps and parameters of models and rules follow; plastic weights, states,
+        signals under way and ``initial`` stay. Raises ParameterError, and then nothing has changed.
         """
         checked = self._checked({**(values or {}), **parameters})
-        k, before = self._state.k, self._phase
-        # what events have set by now stays; before the first step none has, they come after what is set by hand
-        self._use(self._bound(self._chosen | (dict(before.given) if k else {}) | checked, k), k)
-        go_over(self._state, before, self._phase)
-        self._chosen |= checked
-        self._since = k
+        state = self._state
+        try:
+            with np.errstate(all="ignore"):
+                self._controls.set(state.conditions, state.weights, checked)
+        except PatchError as error:
+            raise ParameterError(str(error)) from None
+        self._reader.use(state)
 
-    def _bound(self, given: Mapping[str, float], step: int) -> Network:
-        """The network with these parameters from a step on. Raises ParameterError."""
-        if self._rebind is None:
-            raise ParameterError("this simulation was made without a way to compile the network again")
-        network = self._rebind(given, step or None)
-        if not _same_structure(self.network, network):
-            raise ParameterError("with these parameters the network has another structure")
-        return network
-
-    def _checked(self, values: Mapping[str, float]) -> dict[str, float]:
+    def _checked(self, values: Mapping[str, float]) -> dict[int, float]:
+        slots = self.network.settable.index
         for name, value in values.items():
             if name not in self.network.parameters:
                 hint = suggest(name, self.network.parameters, "the parameters are")
@@ -146,50 +143,82 @@ class Simulation:
                 )
             if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
                 raise ParameterError(f"parameter '{name}' takes a finite number, not {value!r}")
-        return {name: float(value) for name, value in values.items()}
+        return {slots[name]: float(value) for name, value in values.items()}
+
+    def clamp(self, neurons: str, value: float) -> None:
+        """Hold neurons (``K1..K3``, ``K + O``, ``left.K``) at a value from step k on, whatever their model says; its
+        states go on. Raises KeyError for a name that there is not, ValueError for a value that is not finite."""
+        if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
+            raise ValueError(f"a neuron is clamped to a finite number, not {value!r}")
+        now = self._state.conditions
+        order = max([_BY_HAND, *(order + 1 for order in now.held.active)])
+        clamp = Clamp(order, -1, self._neurons(neurons), ParameterFormula(Number(float(value)), {}))
+        now.held.begin(clamp, now.parameters)
+        self._controls.hold(now)
+
+    def release(self, neurons: str) -> None:
+        """No clamp holds these neurons any more, by hand or by an event that has begun. Raises KeyError."""
+        now = self._state.conditions
+        now.held.release(self._neurons(neurons))
+        self._controls.hold(now)
+
+    def lesion(self, *parts: str) -> None:
+        """Remove neurons (``K3``) or connections (``K -> O``) from step k on. Raises KeyError."""
+        for part in parts:
+            self._parts(part)
+        for part in parts:
+            self._controls.lesion(self._state.conditions, *self._parts(part))
+
+    def mend(self, *parts: str) -> None:
+        """Undo lesions of neurons or connections: from step k on they take part again. Raises KeyError."""
+        for part in parts:
+            self._parts(part)
+        for part in parts:
+            self._controls.mend(self._state.conditions, self._state.signals, *self._parts(part))
+
+    def learning(self, connections: str, on: bool = True) -> None:
+        """Carry out the rules of connections (``K -> O``) from step k on, or stop them: weights and states of rules
+        stay as they are then. Raises KeyError."""
+        _, members = self._parts(connections)
+        if not len(members) or not (self.network.connections.rules[members] >= 0).any():
+            raise UnknownNameError(f"there is no rule at '{connections}'")
+        self._controls.learn(self._state.conditions, members, on)
+
+    def _neurons(self, text: str) -> IntArray:
+        found = self._names.find(text)
+        if isinstance(found, str):
+            raise UnknownNameError(found)
+        return np.array(found.neurons, dtype=np.int64)
+
+    def _parts(self, text: str) -> tuple[IntArray, IntArray]:
+        """The neurons, or else the connections, that a reference names."""
+        none = np.zeros(0, dtype=np.int64)
+        if "->" not in text:
+            return self._neurons(text), none
+        index = self.network.connection_index.get(text)
+        if index is not None and text.endswith(")"):
+            return none, np.array([index], dtype=np.int64)
+        source, _, target = text.partition("->")
+        connections = self.network.connections
+        sources, targets = self._neurons(source.strip()), self._neurons(target.strip())
+        found = np.flatnonzero(np.isin(connections.sources, sources) & np.isin(connections.targets, targets))
+        if not len(found):
+            raise unknown("connection", text, self.network.connection_names)
+        return none, found
 
     def reset(self) -> None:
         """Back to the beginning, with the parameters of the beginning."""
-        self._use(self._original)
-        self._watch = Watch(self._original)
-        self._state, self._chosen, self._since = self._begin.copy(), {}, 0
+        self._watch = Watch(self.network)
+        self._state = self._begin.copy()
+        self._reader.use(self._state)
 
     def state(self) -> State:
-        """A copy of all that the run carries from step to step."""
+        """A copy of all that the run carries from step to step, what was set, clamped and lesioned included."""
         return self._state.copy()
 
     def restore(self, state: State) -> None:
-        """Go on from a state of this simulation. Parameters that were set by hand stay as they are, and so do the fixed
-        weights; what events set goes by the step."""
-        restored = state.copy()
-        k, network = restored.k, self.network
-        if k < self._since and self._original.phases:  # events between the two steps are to come again
-            stay = {name: self._phase.given.get(name, value) for name, value in self._chosen.items()}
-            network = self._bound({**(network_at(self._original, k).given if k else {}), **stay}, k)
-            self._since = k
-        self._use(network, k)
-        fixed = self.network.connections.rules < 0
-        restored.weights[fixed] = self._phase.connections.weights[fixed]
-        self._state = restored
-
-
-def _same_structure(one: Network, other: Network) -> bool:
-    """Whether states of one are states of the other."""
-    a, b = one.connections, other.connections
-    return (
-        one.neurons.names == other.neurons.names
-        and len(a) == len(b)
-        and all(
-            np.array_equal(x, y)
-            for x, y in (
-                (a.sources, b.sources),
-                (a.targets, b.targets),
-                (a.delays, b.delays),
-                (a.rules, b.rules),
-            )
-        )
-        and [len(block.members) for block in one.blocks] == [len(block.members) for block in other.blocks]
-        and [len(block.model.state) for block in one.blocks] == [len(block.model.state) for block in other.blocks]
-        and [entry.rule.name for entry in one.plasticity] == [entry.rule.name for entry in other.plasticity]
-        and [entry.name for entry in one.inputs] == [entry.name for entry in other.inputs]
-    )
+        """Go on from a state of this network, exactly as it was. Raises ValueError for one of another network."""
+        if state.network != self.network.hash or len(state.activity) != len(self.network.neurons):
+            raise ValueError("this is a state of another network")
+        self._state = state.copy()
+        self._reader.use(self._state)

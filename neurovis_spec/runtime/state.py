@@ -17,6 +17,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Plasticity, Quantity, Rule
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.tree import names
+from neurovis_spec.runtime.conditions import Conditions, first_conditions
 from neurovis_spec.runtime.signals import signal_layout
 
 
@@ -27,7 +28,8 @@ class State:
     ``k`` is the step to compute next; ``activity`` (n,) is a[k−1], ``weights`` (m,) is w[k]; ``signals`` as in
     ``SignalLayout``; row t mod (depth) of ``history`` (depth, n) is a[t], for ``pre``; ``cells[b][i]`` is state i of
     the model of block b, ``traces[p][i]`` that of the rule of plasticity p, each as long as the members.
-    ``continued`` says that a[−1] is given, so that nobody takes ``initial`` at step 0.
+    ``conditions`` are what events and callers have changed. ``continued`` says that a[−1] is given, so that nobody
+    takes ``initial`` at step 0; ``drawn`` are the steps of runs before this one, behind which random numbers go on.
     """
 
     k: int
@@ -37,7 +39,11 @@ class State:
     history: FloatArray
     cells: tuple[tuple[FloatArray, ...], ...]
     traces: tuple[tuple[FloatArray, ...], ...]
+    conditions: Conditions
     continued: bool = False
+    drawn: int = 0
+    #: the hash of the network
+    network: str = ""
 
     def copy(self) -> State:
         """A state of its own: no array is shared."""
@@ -49,6 +55,7 @@ class State:
             history=self.history.copy(),
             cells=tuple(tuple(array.copy() for array in block) for block in self.cells),
             traces=tuple(tuple(array.copy() for array in rule) for rule in self.traces),
+            conditions=self.conditions.copy(),
         )
 
 
@@ -69,6 +76,8 @@ def initial_state(network: Network) -> State:
             _initials(entry.rule.state, entry.parameters, len(entry.members), network.dt)
             for entry in network.plasticity
         ),
+        conditions=first_conditions(network),
+        network=network.hash,
     )
 
 

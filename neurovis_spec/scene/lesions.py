@@ -1,6 +1,6 @@
 """Lesions: what has been removed from a network by a step stays in its picture, faintly.
 
-In: a network, whose events are phases (§9). Out: for each connection and neuron the step of its lesion. A lesioned
+In: a network with its events (§9). Out: for each connection and neuron the step of its lesion. A lesioned
 connection keeps the width of its last weight (Eq. 4), so what says that it is gone is that all of it is faint.
 """
 
@@ -28,22 +28,16 @@ class Lesions:
 
 
 def lesions_of(network: Network) -> Lesions:
-    """A connection is lesioned when its block no longer has it, a neuron when it is held at 0 and all of its
-    connections are lesioned; one without connections is only held."""
+    """A connection is lesioned with either of its ends, too."""
     found = Lesions({}, {})
-    count = len(network.connections)
-    ends = np.concatenate([network.connections.sources, network.connections.targets])
-    degree = np.bincount(ends, minlength=len(network.neurons))
-    for step, phase in network.phases:
-        if sum(len(block.incoming) for block in phase.blocks) == count:
-            continue
-        gone = np.ones(count, bool)
-        for block in phase.blocks:
-            gone[block.incoming] = False
+    connections = network.connections
+    for change in network.changes:
+        silent = np.zeros(len(network.neurons), dtype=bool)
+        silent[change.lesioned_neurons] = True
+        gone = silent[connections.sources] | silent[connections.targets]
+        gone[change.lesioned_connections] = True
         for index in np.flatnonzero(gone).tolist():
-            found.connections.setdefault(index, step)
-        lost = np.bincount(ends[np.concatenate([gone, gone])], minlength=len(degree))
-        for neuron, value in phase.clamped:
-            if value == 0 and lost[neuron] == degree[neuron] > 0:
-                found.neurons.setdefault(neuron, step)
+            found.connections.setdefault(index, change.at)
+        for neuron in change.lesioned_neurons.tolist():
+            found.neurons.setdefault(neuron, change.at)
     return found

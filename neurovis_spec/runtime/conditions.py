@@ -1,0 +1,180 @@
+"""Conditions: what events and callers have changed in a run by a step (§9).
+
+In: a Network, Changes and what a caller sets, clamps, lesions, mends, stops. Out: Conditions, a part of the State,
+which backends read: numbers that follow parameters, what is held, what is lesioned. Setting and clamping replace
+numbers; only lesions and stopped rules give the step another ``structure``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.changes import Change, Held
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.patch import Patcher
+
+Mask = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Structure:
+    """Which connections a step leaves out: ``gone`` (m,) those that are lesioned, or one of whose ends is, and
+    ``still`` (m,) those whose rule is not carried out. A backend that has made code for one structure makes it anew
+    where that of a State is another object."""
+
+    gone: Mask
+    still: Mask
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing is left out."""
+        return not (self.gone.any() or self.still.any())
+
+
+@dataclass
+class Conditions:
+    """What holds for the step to come: ``parameters`` and ``chosen`` (one a slot: its value, and whether it was set),
+    ``variables`` as in ``Settable``, what is ``held``, ``lesioned_neurons`` (n,), ``lesioned_connections`` (m,) by
+    name, ``paused`` (m,) connections whose rules are stopped. ``holds`` says for each block which neurons are held at
+    what, None where none is; it is None as a whole where nothing is held."""
+
+    parameters: FloatArray
+    chosen: Mask
+    variables: FloatArray
+    held: Held
+    lesioned_neurons: Mask
+    lesioned_connections: Mask
+    paused: Mask
+    structure: Structure
+    holds: tuple[tuple[IntArray, FloatArray] | None, ...] | None = None
+
+    def copy(self) -> Conditions:
+        """The same, of its own; what is replaced as a whole is shared."""
+        return replace(
+            self,
+            parameters=self.parameters.copy(),
+            chosen=self.chosen.copy(),
+            variables=self.variables.copy(),
+            held=self.held.copy(),
+            lesioned_neurons=self.lesioned_neurons.copy(),
+            lesioned_connections=self.lesioned_connections.copy(),
+            paused=self.paused.copy(),
+        )
+
+    def held_at(self, neuron: int) -> float | None:
+        """What a neuron is held at, None where it is not."""
+        if self.lesioned_neurons[neuron]:
+            return 0.0
+        return float(self.held.value[neuron]) if self.held.order[neuron] >= 0 else None
+
+
+def first_conditions(network: Network) -> Conditions:
+    """Before anything has changed."""
+    n, m = len(network.neurons), len(network.connections)
+    settable = network.settable
+    nothing = np.zeros(m, dtype=np.bool_)
+    nothing.flags.writeable = False
+    return Conditions(
+        parameters=settable.parameters.copy(),
+        chosen=np.zeros(len(settable.slots), dtype=np.bool_),
+        variables=settable.initial.copy(),
+        held=Held.none(n),
+        lesioned_neurons=np.zeros(n, dtype=np.bool_),
+        lesioned_connections=np.zeros(m, dtype=np.bool_),
+        paused=np.zeros(m, dtype=np.bool_),
+        structure=Structure(nothing, nothing),
+    )
+
+
+@dataclass
+class Controls:
+    """Changes the conditions of runs of one network."""
+
+    network: Network
+
+    def __post_init__(self) -> None:
+        self._patcher = Patcher(self.network.settable)
+
+    def set(self, now: Conditions, weights: FloatArray, values: Mapping[int, float]) -> None:
+        """Set slots; all or nothing. Raises PatchError."""
+        patch = self._patcher.patch(now.parameters, now.chosen, values)
+        now.parameters = patch.parameters
+        for slot in values:
+            now.chosen[slot] = True
+        patch.write(weights, now.variables)
+        if now.held.active:
+            now.held.follow(patch.changed, now.parameters)
+            self.hold(now)
+
+    def apply(self, now: Conditions, weights: FloatArray, signals: FloatArray, change: Change) -> None:
+        """What the events of a step change."""
+        if change.parameters:
+            values = {slot: float(formula.values(now.parameters)) for slot, formula in change.parameters}
+            self.set(now, weights, values)
+        if change.released or change.clamps:
+            now.held.end(change.released, now.parameters)
+            for clamp in change.clamps:
+                now.held.begin(clamp, now.parameters)
+            self.hold(now)
+        if len(change.mended_neurons) or len(change.mended_connections):
+            self.mend(now, signals, change.mended_neurons, change.mended_connections)
+        if len(change.lesioned_neurons) or len(change.lesioned_connections):
+            self.lesion(now, change.lesioned_neurons, change.lesioned_connections)
+        for members, on in change.learning:
+            self.learn(now, members, on)
+
+    def lesion(self, now: Conditions, neurons: IntArray, connections: IntArray) -> None:
+        """Neurons and connections are silent from now on."""
+        now.lesioned_neurons[neurons] = True
+        now.lesioned_connections[connections] = True
+        self.restructure(now)
+
+    def mend(self, now: Conditions, signals: FloatArray, neurons: IntArray, connections: IntArray) -> None:
+        """The opposite of a lesion: what has been silent takes part again. It has sent nothing meanwhile: ``signals``
+        under way are 0."""
+        now.lesioned_neurons[neurons] = False
+        now.lesioned_connections[connections] = False
+        before = now.structure.gone
+        self.restructure(now)
+        self._clear(signals, np.flatnonzero(before & ~now.structure.gone))
+
+    def _clear(self, signals: FloatArray, connections: IntArray) -> None:
+        from neurovis_spec.runtime.signals import signal_layout
+
+        offsets, delays = signal_layout(self.network).offsets, self.network.connections.delays
+        for connection in connections.tolist():
+            if delays[connection]:
+                signals[offsets[connection] : offsets[connection] + delays[connection]] = 0.0
+
+    def learn(self, now: Conditions, connections: IntArray, on: bool) -> None:
+        """Switch the rules of connections on or off; weights and states of a rule that is off stay as they are."""
+        now.paused[connections] = not on
+        self.restructure(now)
+
+    def hold(self, now: Conditions) -> None:
+        """Work out what is held in each block."""
+        holding = (now.held.order >= 0) | now.lesioned_neurons
+        if not holding.any():
+            now.holds = None
+            return
+        values = np.where(now.lesioned_neurons, 0.0, now.held.value)
+        holds: list[tuple[IntArray, FloatArray] | None] = []
+        for block in self.network.blocks:
+            own = block.members[holding[block.members]]
+            holds.append((own, values[own]) if len(own) else None)
+        now.holds = tuple(holds)
+
+    def restructure(self, now: Conditions) -> None:
+        """Work out what a step leaves out."""
+        connections = self.network.connections
+        silent = now.lesioned_neurons
+        gone = silent[connections.sources] | silent[connections.targets] | now.lesioned_connections
+        still = gone | now.paused
+        if not (np.array_equal(gone, now.structure.gone) and np.array_equal(still, now.structure.still)):
+            now.structure = Structure(gone, still)
+        self.hold(now)
