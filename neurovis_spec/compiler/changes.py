@@ -15,8 +15,8 @@ import numpy as np
 from neurovis_spec.compiler.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.settable import ParameterFormula
 
-_NONE: IntArray = np.zeros(0, dtype=np.int64)
-frozen(_NONE)
+NO_INDICES: IntArray = np.zeros(0, dtype=np.int64)
+frozen(NO_INDICES)
 
 
 class Clamp(NamedTuple):
@@ -41,10 +41,10 @@ class Change(NamedTuple):
     parameters: tuple[tuple[int, ParameterFormula], ...] = ()
     clamps: tuple[Clamp, ...] = ()
     released: tuple[int, ...] = ()
-    mended_neurons: IntArray = _NONE
-    mended_connections: IntArray = _NONE
-    lesioned_neurons: IntArray = _NONE
-    lesioned_connections: IntArray = _NONE
+    mended_neurons: IntArray = NO_INDICES
+    mended_connections: IntArray = NO_INDICES
+    lesioned_neurons: IntArray = NO_INDICES
+    lesioned_connections: IntArray = NO_INDICES
     learning: tuple[tuple[IntArray, bool], ...] = ()
 
 

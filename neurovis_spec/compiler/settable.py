@@ -17,7 +17,7 @@ import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.language.expressions.arrays import Drawing, Value, evaluate_array
-from neurovis_spec.language.expressions.tree import Tree, names
+from neurovis_spec.language.expressions.tree import Number, Tree, names
 
 
 class Dependent(Protocol):
@@ -58,6 +58,8 @@ class ParameterFormula:
 
     def values(self, parameters: FloatArray) -> Value:
         """What it comes to with these parameters."""
+        if isinstance(self.tree, Number):
+            return self.tree.value
         given: dict[str, Value] = {name: float(parameters[slot]) for name, slot in self.places.items()}
         for name, value in self.known.items():
             given[name] = value if isinstance(value, float | np.ndarray) else value.values(parameters)

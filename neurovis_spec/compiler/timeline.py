@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from neurovis_spec.compiler.arrays import IntArray, frozen
-from neurovis_spec.compiler.changes import Change, Clamp, Held
+from neurovis_spec.compiler.changes import NO_INDICES, Change, Clamp, Held
 from neurovis_spec.compiler.constants import Constants, check_finite
 from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.events import Event
@@ -80,6 +80,8 @@ _MOST_CLAMPS = 1 << 32
 
 def _indices(found: Iterable[int]) -> IntArray:
     result = np.array(sorted(found), dtype=np.int64)
+    if not len(result):
+        return NO_INDICES
     frozen(result)
     return result
 
