@@ -134,5 +134,6 @@ def test_what_a_recording_holds(spec: Path) -> None:
         assert file["neurons"].tolist() == ["A", "B"]
     assert shapes == {
         "activity": (9, 2), "neurons": (2,), "weights": (9, 1), "weights_static": (0,), "plastic": (1,),
-        "sources": (1,), "targets": (1,), "delays": (1,), "dt": (), "step": (9,),
+        "sources": (1,), "targets": (1,), "delays": (1,), "dt": (), "step": (9,), "weights_after": (1,), "reached": (),
+        "lesioned_neurons": (0,), "lesioned_connections": (0,),
     }  # fmt: skip

@@ -69,5 +69,5 @@ def test_going_on_from_a_recording_keeps_what_was_learned(tmp_path: Path) -> Non
     first = network.run(6_000)
     first.save(tmp_path / "first.npz")
     second = network.run(1, start=nv.load(tmp_path / "first.npz"))
-    np.testing.assert_array_equal(second.weights[0], first.weights[-1])
+    np.testing.assert_array_equal(second.weights[0], first.weights_after)
     assert np.abs(second.weights[0]).max() > 0.3

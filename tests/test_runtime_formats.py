@@ -17,18 +17,23 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from networks_by_hand import Link, Unit, Use, build, cpg_rbf, rule
 
+from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime import files, formats
 from neurovis_spec.runtime.record import record
-from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.recording import After, Recording, RecordingError, after_rows, ended
 
-ARRAYS = ("activity", "weights", "weights_static", "plastic", "sources", "targets", "delays", "step", "ranks")
+ARRAYS = ("activity", "weights", "weights_static", "plastic", "sources", "targets", "delays", "step", "ranks",
+          "weights_after", "lesioned_neurons", "lesioned_connections")  # fmt: skip
+
+
+def learning() -> Network:
+    """Three connections share both ends; the one written last is first by delay."""
+    links = [Link(0, 1, 0.5, 3, learns=0), Link(0, 1, 0.25, 2), Link(0, 1, 0.125, 1, learns=0)]
+    return build([Unit("A", bias=0.1), Unit("B")], links, [Use(rule("weight + pre"))], dt=0.1)
 
 
 def parallel() -> Recording:
-    """Three connections share both ends; the one written last is first by delay."""
-    links = [Link(0, 1, 0.5, 3, learns=0), Link(0, 1, 0.25, 2), Link(0, 1, 0.125, 1, learns=0)]
-    network = build([Unit("A", bias=0.1), Unit("B")], links, [Use(rule("weight + pre"))], dt=0.1)
-    return record(network, 7, every=2)
+    return record(learning(), 7, every=2)
 
 
 def same(one: Recording, other: Recording) -> None:
@@ -36,6 +41,7 @@ def same(one: Recording, other: Recording) -> None:
         expected, found = getattr(one, name), getattr(other, name)
         assert found.dtype == expected.dtype
         assert np.array_equal(found, expected, equal_nan=found.dtype.kind == "f")
+    assert (one.reached, one.set_parameters) == (other.reached, other.set_parameters)
     assert (one.neurons, one.dt, one.views, one.counted, one.network, one.hash) == (
         other.neurons,
         other.dt,
@@ -54,6 +60,38 @@ def test_npz_keeps_everything(tmp_path: Path) -> None:
     loaded = formats.load(tmp_path / "0.npz")
     assert loaded["K"].shape == (50, 8)
     assert loaded["signal"].shape == (50,)
+
+
+def test_npz_keeps_what_is_true_after_the_last_step(tmp_path: Path) -> None:
+    after = After(np.array([7.5, -1.0]), 41, {"gain": 0.1}, np.array([1]), np.array([0, 2]))
+    recording = ended(parallel(), after)
+    recording.save(tmp_path / "x.npz")
+    same(recording, formats.load(tmp_path / "x.npz"))
+
+
+def test_a_recording_knows_the_weights_after_its_last_step(tmp_path: Path) -> None:
+    """Also where that step is not among those recorded; a table stands for it with its last row."""
+    whole = parallel()
+    for steps, every in ((5, 1), (5, 2), (6, 5)):
+        network = learning()
+        recording = record(network, steps, every=every)
+        longer = record(network, steps + 1)
+        assert recording.weights_after.tolist() == longer.weights[-1].tolist()
+        assert recording.reached == steps
+    assert whole.weights_after.tolist() != whole.weights[-1].tolist()
+    whole.save(tmp_path / "x.csv")
+    loaded = formats.load(tmp_path / "x.csv")
+    assert (loaded.weights_after.tolist(), loaded.reached) == (whole.weights[-1].tolist(), 7)
+
+
+def test_going_on_keeps_the_last_update_and_counts_on() -> None:
+    network = learning()
+    start = None
+    for run in range(1, 6):
+        start = record(network, 1, start=start)
+        assert start.reached == run
+    assert start is not None
+    assert start.weights[0].tolist() != [0.5, 0.125]
 
 
 def test_npz_holds_the_arrays_of_the_contract(tmp_path: Path) -> None:
@@ -92,11 +130,12 @@ def test_csv_is_a_table_that_reads_back_exactly(tmp_path: Path) -> None:
     assert loaded.dt == pytest.approx(0.1, rel=1e-15)
 
 
-def test_a_csv_is_enough_to_go_on_from(tmp_path: Path) -> None:
+def test_a_csv_is_enough_to_go_on_from_but_for_the_last_update(tmp_path: Path) -> None:
     network = cpg_rbf()
     recording = record(network, 100)
     recording.save(tmp_path / "x.csv")
-    on = [record(network, 10, start=start) for start in (recording, formats.load(tmp_path / "x.csv"))]
+    known = ended(recording, after_rows(recording.step, recording.weights))
+    on = [record(network, 10, start=start) for start in (known, formats.load(tmp_path / "x.csv"))]
     assert np.array_equal(on[0].activity, on[1].activity)
     assert on[0].weights[0].any()
 
@@ -195,6 +234,8 @@ def test_a_recording_by_another_program_is_read(tmp_path: Path) -> None:
     assert loaded.weight("A -> B (2)").tolist() == [1, 2]
     assert loaded.snapshot(4).weights.tolist() == [5, 2]
     assert (loaded.hash, loaded.network) == ("", "")
+    assert (loaded.weights_after.tolist(), loaded.reached, loaded.set_parameters) == ([2], 5, {})
+    assert len(loaded.lesioned_neurons) == len(loaded.lesioned_connections) == 0
 
 
 BAD: Mapping[str, Mapping[str, object]] = {
@@ -217,6 +258,11 @@ BAD: Mapping[str, Mapping[str, object]] = {
     "names neurons that are not there": {"about": np.array(json.dumps({"views": {"K": [[7], False]}}))},
     "counts no instances": {"about": np.array(json.dumps({"counted": {"left": -1}}))},
     "counts more instances than there is room for": {"about": np.array(json.dumps({"counted": {"left": 1 << 60}}))},
+    "'weights_after' has the shape": {"weights_after": np.zeros(2)},
+    "'reached' is -1": {"reached": np.array(-1)},
+    "'lesioned_neurons' holds a number outside": {"lesioned_neurons": np.array([2])},
+    "'lesioned_connections' does not ascend": {"lesioned_connections": np.array([1, 0])},
+    "sets no parameters": {"about": np.array(json.dumps({"set_parameters": {"gain": "1"}}))},
     "names no views": {"about": np.array(json.dumps({"views": 3}))},
     "ranks a connection": {"about": np.array(json.dumps({"parallel": [[9, 2]]}))},
 }

@@ -339,22 +339,23 @@ def test_what_was_learned_is_kept() -> None:
     network = cpg_rbf()
     before = record(network, 500)
     after = record(network, 5, start=before)
-    assert np.array_equal(after.weights[0], before.weights[-1])
+    assert np.array_equal(after.weights[0], before.weights_after)
+    assert not np.array_equal(after.weights[0], before.weights[-1])
     rhythm = before["C"][-1]
     matrix = network.connections.weights[:4].reshape(2, 2)
     np.testing.assert_allclose(after["C"][0], np.tanh(rhythm @ matrix), rtol=0, atol=1e-15)
     frozen = record(cpg_rbf(learns=False), 5, start=before)
-    assert np.array_equal(frozen.weights_static[20:], before.weights[-1])
+    assert np.array_equal(frozen.weights_static[20:], before.weights_after)
     assert len(frozen.plastic) == 0
-    assert np.array_equal(Simulation(network, start=before).weights, before.weights[-1])
+    assert np.array_equal(Simulation(network, start=before).weights, before.weights_after)
 
 
 def test_pre_goes_on_as_well() -> None:
     ramp = [Input("ramp", 0, 1, tree("k + 1"))]
     network = build([Unit("S", input=0), Unit("A")], [Link(0, 1, 0.0, 3, learns=0)], [Use(rule("pre"))], ramp)
     rest = record(network, 5, start=record(network, 10))
-    # w[9] = a[5] is the last weight recorded; then a[7], a[8], a[9] arrive, and a[0] of the new run
-    assert rest.weight("S -> A").tolist() == [6, 8, 9, 10, 1]
+    # w[10] = a[6] is the weight after the last step; then a[7], a[8], a[9] arrive, and a[0] of the new run
+    assert rest.weight("S -> A").tolist() == [7, 8, 9, 10, 1]
 
 
 def test_recordings_of_another_network_are_refused() -> None:

@@ -16,7 +16,7 @@ import neurovis_spec as nv
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.runtime.files import uninterrupted
 from neurovis_spec.runtime.memory import TooLargeError
-from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.recording import Recording, RecordingError, after_rows, ended
 from neurovis_spec.runtime.state import State
 from neurovis_spec.runtime.stream import StoppedError
 from neurovis_spec.runtime.watch import Watch
@@ -42,7 +42,9 @@ def assert_equal(one: Recording, other: Recording) -> None:
     assert one.neurons == other.neurons
     assert one.connection_names == other.connection_names
     assert one.dt == other.dt
-    for name in ("activity", "weights", "weights_static", "plastic", "sources", "targets", "delays", "step", "ranks"):
+    assert (one.reached, one.set_parameters) == (other.reached, other.set_parameters)
+    for name in ("activity", "weights", "weights_static", "plastic", "sources", "targets", "delays", "step", "ranks",
+                 "weights_after", "lesioned_neurons", "lesioned_connections"):  # fmt: skip
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name, strict=True)
 
 
@@ -126,6 +128,7 @@ def test_ctrl_c_keeps_the_steps_until_then(
     path = tmp_path / f"x.{suffix}"
     network.run_to(path, 10)
     network.run(600, every=every).save(tmp_path / f"whole.{suffix}")
+    after = network.run(601).weights_after.tolist()
     interrupt(monkeypatch, 600)
     with pytest.raises(StoppedError) as stopped:
         network.run_to(path, 2000, every=every)
@@ -134,7 +137,8 @@ def test_ctrl_c_keeps_the_steps_until_then(
     if suffix == "npz":
         with zipfile.ZipFile(path) as archive:
             assert archive.testzip() is None
-    assert_equal(kept, whole)
+        assert (kept.reached, kept.weights_after.tolist()) == (601, after)
+    assert_equal(ended(kept, after_rows(kept.step, kept.weights)), ended(whole, after_rows(whole.step, whole.weights)))
     held = {1: "steps 0 to 599", 7: "steps 0 to 595, one in 7", 1000: "step 0"}[every]
     assert str(stopped.value) == f"stopped at step 600; {path} holds {held}"
     assert sorted(entry.name for entry in tmp_path.iterdir()) == [f"whole.{suffix}", f"x.{suffix}"]

@@ -2,7 +2,8 @@
 
 In: a Recording and a path, or a path. Out: a file written row by row, or a Recording. The header is ``step``, ``t``,
 the names of the neurons, then ``K1 -> O`` for each changing connection. Numbers read back exactly. What stays in a run
-is not in the table, so a recording read from it knows the changing connections alone, with delay 1.
+is not in the table, so a recording read from it knows the changing connections alone, with delay 1; nor is what is true
+after the last step, for which the last row stands.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.runtime.files import regular_size, replacing
-from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.recording import After, Recording, RecordingError, after_rows
 from neurovis_spec.runtime.rows import RowWriter, Steps
 
 _CONNECTION = re.compile(r"(?P<source>\S+) -> (?P<target>\S+)(?: \((?P<rank>[0-9]{1,9})\))?")
@@ -50,7 +51,7 @@ class _CsvRows:
         self._rows, self._steps = rows, steps
         self._written = 0
 
-    def write(self, activity: FloatArray, weights: FloatArray) -> None:
+    def write(self, activity: FloatArray, weights: FloatArray, after: After) -> None:
         numbers = np.arange(self._written, self._written + len(activity)) * self._steps.every
         self._rows(numbers, activity, weights)
         self._written += len(activity)
@@ -117,10 +118,12 @@ def _recording(header: list[str], table: FloatArray) -> Recording:
     whole = (steps == np.floor(steps)) & (np.abs(steps) < 2.0**53)
     if not (whole.all() and (np.diff(steps, prepend=-1.0) > 0).all()):
         raise RecordingError("the steps are no ascending whole numbers")
+    weights = table[:, 2 + len(neurons) :].copy()
+    after = after_rows(steps.astype(np.int64), weights)
     return Recording(
         activity=table[:, 2 : 2 + len(neurons)].copy(),
         neurons=neurons,
-        weights=table[:, 2 + len(neurons) :].copy(),
+        weights=weights,
         weights_static=np.zeros(0),
         plastic=np.arange(len(ends)),
         sources=sources,
@@ -129,6 +132,8 @@ def _recording(header: list[str], table: FloatArray) -> Recording:
         dt=_dt(table),
         step=steps.astype(np.int64),
         ranks=ranks,
+        weights_after=after.weights,
+        reached=after.reached,
     )
 
 

@@ -3,7 +3,7 @@
 In: a Recording and a path, or a path. Out: a file, or a Recording. A file is believed in nothing: headers are read
 before memory is taken, sizes must agree with each other and with the archive, and pickles are never loaded. Beside the
 arrays of §12 ours hold ``about``, a JSON text with what arrays do not say (names of groups and outputs, the network's
-hash, ranks of parallel connections); a file without it is read as well.
+hash, ranks of parallel connections, parameters that were set); a file without it is read as well.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from neurovis_spec.language.data_files_npy import LONGEST_HEADER, read_header
 from neurovis_spec.language.data_files_table import CellError
 from neurovis_spec.runtime.files import regular_size, replacing
 from neurovis_spec.runtime.npz_member import GrowingMember, npy_header
-from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.recording import After, Recording, RecordingError, after_rows, ended
 from neurovis_spec.runtime.rows import RowWriter, Steps
 
 Array: TypeAlias = npt.NDArray[np.generic]
@@ -46,6 +46,14 @@ REQUIRED: Mapping[str, tuple[str, int]] = {
     "delays": ("iu", 1),
     "dt": ("fiu", 0),
     "step": ("iu", 1),
+}
+#: those that files of other programs and of earlier versions need not hold
+OPTIONAL: Mapping[str, tuple[str, int]] = {
+    "weights_after": ("fiu", 1),
+    "reached": ("iu", 0),
+    "lesioned_neurons": ("iu", 1),
+    "lesioned_connections": ("iu", 1),
+    "about": ("U", 0),
 }
 #: an archive may always grow to this many bytes, and beyond that to a hundred times its size
 ROOM = 256 * 2**20
@@ -79,11 +87,11 @@ def stream_npz(path: Path, frame: Recording, steps: Steps) -> Iterator[RowWriter
         zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive,
         tempfile.TemporaryFile(dir=path.resolve().parent) as spool,
     ):
-        _put(archive, _small(frame))
         growing = GrowingMember(archive, file, "activity.npy", len(steps), n)
         rows = _NpzRows(growing, spool)
         yield rows
         growing.finish(rows.count)
+        _put(archive, _small(frame if rows.after is None else ended(frame, rows.after)))
         kept = replace(steps, total=min(steps.total, rows.count * steps.every))
         with archive.open("step.npy", "w", force_zip64=True) as member:
             member.write(npy_header("<i8", (rows.count,)))
@@ -101,11 +109,13 @@ class _NpzRows:
     def __init__(self, activity: GrowingMember, weights: IO[bytes]) -> None:
         self._activity, self._weights = activity, weights
         self.count = 0
+        self.after: After | None = None
 
-    def write(self, activity: FloatArray, weights: FloatArray) -> None:
+    def write(self, activity: FloatArray, weights: FloatArray, after: After) -> None:
         self._activity.write(activity.astype("<f8").tobytes())
         self._weights.write(weights.astype("<f8").tobytes())
         self.count += len(activity)
+        self.after = after
 
 
 def _put(archive: zipfile.ZipFile, arrays: Mapping[str, Array]) -> None:
@@ -124,6 +134,7 @@ def _small(recording: Recording) -> dict[str, Array]:
         "views": {name: [list(members), single] for name, (members, single) in recording.views.items()},
         "counted": dict(recording.counted),
         "parallel": [[int(index), int(recording.ranks[index])] for index in parallel],
+        "set_parameters": dict(recording.set_parameters),
     }
     return {
         "neurons": np.array(recording.neurons, dtype=np.str_),
@@ -133,6 +144,10 @@ def _small(recording: Recording) -> dict[str, Array]:
         "targets": recording.targets,
         "delays": recording.delays,
         "dt": np.array(recording.dt, dtype=np.float64),
+        "weights_after": recording.weights_after,
+        "reached": np.array(recording.reached, dtype=np.int64),
+        "lesioned_neurons": recording.lesioned_neurons,
+        "lesioned_connections": recording.lesioned_connections,
         "about": np.array(json.dumps(about)),
     }
 
@@ -155,9 +170,9 @@ def _arrays(path: Path) -> dict[str, Array]:
     arrays: dict[str, Array] = {}
     with zipfile.ZipFile(path) as archive:
         present = set(archive.namelist())
-        for name, (kinds, dimensions) in {**REQUIRED, "about": ("U", 0)}.items():
+        for name, (kinds, dimensions) in {**REQUIRED, **OPTIONAL}.items():
             if f"{name}.npy" not in present:
-                if name == "about":
+                if name in OPTIONAL:
                     continue
                 raise RecordingError(f"not a recording: it holds no '{name}'")
             member = archive.getinfo(f"{name}.npy")
@@ -193,9 +208,10 @@ def _recording(arrays: Mapping[str, Array]) -> Recording:
         "targets": (m,),
         "delays": (m,),
         "step": (rows,),
+        "weights_after": (p,),
     }
     for name, shape in shapes.items():
-        if arrays[name].shape != shape:
+        if name in arrays and arrays[name].shape != shape:
             raise RecordingError(f"'{name}' has the shape {arrays[name].shape}, where the others ask for {shape}")
     neurons = tuple(str(name) for name in arrays["neurons"].tolist())
     dt = float(arrays["dt"].astype(np.float64))
@@ -204,22 +220,48 @@ def _recording(arrays: Mapping[str, Array]) -> Recording:
     if not (math.isfinite(dt) and dt > 0):
         raise RecordingError(f"'dt' is {dt}")
     about = _about(arrays)
+    step = _integers(arrays, "step", 0, 2**62, ascending=True)
+    weights = arrays["weights"].astype(np.float64)
+    after = _after(arrays, about, after_rows(step, weights), n, m)
     return Recording(
         activity=arrays["activity"].astype(np.float64),
         neurons=neurons,
-        weights=arrays["weights"].astype(np.float64),
+        weights=weights,
         weights_static=arrays["weights_static"].astype(np.float64),
         plastic=_integers(arrays, "plastic", 0, m, ascending=True),
         sources=_integers(arrays, "sources", 0, n),
         targets=_integers(arrays, "targets", 0, n),
         delays=_integers(arrays, "delays", 0, 2**31),
         dt=dt,
-        step=_integers(arrays, "step", 0, 2**62, ascending=True),
+        step=step,
         ranks=_ranks(about, arrays["sources"].astype(np.int64), arrays["targets"].astype(np.int64)),
+        weights_after=after.weights,
+        reached=after.reached,
+        set_parameters=after.set_parameters,
+        lesioned_neurons=after.lesioned_neurons,
+        lesioned_connections=after.lesioned_connections,
         views=_views(about, n),
         network=str(about.get("network", "")),
         hash=str(about.get("hash", "")),
         counted=_counted(about, n),
+    )
+
+
+def _after(arrays: Mapping[str, Array], about: Mapping[str, object], rows: After, n: int, m: int) -> After:
+    """What is true after the last step; where the file does not say it, what its rows say."""
+    given = about.get("set_parameters", {})
+    if not isinstance(given, dict) or not all(type(value) in (int, float) for value in given.values()):
+        raise RecordingError("'about' sets no parameters")
+    reached = int(arrays["reached"]) if "reached" in arrays else rows.reached
+    if not 0 <= reached < 2**62:
+        raise RecordingError(f"'reached' is {reached}")
+    lost = {name: _integers(arrays, name, 0, high, ascending=True) if name in arrays else np.zeros(0, dtype=np.int64)
+            for name, high in (("lesioned_neurons", n), ("lesioned_connections", m))}  # fmt: skip
+    return After(
+        weights=arrays["weights_after"].astype(np.float64) if "weights_after" in arrays else rows.weights,
+        reached=reached,
+        set_parameters={str(name): float(value) for name, value in given.items()},
+        **lost,
     )
 
 

@@ -21,7 +21,7 @@ from neurovis_spec.runtime.backend import Backend, prepare
 from neurovis_spec.runtime.conditions import Controls
 from neurovis_spec.runtime.inputs import STRETCH, InputReader
 from neurovis_spec.runtime.memory import check_room
-from neurovis_spec.runtime.recording import Recording, recording_of
+from neurovis_spec.runtime.recording import After, Recording, recording_of
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.runtime.watch import Watch
@@ -47,7 +47,12 @@ def record(
     kept = np.arange(0, steps, every, dtype=np.int64)
     rows = _InMemory(network, len(kept))
     go(network, state, Course(steps, every, inputs, backend), rows, progress)
-    return recording_of(network, kept, rows.activity, rows.weights, state.weights)
+    return recording_of(network, kept, rows.activity, rows.weights, state.weights, after(network, state, start))
+
+
+def after(network: Network, state: State, start: Recording | None = None) -> After:
+    """What is true in a state, that of a run that began anew or went on from ``start``."""
+    return After(state.weights[network.changing], state.k + (0 if start is None else start.reached))
 
 
 class Rows(Protocol):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -42,14 +42,35 @@ class Snapshot:
     previous_weights: FloatArray | None
 
 
+def _no_indices() -> IntArray:
+    return np.zeros(0, dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class After:
+    """What is true after the last step that was made, which need not be one that was recorded.
+
+    ``weights`` (p,) are those of the changing connections after that step's update; ``reached`` is how many steps were
+    made, with those of the runs that were continued; ``set_parameters`` are the parameters whose values do not come
+    from the spec, ``lesioned_neurons`` and ``lesioned_connections`` the indices of what lesions have taken out.
+    """
+
+    weights: FloatArray
+    reached: int
+    set_parameters: Mapping[str, float] = field(default_factory=dict)
+    lesioned_neurons: IntArray = field(default_factory=_no_indices)
+    lesioned_connections: IntArray = field(default_factory=_no_indices)
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """A run of a network with n neurons and m connections, p of which can change.
 
     ``step`` (rows,) are the steps recorded, ``activity`` (rows, n) is a[t], ``weights`` (rows, p) is w[t], before the
-    step's update; ``plastic`` (p,) are the indices of the changing connections, ``weights_static`` (m − p,) those of
-    the others, in their order. All arrays are read-only. ``recording["O"]`` is the activity of a neuron (rows,), of a
-    group, an output or any other reference of a spec (``K3..K5``, ``K1 + O``, ``left.K``) (rows, size).
+    step's update; ``plastic`` (p,) are the indices of the changing connections, ``weights_static`` (m − p,) the weights
+    of the others, in their order. ``weights_after`` and the four below it are what ``After`` says. All arrays are
+    read-only. ``recording["O"]`` is the activity of a neuron (rows,), of a group, an output or any other reference of a
+    spec (``K3..K5``, ``K1 + O``, ``left.K``) (rows, size).
     """
 
     activity: FloatArray
@@ -64,6 +85,11 @@ class Recording:
     step: IntArray
     #: 1, 2, … among connections that share both ends (``data-index``)
     ranks: IntArray
+    weights_after: FloatArray
+    reached: int
+    set_parameters: Mapping[str, float] = field(default_factory=dict)
+    lesioned_neurons: IntArray = field(default_factory=_no_indices)
+    lesioned_connections: IntArray = field(default_factory=_no_indices)
     #: names besides those of neurons: neuron indices, and whether a single neuron is meant
     views: Mapping[str, tuple[tuple[int, ...], bool]] = field(default_factory=dict)
     network: str = ""
@@ -73,7 +99,8 @@ class Recording:
 
     def __post_init__(self) -> None:
         for array in (self.activity, self.weights, self.weights_static, self.plastic, self.sources, self.targets,
-                      self.delays, self.step, self.ranks):  # fmt: skip
+                      self.delays, self.step, self.ranks, self.weights_after, self.lesioned_neurons,
+                      self.lesioned_connections):  # fmt: skip
             frozen(array)
 
     def __len__(self) -> int:
@@ -161,7 +188,7 @@ def unknown(what: str, name: str, known: Iterable[str]) -> UnknownNameError:
 
 
 def recording_of(
-    network: Network, step: IntArray, activity: FloatArray, weights: FloatArray, all_weights: FloatArray
+    network: Network, step: IntArray, activity: FloatArray, weights: FloatArray, all_weights: FloatArray, after: After
 ) -> Recording:
     """A recording with the structure of a network; ``all_weights`` (m,) gives those that stay."""
     connections = network.connections
@@ -179,11 +206,35 @@ def recording_of(
         dt=network.dt,
         step=step,
         ranks=_ranks(network),
+        weights_after=after.weights,
+        reached=after.reached,
+        set_parameters=after.set_parameters,
+        lesioned_neurons=after.lesioned_neurons,
+        lesioned_connections=after.lesioned_connections,
         views=names.views,
         network=network.name,
         hash=network.hash,
         counted=names.counted,
     )
+
+
+def ended(recording: Recording, after: After) -> Recording:
+    """The recording with what is true after its last step."""
+    return replace(
+        recording,
+        weights_after=after.weights,
+        reached=after.reached,
+        set_parameters=after.set_parameters,
+        lesioned_neurons=after.lesioned_neurons,
+        lesioned_connections=after.lesioned_connections,
+    )
+
+
+def after_rows(step: IntArray, weights: FloatArray) -> After:
+    """What the rows alone say of the time after them: the weights of the last one, before its update."""
+    if not len(step):
+        return After(np.full(weights.shape[1], np.nan), 0)
+    return After(weights[-1].copy(), int(step[-1]) + 1)
 
 
 def _ranks(network: Network) -> IntArray:

@@ -2,11 +2,11 @@
 
 In: a Network and a Recording of it, or of a network with the same neurons. Out: the State before step 0 of a new run.
 
-The last activities recorded become a[−1], the last weights of the connections that could change become w[0], and
-the signals under way are formed again from the last rows, as far back as the delays reach and consecutive steps
-were recorded (what lies before is 0). ``initial`` is not taken again. Steps count from 0, so inputs begin anew. States
-of models and rules are no part of a recording and begin at their initial values; weights that could not change are
-the network's own, so that a parameter given anew has its effect.
+The last activities recorded become a[−1], the weights after the last step become w[0] of the connections that could
+change, and the signals under way are formed again from the last rows, as far back as the delays reach and consecutive
+steps were recorded (what lies before is 0). ``initial`` is not taken again. Steps count from 0, so inputs begin anew.
+States of models and rules are no part of a recording and begin at their initial values; weights that could not change
+are the network's own, so that a parameter given anew has its effect.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def resumed_state(network: Network, recording: Recording) -> State:
         weights[changing] = recording.weights[row]
         _send(network, state, -ago, activity, weights)
     state.activity = recording.activity[-1][order]
-    state.weights[changing] = recording.weights[-1]
+    state.weights[changing] = recording.weights_after
     return state
 
 

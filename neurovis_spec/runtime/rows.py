@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.runtime.recording import After
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +38,7 @@ class Steps:
 class RowWriter(Protocol):
     """Takes rows in the order of their steps."""
 
-    def write(self, activity: FloatArray, weights: FloatArray) -> None:
-        """Some rows: (count, n) and (count, p), which are only lent."""
+    def write(self, activity: FloatArray, weights: FloatArray, after: After) -> None:
+        """Some rows, which are only lent: (count, n) and (count, p); and what is true after the last step made, which
+        the file holds if nothing follows. At the end there may be none (count 0)."""
         ...

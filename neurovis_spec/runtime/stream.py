@@ -7,6 +7,7 @@ streams says so by having ``stream``; of the others the whole recording is saved
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Protocol, runtime_checkable
@@ -20,8 +21,8 @@ from neurovis_spec.runtime.files import uninterrupted
 from neurovis_spec.runtime.formats import for_path
 from neurovis_spec.runtime.inputs import STRETCH
 from neurovis_spec.runtime.memory import check_disk
-from neurovis_spec.runtime.record import Course, checked_steps, go, record
-from neurovis_spec.runtime.recording import Recording, recording_of
+from neurovis_spec.runtime.record import Course, after, checked_steps, go, record
+from neurovis_spec.runtime.recording import After, Recording, recording_of
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.rows import RowWriter, Steps
 from neurovis_spec.runtime.state import initial_state
@@ -64,17 +65,18 @@ def record_to(
     steps = Steps(checked_steps(network, course.steps, course.every), course.every)
     state = initial_state(network) if start is None else resumed_state(network, start)
     none = np.zeros((0, len(network.neurons))), np.zeros((0, len(network.changing)))
-    frame = recording_of(network, np.zeros(0, dtype=np.int64), *none, state.weights)
+    frame = recording_of(network, np.zeros(0, dtype=np.int64), *none, state.weights, after(network, state, start))
     check_disk(path, steps.total, steps.every, format_.size(frame, steps))
     stopped = False
     with format_.stream(path, frame, steps) as writer:
-        rows = _Handed(network, writer)
+        rows = _Handed(network, writer, lambda: after(network, state, start))
         try:
             go(network, state, course, rows, progress)
         except KeyboardInterrupt:
             if not rows.handed:
                 raise
             stopped = True
+        rows.close()
     if stopped:
         raise StoppedError(path, state.k - 1, rows.handed, steps.every)
 
@@ -82,10 +84,10 @@ def record_to(
 class _Handed:
     """Rows that are handed on when a stretch is full; the arrays for them are used again."""
 
-    def __init__(self, network: Network, writer: RowWriter) -> None:
+    def __init__(self, network: Network, writer: RowWriter, after: Callable[[], After]) -> None:
         self._activity = np.empty((STRETCH, len(network.neurons)))
         self._weights = np.empty((STRETCH, len(network.changing)))
-        self._writer = writer
+        self._writer, self._after = writer, after
         self.handed = 0
 
     def begin(self, count: int) -> tuple[FloatArray, FloatArray]:
@@ -94,5 +96,10 @@ class _Handed:
     def end(self, count: int) -> None:
         if count:
             with uninterrupted():
-                self._writer.write(self._activity[:count], self._weights[:count])
+                self._writer.write(self._activity[:count], self._weights[:count], self._after())
                 self.handed += count
+
+    def close(self) -> None:
+        """Hand on what is true after the last step, which may lie behind the last row."""
+        with uninterrupted():
+            self._writer.write(self._activity[:0], self._weights[:0], self._after())
