@@ -106,7 +106,8 @@ class CompiledNetwork:
     ) -> None:
         """Run as ``run`` does and write the recording to a file while it is made, in memory that does not grow with the
         steps. What was there stays until the end. Raises what ``run`` and ``Recording.save`` raise, RecordingError
-        where the disk has not the room, and after Ctrl-C a KeyboardInterrupt; the file holds the steps until then."""
+        where the disk has not the room, and after Ctrl-C a KeyboardInterrupt; the file holds the steps until then.
+        After any other exception a part beside the file holds them, which is read where the file is not there."""
         course = self._course(steps, inputs, backend, every)
         pipeline.simulate_to(self.network, Path(path), course, start, progress)
 

@@ -567,9 +567,12 @@ def test_a_disk_that_becomes_full_leaves_the_recording_that_was_there(folder: Pa
     limited = ["sh", "-c", 'ulimit -f 64; exec "$@"', "sh", *command]
     done = subprocess.run(limited, capture_output=True, check=False)
     assert (done.returncode, done.stdout) == (1, b"")
-    assert done.stderr.decode() == f"error: x.{suffix} cannot be written: File too large\n"
+    kept = nv.load(f".x.{suffix}.part")
+    held = f"x.{suffix}: what was recorded, up to step {len(kept) - 1}, is in .x.{suffix}.part"
+    assert done.stderr.decode() == f"warning: {held}\nerror: x.{suffix} cannot be written: File too large\n"
+    assert len(kept) > 200
     assert Path(f"x.{suffix}").read_bytes() == before
-    assert sorted(folder.iterdir()) == [folder / "small.yaml", folder / f"x.{suffix}"]
+    assert sorted(folder.iterdir()) == [folder / f".x.{suffix}.part", folder / "small.yaml", folder / f"x.{suffix}"]
 
 
 def rest(terminal: int) -> bytes:

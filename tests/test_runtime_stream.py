@@ -14,9 +14,10 @@ from small_specs import compiled
 
 import neurovis_spec as nv
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.runtime.files import uninterrupted
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.interrupts import ENDING, deferred, end_like_ctrl_c
 from neurovis_spec.runtime.memory import TooLargeError
-from neurovis_spec.runtime.recording import Recording, RecordingError, after_rows, ended
+from neurovis_spec.runtime.recording import Recording, RecordingError
 from neurovis_spec.runtime.state import State
 from neurovis_spec.runtime.stream import StoppedError
 from neurovis_spec.runtime.watch import Watch
@@ -113,22 +114,33 @@ def test_what_fails_leaves_what_was_there(network: CompiledNetwork, tmp_path: Pa
         if done >= 512:
             raise _FailedError
 
-    with pytest.raises(_FailedError):
+    with (
+        pytest.warns(UserWarning, match=r"what was recorded, up to step 511, is in .*part$"),
+        pytest.raises(_FailedError),
+    ):
         network.run_to(path, 2000, progress=stop)
     assert path.read_bytes() == before
-    assert list(tmp_path.iterdir()) == [path]
+    part = tmp_path / f".x.{suffix}.part"
+    assert sorted(tmp_path.iterdir()) == [part, path]
+    assert_equal(nv.load(part), _as_read(network.run(512), tmp_path.parent / f"y.{suffix}"))
 
 
-@pytest.mark.parametrize(("every", "rows"), [(1, 600), (7, 86), (1000, 1)])
+def _as_read(recording: Recording, path: Path) -> Recording:
+    """What a format keeps of a recording."""
+    recording.save(path)
+    return nv.load(path)
+
+
+@pytest.mark.parametrize(("every", "rows"), [(1, 601), (7, 86), (1000, 1)])
 @pytest.mark.parametrize("suffix", ["npz", "csv"])
 def test_ctrl_c_keeps_the_steps_until_then(
     network: CompiledNetwork, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str, every: int, rows: int
 ) -> None:
-    """Also those of a stretch that is not full; an older recording gives way to what can be read."""
+    """Also those of a stretch that is not full, and the step that is made just then; an older recording gives way to
+    what can be read."""
     path = tmp_path / f"x.{suffix}"
     network.run_to(path, 10)
-    network.run(600, every=every).save(tmp_path / f"whole.{suffix}")
-    after = network.run(601).weights_after.tolist()
+    network.run(601, every=every).save(tmp_path / f"whole.{suffix}")
     interrupt(monkeypatch, 600)
     with pytest.raises(StoppedError) as stopped:
         network.run_to(path, 2000, every=every)
@@ -137,10 +149,9 @@ def test_ctrl_c_keeps_the_steps_until_then(
     if suffix == "npz":
         with zipfile.ZipFile(path) as archive:
             assert archive.testzip() is None
-        assert (kept.reached, kept.weights_after.tolist()) == (601, after)
-    assert_equal(ended(kept, after_rows(kept.step, kept.weights)), ended(whole, after_rows(whole.step, whole.weights)))
-    held = {1: "steps 0 to 599", 7: "steps 0 to 595, one in 7", 1000: "step 0"}[every]
-    assert str(stopped.value) == f"stopped at step 600; {path} holds {held}"
+    assert_equal(kept, whole)
+    held = {1: "steps 0 to 600", 7: "steps 0 to 595, one in 7", 1000: "step 0"}[every]
+    assert str(stopped.value) == f"stopped at step 601; {path} holds {held}"
     assert sorted(entry.name for entry in tmp_path.iterdir()) == [f"whole.{suffix}", f"x.{suffix}"]
 
 
@@ -160,7 +171,13 @@ def test_ctrl_c_before_the_first_step_leaves_what_was_there(
     path = tmp_path / "x.npz"
     network.run_to(path, 10)
     before = path.read_bytes()
-    interrupt(monkeypatch, 0)
+    whole = Watch.__init__
+
+    def interrupted(self: Watch, network: Network) -> None:
+        signal.raise_signal(signal.SIGINT)
+        whole(self, network)
+
+    monkeypatch.setattr(Watch, "__init__", interrupted)
     with pytest.raises(KeyboardInterrupt) as caught:
         network.run_to(path, 2000)
     assert not isinstance(caught.value, StoppedError)
@@ -168,27 +185,50 @@ def test_ctrl_c_before_the_first_step_leaves_what_was_there(
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_ctrl_c_waits_for_the_end_of_a_block() -> None:
-    done = []
+@pytest.mark.parametrize("number", ENDING)
+def test_a_signal_waits_for_the_end_of_a_block_and_a_second_one_does_not(number: signal.Signals) -> None:
+    done: list[object] = []
 
-    def work() -> None:
-        with uninterrupted():
-            signal.raise_signal(signal.SIGINT)
-            done.append("written")
+    def work(times: int) -> None:
+        with deferred() as asked:
+            for _ in range(times):
+                signal.raise_signal(number)
+                done.append(asked.number)
         done.append("never reached")
 
-    with pytest.raises(KeyboardInterrupt):
-        work()
-    assert done == ["written"]
-    with pytest.raises(KeyboardInterrupt):
-        signal.raise_signal(signal.SIGINT)
+    before = {one: signal.getsignal(one) for one in ENDING}
+    try:
+        end_like_ctrl_c()
+        during = {one: signal.getsignal(one) for one in ENDING}
+        for times in (1, 2):
+            with pytest.raises(KeyboardInterrupt):
+                work(times)
+        assert {one: signal.getsignal(one) for one in ENDING} == during
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
+    assert done == [number, number]
+
+
+def test_a_signal_that_is_ignored_stays_ignored() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        end_like_ctrl_c()
+        with deferred() as asked:
+            signal.raise_signal(signal.SIGHUP)
+        assert not asked
+        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+        for one in ENDING[1:]:
+            signal.signal(one, signal.SIG_DFL)
 
 
 def test_elsewhere_than_in_the_main_thread_nothing_waits() -> None:
     done = []
 
     def work() -> None:
-        with uninterrupted():
+        with deferred():
             done.append(signal.getsignal(signal.SIGINT))
 
     thread = threading.Thread(target=work)

@@ -16,6 +16,7 @@ from typing import IO, Final, NoReturn
 
 import click
 
+from neurovis_spec.interrupts import Ended
 from neurovis_spec.version import __version__
 
 #: Each command is ``neurovis_spec.cli.NAME:command``; the line is what ``neurovis --help`` says of it.
@@ -35,7 +36,6 @@ COMMANDS: Final[Mapping[str, str]] = {
 }
 #: What the language names and this version does not have yet.
 LATER: Final = ("live", "ros", "analyze", "import", "export")
-INTERRUPTED: Final = 130
 NO_READER: Final = 141  # as a process that SIGPIPE has ended
 
 EPILOG = """\b
@@ -122,8 +122,9 @@ class Commands(click.Group):
             status = error.exit_code
             _show(error)
         except click.Abort as error:
-            status = INTERRUPTED
-            click.echo(str(error.__cause__ or "") or "stopped", err=True)
+            cause = error.__cause__
+            status = 128 + (cause.number if isinstance(cause, Ended) else Ended().number)
+            click.echo(str(cause or "") or "stopped", err=True)
         sys.exit(_flushed(status))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 from typing import Final
@@ -110,12 +109,8 @@ def _replace(path: Path, text: str) -> None:
     """Write a file as a whole or not at all; its permissions stay."""
     from neurovis_spec.runtime.files import replacing
 
-    with writing(path):
-        mode = path.stat().st_mode
-        with replacing(path) as file:
-            if hasattr(os, "fchmod"):
-                os.fchmod(file.fileno(), mode & 0o7777)
-            file.write(text.encode())
+    with writing(path), replacing(path) as file:
+        file.write(text.encode())
 
 
 def _name(spec: str) -> str:

@@ -62,8 +62,9 @@ def command(
     """Run a network and write a recording.
 
     A recording holds the activity of every neuron and every weight that can change, at every step. Without -o
-    nothing is written, and the last step's values are printed. Ctrl-C ends a run; its recording holds the steps until
-    then, a second Ctrl-C leaves the file that was there before.
+    nothing is written, and the last step's values are printed. Ctrl-C ends a run, as do SIGTERM, SIGHUP and SIGQUIT;
+    its recording holds the steps until then. If a run is killed, a part beside the file holds them (.x.npz.part), which
+    is read where the file is not there.
     """
     if backend == "list":
         _list_backends()

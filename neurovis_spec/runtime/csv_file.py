@@ -14,7 +14,9 @@ import math
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from io import FileIO
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -22,14 +24,20 @@ from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.runtime.files import regular_size, replacing
 from neurovis_spec.runtime.recording import After, Recording, RecordingError, after_rows
 from neurovis_spec.runtime.rows import RowWriter, Steps
+from neurovis_spec.runtime.unfinished import Part, move, part_of
 
 _CONNECTION = re.compile(r"(?P<source>\S+) -> (?P<target>\S+)(?: \((?P<rank>[0-9]{1,9})\))?")
+
+#: bytes that are read together
+_BLOCK = 1 << 16
 
 
 def write_csv(recording: Recording, path: Path) -> None:
     """Write a recording; what was there stays until all is written."""
-    with _table_of(recording, path) as rows:
-        rows(recording.step, recording.activity, recording.weights)
+    with replacing(path) as file:
+        table = _Table(file, recording)
+        table.write(recording.step, recording.activity, recording.weights)
+        table.close()
 
 
 def csv_size(frame: Recording, steps: Steps) -> int:
@@ -39,50 +47,97 @@ def csv_size(frame: Recording, steps: Steps) -> int:
 
 @contextmanager
 def stream_csv(path: Path, frame: Recording, steps: Steps) -> Iterator[RowWriter]:
-    """A writer for rows as they come; what was there stays until all is written."""
-    with _table_of(frame, path) as rows:
-        yield _CsvRows(rows, steps)
+    """A writer for rows as they come; what was there stays until all is written. After an exception there is a part
+    that holds the rows until then."""
+    with part_of(path) as part:
+        rows = _CsvRows(part, frame, steps.every)
+        yield rows
+        rows.close()
+        part.take_place()
 
 
 class _CsvRows:
     """Writes rows, and knows of which steps they are."""
 
-    def __init__(self, rows: Callable[[IntArray, FloatArray, FloatArray], None], steps: Steps) -> None:
-        self._rows, self._steps = rows, steps
-        self._written = 0
+    def __init__(self, part: Part, frame: Recording, every: int) -> None:
+        self._buffered = io.BufferedRandom(part.file)
+        self._table = _Table(self._buffered, frame)
+        self._part, self._every, self._rows = part, every, 0
 
     def write(self, activity: FloatArray, weights: FloatArray, after: After) -> None:
-        numbers = np.arange(self._written, self._written + len(activity)) * self._steps.every
-        self._rows(numbers, activity, weights)
-        self._written += len(activity)
+        numbers = np.arange(self._rows, self._rows + len(activity)) * self._every
+        self._table.write(numbers, activity, weights)
+        self._rows += len(activity)
+        self._part.held = (self._rows - 1) * self._every if self._rows else None
+
+    def close(self) -> None:
+        """Leave the file to its owner."""
+        self._table.close()
+        self._buffered.detach()
 
 
-@contextmanager
-def _table_of(frame: Recording, path: Path) -> Iterator[Callable[[IntArray, FloatArray, FloatArray], None]]:
-    """A file with the header of a recording, and what writes rows into it."""
-    names = [frame.connection_names[index] for index in frame.plastic.tolist()]
-    with replacing(path) as file:
-        text = io.TextIOWrapper(file, encoding="utf-8", newline="")
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(["step", "t", *frame.neurons, *names])
+class _Table:
+    """A file with the header of a recording, into which rows are written."""
 
-        def rows(steps: IntArray, activity: FloatArray, weights: FloatArray) -> None:
-            for step, active, strong in zip(steps.tolist(), activity, weights, strict=True):
-                writer.writerow([step, step * frame.dt, *active.tolist(), *strong.tolist()])
+    def __init__(self, file: BinaryIO, frame: Recording) -> None:
+        self._text = io.TextIOWrapper(file, encoding="utf-8", newline="")
+        self._writer, self._dt = csv.writer(self._text, lineterminator="\n"), frame.dt
+        names = [frame.connection_names[index] for index in frame.plastic.tolist()]
+        self._writer.writerow(["step", "t", *frame.neurons, *names])
 
-        try:
-            yield rows
-            text.flush()
-        finally:
-            text.detach()
+    def write(self, steps: IntArray, activity: FloatArray, weights: FloatArray) -> None:
+        """Further rows, which are with the system afterwards."""
+        for step, active, strong in zip(steps.tolist(), activity, weights, strict=True):
+            self._writer.writerow([step, step * self._dt, *active.tolist(), *strong.tolist()])
+        self._text.flush()
+
+    def close(self) -> None:
+        """Leave the file to its owner, with all rows in it."""
+        self._text.detach()
+
+
+def held_csv(file: FileIO) -> int | None:
+    """The last step that a part holds, None for none. Raises OSError."""
+    end = _whole(file, file.seek(0, io.SEEK_END))
+    begin = _whole(file, end - 1)
+    file.seek(begin)
+    match = re.match(rb"([0-9]{1,16}),", file.read(20))
+    return int(match[1]) if match and begin else None
+
+
+def finish_csv(file: FileIO, part: Path, path: Path) -> None:
+    """Make of a part what its run did not come to make. Raises OSError."""
+    file.truncate(_whole(file, file.seek(0, io.SEEK_END)))
+    move(file, part, path)
+
+
+def recover_csv(part: Path) -> Recording:
+    """Read a part, up to its last whole line. Raises RecordingError."""
+    return _read(part, lambda lines: (line for line in lines if line.endswith("\n")))
+
+
+def _whole(file: FileIO, end: int) -> int:
+    """The bytes up to the end of the last whole line before a place."""
+    while end > 0:
+        begin = max(0, end - _BLOCK)
+        file.seek(begin)
+        found = file.read(end - begin).rfind(b"\n")
+        if found >= 0:
+            return begin + found + 1
+        end = begin
+    return 0
 
 
 def read_csv(path: Path) -> Recording:
     """Read a recording. Raises RecordingError, with the line at fault."""
+    return _read(path, lambda lines: lines)
+
+
+def _read(path: Path, chosen: Callable[[Iterator[str]], Iterator[str]]) -> Recording:
     try:
         regular_size(path)
         with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(file)
+            reader = csv.reader(chosen(file))
             header = next(reader, [])
             return _recording(header, _table(reader, len(header)))
     except OSError as error:

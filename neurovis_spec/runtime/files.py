@@ -7,63 +7,61 @@ to take: it gets all at the end.
 
 from __future__ import annotations
 
+import io
 import os
 import shutil
-import signal
 import stat
 import tempfile
-import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
-from uuid import uuid4
+
+from neurovis_spec.runtime.parts import clear, open_beside
 
 
 @contextmanager
 def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     """A file to write (and to read) that replaces ``path`` at the end; after an exception nothing has changed.
 
-    A link is followed. Raises OSError where the folder cannot be written or the path is neither a regular file nor a
-    character device.
+    A link is followed. Permissions stay. Raises OSError where the folder cannot be written or the path is neither a
+    regular file nor a character device.
     """
-    target = Path(os.path.realpath(path))
+    target = written_to(path)
     if target.is_char_device():
         with tempfile.TemporaryFile() as file:
             yield file
-            file.seek(0)
-            with target.open("wb") as device:
-                shutil.copyfileobj(file, device)
+            copy_to_device(file, target)
         return
-    if target.exists() and not target.is_file():
-        raise OSError(f"{path} is not a regular file")
-    beside = target.with_name(f".{target.name[:100]}.{uuid4().hex[:12]}.part")
+    clear(target, "new")
+    beside, raw = open_beside(target, "new")
     try:
-        with beside.open("x+b") as file:
-            yield file
-            file.flush()
-            os.fsync(file.fileno())
+        buffered = io.BufferedRandom(raw)
+        yield buffered
+        buffered.flush()
+        os.fsync(raw.fileno())
         beside.replace(target)
     except BaseException:
         beside.unlink(missing_ok=True)
         raise
-
-
-@contextmanager
-def uninterrupted() -> Iterator[None]:
-    """A block in which Ctrl-C waits for its end, so that nothing in it is half done."""
-    before = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(before):
-        yield  # nothing that Ctrl-C raises comes here
-        return
-    waiting: list[int] = []
-    signal.signal(signal.SIGINT, lambda number, frame: waiting.append(number))
-    try:
-        yield
     finally:
-        signal.signal(signal.SIGINT, before)
-    if waiting:
-        before(waiting[0], None)
+        with suppress(OSError):  # what could not be written by now cannot be written
+            raw.close()
+
+
+def written_to(path: str | os.PathLike[str]) -> Path:
+    """The file that a path stands for, links followed. Raises OSError for a folder, a pipe, a block device."""
+    target = Path(os.path.realpath(path))
+    if target.exists() and not target.is_file() and not target.is_char_device():
+        raise OSError(f"{path} is not a regular file")
+    return target
+
+
+def copy_to_device(file: BinaryIO, device: Path) -> None:
+    """Send a whole file to a character device."""
+    file.seek(0)
+    with device.open("wb") as opened:
+        shutil.copyfileobj(file, opened)
 
 
 def regular_size(path: str | os.PathLike[str]) -> int:

@@ -7,13 +7,25 @@ group ``neurovis.formats`` by the suffix of the path.
 from __future__ import annotations
 
 import os
+import warnings
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
+from io import FileIO
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 from neurovis_spec import plugins
-from neurovis_spec.runtime.csv_file import csv_size, read_csv, stream_csv, write_csv
-from neurovis_spec.runtime.npz_file import npz_size, read_npz, stream_npz, write_npz
+from neurovis_spec.runtime.csv_file import csv_size, finish_csv, held_csv, read_csv, recover_csv, stream_csv, write_csv
+from neurovis_spec.runtime.npz_file import (
+    finish_npz,
+    held_npz,
+    npz_size,
+    read_npz,
+    recover_npz,
+    stream_npz,
+    write_npz,
+)
+from neurovis_spec.runtime.parts import beside, is_written, rest, seize, shown, target_of
 from neurovis_spec.runtime.recording import Recording, RecordingError
 from neurovis_spec.runtime.rows import RowWriter, Steps
 
@@ -34,6 +46,34 @@ class Format(Protocol):
         ...
 
 
+@runtime_checkable
+class StreamingFormat(Format, Protocol):
+    """A format that takes rows as they come, into a part beside the file that can be read whatever becomes of a run."""
+
+    def stream(self, path: Path, frame: Recording, steps: Steps) -> AbstractContextManager[RowWriter]:
+        """A writer for the rows of these steps; ``frame`` is the recording without them. The file is there when the
+        block ends, with as many rows as came, which are fewer where a run was stopped; after an exception the part
+        stays, if it holds a step (``part_of``). What a ``write`` was given can be read when it returns. Raises
+        OSError."""
+        ...
+
+    def size(self, frame: Recording, steps: Steps) -> int:
+        """About how many bytes of the disk it takes."""
+        ...
+
+    def held(self, file: FileIO) -> int | None:
+        """The last step that a part holds, None for none. Raises OSError."""
+        ...
+
+    def recover(self, part: Path) -> Recording:
+        """Read a part as far as it is whole. Raises RecordingError."""
+        ...
+
+    def finish(self, file: FileIO, part: Path, path: Path) -> None:
+        """Make of a part the file that it was to become; ``file`` is the part, open. Raises RecordingError, OSError."""
+        ...
+
+
 class NpzFormat:
     """NumPy's archive of arrays (§12)."""
 
@@ -51,6 +91,18 @@ class NpzFormat:
     def size(self, frame: Recording, steps: Steps) -> int:
         """Bytes of the disk."""
         return npz_size(frame, steps)
+
+    def held(self, file: FileIO) -> int | None:
+        """The last step that a part holds."""
+        return held_npz(file)
+
+    def recover(self, part: Path) -> Recording:
+        """Read a part."""
+        return recover_npz(part)
+
+    def finish(self, file: FileIO, part: Path, path: Path) -> None:
+        """Make a recording of a part."""
+        finish_npz(file, part, path)
 
     def load(self, path: Path) -> Recording:
         """Read the arrays; no pickles, and no more memory than the file's size warrants."""
@@ -75,6 +127,18 @@ class CsvFormat:
         """About the bytes of the disk."""
         return csv_size(frame, steps)
 
+    def held(self, file: FileIO) -> int | None:
+        """The last step that a part holds."""
+        return held_csv(file)
+
+    def recover(self, part: Path) -> Recording:
+        """Read a part."""
+        return recover_csv(part)
+
+    def finish(self, file: FileIO, part: Path, path: Path) -> None:
+        """Make a recording of a part."""
+        finish_csv(file, part, path)
+
     def load(self, path: Path) -> Recording:
         """Read the table: what stays is not in it, so the recording knows the changing connections alone."""
         return read_csv(path)
@@ -98,5 +162,65 @@ def save(recording: Recording, path: str | os.PathLike[str]) -> None:
 
 
 def load(path: str | os.PathLike[str]) -> Recording:
-    """Read a recording in the format of the suffix. Raises RecordingError for anything that cannot be read."""
-    return for_path(path).load(Path(path))
+    """Read a recording in the format of the suffix, or a part of one, whose run has not come to its end.
+
+    Where the file is not there, but a part of it, this is read, and a warning says so. Raises RecordingError for
+    anything that cannot be read."""
+    path = Path(path)
+    target = target_of(path)
+    if target is not None:
+        format_ = for_path(target)
+        if isinstance(format_, StreamingFormat):
+            return format_.recover(path)
+    format_ = for_path(path)
+    if isinstance(format_, StreamingFormat):
+        parts = beside(Path(os.path.realpath(path)), "part")
+        if path.exists():
+            _tell(path, parts, format_)
+        elif parts:
+            return _in_place(path, parts[0], format_)
+    return format_.load(path)
+
+
+def _in_place(path: Path, part: Path, format_: StreamingFormat) -> Recording:
+    """The recording in a part, which stands in for the file itself."""
+    recording = format_.recover(part)
+    if not len(recording):
+        raise RecordingError(f"{path}: No such file or directory")
+    fate = "is still going on" if is_written(part) else "did not come to its end"
+    held = f"what was recorded, up to step {recording.step[-1]}, is read from {shown(part, path)}"
+    _warn(f"{path}: its run {fate}; {held}")
+    return recording
+
+
+def _tell(path: Path, parts: Sequence[Path], format_: StreamingFormat) -> None:
+    """Say what lies beside a file that is read: a later run of which nobody might hear otherwise."""
+    for part in parts:
+        file = seize(part)
+        if file is not None:
+            with file:
+                last = format_.held(file)
+            if last is not None:
+                held = f"what it recorded, up to step {last}, is in {shown(part, path)}"
+                _warn(f"{path} is of an earlier run: a later run did not come to its end; {held}")
+
+
+def settle(path: Path, format_: StreamingFormat) -> None:
+    """Before a run writes a recording: take over what runs that are gone have left beside it, or clear it away, and
+    say so. Where the file itself is not there a part becomes it. Raises RecordingError, OSError."""
+    target = Path(os.path.realpath(path))
+    for part, file in rest(target):
+        last = format_.held(file)
+        held = f"what an earlier run recorded before it broke off, up to step {last},"
+        if last is None:
+            part.unlink()
+        elif target.exists():
+            part.unlink()
+            _warn(f"{path}: {held} is removed ({shown(part, path)})")
+        else:
+            format_.finish(file, part, path)
+            _warn(f"{path}: {held} is in it until this run is at its end")
+
+
+def _warn(message: str) -> None:
+    warnings.warn(message, stacklevel=3)

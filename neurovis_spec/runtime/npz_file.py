@@ -3,20 +3,21 @@
 In: a Recording and a path, or a path. Out: a file, or a Recording. A file is believed in nothing: headers are read
 before memory is taken, sizes must agree with each other and with the archive, and pickles are never loaded. Beside the
 arrays of §12 ours hold ``about``, a JSON text with what arrays do not say (names of groups and outputs, the network's
-hash, ranks of parallel connections, parameters that were set); a file without it is read as well.
+hash, ranks of parallel connections, parameters that were set); a file without it is read as well. While a network runs
+its rows go into a journal beside the file, of which the archive is made at the end.
 """
 
 from __future__ import annotations
 
+import io
 import json
 import math
-import shutil
 import sys
-import tempfile
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
+from io import FileIO
 from pathlib import Path
 from typing import IO, TypeAlias
 
@@ -28,9 +29,10 @@ from neurovis_spec.compiler.limits import DEEPEST
 from neurovis_spec.language.data_files_npy import LONGEST_HEADER, read_header
 from neurovis_spec.language.data_files_table import CellError
 from neurovis_spec.runtime.files import regular_size, replacing
-from neurovis_spec.runtime.npz_member import GrowingMember, npy_header
+from neurovis_spec.runtime.journal import Journal, JournalWriter, read_journal
 from neurovis_spec.runtime.recording import After, Recording, RecordingError, after_rows, ended
 from neurovis_spec.runtime.rows import RowWriter, Steps
+from neurovis_spec.runtime.unfinished import Part, part_of
 
 Array: TypeAlias = npt.NDArray[np.generic]
 
@@ -58,8 +60,7 @@ OPTIONAL: Mapping[str, tuple[str, int]] = {
 #: an archive may always grow to this many bytes, and beyond that to a hundred times its size
 ROOM = 256 * 2**20
 RATIO = 100
-#: bytes of a number, and those that are copied together
-_NUMBER, _CHUNK = 8, 1 << 20
+_NUMBER = 8
 
 
 def write_npz(recording: Recording, path: Path) -> None:
@@ -70,52 +71,112 @@ def write_npz(recording: Recording, path: Path) -> None:
 
 
 def npz_size(frame: Recording, steps: Steps) -> int:
-    """The bytes that a streamed file takes, weights once more while it is written."""
+    """The bytes that a streamed file takes, and the journal of which it is made."""
     n, p = len(frame.neurons), len(frame.plastic)
     small = sum(array.nbytes for array in _small(frame).values())
-    return len(steps) * _NUMBER * (n + 1 + 2 * p) + small
+    return len(steps) * _NUMBER * (2 * n + 2 * p + 1) + 2 * small
 
 
 @contextmanager
 def stream_npz(path: Path, frame: Recording, steps: Steps) -> Iterator[RowWriter]:
-    """A writer for rows: activities go into the archive as they come; the weights, which must lie together, into a file
-    without a name beside it, and into the archive at the end. What was there stays until all is written. There may be
-    fewer rows in the end than steps were to be."""
-    n, p = len(frame.neurons), len(frame.plastic)
-    with (
-        replacing(path) as file,
-        zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive,
-        tempfile.TemporaryFile(dir=path.resolve().parent) as spool,
-    ):
-        growing = GrowingMember(archive, file, "activity.npy", len(steps), n)
-        rows = _NpzRows(growing, spool)
-        yield rows
-        growing.finish(rows.count)
-        _put(archive, _small(frame if rows.after is None else ended(frame, rows.after)))
-        kept = replace(steps, total=min(steps.total, rows.count * steps.every))
-        with archive.open("step.npy", "w", force_zip64=True) as member:
-            member.write(npy_header("<i8", (rows.count,)))
-            for part in kept.parts():
-                member.write(part.astype("<i8").tobytes())
-        with archive.open("weights.npy", "w", force_zip64=True) as member:
-            member.write(npy_header("<f8", (rows.count, p)))
-            spool.seek(0)
-            shutil.copyfileobj(spool, member, _CHUNK)
+    """A writer for rows, of which there may be fewer in the end than steps were to be. What was there stays until all
+    is written; after an exception there is a part that holds the rows until then."""
+    with part_of(path) as part:
+        yield _NpzRows(part, frame, steps.every)
+        _archive(part.file, path)
 
 
 class _NpzRows:
-    """Writes rows into two files, and counts them."""
+    """Writes rows into a journal, and says which steps it holds."""
 
-    def __init__(self, activity: GrowingMember, weights: IO[bytes]) -> None:
-        self._activity, self._weights = activity, weights
-        self.count = 0
-        self.after: After | None = None
+    def __init__(self, part: Part, frame: Recording, every: int) -> None:
+        self._journal = JournalWriter(part.file, _frame_bytes(frame), every)
+        self._part, self._every, self._rows = part, every, 0
 
     def write(self, activity: FloatArray, weights: FloatArray, after: After) -> None:
-        self._activity.write(activity.astype("<f8").tobytes())
-        self._weights.write(weights.astype("<f8").tobytes())
-        self.count += len(activity)
-        self.after = after
+        self._journal.write(activity, weights, after)
+        self._rows += len(activity)
+        self._part.held = (self._rows - 1) * self._every if self._rows else None
+
+
+def _archive(file: FileIO, path: Path) -> None:
+    """Make an archive of a journal, in memory that does not grow with the rows. Raises RecordingError, OSError."""
+    journal, frame = _journal(file)
+    rows, (n, p) = journal.rows, journal.columns
+    with replacing(path) as out, zipfile.ZipFile(out, "w", zipfile.ZIP_STORED) as archive:
+        _put(archive, _small(frame))
+        _put_pieces(archive, "activity", "<f8", (rows, n), journal.pieces("activity"))
+        _put_pieces(archive, "weights", "<f8", (rows, p), journal.pieces("weights"))
+        steps = Steps(rows * journal.every, journal.every)
+        _put_pieces(archive, "step", "<i8", (rows,), (part.astype("<i8").tobytes() for part in steps.parts()))
+
+
+def held_npz(file: FileIO) -> int | None:
+    """The last step that a part holds, None for none. Raises OSError."""
+    try:
+        journal, _ = _journal(file)
+    except RecordingError:
+        return None
+    return (journal.rows - 1) * journal.every if journal.rows else None
+
+
+def finish_npz(file: FileIO, part: Path, path: Path) -> None:
+    """Make of a part what its run did not come to make. Raises RecordingError, OSError."""
+    _archive(file, path)
+    part.unlink()
+
+
+def recover_npz(part: Path) -> Recording:
+    """Read a part. Raises RecordingError."""
+    with _suspicion(part), FileIO(part) as file:
+        journal, frame = _journal(file)
+        steps = np.arange(journal.rows, dtype=np.int64) * journal.every
+        activity, weights = journal.numbers("activity"), journal.numbers("weights")
+        return replace(frame, step=steps, activity=activity, weights=weights)
+
+
+def _journal(file: FileIO) -> tuple[Journal, Recording]:
+    """A journal, and the recording without its rows."""
+
+    def columns(frame: bytes) -> tuple[int, int]:
+        recording = _recording(_arrays(io.BytesIO(frame), len(frame)))
+        frames.append(recording)
+        return len(recording.neurons), len(recording.plastic)
+
+    frames: list[Recording] = []
+    try:
+        journal = read_journal(file, columns)
+        frame = frames[0]
+        if journal.chunks:
+            told = {name: np.array(journal.after[name], dtype=np.int64)
+                    for name in ("reached", "lesioned_neurons", "lesioned_connections")}  # fmt: skip
+            arrays = {**told, "weights_after": journal.weights}
+            none = after_rows(frame.step, frame.weights)
+            frame = ended(frame, _after(arrays, journal.after, none, len(frame.neurons), len(frame.sources)))
+    except (OSError, RecordingError):
+        raise
+    except Exception as error:  # as in _suspicion
+        raise RecordingError(f"not a recording in progress ({type(error).__name__}: {str(error)[:200]})") from None
+    return journal, frame
+
+
+def _frame_bytes(frame: Recording) -> bytes:
+    """All but the rows, as an archive of its own."""
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
+        none = {"activity": frame.activity[:0], "weights": frame.weights[:0], "step": frame.step[:0]}
+        _put(archive, {**none, **_small(frame)})
+    return file.getvalue()
+
+
+def _put_pieces(
+    archive: zipfile.ZipFile, name: str, descr: str, shape: tuple[int, ...], pieces: Iterable[bytes]
+) -> None:
+    """An array whose bytes come one piece after another."""
+    with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+        np.lib.format.write_array_header_1_0(member, {"descr": descr, "fortran_order": False, "shape": shape})
+        for piece in pieces:
+            member.write(piece)
 
 
 def _put(archive: zipfile.ZipFile, arrays: Mapping[str, Array]) -> None:
@@ -154,8 +215,17 @@ def _small(recording: Recording) -> dict[str, Array]:
 
 def read_npz(path: Path) -> Recording:
     """Read a recording. Raises RecordingError."""
+    with _suspicion(path):
+        size = regular_size(path)
+        with path.open("rb") as file:
+            return _recording(_arrays(file, size))
+
+
+@contextmanager
+def _suspicion(path: Path) -> Iterator[None]:
+    """A block that reads a file; whatever is wrong with it is a RecordingError."""
     try:
-        return _recording(_arrays(path))
+        yield
     except RecordingError as error:
         raise RecordingError(f"{path}: {error}") from None
     except OSError as error:
@@ -165,10 +235,10 @@ def read_npz(path: Path) -> Recording:
         raise RecordingError(f"{path}: not a recording ({type(error).__name__}: {str(error)[:200]})") from None
 
 
-def _arrays(path: Path) -> dict[str, Array]:
-    room = max(ROOM, RATIO * regular_size(path))
+def _arrays(archived: IO[bytes], size: int) -> dict[str, Array]:
+    room = max(ROOM, RATIO * size)
     arrays: dict[str, Array] = {}
-    with zipfile.ZipFile(path) as archive:
+    with zipfile.ZipFile(archived) as archive:
         present = set(archive.namelist())
         for name, (kinds, dimensions) in {**REQUIRED, **OPTIONAL}.items():
             if f"{name}.npy" not in present:

@@ -63,7 +63,15 @@ class Rows(Protocol):
         ...
 
     def end(self, count: int) -> None:
-        """So many rows of the arrays are filled: all, or fewer where the run ends here."""
+        """So many rows of the arrays are filled: all, or fewer where they are handed on early."""
+        ...
+
+    def due(self) -> bool:
+        """Whether rows are to be handed on now, asked after each step."""
+        ...
+
+    def over(self) -> bool:
+        """Whether the run is to end here."""
         ...
 
 
@@ -77,11 +85,16 @@ class _InMemory:
 
     def begin(self, count: int) -> tuple[FloatArray, FloatArray]:
         first = self._filled
-        self._filled += count
         return self.activity[first : first + count], self.weights[first : first + count]
 
     def end(self, count: int) -> None:
-        return
+        self._filled += count
+
+    def due(self) -> bool:
+        return False
+
+    def over(self) -> bool:
+        return False
 
 
 @dataclass(frozen=True)
@@ -106,7 +119,8 @@ def go(network: Network, state: State, course: Course, rows: Rows, progress: Pro
     """Run a network from a state, and hand on the rows that are kept."""
     every, steps = course.every, course.steps
     changing = _subscript(network.changing)
-    look, step, reader = Watch(network).look, prepare(network, course.backend).step, InputReader(network, course.inputs)
+    look, due, step = Watch(network).look, rows.due, prepare(network, course.backend).step
+    reader = InputReader(network, course.inputs)
     controls, changes = Controls(network), {change.at: change for change in network.changes}
     edges = [0, *(at for at in changes if 0 < at < steps), steps]
     with np.errstate(all="ignore"):
@@ -115,20 +129,28 @@ def go(network: Network, state: State, course: Course, rows: Rows, progress: Pro
                 controls.apply(state.conditions, state.weights, state.signals, changes[begin])
             reader.use(state)
             for first, stop in _stretches(begin, end):
-                activity, weights = rows.begin((stop - 1) // every - (first - 1) // every)
+                if rows.over():
+                    return
+                wanted = (stop - 1) // every - (first - 1) // every
+                activity, weights = rows.begin(wanted)
                 row = 0
-                try:
-                    for k, vector in enumerate(reader.rows(first, stop), first):
-                        keep = k % every == 0
-                        if keep and changing is not None:
-                            weights[row] = state.weights[changing]
-                        step(state, vector)
-                        look(state)
-                        if keep:
-                            activity[row] = state.activity
-                            row += 1
-                finally:  # after Ctrl-C, too
-                    rows.end(row)
+                for k, vector in enumerate(reader.rows(first, stop), first):
+                    keep = k % every == 0
+                    if keep and changing is not None:
+                        weights[row] = state.weights[changing]
+                    step(state, vector)
+                    look(state)
+                    if keep:
+                        activity[row] = state.activity
+                        row += 1
+                    if due():
+                        rows.end(row)
+                        if rows.over():
+                            return
+                        wanted -= row
+                        activity, weights = rows.begin(wanted)
+                        row = 0
+                rows.end(row)
                 if progress is not None:
                     progress(stop, steps)
 

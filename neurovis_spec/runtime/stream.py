@@ -1,24 +1,24 @@
-"""Recordings that are written while the network runs: a stretch of rows at a time, so that no run is too long.
+"""Recordings that are written while the network runs: some rows at a time, so that no run is too long and none is lost.
 
-In: a Network, a path, how to run. Out: a file, which is there when the run has come to its end, or when Ctrl-C has
-ended it, with the steps until then; after any other exception there is what was there before. A format that writes in
-streams says so by having ``stream``; of the others the whole recording is saved.
+In: a Network, a path, how to run. Out: a file, which is there when the run has come to its end, or when a signal has
+ended it (Ctrl-C, SIGTERM, SIGHUP, SIGQUIT), with the steps until then. After anything else there is what was there
+before, and a part beside it with what was recorded. A format that writes in streams says so by having ``stream``; of
+the others the whole recording is saved.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Protocol, runtime_checkable
+from time import monotonic
 
 import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.interrupts import Asked, Ended, deferred
 from neurovis_spec.progress import Progress
-from neurovis_spec.runtime.files import uninterrupted
-from neurovis_spec.runtime.formats import for_path
+from neurovis_spec.runtime.formats import StreamingFormat, for_path, settle
 from neurovis_spec.runtime.inputs import STRETCH
 from neurovis_spec.runtime.memory import check_disk
 from neurovis_spec.runtime.record import Course, after, checked_steps, go, record
@@ -27,29 +27,17 @@ from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.rows import RowWriter, Steps
 from neurovis_spec.runtime.state import initial_state
 
-
-@runtime_checkable
-class StreamingFormat(Protocol):
-    """A format that takes rows as they come."""
-
-    def stream(self, path: Path, frame: Recording, steps: Steps) -> AbstractContextManager[RowWriter]:
-        """A writer for the rows of these steps; ``frame`` is the recording without them. The file is there when the
-        block ends, with as many rows as came, which are fewer where a run was stopped; after an exception nothing has
-        changed. Raises OSError."""
-        ...
-
-    def size(self, frame: Recording, steps: Steps) -> int:
-        """About how many bytes of the disk it takes."""
-        ...
+#: seconds after which rows are handed on, so that so much of a run can be lost and a step
+OFTEN = 0.1
 
 
-class StoppedError(KeyboardInterrupt):
-    """Ctrl-C has ended a run; what was recorded by then is in the file. ``rows`` says how many steps these are."""
+class StoppedError(Ended):
+    """A signal has ended a run; what was recorded by then is in the file. ``rows`` says how many steps these are."""
 
-    def __init__(self, path: Path, step: int, rows: int, every: int) -> None:
+    def __init__(self, number: int, path: Path, step: int, rows: int, every: int) -> None:
         last = (rows - 1) * every
         held = "step 0" if rows == 1 else f"steps 0 to {last}{'' if every == 1 else f', one in {every}'}"
-        super().__init__(f"stopped at step {max(step, last + 1)}; {path} holds {held}")
+        super().__init__(number, f"stopped at step {step}; {path} holds {held}")
         self.rows = rows
 
 
@@ -57,7 +45,8 @@ def record_to(
     network: Network, path: Path, course: Course, start: Recording | None = None, progress: Progress | None = None
 ) -> None:
     """Run a network and write what ``record`` returns to a file. Raises what ``record`` and ``formats.save`` raise, and
-    StoppedError after Ctrl-C, when the steps until then are in the file; KeyboardInterrupt where there are none."""
+    StoppedError after a signal, when the steps until then are in the file; KeyboardInterrupt where there are none, and
+    after a second signal, which ends everything at once."""
     format_ = for_path(path)
     if not isinstance(format_, StreamingFormat):
         format_.save(record(network, course.steps, course.inputs, course.backend, course.every, start, progress), path)
@@ -66,28 +55,33 @@ def record_to(
     state = initial_state(network) if start is None else resumed_state(network, start)
     none = np.zeros((0, len(network.neurons))), np.zeros((0, len(network.changing)))
     frame = recording_of(network, np.zeros(0, dtype=np.int64), *none, state.weights, after(network, state, start))
+    settle(path, format_)
     check_disk(path, steps.total, steps.every, format_.size(frame, steps))
-    stopped = False
-    with format_.stream(path, frame, steps) as writer:
-        rows = _Handed(network, writer, lambda: after(network, state, start))
-        try:
-            go(network, state, course, rows, progress)
-        except KeyboardInterrupt:
-            if not rows.handed:
-                raise
-            stopped = True
-        rows.close()
-    if stopped:
-        raise StoppedError(path, state.k - 1, rows.handed, steps.every)
+    written = False
+    try:
+        with deferred() as asked:
+            with format_.stream(path, frame, steps) as writer:
+                rows = _Handed(network, writer, lambda: after(network, state, start), asked)
+                go(network, state, course, rows, progress)
+                if asked and not rows.handed:
+                    raise Ended(asked.number)
+                rows.close()
+            written = True
+    except KeyboardInterrupt:
+        if not written:
+            raise
+    if asked:
+        raise StoppedError(asked.number, path, state.k, rows.handed, steps.every)
 
 
 class _Handed:
-    """Rows that are handed on when a stretch is full; the arrays for them are used again."""
+    """Rows that are handed on when a stretch is full or some time has passed; the arrays for them are used again."""
 
-    def __init__(self, network: Network, writer: RowWriter, after: Callable[[], After]) -> None:
+    def __init__(self, network: Network, writer: RowWriter, after: Callable[[], After], asked: Asked) -> None:
         self._activity = np.empty((STRETCH, len(network.neurons)))
         self._weights = np.empty((STRETCH, len(network.changing)))
-        self._writer, self._after = writer, after
+        self._writer, self._after, self._asked = writer, after, asked
+        self._due = monotonic() + OFTEN
         self.handed = 0
 
     def begin(self, count: int) -> tuple[FloatArray, FloatArray]:
@@ -95,11 +89,16 @@ class _Handed:
 
     def end(self, count: int) -> None:
         if count:
-            with uninterrupted():
-                self._writer.write(self._activity[:count], self._weights[:count], self._after())
-                self.handed += count
+            self._writer.write(self._activity[:count], self._weights[:count], self._after())
+            self.handed += count
+        self._due = monotonic() + OFTEN
+
+    def due(self) -> bool:
+        return self.over() or monotonic() >= self._due
+
+    def over(self) -> bool:
+        return bool(self._asked)
 
     def close(self) -> None:
         """Hand on what is true after the last step, which may lie behind the last row."""
-        with uninterrupted():
-            self._writer.write(self._activity[:0], self._weights[:0], self._after())
+        self._writer.write(self._activity[:0], self._weights[:0], self._after())

@@ -1,0 +1,158 @@
+"""A run as it is recorded before it becomes a ``.npz``: chunks of rows one behind the other, each with its checksum.
+
+In: rows as they come, a file. Out: at any time a file that can be read up to its last whole chunk; its rows.
+
+The file begins with a line that says what it is, and a frame: all that does not grow with the steps. A chunk holds
+activities, changing weights, and what was true after its last step. What breaks off or does not agree ends the file.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import struct
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from io import FileIO
+from typing import Final, Literal
+from zlib import crc32
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.runtime.recording import After, RecordingError
+
+MAGIC: Final = b"neurovis run 1\n"
+#: bytes of the frame, every how many steps, checksum; of a chunk: a mark, rows, bytes of the text at its end, checksum
+_FRAME, _CHUNK = struct.Struct("<QQI"), struct.Struct("<4sQQI")
+_MARK = b"rows"
+_NUMBER, _PIECE = 8, 1 << 20
+
+
+class JournalWriter:
+    """Writes a journal. After ``write`` a whole chunk more is with the system, so that it outlives this process."""
+
+    def __init__(self, file: FileIO, frame: bytes, every: int) -> None:
+        self._file = file
+        _write(file, MAGIC + _FRAME.pack(len(frame), every, crc32(frame)), frame)
+
+    def write(self, activity: FloatArray, weights: FloatArray, after: After) -> None:
+        """A chunk of rows. Raises OSError."""
+        text = json.dumps(
+            {
+                "reached": after.reached,
+                "set_parameters": dict(after.set_parameters),
+                "lesioned_neurons": after.lesioned_neurons.tolist(),
+                "lesioned_connections": after.lesioned_connections.tolist(),
+            }
+        ).encode()
+        parts = [_bytes(activity), _bytes(weights), _bytes(after.weights), memoryview(text)]
+        total = 0
+        for part in parts:
+            total = crc32(part, total)
+        _write(self._file, _CHUNK.pack(_MARK, len(activity), len(text), total), *parts)
+
+
+def _bytes(numbers: FloatArray) -> memoryview:
+    return np.ascontiguousarray(numbers, dtype="<f8").reshape(-1).view(np.uint8).data
+
+
+def _write(file: FileIO, *parts: bytes | memoryview) -> None:
+    """Write all of it: a full disk takes some, and refuses the rest."""
+    for part in parts:
+        left = memoryview(part)
+        while left:
+            left = left[file.write(left) or 0 :]
+
+
+@dataclass(frozen=True)
+class _Chunk:
+    """Where a chunk's numbers begin, and how many rows they are."""
+
+    offset: int
+    rows: int
+
+
+@dataclass(frozen=True)
+class Journal:
+    """What can be read of a journal: the bytes of its frame, ``rows`` rows of every ``every``-th step, and what was
+    true after the last (``after``, the text of its last chunk; ``weights``, the changing ones)."""
+
+    file: FileIO
+    frame: bytes
+    every: int
+    columns: tuple[int, int]
+    chunks: tuple[_Chunk, ...]
+    after: dict[str, object]
+    weights: FloatArray
+
+    @property
+    def rows(self) -> int:
+        """How many rows it holds."""
+        return sum(chunk.rows for chunk in self.chunks)
+
+    def pieces(self, what: Literal["activity", "weights"]) -> Iterator[bytes]:
+        """The bytes of all activities or of all changing weights, in order, some at a time."""
+        n, p = self.columns
+        for chunk in self.chunks:
+            offset, width = (chunk.offset, n) if what == "activity" else (chunk.offset + chunk.rows * n * _NUMBER, p)
+            yield from _pieces(self.file, offset, chunk.rows * width * _NUMBER)
+
+    def numbers(self, what: Literal["activity", "weights"]) -> FloatArray:
+        """The same as an array (rows, columns)."""
+        width = self.columns[0 if what == "activity" else 1]
+        return np.frombuffer(b"".join(self.pieces(what)), dtype="<f8").astype(np.float64).reshape(self.rows, width)
+
+
+def read_journal(file: FileIO, columns: Callable[[bytes], tuple[int, int]]) -> Journal:
+    """Read a journal as far as it is whole. ``columns`` says from a frame how many neurons and changing connections
+    there are. Raises RecordingError, OSError."""
+    size = file.seek(0, io.SEEK_END)
+    file.seek(0)
+    head = file.read(len(MAGIC) + _FRAME.size)
+    if len(head) < len(MAGIC) + _FRAME.size or not head.startswith(MAGIC):
+        raise RecordingError("not a recording in progress")
+    length, every, checksum = _FRAME.unpack(head[len(MAGIC) :])
+    frame = b"".join(_pieces(file, len(head), length)) if length <= size else b""
+    if len(frame) != length or crc32(frame) != checksum or every < 1:
+        raise RecordingError("not a recording in progress: its beginning is damaged")
+    n, p = columns(frame)
+    chunks: list[_Chunk] = []
+    offset, text, last = len(head) + length, b"{}", b""
+    while offset + _CHUNK.size <= size:
+        file.seek(offset)
+        mark, rows, more, checksum = _CHUNK.unpack(file.read(_CHUNK.size))
+        begin = offset + _CHUNK.size
+        numbers = (rows * (n + p) + p) * _NUMBER
+        end = begin + numbers + more
+        if mark != _MARK or end > size or _sum(file, begin, end) != checksum:
+            break
+        chunks.append(_Chunk(begin, rows))
+        last = b"".join(_pieces(file, begin + numbers - p * _NUMBER, p * _NUMBER))
+        text = b"".join(_pieces(file, begin + numbers, more))
+        offset = end
+    after = json.loads(text)
+    if not isinstance(after, dict):
+        raise RecordingError("not a recording in progress")
+    weights: npt.NDArray[np.float64] = np.frombuffer(last, dtype="<f8").astype(np.float64)
+    return Journal(file, frame, every, (n, p), tuple(chunks), after, weights)
+
+
+def _sum(file: FileIO, begin: int, end: int) -> int:
+    total = 0
+    for piece in _pieces(file, begin, end - begin):
+        total = crc32(piece, total)
+    return total
+
+
+def _pieces(file: FileIO, offset: int, length: int) -> Iterator[bytes]:
+    """So many bytes from a place on, or as many as there are."""
+    while length > 0:
+        file.seek(offset)
+        piece = file.read(min(length, _PIECE))
+        if not piece:
+            return
+        yield piece
+        offset += len(piece)
+        length -= len(piece)

@@ -1,0 +1,80 @@
+"""The part of a recording that is being made: kept if its run fails, so that what was recorded is not lost.
+
+In: the path of a recording. Out: a file beside it that rows are written to as they come.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from io import FileIO
+from pathlib import Path
+
+from neurovis_spec.runtime.files import copy_to_device, written_to
+from neurovis_spec.runtime.parts import open_beside, shown
+
+
+@dataclass
+class Part:
+    """A file that is written to without a buffer. ``held`` is the last step that can be read from it, None for none."""
+
+    file: FileIO
+    #: None where the recording goes to a device
+    path: Path | None
+    target: Path
+    held: int | None = None
+
+    def take_place(self) -> None:
+        """Be the recording itself from now on, where both have the same form. Raises OSError."""
+        if self.path is None:
+            copy_to_device(self.file, self.target)
+            return
+        os.fsync(self.file.fileno())
+        self.path.replace(self.target)
+        self.path = None
+
+
+@contextmanager
+def part_of(path: Path) -> Iterator[Part]:
+    """A part for a recording. It is removed when the block ends; after an exception it stays if it holds a step, and a
+    warning says so. Raises OSError."""
+    target = written_to(path)
+    if target.is_char_device():
+        with tempfile.TemporaryFile(buffering=0) as unnamed, FileIO(os.dup(unnamed.fileno()), "r+") as file:
+            yield Part(file, None, target)
+        return
+    beside, file = open_beside(target, "part")
+    part = Part(file, beside, target)
+    try:
+        yield part
+    except BaseException:
+        if part.path is not None and part.held is None:
+            part.path.unlink(missing_ok=True)
+        elif part.path is not None:
+            words = f"{path}: what was recorded, up to step {part.held}, is in {shown(beside, path)}"
+            warnings.warn(words + ("" if target.exists() else ", and is read in its place"), stacklevel=2)
+        raise
+    else:
+        if part.path is not None:
+            part.path.unlink(missing_ok=True)
+    finally:
+        with suppress(OSError):
+            file.close()
+
+
+def move(file: FileIO, part: Path, path: Path) -> None:
+    """Let a part, of the same form as the recording, be the recording. Raises OSError."""
+    target = written_to(path)
+    if target.is_char_device():
+        with target.open("wb") as device:
+            file.seek(0)
+            shutil.copyfileobj(file, device)
+        part.unlink()
+        return
+    os.fsync(file.fileno())
+    part.replace(target)
