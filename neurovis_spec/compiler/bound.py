@@ -87,6 +87,26 @@ def make_settable(
     return Settable(slots, tuple(bindings), variables, begin)
 
 
+def own_weights(slots: tuple[Slot, ...], bundles: tuple[Bundle, ...], weights: FloatArray) -> FloatArray | None:
+    """The first weights with the parameters as the spec has them; None where none are given from outside."""
+    if not any(slot.given for slot in slots):
+        return None
+    own = np.zeros(len(slots))
+    for place, slot in enumerate(slots):
+        formula = slot.own if slot.given else slot.formula
+        own[place] = slot.value if formula is None else formula.values(own)
+    result = weights.copy()
+    start = 0
+    for bundle in bundles:
+        count = len(bundle.sources)
+        for part in bundle.parts:
+            if part.field in ("weights", "first"):
+                result[start + part.within(count)] = part.formula.values(own)
+        start += count
+    frozen(result)
+    return result
+
+
 def _of_neurons(population: Population, blocks: tuple[Block, ...]) -> Iterator[_Found]:
     n = len(population.neurons)
     home, position = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
@@ -117,6 +137,8 @@ def _of_connections(
         count = len(bundle.sources)
         for part in bundle.parts:
             members = start + part.within(count)
+            if part.field == "first":
+                continue
             if part.field == "rule":
                 yield _Found(f"rule/{int(connections.rules[start])}/{part.name}", position[members], part)
             else:

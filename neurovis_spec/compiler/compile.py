@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from neurovis_spec.compiler.arrays import IntArray
-from neurovis_spec.compiler.bound import make_settable
+from neurovis_spec.compiler.bound import make_settable, own_weights
 from neurovis_spec.compiler.connect import Connected, connect, join
 from neurovis_spec.compiler.constants import Constants, parse_formula
 from neurovis_spec.compiler.crowds import crowded
@@ -148,6 +148,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         hash=content,
         noises=noises,
         instances=_instances(units, population),
+        numbering=own_weights(slots, bundles, connections.weights),
         settable=make_settable(slots, population, bundles, connections, inputs, blocks, plasticity),
     )
     eventful = _eventful(spec, network, directory, constants, made)

@@ -167,18 +167,21 @@ class Constants:
     #: what follows parameters, of all that is evaluated while somebody asks for it
     _parts: list[Part] | None = None
 
-    def declare(self, name: str, tree: Tree | None, value: float, bounds: tuple[float | None, float | None]) -> None:
-        """Give a parameter a slot, if it can be set or follows one that can. ``tree``: what it follows."""
+    def declare(
+        self, name: str, tree: Tree | None, value: float, low: float | None, high: float | None, given: bool
+    ) -> None:
+        """Give a parameter a slot, if it can be set or follows one that can. ``tree`` is its formula, which it follows
+        unless its value is ``given`` from outside or it is given another one (``settings``)."""
+        own = None if tree is None or not given or self.path else self.bound(tree)
+        tree = None if given else tree
         followed = None if tree is None or names(tree).isdisjoint(self.settable) else self.bound(tree)
         if self.path and name not in self.settings and followed is None:
             return
         formula = self.settings.get(name, followed)
-        low, high = (
-            math.copysign(math.inf, sign) if bound is None else bound
-            for sign, bound in zip((-1, 1), bounds, strict=True)
-        )
+        least, most = -math.inf if low is None else low, math.inf if high is None else high
         self.settable[name] = len(self.slots)
-        self.slots.append(Slot(f"{self.path}.{name}" if self.path else name, value, formula, low, high))
+        called = f"{self.path}.{name}" if self.path else name
+        self.slots.append(Slot(called, value, formula, least, most, given and not self.path, own))
 
     @contextmanager
     def following(self) -> Iterator[list[Part]]:

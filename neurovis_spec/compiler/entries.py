@@ -55,7 +55,8 @@ class Bundle(NamedTuple):
     description: str | None
     #: whether no neuron is in both ends of the entry
     apart: bool
-    #: what of it follows parameters: ``weights`` of an entry without a rule, ``centres``, ``low``, ``high``, ``rule``
+    #: what of it follows parameters: ``weights``, ``first`` of an entry that learns (its first weights, which nothing
+    #: that is set in a run changes), ``centres``, ``low``, ``high``, ``rule``
     parts: tuple[Part, ...] = ()
 
 
@@ -154,7 +155,7 @@ class EntryBuilder:
             None if body.description is None else body.description.value,
             not np.isin(self.sources, self.targets).any(),
             (
-                *(part._replace(field="weights") for part in weighted if learning is None),
+                *(part._replace(field="weights" if learning is None else "first") for part in weighted),
                 *(part._replace(field="centres") for part in centred),
                 *bounding,
                 *(part._replace(field="rule") for part in ruled),

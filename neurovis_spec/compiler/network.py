@@ -199,6 +199,8 @@ class Network:
     settable: Settable = field(default_factory=Settable)
     #: what events change, a Change for each step at which something does, ascending
     changes: tuple[Change, ...] = ()
+    #: w[0] with the parameters that the spec itself has, where some are given from outside
+    numbering: FloatArray | None = None
 
     @cached_property
     def neuron_index(self) -> Mapping[str, int]:
@@ -239,7 +241,8 @@ class Network:
 
     @cached_property
     def connection_names(self) -> tuple[str, ...]:
-        """``C1 -> K1``; where several share both ends ``C1 -> K1 (2)`` …, ordered by delay, rule, weight, place."""
+        """``C1 -> K1``; where several share both ends ``C1 -> K1 (2)`` …, ordered by delay, rule, weight, place. The
+        weight is that of the spec: what is set from outside changes no name (``numbering``)."""
         connections, names = self.connections, self.neurons.names
         plain = [
             f"{names[s]} -> {names[t]}"
@@ -258,7 +261,8 @@ class Network:
         connections = self.connections
         rule = int(connections.rules[index])
         name = self.plasticity[rule].rule.name if rule >= 0 else ""
-        return (int(connections.delays[index]), name, float(connections.weights[index]), index)
+        weights = connections.weights if self.numbering is None else self.numbering
+        return (int(connections.delays[index]), name, float(weights[index]), index)
 
     @cached_property
     def connection_index(self) -> Mapping[str, int]:

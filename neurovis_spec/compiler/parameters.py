@@ -58,7 +58,7 @@ def _parameter(
         constants.broken.add(name)
         return
     constants.parameters[name] = value
-    constants.declare(name, None if name in given else tree, value, (low, high))
+    constants.declare(name, tree, value, low, high, name in given)
     if low is not None and high is not None and low > high and parameter.minimum is not None:
         message = f"the least value of '{name}', {low:g}, is above the greatest, {high:g}"
         findings.error("out-of-range", parameter.minimum.span, message, "swap min and max")

@@ -152,13 +152,16 @@ class Distance:
 @dataclass(frozen=True, slots=True, eq=False)
 class Slot:
     """A parameter: of the spec, or with a dotted name of an instance where it depends on one of the spec. ``formula``
-    is what it follows until it is set itself; ``low`` and ``high`` are its bounds."""
+    is what it follows until it is set itself; ``low`` and ``high`` are its bounds. ``given``: its value does not come
+    from the spec, which says ``own``."""
 
     name: str
     value: float
     formula: ParameterFormula | None = None
     low: float = -np.inf
     high: float = np.inf
+    given: bool = False
+    own: ParameterFormula | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

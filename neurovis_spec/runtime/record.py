@@ -47,12 +47,24 @@ def record(
     kept = np.arange(0, steps, every, dtype=np.int64)
     rows = _InMemory(network, len(kept))
     go(network, state, Course(steps, every, inputs, backend), rows, progress)
-    return recording_of(network, kept, rows.activity, rows.weights, state.weights, after(network, state, start))
+    return recording_of(network, kept, rows.activity, rows.weights, state.weights, after(network, state))
 
 
-def after(network: Network, state: State, start: Recording | None = None) -> After:
-    """What is true in a state, that of a run that began anew or went on from ``start``."""
-    return After(state.weights[network.changing], state.k + (0 if start is None else start.reached))
+def after(network: Network, state: State) -> After:
+    """What is true in a state."""
+    now, slots = state.conditions, network.settable
+    given = {
+        name: float(now.parameters[slots.index[name]])
+        for name in network.parameters
+        if now.chosen[slots.index[name]] or slots.slots[slots.index[name]].given
+    }
+    return After(
+        state.weights[network.changing],
+        state.drawn + state.k,
+        given,
+        np.flatnonzero(now.lesioned_neurons),
+        np.flatnonzero(now.lesioned_connections),
+    )
 
 
 class Rows(Protocol):

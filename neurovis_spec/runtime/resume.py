@@ -2,11 +2,14 @@
 
 In: a Network and a Recording of it, or of a network with the same neurons. Out: the State before step 0 of a new run.
 
-The last activities recorded become a[−1], the weights after the last step become w[0] of the connections that could
-change, and the signals under way are formed again from the last rows, as far back as the delays reach and consecutive
-steps were recorded (what lies before is 0). ``initial`` is not taken again. Steps count from 0, so inputs begin anew.
-States of models and rules are no part of a recording and begin at their initial values; weights that could not change
-are the network's own, so that a parameter given anew has its effect.
+What was learned and what was changed is kept, unless it is given anew. The last activities recorded become a[−1]; the
+weights after the last step become w[0] of the connections that learned. Parameters that were set (by ``--set``, an
+event or a caller) keep their values, and all that follows them with them; one that this network is given (``--set``)
+goes before that. Lesions stay. The signals under way are formed again from the last rows, as far back as the delays
+reach and consecutive steps were recorded (what lies before is 0). ``initial`` is not taken again.
+
+Steps count from 0, so inputs, events and episodes begin anew; random numbers go on behind the steps that were made.
+Clamps, stopped rules and the states of models and rules are no part of a recording.
 """
 
 from __future__ import annotations
@@ -17,7 +20,9 @@ import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.patch import PatchError
 from neurovis_spec.diagnostics import suggest
+from neurovis_spec.runtime.conditions import Controls
 from neurovis_spec.runtime.recording import Recording, RecordingError
 from neurovis_spec.runtime.signals import signal_layout
 from neurovis_spec.runtime.state import State, initial_state
@@ -28,18 +33,56 @@ def resumed_state(network: Network, recording: Recording) -> State:
     if not len(recording):
         raise RecordingError("the recording holds no step to go on from")
     order = _matching_neurons(network, recording)
-    changing = _matching_connections(network, recording)
+    learned = _learned(network, recording)
     state = initial_state(network)
-    state.continued = True
+    state.continued, state.drawn = True, recording.reached
+    controls = Controls(network)
+    _set_again(network, recording, state, controls)
+    _lesion_again(network, recording, state, controls)
     depth = int(network.connections.delays.max(initial=1))
+    columns, places = learned
     for ago, row in _last_rows(recording, depth):
         activity = recording.activity[row][order]
         weights = state.weights.copy()
-        weights[changing] = recording.weights[row]
+        weights[places] = recording.weights[row][columns]
         _send(network, state, -ago, activity, weights)
     state.activity = recording.activity[-1][order]
-    state.weights[changing] = recording.weights_after
+    state.weights[places] = recording.weights_after[columns]
     return state
+
+
+def _set_again(network: Network, recording: Recording, state: State, controls: Controls) -> None:
+    """Parameters keep the values that they had been given, unless they are given others now."""
+    slots = network.settable
+    values: dict[int, float] = {}
+    for name, value in recording.set_parameters.items():
+        slot = slots.index.get(name)
+        if slot is None or slots.slots[slot].given or name not in network.parameters:
+            continue
+        if name in network.structural:
+            if value != network.parameters[name]:
+                raise RecordingError(
+                    f"the recording was made with {name} = {value:g}, on which the structure of the network depends, "
+                    f"and this network has {network.parameters[name]:g}: set '{name}' to one of them"
+                )
+            continue
+        values[slot] = value
+    if values:
+        try:
+            with np.errstate(all="ignore"):
+                controls.set(state.conditions, state.weights, values)
+        except PatchError as error:
+            raise RecordingError(f"the parameters of the recording do not fit: {error}") from None
+
+
+def _lesion_again(network: Network, recording: Recording, state: State, controls: Controls) -> None:
+    """What was lesioned stays so."""
+    neurons = [network.neuron_index[recording.neurons[index]] for index in recording.lesioned_neurons.tolist()]
+    names = [recording.connection_names[index] for index in recording.lesioned_connections.tolist()]
+    connections = [network.connection_index[name] for name in names if name in network.connection_index]
+    if neurons or connections:
+        found = (np.array(places, dtype=np.int64) for places in (neurons, connections))
+        controls.lesion(state.conditions, *found)
 
 
 def _last_rows(recording: Recording, depth: int) -> list[tuple[int, int]]:
@@ -75,13 +118,23 @@ def _matching_neurons(network: Network, recording: Recording) -> IntArray:
     return np.array([columns[name] for name in network.neurons.names], dtype=np.int64)
 
 
-def _matching_connections(network: Network, recording: Recording) -> IntArray:
-    """For each changing connection of the recording its index in the network."""
-    names = [recording.connection_names[index] for index in recording.plastic.tolist()]
-    for name in names:
-        if name not in network.connection_index:
+def _learned(network: Network, recording: Recording) -> tuple[IntArray, IntArray]:
+    """The columns of weights that were learned, and their places in the network. Weights that follow parameters are
+    what these make of them."""
+    following = np.zeros(len(network.connections), dtype=np.bool_)
+    for binding in network.settable.bindings:
+        if binding.weights:
+            following[binding.indices] = True
+    columns, places = [], []
+    for column, index in enumerate(recording.plastic.tolist()):
+        name = recording.connection_names[index]
+        place = network.connection_index.get(name)
+        if place is None:
             raise RecordingError(_without("connection", name, f"'{network.name}'", network.connection_index))
-    return np.array([network.connection_index[name] for name in names], dtype=np.int64)
+        if not following[place]:
+            columns.append(column)
+            places.append(place)
+    return np.array(columns, dtype=np.int64), np.array(places, dtype=np.int64)
 
 
 def _without(what: str, name: str, place: str, known: Mapping[str, int]) -> str:

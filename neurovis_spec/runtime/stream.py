@@ -54,14 +54,14 @@ def record_to(
     steps = Steps(checked_steps(network, course.steps, course.every), course.every)
     state = initial_state(network) if start is None else resumed_state(network, start)
     none = np.zeros((0, len(network.neurons))), np.zeros((0, len(network.changing)))
-    frame = recording_of(network, np.zeros(0, dtype=np.int64), *none, state.weights, after(network, state, start))
+    frame = recording_of(network, np.zeros(0, dtype=np.int64), *none, state.weights, after(network, state))
     settle(path, format_)
     check_disk(path, steps.total, steps.every, format_.size(frame, steps))
     written = False
     try:
         with deferred() as asked:
             with format_.stream(path, frame, steps) as writer:
-                rows = _Handed(network, writer, lambda: after(network, state, start), asked)
+                rows = _Handed(network, writer, lambda: after(network, state), asked)
                 go(network, state, course, rows, progress)
                 if asked and not rows.handed:
                     raise Ended(asked.number)
