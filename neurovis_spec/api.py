@@ -146,4 +146,6 @@ def _finish(document: SourceDocument | None, request: Request, findings: Finding
     if spec is None or network is None:
         span = Span(file, 1, 1, 1, 2)
         raise SpecError((Diagnostic("internal", "no network came out, and no finding says why", span),))
-    return CompiledNetwork(network, spec, request, findings.sorted(), dict(findings.sources), memory)
+    return CompiledNetwork(
+        network, spec, request, findings.sorted(), dict(findings.sources), memory, frozenset(findings.files)
+    )

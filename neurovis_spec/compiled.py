@@ -47,6 +47,14 @@ class CompiledNetwork:
     sources: Mapping[str, str]
     #: the earlier layout that the spec names (``layout.file``)
     memory: Layout | None = None
+    #: the files that the spec names, of data, included, and of the layout
+    files: frozenset[Path] = frozenset()
+
+    @property
+    def layout_file(self) -> Path | None:
+        """The file of the earlier layout that the spec names, which need not be there."""
+        layout = self.spec.layout
+        return None if layout is None or layout.file is None else self.request.base / layout.file.value
 
     @property
     def name(self) -> str:

@@ -13,6 +13,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import islice
+from pathlib import Path
 from typing import Literal, NamedTuple
 
 Severity = Literal["error", "warning"]
@@ -59,6 +60,8 @@ class Findings:
     """Collects findings while the stages go on; ``sources`` maps each file read to its text."""
 
     sources: dict[str, str] = field(default_factory=dict)
+    #: the files that an author names, as far as they were looked for
+    files: set[Path] = field(default_factory=set)
     _items: list[Diagnostic] = field(default_factory=list)
     _errors: int = 0
     _faults: set[Span] = field(default_factory=set)
@@ -86,6 +89,7 @@ class Findings:
 
     def take(self, others: Findings) -> None:
         """Note what others have noted."""
+        self.files |= others.files
         for item in others._items:
             self._items.append(item)
             if item.severity == "error":

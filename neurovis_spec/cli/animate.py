@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from neurovis_spec.cli.files import check_target, network_of, recording_of, show_warnings, writing
+from neurovis_spec.cli.files import network_of, recording_of, show_warnings, writing
 from neurovis_spec.cli.options import (
     examples,
     output_option,
@@ -17,6 +17,7 @@ from neurovis_spec.cli.options import (
     theme_option,
 )
 from neurovis_spec.cli.progress import progress
+from neurovis_spec.cli.targets import check_files, check_target
 
 
 def _finite(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
@@ -60,8 +61,9 @@ def command(
     settings: dict[str, float],
 ) -> None:
     """Draw a run as a moving picture, one frame a step."""
-    check_target(output)
+    check_target(output, [("the spec itself", spec), ("the recording that is drawn", recording)])
     network = network_of(spec, settings)
+    check_files(output, network)
     record = recording_of(recording)
     with progress("drawing") as bar, writing(output):
         network.animate(output, steps=steps, start=start, fps=fps, recording=record, theme=theme, progress=bar)

@@ -136,16 +136,6 @@ def tables(named: Mapping[str, str], network: Network) -> dict[str, FloatArray]:
     return arrays
 
 
-def check_target(path: Path | None) -> None:
-    """Refuse a path that cannot be written before any work is done for it."""
-    if path is None:
-        return
-    if path.is_dir():
-        raise fault(f"{path} is a folder, not a file")
-    if not path.parent.is_dir():
-        raise fault(f"{path}: there is no folder '{path.parent}'", f"make it: mkdir -p {path.parent}")
-
-
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
     """A block that writes a file; what the system refuses is said of this path."""

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from neurovis_spec.cli.files import check_target, count, earlier_layout, network_of, show_warnings, writing
+from neurovis_spec.cli.files import count, earlier_layout, network_of, show_warnings, writing
 from neurovis_spec.cli.options import engine_option, examples, output_option, set_option, spec_argument
 from neurovis_spec.cli.progress import progress
+from neurovis_spec.cli.targets import check_files, check_target
 
 if TYPE_CHECKING:
     from neurovis_spec.compiled import NetworkLayout
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     )
 )
 @spec_argument
-@output_option("Write the layout file here; without it, to standard output.")
+@output_option("Write the layout file here; without it, or for -, to standard output.")
 @engine_option
 @click.option(
     "--update",
@@ -50,9 +51,13 @@ def command(
     """
     if update is not None and output is not None:
         raise click.UsageError("--update writes FILE itself: leave out -o, or --update")
-    check_target(output)
-    check_target(update)
+    if output == Path("-"):
+        output = None
+    check_target(output, [("the spec itself", spec)])
+    check_target(update, [("the spec itself", spec)], "--update")
     network = network_of(spec, settings)
+    check_files(output, network, layout=True)
+    check_files(update, network, "--update", layout=True)
     earlier = None if update is None else earlier_layout(update)
     begun = perf_counter()
     with progress("laying out") as bar:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from neurovis_spec.cli.files import check_target, network_of, recording_of, show_warnings, writing
+from neurovis_spec.cli.files import network_of, recording_of, show_warnings, writing
 from neurovis_spec.cli.options import (
     engine_option,
     examples,
@@ -17,6 +17,7 @@ from neurovis_spec.cli.options import (
     theme_option,
 )
 from neurovis_spec.cli.progress import progress
+from neurovis_spec.cli.targets import check_files, check_target
 
 
 @click.command(
@@ -47,8 +48,9 @@ def command(
     Colours show activities and signals, thickness shows weights, glow shows how weights change (the legend gives the
     scales).
     """
-    check_target(output)
+    check_target(output, [("the spec itself", spec), ("the recording that is drawn", recording)])
     network = network_of(spec, settings)
+    check_files(output, network)
     record = recording_of(recording)
     with progress("drawing") as bar, writing(output):
         network.render(output, step=step, recording=record, theme=theme, engine=engine, progress=bar)

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import click
 
 from neurovis_spec.cli.completion import paths
-from neurovis_spec.cli.files import check_target, count, network_of, recording_of, tables, writing
+from neurovis_spec.cli.files import count, network_of, recording_of, tables, writing
 from neurovis_spec.cli.options import backend_option, compile_options, examples, input_option, output_option, set_option
 from neurovis_spec.cli.progress import progress
+from neurovis_spec.cli.targets import check_files, check_target
 
 if TYPE_CHECKING:
     from neurovis_spec.compiled import CompiledNetwork
@@ -71,9 +72,11 @@ def command(
         return
     if spec is None:
         raise click.UsageError("Missing argument 'SPEC'.")
-    check_target(output)
+    read = [(f"the file of the input '{name}'", path) for name, path in inputs.items()]
+    check_target(output, [("the spec itself", spec), ("the recording that the run goes on from", start), *read])
     _check_format(output)
     network = network_of(spec, settings)
+    check_files(output, network)
     arrays, before = tables(inputs, network.network), recording_of(start)
     made = network.network.steps if steps is None else steps
     begun = perf_counter()

@@ -55,6 +55,7 @@ def locate(path_text: str, root: Path, base: Path, span: Span, findings: Finding
         hint = "data lies in the folder of the main spec or below it (--root names another folder)"
         findings.error("path-outside", span, f"the path '{shown}' leaves the folder of the spec", hint)
         return None
+    findings.files.add(path)
     return path
 
 

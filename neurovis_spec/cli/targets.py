@@ -1,0 +1,76 @@
+"""What a command may write to: a path that can be written, and none of those that it reads.
+
+In: the path of an output, those of the inputs, a compiled network. Out: nothing, or an error before any work is done.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from neurovis_spec.cli.failure import fault
+
+if TYPE_CHECKING:
+    from neurovis_spec.compiled import CompiledNetwork
+
+
+def check_target(path: Path | None, inputs: Iterable[tuple[str, str | None]] = (), option: str = "-o") -> None:
+    """Refuse a path that cannot be written, or is one of the ``inputs``: what each is, in words, and its path."""
+    if path is None:
+        return
+    if str(path) == "-":
+        raise click.UsageError(f"{option} takes a file: what is written does not go to standard output ('-')")
+    for what, read in inputs:
+        if read is not None and read != "-" and (_same(path, Path(read)) or _is_part_of(Path(read), path)):
+            raise _refused(path, what, option)
+    if path.is_dir():
+        raise fault(f"{path} is a folder, not a file")
+    if not path.parent.is_dir():
+        raise fault(f"{path}: there is no folder '{path.parent}'", f"make it: mkdir -p {path.parent}")
+
+
+def check_files(path: Path | None, network: CompiledNetwork, option: str = "-o", *, layout: bool = False) -> None:
+    """Refuse a path that is a file of the spec: one that it includes, or reads data from. ``layout``: what is written
+    is a layout file, so it may be the one that the spec names."""
+    if path is None:
+        return
+    memory = network.layout_file
+    for file in sorted(network.files):
+        is_memory = memory is not None and _same(file, memory)
+        if _same(path, file) and not (layout and is_memory):
+            what = "the layout file of the spec" if is_memory else f"a file that the spec reads ('{_near(file)}')"
+            raise _refused(path, what, option)
+
+
+def _refused(path: Path, what: str, option: str) -> click.UsageError:
+    return click.UsageError(f"{option} {path} is {what}, which would be lost: name another file")
+
+
+def _same(one: Path, other: Path) -> bool:
+    """Whether two paths lead to the same file, through whatever links."""
+    if os.path.realpath(one) == os.path.realpath(other):
+        return True
+    try:
+        return one.samefile(other)
+    except OSError:
+        return False
+
+
+def _is_part_of(part: Path, path: Path) -> bool:
+    """Whether one is the part of a recording, and the other what it was to become: writing that clears the part."""
+    from neurovis_spec.runtime.parts import target_of
+
+    target = target_of(part)
+    return target is not None and _same(target, path)
+
+
+def _near(path: Path) -> str:
+    """A path as one names it from here."""
+    try:
+        return str(path.relative_to(Path.cwd()))
+    except ValueError:
+        return str(path)
