@@ -245,7 +245,7 @@ def test_a_disk_that_is_too_small_is_said_beforehand(
 
     monkeypatch.setattr("neurovis_spec.runtime.memory.shutil.disk_usage", usage)
     for suffix in ("npz", "csv"):
-        with pytest.raises(TooLargeError, match=r"of the disk, and 976\.6 KiB are free") as refused:
+        with pytest.raises(TooLargeError, match=r"of the disk while it is written, and 976\.6 KiB are free") as refused:
             network.run_to(tmp_path / f"x.{suffix}", 10**12)
         assert "--every" in refused.value.hint
         network.run_to(tmp_path / f"y.{suffix}", 100)

@@ -12,8 +12,9 @@ from pathlib import Path
 
 from neurovis_spec.runtime.recording import RecordingError
 
-_MEMORY = Path("/proc/meminfo")
-_LIMIT, _TAKEN = Path("/sys/fs/cgroup/memory.max"), Path("/sys/fs/cgroup/memory.current")
+_MEMORY, _GROUPS, _MOUNT = Path("/proc/meminfo"), Path("/proc/self/cgroup"), Path("/sys/fs/cgroup")
+#: a recording of so many bytes is never refused: what is free is an estimate
+SMALL = 64 << 20
 _UNITS = ("bytes", "KiB", "MiB", "GiB", "TiB", "PiB", "EiB")
 _NUMBER = 8
 
@@ -28,10 +29,10 @@ class TooLargeError(RecordingError):
 
 def check_room(steps: int, every: int, columns: int) -> None:
     """Refuse a recording of ``steps`` steps, every ``every``-th kept, with ``columns`` numbers a step, if it takes more
-    memory than is free. Raises TooLargeError."""
+    memory than is free and is not small. Raises TooLargeError."""
     rows, row = -(-steps // every), (columns + 1) * _NUMBER
     room = available()
-    if room is not None and rows * row > room:
+    if room is not None and rows * row > max(room, SMALL):
         raise _too_large(steps, every, rows * row, room, "memory")
 
 
@@ -42,7 +43,7 @@ def check_disk(path: Path, steps: int, every: int, size: int) -> None:
     except OSError:  # what is wrong with the folder is said when the file is opened
         return
     if size > room:
-        raise _too_large(steps, every, size, room, "the disk")
+        raise _too_large(steps, every, size, room, "the disk while it is written")
 
 
 def _too_large(steps: int, every: int, size: int, room: int, where: str) -> TooLargeError:
@@ -69,11 +70,37 @@ def _free() -> int | None:
 
 
 def _allowed() -> int | None:
-    """What a container's limit leaves."""
+    """What the limits of this process's control groups leave (a container's, a service's), None without any. The page
+    cache counts as free: the system gives it up before it refuses memory."""
     try:
-        return max(0, int(_LIMIT.read_text(encoding="ascii")) - int(_TAKEN.read_text(encoding="ascii")))
-    except (OSError, ValueError):  # no container, or "max"
+        lines = _GROUPS.read_text(encoding="utf-8").splitlines()
+    except (OSError, ValueError):  # another operating system
         return None
+    found: list[int] = []
+    for line in lines:
+        _, _, rest = line.partition(":")
+        controllers, _, path = rest.partition(":")
+        if not controllers:
+            found += _left(_MOUNT, path, "memory.max", "memory.current", "")
+        elif "memory" in controllers.split(","):
+            found += _left(_MOUNT / "memory", path, "memory.limit_in_bytes", "memory.usage_in_bytes", "total_")
+    return min(found, default=None)
+
+
+def _left(mount: Path, path: str, limit: str, taken: str, prefix: str) -> list[int]:
+    """What the group at a path and all around it leave; a container sees its own at the mount."""
+    own = mount / path.strip("/")
+    left = []
+    for group in (own, *own.parents):
+        if group.is_relative_to(mount):
+            try:
+                room = int((group / limit).read_text("ascii")) - int((group / taken).read_text("ascii"))
+                counts = dict(line.split() for line in (group / "memory.stat").read_text("ascii").splitlines())
+                cache = sum(int(counts[f"{prefix}{kind}_file"]) for kind in ("active", "inactive"))
+            except (OSError, ValueError, KeyError):  # no such group, or the limit "max"
+                continue
+            left.append(max(0, room + cache))
+    return left
 
 
 def _round_up(number: int) -> int:
