@@ -7,7 +7,7 @@ of one kind, and so are two that are mirror images of each other.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TypeAlias
 
@@ -194,7 +194,7 @@ def restricted(problem: LayoutProblem, members: Sequence[int], within: int = -1)
     groups = tuple(LayoutGroup(g.name, found) for g in problem.groups if (found := inside(g.members)))
     arrange = tuple((found, how) for of, how in problem.arrange if len(found := inside(of)) == len(of))
     boxes = tuple((name, found) for name, of in problem.boxes if len(found := inside(of)) == len(of) < whole)
-    kept = [i for i, m in enumerate(problem.modules) if i != within and all(n in place for n in m.members)]
+    kept = _within(problem, within) if within >= 0 else _whole(problem, place)
     number = {old: new for new, old in enumerate(kept)}
     modules = tuple(
         LayoutModule(
@@ -220,6 +220,20 @@ def restricted(problem: LayoutProblem, members: Sequence[int], within: int = -1)
         rank_spacing=problem.rank_spacing,
         modules=modules,
     )
+
+
+def _within(problem: LayoutProblem, instance: int) -> list[int]:
+    """The instances within an instance, which may hold as many neurons as what is around them."""
+    inside = {instance}
+    for number, module in enumerate(problem.modules):  # an instance stands before those within it
+        if module.parent in inside:
+            inside.add(number)
+    return sorted(inside - {instance})
+
+
+def _whole(problem: LayoutProblem, neurons: Container[int]) -> list[int]:
+    """The instances that have no other neurons than these."""
+    return [i for i, module in enumerate(problem.modules) if all(n in neurons for n in module.members)]
 
 
 def _at(pins: Mapping[int, tuple[float, float]], place: Mapping[int, int]) -> dict[int, tuple[float, float]]:
