@@ -7,12 +7,13 @@ of those loops: around them, or to another side.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles, points_on
-from neurovis_layouts.routing.walls import FloatArray
+from neurovis_layouts.routing.walls import FloatArray, Walls
 from neurovis_spec.layout.geometry import cubics, distance
 from neurovis_spec.layout.model import Point, Route
 
@@ -59,30 +60,87 @@ def loop(centre: Point, way: Point, handle: float, wide: float = 0.59) -> Route:
     return centre, (x + ax - bx, y + ay - by), (x + ax + bx, y + ay + by), centre
 
 
-def best_loop(
-    centre: Point,
-    index: int,
-    before: Sequence[Route],
-    near: Sequence[Point],
-    tangents: Sequence[Point],
-    obstacles: Obstacles,
-    enters: Callable[[Sequence[Route]], Sequence[bool]] | None = None,
-) -> Route:
-    """The loop with most room. ``near`` are neighbours' centres, ``tangents`` unit vectors in which other edges leave
-    or arrive; ``before`` are the loops that this neuron has already, which it keeps off. ``enters`` says which loops
-    enter a foreign frame, if there are such."""
-    shapes = _FURTHER if before else _SHAPES
-    routes = [loop(centre, way, *shape) for way, _ in _WAYS for shape in shapes]
-    clear = obstacles.clearances(routes, [(index, index)] * len(routes))
-    entering = enters(routes) if enters is not None else [False] * len(routes)
-    others = [_seen(route) for route in before]
-    costs: list[float] = []
-    for number, route in enumerate(routes):
-        way, cost = _WAYS[number // len(shapes)]
-        crowd = _crowd(centre, way, near) + _traffic(way, tangents) + cost + 0.12 * (number % len(shapes))
-        crowd += 8 * max(0.0, REACH - clear[number]) + _ENTERING * entering[number] + _OVER * (clear[number] <= TOUCH)
-        costs.append(crowd + _TOGETHER * max((_APART - _between(_seen(route), other) for other in others), default=0.0))
-    return routes[min(range(len(routes)), key=lambda number: (costs[number], number // len(shapes)))]
+class Loops:
+    """The loops of one neuron: each is chosen where there is most room, off those that are there already."""
+
+    def __init__(
+        self,
+        centre: Point,
+        index: int,
+        near: Sequence[Point],
+        tangents: Sequence[Point],
+        obstacles: Obstacles,
+        walls: Walls | None = None,
+    ) -> None:
+        """``near`` are neighbours' centres, ``tangents`` unit vectors in which other edges leave or arrive."""
+        self._centre, self._own, self._obstacles, self._walls = centre, (index, index), obstacles, walls
+        self._crowds = [_crowd(centre, way, near) + _traffic(way, tangents) + cost for way, cost in _WAYS]
+        self._there: set[Route] = set()
+        #: those that came since the last choice
+        self._new: list[Route] = []
+        #: the loops to choose from, their points that are seen, and how much too close each is to one that is there
+        self._choice = self._tried(_SHAPES)
+        self._lines: list[FloatArray] = []
+        self._close: list[float] = [0.0] * len(self._choice)
+
+    def add(self, route: Route) -> None:
+        """Note a loop that is there."""
+        if route not in self._there:
+            self._there.add(route)
+            self._new.append(route)
+
+    def best(self) -> Route:
+        """The loop with most room; one that enters no foreign frame, unless there is no room for such a one."""
+        self._look()
+        found = self._least([False] * len(self._choice))
+        if self._walls is not None and self._walls.entered([found], [self._own])[0]:
+            routes = [tried.route for tried in self._choice]
+            found = self._least(self._walls.entered(routes, [self._own] * len(routes)))
+        return found
+
+    def _look(self) -> None:
+        """Compare what there is to choose from with the loops that are there since the last time."""
+        if self._new and not self._lines:
+            self._choice = self._tried(_FURTHER)
+            self._lines = [_seen(tried.route) for tried in self._choice]
+            self._close = [0.0] * len(self._choice)
+        for other in map(_seen, self._new):
+            self._close = [
+                max(close, _APART - _between(line, other)) for line, close in zip(self._lines, self._close, strict=True)
+            ]
+        self._new.clear()
+
+    def _least(self, entering: Sequence[bool]) -> Route:
+        """The cheapest loop; of equals the first way, and of its shapes the first."""
+        costs = [
+            tried.crowd + (tried.nearing + _ENTERING * enters + tried.over) + _TOGETHER * close
+            for tried, enters, close in zip(self._choice, entering, self._close, strict=True)
+        ]
+        return self._choice[min(range(len(costs)), key=lambda number: (costs[number], number))].route
+
+    def _tried(self, shapes: Sequence[tuple[float, float]]) -> list[_Tried]:
+        """The loops of these shapes, way by way."""
+        routes = [loop(self._centre, way, *shape) for way, _ in _WAYS for shape in shapes]
+        clear = self._obstacles.clearances(routes, [self._own] * len(routes))
+        return [
+            _Tried(
+                route,
+                self._crowds[number // len(shapes)] + 0.12 * (number % len(shapes)),
+                8 * max(0.0, REACH - clear[number]),
+                _OVER * (clear[number] <= TOUCH),
+            )
+            for number, route in enumerate(routes)
+        ]
+
+
+@dataclass(frozen=True, slots=True)
+class _Tried:
+    """A loop, what it costs for what it stands among, for being close to a disc and for running over one."""
+
+    route: Route
+    crowd: float
+    nearing: float
+    over: float
 
 
 def _seen(route: Route) -> FloatArray:

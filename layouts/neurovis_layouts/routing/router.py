@@ -16,7 +16,7 @@ from neurovis_layouts.routing.curves import Waypoint, curve
 from neurovis_layouts.routing.easing import MOST_EASED, eased
 from neurovis_layouts.routing.ends import shared_ends
 from neurovis_layouts.routing.judge import OFF, Judge
-from neurovis_layouts.routing.loops import best_loop
+from neurovis_layouts.routing.loops import Loops
 from neurovis_layouts.routing.nests import nested
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
 from neurovis_layouts.routing.ports import Port, leanings
@@ -266,26 +266,13 @@ def _loops(
         if edges[i].target in tangents:
             tangents[edges[i].target].append(_unit(route[-1], route[-2]))
     near = _neighbours(centres, tangents)
-
-    def best(i: int, before: Sequence[Route], walls: Walls | None) -> Route:
-        own = edges[i].source
-
-        def enters(tried: Sequence[Route]) -> list[bool]:
-            return walls.entered(tried, [(own, own)] * len(tried)) if walls is not None else [False] * len(tried)
-
-        return best_loop(centres[own], own, before, near[own], tangents[own], obstacles, enters)
-
+    loops = {own: Loops(centres[own], own, near[own], tangents[own], obstacles, walls) for own in tangents}
     result = {i: there[i] for i in looping if i in there}
-    drawn: dict[int, list[Route]] = {}
-    for i in result:
-        drawn.setdefault(edges[i].source, []).append(result[i])
+    for i, route in result.items():
+        loops[edges[i].source].add(route)
     for i in (i for i in looping if i not in result):
-        own = edges[i].source
-        before = drawn.setdefault(own, [])
-        result[i] = best(i, before, None)
-        if walls is not None and walls.entered([result[i]], [(own, own)])[0]:
-            result[i] = best(i, before, walls)
-        before.append(result[i])
+        result[i] = loops[edges[i].source].best()
+        loops[edges[i].source].add(result[i])
     return result
 
 

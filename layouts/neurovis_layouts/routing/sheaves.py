@@ -7,14 +7,15 @@ shifted to a side, where it is clear of the other, of discs and frames, and on n
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
+from functools import partial
 
 import numpy as np
 
 from neurovis_layouts.routing.ends import by_ends
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
-from neurovis_layouts.routing.strokes import line_of, together, tolerable
+from neurovis_layouts.routing.strokes import Sheaf, line_of, lines_of, tolerable
 from neurovis_layouts.routing.walls import FloatArray, IntArray, Walls
 from neurovis_spec.layout.model import LayoutEdge, Route
 
@@ -49,53 +50,57 @@ def spread_out(
     if not groups:
         return {}
     drawn = dict(routes)
-    lines = {i: line_of(route) for i, route in routes.items()}
+    lines = dict(zip(routes, lines_of(list(routes.values())), strict=True))
     moved: set[int] = set()
     for _ in range(_ROUNDS):
         drawing = np.sort(np.concatenate([_cells(line) for line in lines.values()]))
         for group in groups:
-            for i in group[::-1]:
-                if i not in free:
+            sheaf, own = Sheaf([lines[k] for k in group]), None
+            for number, i in reversed(list(enumerate(group))):
+                if i not in free or sheaf.together([lines[i]], number)[0] <= tolerable(lines[i], _SHARE):
                     continue
-                mates = [lines[k] for k in group if k != i]
-                if together(lines[i], mates) <= tolerable(lines[i], _SHARE):
-                    continue
-                own = np.sort(np.concatenate([_cells(lines[k]) for k in group]))
-                best = _shifted(drawn[i], edges[i], mates, (drawing, own), obstacles, walls)
+                if own is None:
+                    own = np.sort(np.concatenate([_cells(lines[k]) for k in group]))
+                best = _shifted(
+                    drawn[i], edges[i], partial(sheaf.together, but=number), (drawing, own), obstacles, walls
+                )
                 if best != drawn[i]:
                     drawn[i], lines[i] = best, line_of(best)
                     moved.add(i)
+                    sheaf, own = Sheaf([lines[k] for k in group]), None
     return {i: drawn[i] for i in sorted(moved)}
 
 
-def _shared(line: FloatArray, mates: Sequence[FloatArray]) -> float:
-    """What it costs that a line runs on one of its mates; less than to enter a frame or to run over a disc."""
+def _shared(line: FloatArray, share: float) -> float:
+    """What it costs that so much of a line runs on one of its mates; less than to enter a frame or to run over a
+    disc."""
     most = tolerable(line, _SHARE)
-    return min(_ENTERING / 2, _SAME * _SHARE / most * max(0.0, together(line, mates) - most / 2))
+    return min(_ENTERING / 2, _SAME * _SHARE / most * max(0.0, share - most / 2))
 
 
 def _shifted(
     route: Route,
     edge: LayoutEdge,
-    mates: Sequence[FloatArray],
+    together: Callable[[Sequence[FloatArray]], Sequence[float]],
     drawn: tuple[IntArray, IntArray],
     obstacles: Obstacles,
     walls: Walls | None,
 ) -> Route:
-    """The route, or what is best of it shifted to either side; ``drawn`` are the cells of all lines, and of those
-    between the same ends."""
+    """The route, or what is best of it shifted to either side; ``together`` says how much of lines runs on one between
+    the same ends, ``drawn`` are the cells of all lines, and of those between the same ends."""
     own = edge.source, edge.target
     shifts = [0.0, *(side * shift for shift in _SHIFTS for side in (1.0, -1.0))]
     tried = [_beside(route, shift) for shift in shifts]
     clear = obstacles.clearances(tried, [own] * len(tried))
     enters = walls.entered(tried, [own] * len(tried)) if walls is not None else [False] * len(tried)
+    lines = lines_of(tried)
     costs = [
         _FAR * abs(shift)
         + _ENTERING * (entering + (clearance < TOUCH + _SLACK))
         + _NEARING * (REACH - clearance)
-        + _shared(line, mates)
+        + _shared(line, share)
         + _OTHER * _crowded(line, drawn)
-        for shift, line, clearance, entering in zip(shifts, map(line_of, tried), clear, enters, strict=True)
+        for shift, line, clearance, entering, share in zip(shifts, lines, clear, enters, together(lines), strict=True)
     ]
     return tried[min(range(len(tried)), key=lambda k: (costs[k], k))]
 

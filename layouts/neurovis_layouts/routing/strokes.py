@@ -23,16 +23,20 @@ _END = 0.4
 _STEP = 0.1
 #: How far lines may run on each other, about.
 _RUN = 0.4
+#: Cells of this width have what is close to a point beside the point's own; numbers of cells in a column.
+_WITHIN, _COLUMN = 0.15, 1 << 31
+#: So many lines are compared one by one.
+_FEW = 4
 #: How far from a place crossings are counted.
 _NEAR = 2.5
 
 
 def line_of(route: Route) -> FloatArray:
     """(n, 2) points on a route, between what discs and arrowheads hide."""
-    return _lines([route])[0]
+    return lines_of([route])[0]
 
 
-def _lines(routes: Sequence[Route]) -> list[FloatArray]:
+def lines_of(routes: Sequence[Route]) -> list[FloatArray]:
     """The line of each route."""
     if not routes:
         return []
@@ -72,13 +76,59 @@ def _near(line: FloatArray, points: FloatArray) -> float:
     points = points[((points >= low) & (points <= high)).all(axis=1)]
     if not len(points):
         return 0.0
-    # points stand a step apart: half of it may be missing to the nearest
-    dx, dy = line[:, None, 0] - points[None, :, 0], line[:, None, 1] - points[None, :, 1]
+    close = _beside(line[:, None, 0] - points[None, :, 0], line[:, None, 1] - points[None, :, 1])
+    return float(close.any(axis=1).sum()) / len(line)
+
+
+def _beside(dx: FloatArray, dy: FloatArray) -> BoolArray:
+    """Whether what is so far off is one to the eye."""
     dx *= dx
     dy *= dy
     dx += dy
-    near = dx.min(axis=1) < _CLOSE * _CLOSE + _STEP * _STEP / 4
-    return float(near.sum()) / len(line)
+    # points stand a step apart: half of it may be missing to the nearest
+    near: BoolArray = dx < _CLOSE * _CLOSE + _STEP * _STEP / 4
+    return near
+
+
+class Sheaf:
+    """Lines between the same ends, which are asked about over and over."""
+
+    def __init__(self, lines: Sequence[FloatArray]) -> None:
+        self._lines = list(lines)
+        points = np.concatenate([np.zeros((0, 2)), *lines])
+        owner = np.repeat(np.arange(len(lines), dtype=np.int64), [len(line) for line in lines])
+        keys = _keys(points)
+        order = np.argsort(keys, kind="stable")
+        self._keys, self._points, self._owner = keys[order], points[order], owner[order]
+
+    def together(self, tried: Sequence[FloatArray], but: int) -> list[float]:
+        """For each of these lines the largest share of it that runs on one of the sheaf ``but`` for one."""
+        mates = [line for number, line in enumerate(self._lines) if number != but]
+        if len(mates) <= _FEW:
+            return [together(line, mates) for line in tried]
+        points = np.concatenate([np.zeros((0, 2)), *tried])
+        near = np.zeros((len(points), len(self._lines)), dtype=np.bool_)
+        keys = _keys(points)
+        for column in (-1, 0, 1):  # what is near lies in this cell or in one beside it
+            first = np.searchsorted(self._keys, keys + column * _COLUMN - 1)
+            count = np.searchsorted(self._keys, keys + column * _COLUMN + 1, "right") - first
+            at = np.repeat(np.arange(len(points), dtype=np.int64), count)
+            entry = np.arange(len(at), dtype=np.int64) - np.repeat(np.cumsum(count) - count - first, count)
+            close = _beside(points[at, 0] - self._points[entry, 0], points[at, 1] - self._points[entry, 1])
+            near[at[close], self._owner[entry[close]]] = True
+        near[:, but] = False
+        cuts = np.cumsum([len(line) for line in tried])[:-1]
+        return [
+            float(part.sum(axis=0).max()) / len(line) if len(line) else 0.0
+            for line, part in zip(tried, np.split(near, cuts), strict=True)
+        ]
+
+
+def _keys(points: FloatArray) -> IntArray:
+    """(n,) the cells that points (n, 2) are in, as numbers: those of a column follow each other."""
+    cells = np.floor(points / _WITHIN).astype(np.int64)
+    keys: IntArray = cells[:, 0] * _COLUMN + cells[:, 1]
+    return keys
 
 
 class Strokes:
@@ -86,8 +136,8 @@ class Strokes:
 
     def __init__(self, routes: Mapping[int, Route], others: Sequence[Route]) -> None:
         chosen = sorted(routes)
-        self.lines = dict(zip(chosen, _lines([routes[i] for i in chosen]), strict=True))
-        first = _segments([*self.lines.items(), *((-1, line) for line in _lines(others))])
+        self.lines = dict(zip(chosen, lines_of([routes[i] for i in chosen]), strict=True))
+        first = _segments([*self.lines.items(), *((-1, line) for line in lines_of(others))])
         # from left to right, so that what is near a place is found soon
         order = np.argsort(first[0][:, 0], kind="stable")
         self._from, self._to, self._owner = (figures[order] for figures in first)
@@ -100,7 +150,7 @@ class Strokes:
 
     def crossed(self, edges: Sequence[int], routes: Sequence[Route], place: Point) -> list[int]:
         """How often each of these routes, of these edges, crosses lines of other edges near a place."""
-        a, b, number = _segments(list(enumerate(line[_close(line, place)] for line in _lines(routes))))
+        a, b, number = _segments(list(enumerate(line[_close(line, place)] for line in lines_of(routes))))
         if not len(a):
             return [0] * len(edges)
         low, high = np.minimum(a, b).min(axis=0) - 2 * _STEP, np.maximum(a, b).max(axis=0) + 2 * _STEP
