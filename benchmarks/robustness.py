@@ -108,6 +108,13 @@ def _unknown(section: str, line: str, before: str = "") -> str:
     return HEAD + before + section + "".join(line.replace("#", str(number)) for number in range(20_000))
 
 
+def _misspelt(section: str, value: str, key: str, wrong: str, count: int = 8000) -> str:
+    """So many names, each used by a neuron that misspells it."""
+    names = "".join(f"  gain{number}_: {value}\n" for number in range(count))
+    used = "".join(f"  A{number}_: {{{key}: {wrong}{number}_}}\n" for number in range(count))
+    return HEAD + f"{section}:\n{names}neurons:\n{used}"
+
+
 #: Small texts that would become something huge.
 BOMBS: dict[str, Case] = {
     "aliases of aliases": Case(_bomb()),
@@ -165,6 +172,8 @@ LARGE: dict[str, Case] = {
     "20,000 unknown ends": Case(
         _unknown("connections:\n", "  B#_ -> A#_: 1\n", "neurons: {A: {}}\n"), seconds=4, mib=150
     ),
+    "8,000 misspelt parameters": Case(_misspelt("parameters", "1", "bias", "gian"), seconds=3, mib=60),
+    "2,000 misspelt inputs": Case(_misspelt("inputs", "{}", "input", "gian", 2000), seconds=3, mib=60),
     "50,000 keys of one name": Case(HEAD + "neurons:\n" + "  A: {}\n" * 50_000, seconds=1, mib=60),
     "50,000 anchors": Case(HEAD + "authors:\n" + "  - &a x\n" * 50_000, seconds=0.5),
     "50,000 tags": Case(HEAD + "authors:\n" + "  - !!str x\n" * 50_000, seconds=0.5),

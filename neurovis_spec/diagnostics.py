@@ -11,7 +11,6 @@ import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
 from itertools import islice
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -169,45 +168,14 @@ def listed(names: Collection[str]) -> str:
 
 
 def nearest(name: str, known: Iterable[str], most: int = 3) -> tuple[str, ...]:
-    """The known names that are most like ``name``, best first; none that is too far off.
+    """The known names that are most like ``name``, best first, up to six; none that is too far off.
 
     >>> nearest("kerel", ["kernel", "sigmoid", "keel"]), nearest("tahn", ["tanh", "sigmoid", "atan"])
     (('kernel', 'keel'), ('tanh',))
     """
-    return _alike(name, tuple(dict.fromkeys(known)))[:most]
+    from neurovis_spec.likeness import alike  # only here: most specs have no mistake
 
-
-@lru_cache(maxsize=16)
-def _alike(name: str, known: tuple[str, ...]) -> tuple[str, ...]:
-    """All known names that are much like another, best first; kept, as who is answered with these may also be
-    understood by them."""
-    from difflib import SequenceMatcher
-
-    folded = name.casefold()
-    letters = Counter(folded)
-    scored: list[tuple[float, str]] = []
-    for candidate in known:
-        other = candidate.casefold()
-        # a name of one letter begins too many others
-        begins = bool(folded and other) and (other.startswith(folded) or (other[1:] != "" and folded.startswith(other)))
-        alike = _stem(folded) == _stem(other) != ""
-        # No ratio is above that of the letters they share: most candidates are done with here.
-        shared = sum(min(count, other.count(letter)) for letter, count in letters.items())
-        if not begins and not alike and 2 * shared < 0.55 * (len(folded) + len(other)):
-            continue
-        score = SequenceMatcher(None, folded, other, autojunk=False).ratio()
-        if folded[:1] == other[:1]:
-            score += 0.05  # a first letter is seldom mistyped
-        if letters == Counter(other):
-            score = max(score, 0.97)  # letters changed over, the commonest slip
-        if begins:
-            score = max(score, 0.75)
-        if alike:
-            score = max(score, 0.7)
-        if score >= 0.6:
-            scored.append((-score, candidate))
-    best = min(scored, default=(0.0, ""))[0]
-    return tuple(candidate for score, candidate in sorted(scored) if score <= best + 0.12)
+    return alike(name, tuple(dict.fromkeys(known)))[:most]
 
 
 def meant(name: str, known: Iterable[str]) -> str | None:
@@ -249,11 +217,6 @@ def slips(one: str, other: str) -> int:
             row.append(cost)
         before, last = last, row
     return last[-1]
-
-
-def _stem(name: str) -> str:
-    """A name without the number at its end: K3 and K12 are alike."""
-    return name.rstrip("0123456789")
 
 
 def suggest(name: str, known: Iterable[str], what: str = "known") -> str | None:
