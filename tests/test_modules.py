@@ -192,10 +192,28 @@ instances: {left: {module: leg, count: 2}}
         assert network.neurons.bias[mine].tolist() == bias.tolist()
         assert network.neurons.initial[mine].tolist() == initial.tolist()
         begin = 8 * (number - 1)
-        first = Stream(5, "weight", f"left{number}.S -> K").drawn("normal", 1.0, 2.0, i, 0, 0, 0)
-        second = Stream(5, "weight", f"left{number}.S -> K (2)").drawn("uniform", 0.0, 1.0, i, 0, 0, 0)
+        first = Stream(5, "weight", f"left{number}/S -> K").drawn("normal", 1.0, 2.0, i, 0, 0, 0)
+        second = Stream(5, "weight", f"left{number}/S -> K (2)").drawn("uniform", 0.0, 1.0, i, 0, 0, 0)
         assert network.connections.weights[begin : begin + 8].tolist() == [*first.tolist(), *second.tolist()]
     assert [noise.name for noise in network.noises] == ["left1.S", "left2.S"]
+
+
+def test_entries_within_and_around_an_instance_draw_independently() -> None:
+    draw = "{weight: 'normal(0, 1)', pattern: all_to_all}"
+    network = network_of(
+        f"""
+seed: 3
+modules:
+  knee: {{neurons: {{K: {{count: 9}}, O: {{count: 9}}}}, connections: {{K -> O: {draw}}}}}
+  leg: {{neurons: {{O: {{count: 9}}}}, instances: {{knee: {{module: knee}}}}, connections: {{knee.K -> O: {draw}}}}}
+neurons: {{O: {{count: 9}}}}
+instances: {{left: {{module: leg, count: 1}}}}
+connections: {{left1.knee.K -> O: {draw}}}
+"""
+    )
+    assert network.connections.entries == ("left1.knee.K -> O",) * 3
+    assert len(network.connections) == 3 * 81
+    assert len(set(network.connections.weights.tolist())) == 3 * 81
 
 
 # Parameters

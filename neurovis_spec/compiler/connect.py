@@ -99,7 +99,7 @@ class Connector:
         """One entry; None where it is at fault, and then all that does not depend on that is still looked at."""
         before = self.constants.findings.errors
         sources, targets = self._ends(key)
-        name = self.unit.called(_normal(key.value))
+        name = _normal(key.value)
         seen[name] = seen.get(name, 0) + 1
         if seen[name] > 1:
             name = f"{name} ({seen[name]})"

@@ -84,7 +84,10 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True)
 class EntryBuilder:
-    """Builds one entry, step by step: its shape, its weights, its rule. An end that is at fault is None."""
+    """Builds one entry, step by step: its shape, its weights, its rule. An end that is at fault is None.
+
+    ``name`` is what it is called in its unit.
+    """
 
     place: Place
     key: Located[str]
@@ -99,7 +102,7 @@ class EntryBuilder:
         return self.place.unit.constants
 
     def _stream(self, purpose: str) -> Stream:
-        return Stream(self.place.seed, purpose, self.name)
+        return Stream(self.place.seed, purpose, self.place.unit.declares(self.name))
 
     def _kept(self, *keys: str) -> bool:
         """Whether nothing was lost that these keys may have said."""
@@ -142,7 +145,7 @@ class EntryBuilder:
         if shape.delays is not None:
             delays = np.where(shape.delays >= 0, shape.delays, delays)
         return Bundle(
-            self.name,
+            self.place.unit.called(self.name),
             self.key.span,
             self.sources[shape.i],
             self.targets[shape.j],

@@ -43,6 +43,11 @@ class Unit:
         """The name that something of this unit has in the whole network."""
         return f"{self.path}.{name}" if self.path else name
 
+    def declares(self, entry: str) -> str:
+        """The name by which an entry of ``connections`` of this unit draws: ``left1/K -> O`` within the instance left1.
+        It is another one than that of the entry ``left1.K -> O`` around it, as no name and no path has a slash."""
+        return f"{self.path}/{entry}" if self.path else entry
+
     @property
     def gaps(self) -> Gaps:
         """What could not be read, in this unit and among the definitions."""
