@@ -242,6 +242,51 @@ def test_one_warning_names_the_connection(backend: str) -> None:
     assert len(caught) == 1
 
 
+HIDDEN = [
+    (
+        "inputs: {s: {expression: 1/(k - 5)}}\nneurons: {A: {}, B: {input: s, activation: tanh}}",
+        "the input 's' of B is inf at step 5",
+    ),
+    (
+        "inputs: {s: {expression: 1/(k - 300)}}\nneurons: {B: {bias: 1}}",
+        "the input 's' is inf at step 300",
+    ),
+    (
+        "activations: {above: {value: 1 if x > 0 else 0}}\n"
+        "neurons: {A: {noise: 'normal(0, 3 - k)', activation: above}}",
+        "the noise of A is nan at step 4",
+    ),
+    (
+        "models: {wild: {state: {v: {initial: 1e300, each_step: v*1e3}}, activity: tanh(v)}}\n"
+        "neurons: {A: {bias: 1}, B: {count: 2, model: wild}}",
+        "the state 'v' of B1 is inf at step 2",
+    ),
+    (
+        "rules: {wild: {state: {m: {initial: 1e300, each_step: m*1e3}}, weight: {each_step: weight + pre/m}}}\n"
+        "neurons: {A: {bias: 1}, B: {}}\nconnections: {A -> B: {weight: 1, plasticity: wild}}",
+        "the state 'm' of A -> B is inf after step 2",
+    ),
+]
+
+
+@pytest.mark.parametrize("backend", BOTH)
+@pytest.mark.parametrize(("text", "message"), HIDDEN, ids=[message for _, message in HIDDEN])
+def test_what_no_activity_shows_is_warned_of_once(text: str, message: str, backend: str) -> None:
+    network = nv.compile_text(f"neurovis: 1\nname: x\n{text}\n")
+    with pytest.warns(RuntimeWarning) as caught:
+        recording = network.run(600, backend=backend)
+    assert [str(item.message) for item in caught] == [f"{message}, in 'x'"]
+    assert np.isfinite(recording.activity).all()
+
+
+@pytest.mark.parametrize("backend", BOTH)
+def test_what_is_not_finite_behind_the_end_of_a_run_is_no_reason_to_warn(backend: str) -> None:
+    text = "neurovis: 1\nname: x\ninputs: {s: {expression: 1/(k - 5)}}\nneurons: {B: {input: s, activation: tanh}}\n"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        nv.compile_text(text).run(5, backend=backend)
+
+
 @pytest.mark.parametrize("backend", BOTH)
 def test_large_but_finite_is_no_reason_to_warn(backend: str) -> None:
     network = build([Unit("A", bias=1e300), Unit("B", bias=-1e300)])

@@ -131,7 +131,8 @@ def go(network: Network, state: State, course: Course, rows: Rows, progress: Pro
     """Run a network from a state, and hand on the rows that are kept."""
     every, steps = course.every, course.steps
     changing = _subscript(network.changing)
-    look, due, step = Watch(network).look, rows.due, prepare(network, course.backend).step
+    watch, due, step = Watch(network), rows.due, prepare(network, course.backend).step
+    look = watch.look
     reader = InputReader(network, course.inputs)
     controls, changes = Controls(network), {change.at: change for change in network.changes}
     edges = [0, *(at for at in changes if 0 < at < steps), steps]
@@ -145,8 +146,9 @@ def go(network: Network, state: State, course: Course, rows: Rows, progress: Pro
                     return
                 wanted = (stop - 1) // every - (first - 1) // every
                 activity, weights = rows.begin(wanted)
-                row = 0
-                for k, vector in enumerate(reader.rows(first, stop), first):
+                row, vectors = 0, reader.rows(first, stop)
+                watch.given(first, vectors)
+                for k, vector in enumerate(vectors, first):
                     keep = k % every == 0
                     if keep and changing is not None:
                         weights[row] = state.weights[changing]

@@ -7,6 +7,7 @@ can be kept and gone back to.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import cached_property
 
@@ -105,6 +106,8 @@ class Simulation:
         state = self._state
         vector = self._reader.at(state.k, {**(values or {}), **inputs})
         with np.errstate(all="ignore"):
+            if not math.isfinite(vector.dot(vector)):
+                self._watch.given(state.k, vector.reshape(1, -1))
             self._stepper.step(state, vector)
             self._watch.look(state)
         if state.k in self._changes:  # those of the next step apply now, so that ``weights`` are those of the next step

@@ -1,17 +1,23 @@
-"""The watch: one warning, at once, when an activity or a weight is no longer a finite number.
+"""The watch: one warning, at once, when something that a run computes is no longer a finite number.
 
-In: the State after a step. Out: at most one RuntimeWarning in a run, which names the neuron or connection and the step.
+In: the inputs of the steps to come, the State after each step. Out: at most one RuntimeWarning in a run, which names
+the step and the neuron or the connection whose activity, weight, state or input it is.
 """
 
 from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Iterator
 
 import numpy as np
 
+from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.state import State
+
+#: No step.
+_NEVER = -1
 
 
 class Watch:
@@ -20,30 +26,82 @@ class Watch:
     def __init__(self, network: Network) -> None:
         self._network = network
         self._learns = bool(network.plasticity)
+        self._remembers = any(block.model.state for block in network.blocks) or any(
+            plasticity.rule.state for plasticity in network.plasticity
+        )
+        #: the first of the steps to come whose inputs are not all finite, and these inputs
+        self._step = _NEVER
+        self._vector: FloatArray = np.zeros(0)
         self.warned = False
+
+    def given(self, first: int, vectors: FloatArray) -> None:
+        """The inputs of the steps from ``first`` on, a row a step: they are told of when their step is made."""
+        self._step = _NEVER
+        wrong = np.flatnonzero(~np.isfinite(vectors).all(axis=1))
+        if len(wrong):
+            self._step, self._vector = first + int(wrong[0]), vectors[wrong[0]]
 
     def look(self, state: State) -> None:
         """Warn if something of the step just made is NaN or infinite."""
-        # a sum of squares is finite only if all terms are: one cheap product instead of a test each
-        if math.isfinite(state.activity.dot(state.activity)) and (
-            not self._learns or math.isfinite(state.weights.dot(state.weights))
+        if self.warned:
+            return
+        # A sum of squares is finite only if all terms are: one cheap product instead of a test each. Where those of
+        # activities and weights are, the signals that leave, products of both, are finite as well.
+        if (
+            math.isfinite(state.activity.dot(state.activity))
+            and (not self._learns or math.isfinite(state.weights.dot(state.weights)))
+            and (not self._remembers or (_finite(state.cells) and _finite(state.traces)))
+            and state.k - 1 != self._step
         ):
             return
-        if not self.warned:
-            self._name(state)
+        message = next(self._found(state), None)
+        if message is not None:
+            self.warned = True
+            warnings.warn(f"{message}, in '{self._network.name}'", RuntimeWarning, stacklevel=2)
 
-    def _name(self, state: State) -> None:
-        step = state.k - 1
-        bad = np.flatnonzero(~np.isfinite(state.activity))
-        if len(bad):
-            value, name = state.activity[bad[0]], self._network.neurons.names[bad[0]]
-            self._warn(f"the activity of {name} is {value} at step {step}")
-            return
-        bad = np.flatnonzero(~np.isfinite(state.weights))
-        if len(bad):
-            value, name = state.weights[bad[0]], self._network.connection_names[bad[0]]
-            self._warn(f"the weight of {name} is {value} after step {step}")
+    def _found(self, state: State) -> Iterator[str]:
+        """What is not finite: what shows it best comes first."""
+        step, network = state.k - 1, self._network
+        names = network.neurons.names
+        for index in _wrong(state.activity):
+            yield f"the activity of {names[index]} is {state.activity[index]} at step {step}"
+        for index in _wrong(state.weights):
+            yield f"the weight of {network.connection_names[index]} is {state.weights[index]} after step {step}"
+        for block, cells in zip(network.blocks, state.cells, strict=True):
+            for quantity, values in zip(block.model.state, cells, strict=True):
+                for index in _wrong(values):
+                    name = names[block.members[index]]
+                    yield f"the state '{quantity.name}' of {name} is {values[index]} at step {step}"
+        for plasticity, traces in zip(network.plasticity, state.traces, strict=True):
+            for quantity, values in zip(plasticity.rule.state, traces, strict=True):
+                for index in _wrong(values):
+                    name = network.connection_names[plasticity.members[index]]
+                    yield f"the state '{quantity.name}' of {name} is {values[index]} after step {step}"
+        if step == self._step:
+            for index in _wrong(self._vector):
+                yield f"the {self._called(index)} is {self._vector[index]} at step {step}"
 
-    def _warn(self, message: str) -> None:
-        self.warned = True
-        warnings.warn(f"{message}, in '{self._network.name}'", RuntimeWarning, stacklevel=4)
+    def _called(self, index: int) -> str:
+        """What a number of the vector of all inputs is: whose noise, or whose input by its name."""
+        network = self._network
+        names = network.neurons.names
+        for noise in network.noises:
+            if noise.start <= index < noise.start + len(noise.members):
+                return f"noise of {names[noise.members[index - noise.start]]}"
+        entry = next(entry for entry in network.inputs if entry.start <= index < entry.start + entry.size)
+        takers = np.flatnonzero(network.neurons.input == index)
+        return f"input '{entry.name}'" + (f" of {names[takers[0]]}" if len(takers) else "")
+
+
+def _finite(states: tuple[tuple[FloatArray, ...], ...]) -> bool:
+    """Whether these states surely are: their squares, too."""
+    for group in states:
+        for values in group:
+            if not math.isfinite(values.dot(values)):
+                return False
+    return True
+
+
+def _wrong(values: FloatArray) -> list[int]:
+    """Where values are not finite."""
+    return np.flatnonzero(~np.isfinite(values)).tolist()
