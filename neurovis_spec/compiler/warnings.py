@@ -61,6 +61,7 @@ def warn(compiled: Compiled, findings: Findings) -> None:
     _definitions(compiled.spec, compiled.network, findings)
     _modules(compiled, findings)
     _neurons(compiled, findings)
+    _outputs(compiled, findings)
     _rates(compiled, findings)
     _episodes(compiled, findings)
     _vain(compiled, findings)
@@ -166,6 +167,19 @@ def _neurons(compiled: Compiled, findings: Findings) -> None:
         )
         hint = "connect something to it, or give it an input, a bias, an initial or a noise"
         findings.warning("idle-neuron", span, message, hint)
+
+
+def _outputs(compiled: Compiled, findings: Findings) -> None:
+    """Outputs that are called like neurons, but are others."""
+    spec, network = compiled.spec, compiled.network
+    for output in network.outputs:
+        group, neuron = network.group_index.get(output.name), network.neuron_index.get(output.name)
+        own = list(group.indices) if group is not None else [] if neuron is None else [neuron]
+        if own and own != output.neurons.tolist():
+            what = "neuron" if len(own) == 1 else "group"
+            message = f"the output '{output.name}' is called like a {what}, and is another one"
+            hint = f"give it another name, or write {output.name}: {output.name}"
+            findings.warning("misleading-output", key_span(spec, "outputs", output.name), message, hint)
 
 
 def _rates(compiled: Compiled, findings: Findings) -> None:
