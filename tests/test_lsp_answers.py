@@ -87,6 +87,13 @@ def offered(text: str) -> dict[str, Completion]:
         ("parameters:\n  a: 1\n  b: ¦\n  c: 2", ["a", "sin"], ["b", "c"]),
         (BASE + "outputs: {o: K}\nros: {publish: {¦", ["o"], ["go"]),
         (BASE + "ros: {subscribe: {¦", ["go"], ["K"]),
+        (BASE + "ros: {qos: {¦", ["depth", "reliability"], ["K"]),
+        (BASE + "ros: {qos: {reliability: ¦", ["reliable", "best_effort"], ["volatile"]),
+        (BASE + "ros: {subscribe: {go: {¦", ["topic", "type", "timeout", "names"], ["safe", "K"]),
+        (BASE + "ros: {subscribe: {go: {type: ¦", ["std_msgs/Float64", "sensor_msgs/JointState"], ["std_msgs/String"]),
+        (BASE + "ros: {subscribe: {go: {type: geometry_msgs/Twist, field: ¦", ["linear.x"], ["linear", "data"]),
+        (BASE + "ros: {subscribe: {go: {on_timeout: ¦", ["hold", "zero", "stop"], ["go"]),
+        (BASE + "outputs: {o: K}\nros: {publish: {o: {¦", ["topic", "field", "safe"], ["timeout"]),
         ("description: |\n  ¦", [], ["name"]),
     ],
 )

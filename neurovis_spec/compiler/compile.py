@@ -21,17 +21,18 @@ from neurovis_spec.compiler.constants import Constants, parse_formula
 from neurovis_spec.compiler.crowds import crowded
 from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.entries import Bundle
-from neurovis_spec.compiler.gaps import gaps_of
+from neurovis_spec.compiler.gaps import Gaps, gaps_of
 from neurovis_spec.compiler.limits import MOST_SIGNALS, Limits, amount
 from neurovis_spec.compiler.lower import make_blocks, make_plasticity, make_program
 from neurovis_spec.compiler.modules import library_of
-from neurovis_spec.compiler.network import Instance, Network
+from neurovis_spec.compiler.network import Input, Instance, Network, Output
 from neurovis_spec.compiler.noise import make_noises
 from neurovis_spec.compiler.order import Cycle, levels
 from neurovis_spec.compiler.parameters import make_parameters
 from neurovis_spec.compiler.populate import Population, populate, without_neurons
 from neurovis_spec.compiler.references import Directory, other_parameter
-from neurovis_spec.compiler.sections import check_ros, layout_settings, make_outputs, render_settings
+from neurovis_spec.compiler.ros_settings import RosSettings
+from neurovis_spec.compiler.sections import layout_settings, make_outputs, render_settings
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.compiler.units import Expander, constants_of
@@ -85,12 +86,12 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
     population = populate(units, request.limits, seed)
     _look_at_unused(expander, request.limits, seed)
     render = render_settings(spec.render, constants)
-    check_ros(spec.ros, constants)
     if not len(population.neurons):
         _report_no_neurons(spec, population, findings)
         population = without_neurons(population)
     directory = population.directory
     outputs = make_outputs(spec, directory, findings)
+    ros = _ros(spec, inputs, outputs, units[0].gaps, constants)
     layout = layout_settings(spec.layout, units, population, findings)
     made = connect(units, population, request.limits, seed)
     bundles = made.bundles
@@ -150,11 +151,23 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         instances=_instances(units, population),
         numbering=own_weights(slots, bundles, connections.weights),
         settable=make_settable(slots, population, bundles, connections, inputs, blocks, plasticity),
+        ros=ros,
     )
     eventful = _eventful(spec, network, directory, constants, made)
     if eventful is not None and not findings.failed:  # the shape may have been at fault
         warn(Compiled(spec, units, library, expander.used, eventful, bundles), findings)
     return eventful
+
+
+def _ros(
+    spec: Spec, inputs: tuple[Input, ...], outputs: tuple[Output, ...], gaps: Gaps, constants: Constants
+) -> RosSettings:
+    """The ``ros`` section. Most specs have none: nothing that reads it is imported then."""
+    if spec.ros is None:
+        return RosSettings(rate=1 / constants.dt)
+    from neurovis_spec.compiler.ros import Surroundings, ros_settings
+
+    return ros_settings(spec.ros, Surroundings(spec, inputs, outputs, gaps), constants)
 
 
 def _look_at_unused(expander: Expander, limits: Limits, seed: int) -> None:

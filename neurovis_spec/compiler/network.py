@@ -18,6 +18,7 @@ import numpy as np
 from neurovis_spec.compiler.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.changes import Change
 from neurovis_spec.compiler.program import Block, Combine, Operation, Plasticity
+from neurovis_spec.compiler.ros_settings import RosSettings
 from neurovis_spec.compiler.settable import Part, Settable
 from neurovis_spec.compiler.wishes import LayoutSettings, RenderSettings
 from neurovis_spec.language.expressions.tree import Tree
@@ -201,6 +202,8 @@ class Network:
     changes: tuple[Change, ...] = ()
     #: w[0] with the parameters that the spec itself has, where some are given from outside
     numbering: FloatArray | None = None
+    #: what a node of ROS is told; it changes nothing of what the network does
+    ros: RosSettings = field(default_factory=RosSettings)
 
     @cached_property
     def neuron_index(self) -> Mapping[str, int]:

@@ -24,7 +24,7 @@ from neurovis_spec.diagnostics import Findings, Span, shown, suggest
 from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel, RenderModel
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.source import Mapping as SourceMapping
-from neurovis_spec.language.spec import RosModel, Spec
+from neurovis_spec.language.spec import Spec
 
 _NOTHING = LayoutModel.model_validate(SourceMapping((), Span("", 1, 1, 1, 1)), context=Findings())
 
@@ -128,16 +128,6 @@ def _check_engine(engine: Located[str], findings: Findings) -> None:
         return
     hint = suggest(name, ("auto", *installed), "known engines")
     findings.error("unknown-engine", engine.span, f"there is no layout engine '{shown(name)}' here", hint)
-
-
-def check_ros(model: RosModel | None, constants: Constants) -> None:
-    """The ``ros`` section: only what needs no ROS to be seen."""
-    if model is None or model.rate is None:
-        return
-    rate = constants.scalar(model.rate)
-    if rate is not None and not rate > 0:
-        message = f"'rate' is steps a second and above 0, this is {rate:g}"
-        constants.findings.error("out-of-range", model.rate.span, message)
 
 
 def render_settings(model: RenderModel | None, constants: Constants) -> RenderSettings:

@@ -6,45 +6,19 @@ and no expression is parsed here. The descriptions are what an editor shows, and
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
-from pydantic import Field, ValidationInfo
+from pydantic import Field
 
 from neurovis_spec.language.drawing import LayoutModel, RenderModel
 from neurovis_spec.language.library import LANGUAGE_VERSION, Library
-from neurovis_spec.language.located import (
-    FormulaField,
-    IdentifierField,
-    IntegerField,
-    Leaf,
-    TextField,
-    TextsField,
-    refuse,
-)
-from neurovis_spec.language.model import Model, Named, NamedParameters, StandIns
+from neurovis_spec.language.located import IdentifierField, IntegerField, TextsField
+from neurovis_spec.language.model import Named, NamedParameters, StandIns
 from neurovis_spec.language.modules import INCLUDED, InstanceModel, ModuleModel
+from neurovis_spec.language.ros import RosModel
 from neurovis_spec.language.sections import ConnectionsField, EventsField, GroupModel, InputModel, Time
-from neurovis_spec.language.source import Mapping, Node
+from neurovis_spec.language.source import Mapping
 from neurovis_spec.language.values import ParameterField, ReferenceField
-
-
-def _any_mapping(node: Node, info: ValidationInfo) -> Mapping:
-    if isinstance(node, Mapping):
-        return node
-    refuse(info, node, "a mapping")
-
-
-MappingField = Annotated[Mapping, Leaf(_any_mapping, {"type": "object"})]
-
-
-class RosModel(Model):
-    """How the network meets ROS. Its topics are checked by the ROS adapter."""
-
-    namespace: TextField | None = Field(None, description="Prefix of the topics (default /neurovis).")
-    rate: FormulaField | None = Field(None, description="Steps a second (default 1/dt).")
-    qos: MappingField | None = Field(None, description="Quality of service of what is published.")
-    subscribe: MappingField | None = Field(None, description="{input: {topic, type, field, timeout}}.")
-    publish: MappingField | None = Field(None, description="{output: {topic, type}}.")
 
 
 class Spec(Library):

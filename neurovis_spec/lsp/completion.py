@@ -14,6 +14,7 @@ from typing import Literal
 from neurovis_spec import plugins
 from neurovis_spec.compiler.constants import ALWAYS
 from neurovis_spec.diagnostics import Span
+from neurovis_spec.language.ros_types import all_types, numbers_of
 from neurovis_spec.lsp.definitions import Definition, known
 from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.index import Index
@@ -129,6 +130,13 @@ def _of_role(role: Role | None, scope: Scope, path: Path, front: str, index: Ind
             yield from (_Offer(name, "definition", meaning) for name, meaning in PATTERNS.items())
         case "engine":
             yield from (_Offer(name, "word") for name in ("auto", *plugins.names(plugins.LAYOUTS)))
+        case "message":
+            yield from (
+                _Offer(name, "word", ", ".join(numbers_of(name)[:4])) for name in all_types() if numbers_of(name)
+            )
+        case "field":
+            of = index.values.get((*path[:-1], "type"))
+            yield from (_Offer(name, "word") for name in (() if of is None else numbers_of(of.text)))
         case "names" if role.kind == "input":
             module = _owner(path, scope, index)
             yield from (_Offer(name.text, "input") for name in index.declared("input", module))

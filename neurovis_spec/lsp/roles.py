@@ -18,7 +18,18 @@ Kind: TypeAlias = Literal[
     "parameter", "neuron", "input", "instance", "output", "module", "activation", "model", "rule", "local"
 ]
 Use: TypeAlias = Literal[
-    "declares", "names", "formula", "ends", "references", "choice", "setting", "setting value", "pattern", "engine"
+    "declares",
+    "names",
+    "formula",
+    "ends",
+    "references",
+    "choice",
+    "setting",
+    "setting value",
+    "pattern",
+    "engine",
+    "message",
+    "field",
 ]
 
 
@@ -135,6 +146,11 @@ _VALUES: Final[Mapping[str, Role]] = {
     "render gain *": _FORMULA,
     "render size #": _FORMULA,
     "ros rate": _FORMULA,
+    "ros qos depth": _FORMULA,
+    "ros subscribe * timeout": _FORMULA,
+    "ros publish * safe": _FORMULA,
+    "ros * * type": Role("message"),
+    "ros * * field": Role("field"),
     "instances * module": Role("names", "module"),
     "instances * inputs *": Role("names", "input"),
     "instances * count": _FORMULA,

@@ -1,0 +1,231 @@
+"""The ``ros`` section: what a node is told, checked against the inputs and outputs of the network.
+
+In: the section as written, the inputs and outputs. Out: RosSettings, a value of the Network for whoever meets ROS; or
+findings. No ROS is needed for that: of message types as much is checked as the table of the usual ones knows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Final, Literal, cast
+
+from neurovis_spec.compiler.constants import Constants
+from neurovis_spec.compiler.gaps import Gaps
+from neurovis_spec.compiler.limits import plural
+from neurovis_spec.compiler.network import Input, Output
+from neurovis_spec.compiler.references import key_of
+from neurovis_spec.compiler.ros_settings import NAMESPACE, Publication, RosSettings, Subscription
+from neurovis_spec.diagnostics import Findings, meant, shown, suggest
+from neurovis_spec.language.located import Located
+from neurovis_spec.language.model import lost_names
+from neurovis_spec.language.ros import PublishModel, QosModel, RosModel, SubscribeModel
+from neurovis_spec.language.ros_types import COMPLETE, MESSAGES, Field, all_types, fields_of, numbers_of, plain
+from neurovis_spec.language.spec import Spec
+
+#: Where a message has its numbers if nothing else is said.
+_DATA: Final = "data"
+#: A queue of more messages is a mistake.
+_DEEPEST: Final = 1_000_000
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What the section may name: the inputs and outputs of the network, and what could not be read of these."""
+
+    spec: Spec
+    inputs: tuple[Input, ...]
+    outputs: tuple[Output, ...]
+    gaps: Gaps
+
+
+def ros_settings(model: RosModel, around: Surroundings, constants: Constants) -> RosSettings:
+    """The ``ros`` section of a spec. What is invalid in it is reported and left out."""
+    rate = None if model.rate is None else _above_zero(model.rate, "'rate' is steps a second", constants)
+    namespace = NAMESPACE if model.namespace is None else f"/{model.namespace.value.strip('/')}"
+    reliability, durability, depth = _quality(model.qos, constants)
+    return RosSettings(
+        namespace=namespace,
+        rate=1 / constants.dt if rate is None else rate,
+        reliability=reliability,
+        durability=durability,
+        depth=depth,
+        subscribe=tuple(_subscriptions(model, around, constants)),
+        publish=tuple(_publications(model, around, constants)),
+    )
+
+
+def _quality(
+    model: QosModel | None, constants: Constants
+) -> tuple[Literal["reliable", "best_effort"], Literal["volatile", "transient_local"], int]:
+    reliability, durability, depth = "reliable", "volatile", 10
+    if model is not None:
+        reliability = reliability if model.reliability is None else model.reliability.value
+        durability = durability if model.durability is None else model.durability.value
+        if model.depth is not None:
+            given = constants.integer(model.depth, "'depth'", 1, _DEEPEST, structural=False)
+            depth = depth if given is None else given
+    return (
+        cast(Literal["reliable", "best_effort"], reliability),
+        cast(Literal["volatile", "transient_local"], durability),
+        depth,
+    )
+
+
+def _above_zero(formula: Located[int | float | str], what: str, constants: Constants) -> float | None:
+    value = constants.scalar(formula)
+    if value is not None and not value > 0:
+        constants.findings.error("out-of-range", formula.span, f"{what} and above 0, this is {value:g}")
+        return None
+    return value
+
+
+def _subscriptions(model: RosModel, around: Surroundings, constants: Constants) -> Iterator[Subscription]:
+    findings = constants.findings
+    inputs = {entry.name: entry for entry in around.inputs}
+    for name, entry in model.subscribe.items():
+        found = inputs.get(name)
+        if found is None:
+            _report_input(name, model, tuple(inputs), around.gaps, findings)
+        timeout = (
+            None
+            if entry.timeout is None
+            else _above_zero(entry.timeout, "'timeout' is seconds without a message", constants)
+        )
+        if entry.on_timeout is not None and entry.timeout is None and "timeout" not in entry.lost_keys:
+            message = "'on_timeout' has no effect without 'timeout'"
+            findings.warning("no-effect", entry.on_timeout.span, message, "add timeout: SECONDS")
+        size = None if found is None else found.size
+        _check_numbers(entry, size, f"the input '{name}' takes", findings)
+        _check_joints(entry, size, name, findings)
+        if found is not None:
+            yield Subscription(
+                input=name,
+                topic=entry.topic.value,
+                type=_type(entry, found.size),
+                field=_DATA if entry.field is None else entry.field.value,
+                names=tuple(joint.value for joint in entry.names or ()),
+                timeout=timeout,
+                on_timeout=cast(
+                    Literal["hold", "zero", "stop"], "zero" if entry.on_timeout is None else entry.on_timeout.value
+                ),
+            )
+
+
+def _publications(model: RosModel, around: Surroundings, constants: Constants) -> Iterator[Publication]:
+    outputs = {output.name: output for output in around.outputs}
+    for name, entry in model.publish.items():
+        output = outputs.get(name)
+        if output is None:
+            _report_output(name, model, around.spec, constants.findings)
+        safe = None if entry.safe is None else constants.scalar(entry.safe)
+        size = None if output is None else len(output.neurons)
+        _check_numbers(entry, size, f"the output '{name}' has", constants.findings)
+        if output is not None:
+            field = _DATA if entry.field is None else entry.field.value
+            yield Publication(name, entry.topic.value, _type(entry, len(output.neurons)), field, safe)
+
+
+def _type(entry: SubscribeModel | PublishModel, size: int) -> str:
+    """The message type, for so many numbers."""
+    if entry.type is not None:
+        return plain(entry.type.value)
+    return "std_msgs/Float64" if size == 1 else "std_msgs/Float64MultiArray"
+
+
+def _report_input(name: str, model: RosModel, known: tuple[str, ...], gaps: Gaps, findings: Findings) -> None:
+    if gaps.cover("inputs", name) or ("." in name and findings.failed):  # that of an instance may be missing therefore
+        return
+    hint = suggest(name, known, "inputs") or "no inputs are declared; add it under 'inputs'"
+    span = key_of(model.source, "subscribe", name).span
+    findings.error("unknown-input", span, f"there is no input '{shown(name)}'", hint)
+
+
+def _report_output(name: str, model: RosModel, spec: Spec, findings: Findings) -> None:
+    declared = {**spec.outputs, **dict.fromkeys(lost_names(spec.source, "outputs", spec.outputs))}
+    if name in declared or "outputs" in spec.lost_keys:
+        return
+    hint = suggest(name, tuple(declared), "outputs") or "no outputs are declared; add it under 'outputs'"
+    span = key_of(model.source, "publish", name).span
+    findings.error("unknown-output", span, f"there is no output '{shown(name)}'", hint)
+
+
+def _check_numbers(entry: SubscribeModel | PublishModel, size: int | None, who: str, findings: Findings) -> None:
+    """Whether messages of the type have numbers at the field, and may have as many; ``size`` is how many ``who`` has,
+    None where that is not known."""
+    if not entry.lost_keys.isdisjoint(("type", "field")):
+        return
+    name = _type(entry, size or 1)
+    fields = fields_of(name)
+    if fields is None:
+        assert entry.type is not None
+        _check_type(entry.type, name, findings)
+        return
+    path = _DATA if entry.field is None else entry.field.value
+    span = (entry.field or entry.type or entry.topic).span
+    field = fields.get(path)
+    if field is None:
+        if not _within_unknown(path, fields):
+            hint = _where(entry, path, name)
+            findings.error("unknown-field", span, f"messages of type {name} have no field '{shown(path)}'", hint)
+    elif field.kind == "number":
+        if size is not None and field.size is not None and field.size != size:
+            holds = "one number" if not field.several else plural(field.size, "number")
+            findings.error("wrong-size", span, f"'{path}' of {name} is {holds}; {who} {size}")
+    elif field.kind != "opaque":
+        what = (
+            {"text": "a text", "message": "a message"}[field.kind] if not field.several else f"a list of {field.kind}s"
+        )
+        message = f"'{shown(path)}' of {name} is {what}, neither a number nor an array of numbers"
+        findings.error("unknown-field", span, message, _where(entry, path, name))
+
+
+def _within_unknown(path: str, fields: Mapping[str, Field]) -> bool:
+    """Whether a path leads into what ROS 1 and ROS 2 define differently."""
+    parts = path.split(".")
+    heads = (fields.get(".".join(parts[:count])) for count in range(1, len(parts)))
+    return any(head is not None and head.kind == "opaque" for head in heads)
+
+
+def _where(entry: SubscribeModel | PublishModel, path: str, name: str) -> str:
+    """Which fields of a type there are."""
+    known = numbers_of(name)
+    if not known:
+        return "take a type that holds numbers"
+    inner = [one for one in known if one.startswith(f"{path}.")]
+    hint = suggest(path, inner or known, "fields with numbers") or ""
+    return f"say which with field: {', '.join(known[:8])}" if entry.field is None else hint
+
+
+def _check_type(written: Located[str], name: str, findings: Findings) -> None:
+    """A type that is not in the table is one of somebody's own, unless its package is known as a whole, or can only be
+    meant for one that is known."""
+    package, _, message = name.partition("/")
+    if package not in COMPLETE:
+        right = None if package in MESSAGES else meant(package, tuple(MESSAGES))
+        if right is None or message not in MESSAGES[right]:
+            return
+    hint = suggest(name, all_types(), "types")
+    findings.error("unknown-message", written.span, f"there is no message type '{shown(name)}'", hint)
+
+
+def _check_joints(entry: SubscribeModel, size: int | None, name: str, findings: Findings) -> None:
+    """``names``: as many joints as the input has numbers, each once, of messages that name their joints."""
+    if entry.names is None:
+        return
+    key = entry.source.entry("names")
+    assert key is not None
+    type_ = _type(entry, size or 1)
+    fields = fields_of(type_)
+    if fields is not None and "name" not in fields and "type" not in entry.lost_keys:
+        message = f"'names' has no effect: messages of type {type_} name no joints"
+        findings.error("useless-key", key.key.span, message, "sensor_msgs/JointState does")
+        return
+    seen = set[str]()
+    for joint in entry.names:
+        if joint.value in seen:
+            findings.error("repeated-reference", joint.span, f"the joint '{shown(joint.value)}' is named twice")
+        seen.add(joint.value)
+    if size is not None and len(entry.names) != size:
+        message = f"{plural(len(entry.names), 'joint')}; the input '{name}' takes {plural(size, 'number')}"
+        findings.error("wrong-size", key.value.span, message)

@@ -1,0 +1,52 @@
+"""What a node of ROS is told by a spec: where inputs come from and where outputs go to.
+
+In: nothing; these are values of a Network, which ``compiler.ros`` makes. Nothing of them changes what the network does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+NAMESPACE: Final = "/neurovis"
+
+
+@dataclass(frozen=True, slots=True)
+class Subscription:
+    """An input that comes from a topic. ``type`` is written ``package/Name``; ``field`` is a dotted path in a message.
+
+    Of a message that names its joints those of ``names`` are taken, in this order; without names all numbers.
+    ``timeout`` seconds after the last message it is as ``on_timeout`` says; None: never.
+    """
+
+    input: str
+    topic: str
+    type: str
+    field: str = "data"
+    names: tuple[str, ...] = ()
+    timeout: float | None = None
+    on_timeout: Literal["hold", "zero", "stop"] = "zero"
+
+
+@dataclass(frozen=True, slots=True)
+class Publication:
+    """An output that goes to a topic; ``safe`` is what is sent when the run ends or stops, None: nothing."""
+
+    output: str
+    topic: str
+    type: str
+    field: str = "data"
+    safe: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RosSettings:
+    """The ``ros`` section, references resolved. ``namespace`` is absolute; ``rate`` is steps a second."""
+
+    rate: float = 1.0
+    namespace: str = NAMESPACE
+    reliability: Literal["reliable", "best_effort"] = "reliable"
+    durability: Literal["volatile", "transient_local"] = "volatile"
+    depth: int = 10
+    subscribe: tuple[Subscription, ...] = ()
+    publish: tuple[Publication, ...] = ()
