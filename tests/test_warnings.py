@@ -161,6 +161,32 @@ def test_a_neuron_that_may_be_active_is_let_be(neuron: str) -> None:
     assert warnings(body) == []
 
 
+@pytest.mark.parametrize(
+    "model",
+    [
+        "{activity: f(drive) if k < 50 else 1}",
+        "{activity: f(drive) + step(t - 30)}",
+        "{state: {c: {initial: 0, each_step: c + 1}}, activity: f(drive) if c < 10 else 1}",
+        "{state: {c: {initial: 0, each_step: c + (1 if k > 20 else 0)}}, activity: c}",
+        "{let: {late: step(k - 40)}, state: {c: {initial: 0, each_step: c + late}}, activity: c}",
+        "{state: {c: {initial: 0, each_episode: c + 1}}, activity: c}",
+        "{state: {v: {initial: 0, each_step: u}, u: {initial: 0, each_step: u + step(k - 9)}}, activity: v}",
+    ],
+)
+def test_a_neuron_whose_own_model_begins_late_is_let_be(model: str) -> None:
+    body = f"time: {{episode: 30}}\nmodels: {{late: {model}}}\n"
+    body += "neurons: {A: {model: late}, B: {}}\nconnections: {A -> B: 1}\n"
+    assert nv.compile_text(f"neurovis: 1\nname: x\n{body}").run(99)["A"].any()
+    assert warnings(body) == []
+
+
+def test_a_neuron_that_an_event_makes_active_is_let_be() -> None:
+    body = "parameters: {level: 0}\nmodels: {held: {parameters: {at: 0}, activity: at}}\n"
+    body += "neurons: {A: {model: {held: {at: level}}}, B: {}}\nconnections: {A -> B: 1}\n"
+    assert warnings(body) == [("idle-neuron", "A")]
+    assert warnings(body + "events: [{at: 5, set: {level: 1}}]\n") == []
+
+
 def test_a_neuron_without_any_connection_is_told_of_where_others_have_some() -> None:
     assert warnings("neurons: {A: {}, B: {count: 2}}\n") == []  # a sketch
     assert warnings("neurons: {A: {bias: 1}, B: {}, C: {}}\nconnections: {A -> B: 1}\n") == [("idle-neuron", "C")]

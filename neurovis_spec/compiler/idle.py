@@ -1,7 +1,8 @@
 """Idle neurons: those whose activity is 0 at every step, whatever happens elsewhere.
 
 In: a Network. Out: for each group the neurons that nothing reaches but themselves or each other, that have no input,
-bias, initial value or noise, and that stay at 0 by their model and activation (a cosine would not). Those that are only
+bias, initial value or noise, and that surely stay at 0 by their model and activation (a cosine would not), whatever
+events set: of a model that knows the time nothing is sure. Those that are only
 behind such neurons are not told of: they follow from these. A network without a single connection is a sketch: of its
 neurons only those are told of that an output or a rule asks for.
 """
@@ -19,6 +20,7 @@ from neurovis_spec.compiler.network import Group, Network
 from neurovis_spec.compiler.program import Block
 from neurovis_spec.language.expressions.arrays import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
+from neurovis_spec.language.expressions.tree import names
 
 Mask = npt.NDArray[np.bool_]
 #: How far what is active is followed at once; only long ways are gone step by step.
@@ -46,8 +48,9 @@ def idle_neurons(network: Network) -> Iterator[Idle]:
         quiet &= _needed(network)
     if not quiet.any():
         return
-    for block in network.blocks:
-        quiet[block.members] &= _stays_at_zero(block, network.dt)
+    for phase in (network, *(phase for _, phase in network.phases)):
+        for block in phase.blocks:
+            quiet[block.members] &= _stays_at_zero(block, network.dt)
     idle = _unreached(quiet, connections.sources, connections.targets)
     if not idle.any():
         return
@@ -110,23 +113,36 @@ def _first(idle: Mask, sources: IntArray, targets: IntArray) -> Mask:
     return result
 
 
-def _stays_at_zero(block: Block, dt: float) -> npt.NDArray[np.bool_]:
-    """Whether the neurons of a block, never driven, keep their states and an activity of 0. Looked at at two steps, so
-    that what depends on the time is not taken for idle."""
+def _stays_at_zero(block: Block, dt: float) -> Mask:
+    """Whether the neurons of a block, never driven, surely keep their states and an activity of 0: then all that their
+    formulas read stays what it is at the first step."""
     count = len(block.members)
-    result = np.full(count, block.combine != "product", dtype=np.bool_)
-    constants: dict[str, Value] = {**CONSTANTS, "dt": dt, **block.model_parameters}
-    states = {state.name: evaluate_array(state.initial, constants) for state in block.model.state}
-    for k in (0.0, 7.0):
-        values: dict[str, Value] = {**constants, **states, "drive": 0.0, "k": k, "t": k * dt}
-        for name, tree in block.model.let:
-            values[name] = evaluate_array(tree, values)
-        for state in block.model.state:
-            for change in (state.each_step, state.each_episode):
-                if change is not None:
-                    result &= np.broadcast_to(evaluate_array(change, values) == states[state.name], (count,))
-        result &= np.broadcast_to(_activity(block, values) == 0, (count,))
+    if block.combine == "product" or not _TIME.isdisjoint(_read(block)):
+        return np.zeros(count, dtype=np.bool_)
+    result = np.ones(count, dtype=np.bool_)
+    values: dict[str, Value] = {**CONSTANTS, "dt": dt, **block.model_parameters, "drive": 0.0}
+    states = {state.name: evaluate_array(state.initial, values) for state in block.model.state}
+    values |= states
+    for name, tree in block.model.let:
+        values[name] = evaluate_array(tree, values)
+    for state in block.model.state:
+        for change in (state.each_step, state.each_episode):
+            if change is not None:
+                result &= np.broadcast_to(evaluate_array(change, values) == states[state.name], (count,))
+    result &= np.broadcast_to(_activity(block, values) == 0, (count,))
     return result
+
+
+#: What changes by itself.
+_TIME = frozenset(("k", "t"))
+
+
+def _read(block: Block) -> frozenset[str]:
+    """All names that the formulas of a block's model read."""
+    model = block.model
+    trees = [model.activity, *(tree for _, tree in model.let)]
+    trees += [tree for state in model.state for tree in (state.each_step, state.each_episode) if tree is not None]
+    return frozenset().union(*map(names, trees))
 
 
 def _activity(block: Block, values: dict[str, Value]) -> Value:
