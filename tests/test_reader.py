@@ -207,10 +207,10 @@ def test_where_characters_of_a_value_stand(pure: bool) -> None:
         "a": (0, 1, 8),
         "b": (1, 2, 9),
         "c": (1, 3, 9),
-        "d": (None, 4, 4),
-        "e": (None, 5, 4),
-        "f": (None, 6, 4),
-        "g": (None, 8, 4),
+        "d": (None, 4, 12),
+        "e": (None, 5, 9),
+        "f": (None, 7, 7),
+        "g": (None, 9, 5),
     }
 
 

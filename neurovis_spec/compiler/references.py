@@ -194,9 +194,7 @@ def look_at_keys(
 
 def piece(text: Located[str], start: int, end: int) -> Located[str]:
     """Characters ``start`` to ``end`` of a text as a text of their own, with their place."""
-    span = text.node.at(start, end)
-    inner = 0 if span != text.node.span else None
-    return Located(text.value[start:end], Scalar(text.value[start:end], span, inner))
+    return Located(text.value[start:end], text.node.part(start, end))
 
 
 def parts(text: Located[str]) -> Iterator[tuple[str, Span]]:

@@ -31,6 +31,7 @@ from neurovis_spec.language.composer_packed import Packer
 from neurovis_spec.language.composer_refusals import DEEPEST, ComposingStoppedError, Refusals
 from neurovis_spec.language.scalars import NumberRangeError, resolve
 from neurovis_spec.language.source import Entry, Mapping, Node, Scalar, Sequence
+from neurovis_spec.language.written import Written
 
 _PACK_FROM: Final = 64
 _COLON: Final = re.compile(r"[ \t]*:")
@@ -107,33 +108,34 @@ class Composer:
             if self._unread and index in self._unread:
                 scalar = Scalar(True, span, None)  # fits hardly anywhere
             elif event.style in ("'", '"'):
-                scalar = self._quoted(event.value, span, end.index - index - 2)
+                scalar = self._quoted(event.value, span, Written(self._text, index, end.index))
             else:
-                scalar = self._plain(event.value, span)
+                scalar = self._plain(event.value, span, Written(self._text, index, end.index))
         if event.anchor is not None:
             self._anchored[event.anchor] = scalar
         return scalar
 
-    def _plain(self, text: str, span: Span) -> Scalar:
+    def _plain(self, text: str, span: Span, written: Written) -> Scalar:
         inner = 0 if span.line == span.end_line else None
         try:
-            return Scalar(resolve(text), span, inner)
+            return Scalar(resolve(text), span, inner, written if inner is None else None)
         except NumberRangeError as error:
             self._refuse.number(error, span)
             return Scalar(error.nearest, span, inner)
 
-    def _quoted(self, text: str, span: Span, width: int) -> Scalar:
+    def _quoted(self, text: str, span: Span, written: Written) -> Scalar:
         # Escapes are longer than what they stand for: equal lengths mean that there are none.
-        if span.line == span.end_line and width == len(text):
+        if span.line == span.end_line and written.end - written.begin - 2 == len(text):
             return Scalar(text, span, 1)
-        return Scalar(self._refuse.escaped_controls(text, span), span, None)
+        return Scalar(self._refuse.escaped_controls(text, span), span, None, written)
 
     def _block_scalar(self, event: ScalarEvent, index: int, line: int, column: int) -> Scalar:
         # Parsers differ in how much of the blank lines behind it belongs to a block scalar: none, we say.
-        written = self._text[index : marks.end(event).index].rstrip()
-        lines = written.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+        whole = self._text[index : marks.end(event).index].rstrip()
+        lines = whole.replace("\r\n", "\n").replace("\r", "\n").split("\n")
         end_column = len(lines[-1]) + (column if len(lines) == 1 else 1)
-        return Scalar(event.value, Span(self._file, line, column, line + len(lines) - 1, end_column), None)
+        span = Span(self._file, line, column, line + len(lines) - 1, end_column)
+        return Scalar(event.value, span, None, Written(self._text, index, index + len(whole)))
 
     # Collections
 

@@ -12,6 +12,7 @@ from neurovis_spec.language import composer_marks as marks
 from neurovis_spec.language.composer_packed import is_open
 from neurovis_spec.language.composer_refusals import Refusals
 from neurovis_spec.language.source import Entry, Node, Scalar
+from neurovis_spec.language.written import Written
 
 
 def is_plain(event: Event) -> bool:
@@ -51,8 +52,11 @@ class Run:
         """The whole, as if it had been quoted."""
         span = marks.span(self.first, self.last, file)
         one_line = span.line == span.end_line
-        value = text[marks.begin(self.first).index : marks.end(self.last).index]
-        return Scalar(value if one_line else " ".join(value.split()), span, 0 if one_line else None)
+        written = Written(text, marks.begin(self.first).index, marks.end(self.last).index)
+        value = text[written.begin : written.end]
+        if one_line:
+            return Scalar(value, span)
+        return Scalar(" ".join(value.split()), span, None, written)
 
 
 class FlowCommas:

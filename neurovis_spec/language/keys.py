@@ -65,7 +65,7 @@ def _read(
                 perhaps.update(close)
         if right is not None:
             del free[right]
-        yield entry if right is None else Entry(entry.key._replace(value=right, inner=None), entry.value)
+        yield entry if right is None else Entry(entry.key._replace(value=right, inner=None, written=None), entry.value)
 
 
 def _unknown(name: str) -> str:

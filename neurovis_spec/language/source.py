@@ -14,6 +14,7 @@ from functools import cached_property
 from typing import NamedTuple, TypeAlias
 
 from neurovis_spec.diagnostics import Span
+from neurovis_spec.language.written import Written
 
 ScalarValue: TypeAlias = bool | int | float | str | None
 
@@ -21,17 +22,39 @@ ScalarValue: TypeAlias = bool | int | float | str | None
 class Scalar(NamedTuple):
     """A null, truth value, number or text. ``inner`` is the offset of the value's first character in the span
     (1 behind a quote), or None where the value's characters do not stand one by one in the source (escapes,
-    several lines)."""
+    several lines); ``written`` is then how it stands there, as far as that is known."""
 
     value: ScalarValue
     span: Span
     inner: int | None = 0
+    written: Written | None = None
 
     def at(self, start: int, end: int) -> Span:
         """The place of characters ``start`` to ``end`` of a text value; the whole where that cannot be told."""
+        if self.written is not None and isinstance(self.value, str):
+            return self._within(self.written, self.value, start, end)
         if self.inner is None or self.span.line != self.span.end_line:
             return self.span
         return self.span.within(self.inner + start, self.inner + end)
+
+    def part(self, start: int, end: int) -> Scalar:
+        """Characters ``start`` to ``end`` of a text value as a text of their own."""
+        text = str(self.value)
+        span = self.at(start, end)
+        if self.written is not None:
+            return Scalar(text[start:end], span, None, self.written.part(text, start, end))
+        return Scalar(text[start:end], span, None if span == self.span else 0)
+
+    def _within(self, written: Written, value: str, start: int, end: int) -> Span:
+        places = written.places(value)
+        if not places:
+            return self.span
+        file, line, column, _, _ = self.span
+        last = min(max(start, end - 1), len(places) - 1)
+        (first_line, first), (last_line, final) = places[min(start, last)], places[last]
+        first += 0 if first_line else column - 1
+        final += 0 if last_line else column - 1
+        return Span(file, line + first_line, first + 1, line + last_line, final + 2)
 
 
 class Entry(NamedTuple):
