@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import neurovis_spec as nv
+from neurovis_spec.runtime.simulation import ParameterError
 
 SPEC = Path(__file__).parents[1] / "specs" / "cpg_rbf.yaml"
 
@@ -59,6 +60,23 @@ def test_a_simulator_goes_step_by_step(network: nv.CompiledNetwork) -> None:
     assert sim.weight("C1 -> C2") == network.network.connections.weights[1], "any weight, a fixed one too"
     sim.set(phi=0.06)
     assert sim.weight("C1 -> C2") == pytest.approx(-1.01 * np.sin(0.06))
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [(5.0, "'g' is 5; its bounds are 0 to 2"), (0.25, "the lower bound 0.5 is above"), (0.0, "expression is infinite")],
+)
+def test_what_set_cannot_take_is_a_parameter_error_and_changes_nothing(value: float, words: str) -> None:
+    text = (
+        "neurovis: 1\nname: x\nparameters: {g: {value: 1, min: 0, max: 2}}\nneurons: {A: {bias: 1/g}, B: {}}\n"
+        "connections: {A -> B: {weight: 0.6, plasticity: hebbian, bounds: [0.5, g]}}\n"
+    )
+    sim = nv.compile_text(text).simulator()
+    sim.step()
+    with pytest.raises(ParameterError, match=words):
+        sim.set(g=value)
+    sim.step()
+    assert sim.activity[0] == 1
 
 
 def test_a_step_takes_a_mapping_for_names_with_dots() -> None:
