@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import io
 import math
+import subprocess
+import sys
+import tracemalloc
 
 import numpy as np
 import pytest
 from hand_networks import use_case_1
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from neurovis_renderers import coverage
+from neurovis_renderers import coverage, films, raster
 from neurovis_renderers.lettering import lettering
 from neurovis_renderers.raster import Canvas, PillowRenderer
 from PIL import Image
@@ -126,6 +129,95 @@ def test_films_have_their_frames_and_last_as_long_as_they_should(suffix: str) ->
         assert picture.info["loop"] == 0
     assert sum(lasts) == pytest.approx(150, abs=10)
     assert told == [1, 2, 3, 4, 5, 6]
+
+
+@pytest.mark.parametrize("suffix", [".gif", ".webp"])
+def test_films_show_their_frames(suffix: str) -> None:
+    moving = short_film(4)
+    with Image.open(io.BytesIO(PillowRenderer().animate(moving, suffix))) as picture:
+        for frame in range(4):
+            picture.seek(frame)
+            shown = np.asarray(picture.convert("RGB"), float)
+            meant = Canvas(moving.scene).paint(still(moving, frame)).astype(float)
+            assert np.abs(shown - meant).mean() < 4, np.abs(shown - meant).mean()
+
+
+def test_a_gif_lasts_as_long_as_its_frames_also_where_nothing_changes_for_hours() -> None:
+    first, second = np.zeros((8, 9, 3), np.uint8), np.zeros((8, 9, 3), np.uint8)
+    second[3:5, 2:7] = 200
+    data = films.gif(iter([first, first, second, first]), [20, 2_000_000, 40, 30])
+    lasts, shown = [], []
+    with Image.open(io.BytesIO(data)) as picture:
+        for frame in range(picture.n_frames):  # type: ignore[attr-defined]
+            picture.seek(frame)
+            lasts.append(picture.info["duration"])
+            shown.append(int(np.asarray(picture.convert("RGB"))[4, 4, 0]))
+    assert lasts[-2:] == [40, 30]
+    assert sum(lasts) == 2_000_090
+    assert shown == [0, 0, 0, 0, 200, 0]
+
+
+_BOUNDED = """
+import resource, sys
+import numpy as np
+from neurovis_renderers import films
+
+def frames(count):
+    for frame in range(count):
+        picture = np.full((400, 300, 3), 90, np.uint8)
+        picture[frame : frame + 40, 20:220, frame % 3] = 250
+        yield picture
+
+make = getattr(films, sys.argv[1])
+make(frames(3), [40] * 3)
+pages = int(open("/proc/self/statm").read().split()[0])
+resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + (32 << 20), -1))
+print(len(make(frames(200), [40] * 200)))
+"""
+
+
+@pytest.mark.parametrize("kind", ["gif", "webp"])
+def test_a_film_takes_the_memory_of_a_few_pictures(kind: str) -> None:
+    """Two hundred of half a megabyte do not fit into the 32 that are left."""
+    done = subprocess.run([sys.executable, "-c", _BOUNDED, kind], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert 10_000 < int(done.stdout) < 8 << 20
+
+
+def test_a_big_picture_is_the_same_in_bands(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn = scene()
+    whole = Canvas(drawn).paint(drawn)
+    monkeypatch.setattr(raster, "_MOST_AT_ONCE", 100 * drawn.pixels[0])
+    assert len(Canvas(drawn)._bands) > 4
+    assert np.abs(Canvas(drawn).paint(drawn).astype(int) - whole).max() <= 1
+
+
+def test_what_is_remembered_is_bounded_by_its_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(raster, "_MOST_KEPT", 1 << 16)
+    drawn = scene()
+    canvas = Canvas(drawn)
+    before = canvas.paint(drawn)
+    (band,) = canvas._bands
+    assert 0 < band._masks._bytes <= 1 << 16
+    assert band._masks._bytes == sum(mask.nbytes for mask, _ in band._masks._kept.values())
+    assert np.array_equal(canvas.paint(drawn), before)
+
+
+@pytest.mark.parametrize("width", [63.0, 400.0, 4000.0])
+def test_a_wide_stroke_covers_what_lies_within_half_its_width(width: float) -> None:
+    line = ((20.0, 80.0), (70.0, 80.0), (120.0, 80.0), (180.0, 80.0))
+    mask = coverage.stroke_field(line, width, SIZE).mask(width)
+    assert mask.share.sum() == pytest.approx(160 * min(width, SIZE[1]), rel=0.01)
+
+
+def test_a_head_that_hides_the_picture_takes_the_memory_of_the_picture() -> None:
+    corners = ((100.0, 80.0), (4000.0, 9000.0), (3000.0, 80.0), (4000.0, -9000.0))
+    tracemalloc.start()
+    mask = coverage.polygon(corners, (1280, 960))
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(mask.pixels) > 1000 * 900
+    assert peak < 1280 * 960 * 100
 
 
 def test_a_frame_does_not_depend_on_those_before_it() -> None:

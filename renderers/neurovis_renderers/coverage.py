@@ -20,6 +20,11 @@ Size = tuple[int, int]  # width, height
 
 #: Powers of two, so that a pixel (up to 2^28 of them), a distance and a dot fit into 62 bits.
 _LEVELS, _MOST_DOTS = 1 << 16, 1 << 18
+#: Pairs of a pixel and a dot that are compared at once: they take some 16 MB.
+_MOST_PAIRS = 1 << 18
+#: A stroke wider than this (in pixels) is drawn from dots that are further apart; the same as how far it reaches.
+WIDE = 62.5
+_FAR = WIDE / 2 + 0.75
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +33,11 @@ class Mask:
 
     pixels: IntArray
     share: FloatArray
+
+    @property
+    def nbytes(self) -> int:
+        """What it takes of memory."""
+        return self.pixels.nbytes + self.share.nbytes
 
     def onto(self, picture: FloatArray, colour: tuple[int, int, int], opacity: float = 1.0) -> None:
         """Blend a colour over a picture (height · width, 3), in sRGB as browsers do."""
@@ -42,6 +52,11 @@ class Field:
     pixels: IntArray
     across: FloatArray
     ends: FloatArray
+
+    @property
+    def nbytes(self) -> int:
+        """What it takes of memory."""
+        return self.pixels.nbytes + self.across.nbytes + self.ends.nbytes
 
     def mask(self, width: float) -> Mask:
         """The stroke of this width."""
@@ -70,12 +85,20 @@ def flatten(points: Sequence[Point], spacing: float = 1.0) -> FloatArray:
 
 
 def stroke_field(points: Sequence[Point], widest: float, size: Size) -> Field:
-    """The field of a spline for strokes up to ``widest``, with butt caps."""
+    """The field of a spline for strokes up to ``widest``, with butt caps.
+
+    Where the stroke is wide, so are the steps along the curve: at a dot the curve is taken for straight, and a bend as
+    narrow as its stroke is wide cannot be seen beneath it.
+    """
+    reach = widest / 2 + 0.75
     dots = flatten(points)
     tangents = np.gradient(dots, axis=0)
     lengths = np.hypot(*tangents.T)[:, None]
     tangents = np.divide(tangents, lengths, out=np.tile([1.0, 0.0], (len(dots), 1)), where=lengths > 1e-12)
-    pixels, centres, nearest = _near(dots, widest / 2 + 0.75, size)
+    if reach > _FAR:
+        some = np.linspace(0, len(dots) - 1, max(2, int(len(dots) * _FAR / reach))).round().astype(np.int64)
+        dots, tangents = dots[some], tangents[some]
+    pixels, centres, nearest = _near(dots, reach, size)
     away = centres - dots[nearest]
     along = (away * tangents[nearest]).sum(axis=1)
     across = np.abs(away[:, 0] * tangents[nearest, 1] - away[:, 1] * tangents[nearest, 0])
@@ -98,23 +121,59 @@ def dashed(points: Sequence[Point], width: float, dash: Sequence[float], size: S
 
 def _near(dots: FloatArray, reach: float, size: Size) -> tuple[IntArray, FloatArray, IntArray]:
     """The pixels within ``reach`` of dots: their indices, their centres, and the dot that is nearest to each."""
+    pixels, nearest = (_near_far if reach > _FAR else _near_close)(dots, reach, size)
+    centres: FloatArray = np.stack([pixels % size[0] + 0.5, pixels // size[0] + 0.5], axis=1)
+    return pixels, centres, nearest
+
+
+def _near_close(dots: FloatArray, reach: float, size: Size) -> tuple[IntArray, IntArray]:
+    """``_near`` by all pairs of a dot and a pixel in the square around it, so many at a time."""
     wide, high = size
     most = int(np.ceil(reach - 0.5))
     steps = np.arange(-most, most + 1)
-    x = np.floor(dots[:, 0]).astype(np.int64)[:, None, None] + steps[None, None, :]
-    y = np.floor(dots[:, 1]).astype(np.int64)[:, None, None] + steps[None, :, None]
-    distance = (x + 0.5 - dots[:, 0, None, None]) ** 2 + (y + 0.5 - dots[:, 1, None, None]) ** 2
-    kept = (x >= 0) & (x < wide) & (y >= 0) & (y < high) & (distance <= reach**2)
-    # one number for pixel, distance and dot, so that one sort finds the nearest dot of each pixel
-    level = (distance[kept] * ((_LEVELS - 1) / reach**2)).astype(np.int64)
-    which = np.broadcast_to(np.arange(len(dots))[:, None, None], kept.shape)[kept]
-    keys = np.sort(((y * wide + x)[kept] * _LEVELS + level) * _MOST_DOTS + which)
+    together = max(1, _MOST_PAIRS // len(steps) ** 2)
+    found = [np.empty(0, np.int64)]
+    for start in range(0, len(dots), together):
+        some = dots[start : start + together]
+        x = np.floor(some[:, 0]).astype(np.int64)[:, None, None] + steps[None, None, :]
+        y = np.floor(some[:, 1]).astype(np.int64)[:, None, None] + steps[None, :, None]
+        distance = (x + 0.5 - some[:, 0, None, None]) ** 2 + (y + 0.5 - some[:, 1, None, None]) ** 2
+        kept = (x >= 0) & (x < wide) & (y >= 0) & (y < high) & (distance <= reach**2)
+        # one number for pixel, distance and dot, so that one sort finds the nearest dot of each pixel
+        level = (distance[kept] * ((_LEVELS - 1) / reach**2)).astype(np.int64)
+        which = np.broadcast_to(np.arange(start, start + len(some))[:, None, None], kept.shape)[kept]
+        found.append(_least(((y * wide + x)[kept] * _LEVELS + level) * _MOST_DOTS + which))
+    keys = _least(np.concatenate(found))
+    return keys // (_LEVELS * _MOST_DOTS), keys % _MOST_DOTS
+
+
+def _least(keys: IntArray) -> IntArray:
+    """The least key of each pixel, by pixel."""
+    keys = np.sort(keys)
     owner = keys // (_LEVELS * _MOST_DOTS)
     first = np.ones(len(keys), bool)
     first[1:] = owner[1:] != owner[:-1]
-    pixels = owner[first]
-    centres: FloatArray = np.stack([pixels % wide + 0.5, pixels // wide + 0.5], axis=1)
-    return pixels, centres, keys[first] % _MOST_DOTS
+    return keys[first]
+
+
+def _near_far(dots: FloatArray, reach: float, size: Size) -> tuple[IntArray, IntArray]:
+    """``_near`` dot by dot, for a reach that covers much of the picture: memory for its pixels, not for pairs."""
+    wide, high = size
+    best, which = np.full((high, wide), reach**2), np.full((high, wide), -1, np.int32)
+    for number, (x, y) in enumerate(dots.tolist()):
+        rows, columns = _span(y, reach, high), _span(x, reach, wide)
+        across, down = np.arange(wide)[columns] + 0.5 - x, np.arange(high)[rows] + 0.5 - y
+        distance = across[None, :] ** 2 + down[:, None] ** 2
+        closer = distance < best[rows, columns]
+        best[rows, columns][closer] = distance[closer]
+        which[rows, columns][closer] = number
+    pixels = np.flatnonzero(which >= 0)
+    return pixels, which.reshape(-1)[pixels].astype(np.int64)
+
+
+def _span(centre: float, reach: float, end: int) -> slice:
+    """The pixels of a side of ``end`` pixels that lie within ``reach`` of a place."""
+    return slice(max(0, int(centre - reach)), max(0, min(end, int(centre + reach) + 1)))
 
 
 def _window(x0: float, y0: float, x1: float, y1: float, size: Size) -> tuple[IntArray, FloatArray, FloatArray]:
@@ -176,15 +235,35 @@ def outline(corner: Point, extent: Point, radius: float, width: float, size: Siz
 
 
 def polygon(points: Sequence[Point], size: Size, grid: int = 8) -> Mask:
-    """A small filled polygon, by the even-odd rule, on a grid of ``grid`` by ``grid`` points a pixel."""
+    """A filled polygon, by the even-odd rule, where its edges run on a grid of ``grid`` by ``grid`` points a pixel."""
     corners = np.asarray(points, float)
     (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
     pixels, x, y = _window(x0, y0, x1, y1, size)
+    share = _inside(corners, x, y).astype(float)
     steps = (np.arange(grid) + 0.5) / grid - 0.5
     dx, dy = (a.ravel() for a in np.meshgrid(steps, steps))
-    px, py = x[:, None] + dx, y[:, None] + dy
-    inside = np.zeros(px.shape, bool)
+    edge = np.flatnonzero(_at_an_edge(corners, x, y))
+    together = max(1, _MOST_PAIRS // grid**2)
+    for start in range(0, len(edge), together):
+        some = edge[start : start + together]
+        share[some] = _inside(corners, x[some, None] + dx, y[some, None] + dy).mean(axis=1)
+    return _mask(pixels, share)
+
+
+def _inside(corners: FloatArray, x: FloatArray, y: FloatArray) -> npt.NDArray[np.bool_]:
+    """Which points lie within a polygon."""
+    inside = np.zeros(x.shape, bool)
     for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         if ay != by:
-            inside ^= ((ay > py) != (by > py)) & (px < ax + (py - ay) * (bx - ax) / (by - ay))
-    return _mask(pixels, inside.mean(axis=1))
+            inside ^= ((ay > y) != (by > y)) & (x < ax + (y - ay) * (bx - ax) / (by - ay))
+    return inside
+
+
+def _at_an_edge(corners: FloatArray, x: FloatArray, y: FloatArray) -> npt.NDArray[np.bool_]:
+    """Which pixels, by their centres, an edge of a polygon may run through."""
+    found = np.zeros(x.shape, bool)
+    for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        dx, dy = bx - ax, by - ay
+        along = np.clip(((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy or 1.0), 0.0, 1.0)
+        found |= (x - ax - along * dx) ** 2 + (y - ay - along * dy) ** 2 < 0.75**2
+    return found

@@ -1,22 +1,24 @@
 """Raster pictures: a Scene as PNG, GIF or WebP, the same picture as the SVG.
 
 In: a Scene or a Film. Out: the bytes of a file, with the pixels that the scene states. Shapes are drawn by coverage
-(``coverage``), texts and file formats are Pillow's. What does not change from frame to frame is computed once.
+(``coverage``), texts and file formats are Pillow's. What does not change from frame to frame is computed once, as far
+as it is small; a big picture is painted in bands, and a film frame by frame, so that memory stays bounded.
 """
 
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import Generic, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 from PIL import Image
 
 from neurovis_renderers import coverage
 from neurovis_renderers.coverage import Field, FloatArray, Mask, Size
+from neurovis_renderers.films import Pixels, gif, webp
 from neurovis_renderers.lettering import lettering
 from neurovis_spec.scene import (
     Arrowhead,
@@ -35,9 +37,10 @@ from neurovis_spec.scene import (
     still,
 )
 
-Pixels = npt.NDArray[np.uint8]
-#: masks that are remembered
-_MOST_KEPT = 20_000
+#: bytes of masks and of fields that are remembered
+_MOST_KEPT = 1 << 27
+#: pixels that are painted at a time: a picture that has more is painted in bands, one after the other
+_MOST_AT_ONCE = 1 << 21
 _FORMATS = {".png": "PNG", ".gif": "GIF", ".webp": "WEBP"}
 
 
@@ -63,44 +66,84 @@ class PillowRenderer:
         unit = 10 if suffix == ".gif" else 1
         times = [round(1000 * frame / film.fps / unit) * unit for frame in range(film.frames + 1)]
         lasts = [max(end - start, 2 * unit) for start, end in pairwise(times)]
-        canvas = Canvas(film.scene)
-        pictures = []
-        for frame in range(film.frames):
-            pictures.append(Image.fromarray(canvas.paint(still(film, frame))))
-            if progress is not None:
-                progress(frame + 1, film.frames)
-        buffer = io.BytesIO()
-        rest, first = pictures[1:], pictures[0]
-        if suffix == ".gif":
-            first.save(buffer, "GIF", save_all=True, append_images=rest, duration=lasts, loop=0)
-        else:
-            first.save(buffer, "WEBP", save_all=True, append_images=rest, duration=lasts, loop=0, quality=85, method=2)
-        return buffer.getvalue()
+        frames = _frames(film, progress)
+        return gif(frames, lasts) if suffix == ".gif" else webp(frames, lasts)
+
+
+def _frames(film: Film, progress: Progress | None) -> Iterator[Pixels]:
+    """The pictures of a film, each made when it is asked for."""
+    canvas = Canvas(film.scene)
+    for frame in range(film.frames):
+        picture = canvas.paint(still(film, frame))
+        if progress is not None:
+            progress(frame + 1, film.frames)
+        yield picture
 
 
 class Canvas:
     """Draws scenes of one size; remembers the masks of shapes it has seen."""
 
     def __init__(self, scene: Scene) -> None:
-        self._size: Size = scene.pixels
-        self._density = scene.density
-        self._masks: dict[object, Mask] = {}
-        self._fields: dict[object, tuple[float, Field]] = {}
+        wide, high = self._size = scene.pixels
+        rows = max(1, _MOST_AT_ONCE // wide)
+        self._bands = [_Band(scene.density, (wide, min(rows, high - top)), top) for top in range(0, high, rows)]
 
     def paint(self, scene: Scene) -> Pixels:
         """The picture, (height, width, 3)."""
-        wide, high = self._size
+        if len(self._bands) == 1:
+            return self._bands[0].paint(scene)
+        picture = np.empty((self._size[1], self._size[0], 3), np.uint8)
+        for band in self._bands:
+            picture[band.top : band.top + band.size[1]] = band.paint(scene)
+            band.forget()
+        return picture
+
+
+class _Band:
+    """Some rows of a picture, from row ``top`` on: what it takes of memory does not grow with the picture."""
+
+    def __init__(self, density: float, size: Size, top: int) -> None:
+        self.size, self.top = size, top
+        self._density = density
+        self._masks = _Memory[Mask]()
+        self._fields = _Memory[tuple[float, Field]]()
+
+    def forget(self) -> None:
+        """Give back the memory of what was seen."""
+        self._masks.clear()
+        self._fields.clear()
+
+    def paint(self, scene: Scene) -> Pixels:
+        """The rows, (height, width, 3)."""
+        wide, high = self.size
         picture: FloatArray = np.tile(np.array(channels(scene.theme.background), float), (wide * high, 1))
         for group in scene.groups:
             before = picture.copy() if group.opacity < 1 else None
             for shape in group.shapes:
-                self._draw(picture, shape)
+                if self._touches(shape):
+                    self._draw(picture, shape)
             if before is not None:  # the group as one: what it has changed, in part
                 picture = before + group.opacity * (picture - before)
-        return np.rint(picture).astype(np.uint8).reshape(high, wide, 3)
+        return np.rint(picture, out=picture).astype(np.uint8).reshape(high, wide, 3)
+
+    def _touches(self, shape: Shape) -> bool:
+        """Whether a shape may reach into these rows; most of those that are far above or below do not."""
+        match shape:
+            case Spline():
+                rows, reach = [y for _, y in shape.points], shape.width
+            case Arrowhead():
+                rows, reach = [y for _, y in shape.points], 0.0
+            case Disc():
+                rows, reach = [shape.centre[1]], shape.radius + shape.stroke_width
+            case Text():
+                rows, reach = [shape.point[1]], 3 * shape.size
+            case _:
+                return True
+        low, high = (min(rows) - reach) * self._density, (max(rows) + reach) * self._density
+        return high > self.top - 2 and low < self.top + self.size[1] + 2
 
     def _draw(self, picture: FloatArray, shape: Shape) -> None:
-        size, density = self._size, self._density
+        size, density = self.size, self._density
         match shape:
             case Spline():
                 self._stroke(shape).onto(picture, channels(shape.stroke), shape.opacity)
@@ -130,19 +173,18 @@ class Canvas:
                 self._kept(key, lambda: self._lettering(shape)).onto(picture, channels(shape.fill))
 
     def _pixels(self, points: Sequence[Point]) -> list[Point]:
-        """User units to pixels."""
-        return [(x * self._density, y * self._density) for x, y in points]
+        """User units to pixels of the band."""
+        return [(x * self._density, y * self._density - self.top) for x, y in points]
 
     def _lettering(self, text: Text, halo: bool = False) -> Mask:
         (point,) = self._pixels((text.point,))
-        return lettering(replace(text, point=point, size=text.size * self._density), self._size, halo)
+        return lettering(replace(text, point=point, size=text.size * self._density), self.size, halo)
 
     def _kept(self, key: object, make: Callable[[], Mask]) -> Mask:
         mask = self._masks.get(key)
         if mask is None:
-            if len(self._masks) > _MOST_KEPT:
-                self._masks.clear()
-            mask = self._masks[key] = make()
+            mask = make()
+            self._masks.put(key, mask, mask.nbytes)
         return mask
 
     def _stroke(self, shape: Spline) -> Mask:
@@ -150,12 +192,14 @@ class Canvas:
         width = shape.width * self._density
         if shape.dash:
             key, dash = (shape.points, width, shape.dash), [part * self._density for part in shape.dash]
-            return self._kept(key, lambda: coverage.dashed(self._pixels(shape.points), width, dash, self._size))
-        widest, field = self._fields.get(shape.points, (0.0, None))
+            return self._kept(key, lambda: coverage.dashed(self._pixels(shape.points), width, dash, self.size))
+        if width > coverage.WIDE:
+            return coverage.stroke_field(self._pixels(shape.points), width, self.size).mask(width)
+        widest, field = self._fields.get(shape.points) or (0.0, None)
         if field is None or width > widest:
-            widest = width if field is None else 1.5 * width
-            field = coverage.stroke_field(self._pixels(shape.points), widest, self._size)
-            self._fields[shape.points] = (widest, field)
+            widest = width if field is None else min(1.5 * width, coverage.WIDE)
+            field = coverage.stroke_field(self._pixels(shape.points), widest, self.size)
+            self._fields.put(shape.points, (widest, field), field.nbytes)
         return field.mask(width)
 
     def _ramp(self, picture: FloatArray, shape: Ramp) -> None:
@@ -165,4 +209,30 @@ class Canvas:
         for place, colour in enumerate(shape.colours):
             corner = (round(near[0] + place * step), round(near[1]))
             extent = (round(far[0]) - corner[0], round(far[1]) - corner[1])
-            coverage.rectangle(corner, extent, 0, self._size).onto(picture, channels(colour))
+            coverage.rectangle(corner, extent, 0, self.size).onto(picture, channels(colour))
+
+
+Kept = TypeVar("Kept")
+
+
+class _Memory(Generic[Kept]):
+    """What was made, by key, as far as it fits into ``_MOST_KEPT`` bytes; what was put in first goes first."""
+
+    def __init__(self) -> None:
+        self._kept: dict[object, tuple[Kept, int]] = {}
+        self._bytes = 0
+
+    def get(self, key: object) -> Kept | None:
+        found = self._kept.get(key)
+        return None if found is None else found[0]
+
+    def put(self, key: object, value: Kept, size: int) -> None:
+        self._bytes += size - self._kept.pop(key, (value, 0))[1]
+        self._kept[key] = value, size
+        while self._bytes > _MOST_KEPT:
+            first = next(iter(self._kept))
+            self._bytes -= self._kept.pop(first)[1]
+
+    def clear(self) -> None:
+        self._kept.clear()
+        self._bytes = 0

@@ -1,0 +1,89 @@
+"""Films as GIF and WebP, frame by frame: no picture is kept but the one before.
+
+In: the pictures of a film, one after the other, and how many milliseconds each lasts. Out: the bytes of a file that
+starts over at its end. Pillow quantises and compresses; its own way of writing many pictures holds them all at once.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import numpy.typing as npt
+from PIL import GifImagePlugin, Image
+
+Pixels = npt.NDArray[np.uint8]
+
+#: Colours of a picture of a GIF; one more is for what has not changed.
+_COLOURS = 255
+#: The longest that a picture of a GIF can last, in milliseconds.
+_LONGEST = 655_350
+
+
+def gif(frames: Iterator[Pixels], lasts: Sequence[int]) -> bytes:
+    """A GIF: the first picture, then of each the rectangle in which it differs from the one before."""
+    before = next(frames)
+    high, wide = before.shape[:2]
+    buffer = io.BytesIO()
+    buffer.write(b"GIF89a" + struct.pack("<HHBBB", wide, high, 0x70, 0, 0))
+    buffer.write(b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")
+    changed, corner, picture, waiting = np.ones((high, wide), bool), (0, 0), before, lasts[0]
+    for after, last in zip(frames, lasts[1:], strict=True):
+        differs = (after != before).any(axis=2)
+        if not differs.any():  # a picture that stays longer
+            waiting += last
+            continue
+        _write_picture(buffer, picture, changed, corner, waiting)
+        rows, columns = np.flatnonzero(differs.any(axis=1)), np.flatnonzero(differs.any(axis=0))
+        window = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+        changed, corner, picture = differs[window], (int(columns[0]), int(rows[0])), after[window]
+        before, waiting = after, last
+    _write_picture(buffer, picture, changed, corner, waiting)
+    buffer.write(b";")
+    return buffer.getvalue()
+
+
+def _write_picture(
+    buffer: io.BytesIO, picture: Pixels, changed: npt.NDArray[np.bool_], corner: tuple[int, int], lasts: int
+) -> None:
+    """A picture with a palette of its own, seen through where nothing has changed."""
+    reduced = Image.fromarray(picture).convert("P", palette=Image.Palette.ADAPTIVE, colors=_COLOURS)
+    palette = bytes(reduced.getpalette() or ())[: 3 * _COLOURS].ljust(768, b"\0")
+    indices = np.where(changed, np.asarray(reduced), np.uint8(_COLOURS))
+    for start in range(0, lasts, _LONGEST):
+        part = Image.frombytes("P", indices.shape[::-1], indices.tobytes())
+        part.putpalette(palette)
+        how = {"duration": min(lasts - start, _LONGEST), "transparency": _COLOURS, "disposal": 1}
+        buffer.writelines(GifImagePlugin.getdata(part, corner, include_color_table=True, **how))
+        indices = np.full((1, 1), _COLOURS, np.uint8)  # then nothing changes for as long again
+
+
+def webp(frames: Iterator[Pixels], lasts: Sequence[int]) -> bytes:
+    """A WebP; its encoder keeps compressed pictures only."""
+    buffer = io.BytesIO()
+    film = _Film(frames, len(lasts))
+    film.save(buffer, "WEBP", save_all=True, duration=list(lasts), loop=0, quality=85, method=2)
+    return buffer.getvalue()
+
+
+class _Film(Image.Image):
+    """An image of many pictures, as Pillow's readers give it: each is made when it is sought, in order."""
+
+    def __init__(self, frames: Iterator[Pixels], count: int) -> None:
+        super().__init__()
+        self._frames, self.n_frames, self._place = frames, count, -1
+        self.seek(0)
+
+    def seek(self, frame: int) -> None:
+        """Make this picture; going back to the beginning, which Pillow does at the end, changes nothing."""
+        if frame != self._place + 1:
+            return
+        picture = Image.fromarray(next(self._frames))
+        self._size, self._mode, self.im = picture.size, picture.mode, picture.im
+        self._place = frame
+
+    def tell(self) -> int:
+        """Which picture it is."""
+        return self._place
