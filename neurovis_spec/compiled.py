@@ -228,17 +228,20 @@ class CompiledNetwork:
     ) -> None:
         """Draw ``steps`` steps from step ``start`` on, one a frame, into a file whose suffix says what kind.
 
-        ``fps`` defaults to 1/dt, at most 60, and to 25 where the spec writes no dt.
+        ``fps`` defaults to 1/dt, at most 60, and to 25 where the spec writes no dt. Raises OutputError for a kind that
+        nobody makes and for a film that is too long, before anything is run.
         """
+        from neurovis_spec.scene.film_size import check_film
         from neurovis_spec.scene.renderers import renderer_for
-        from neurovis_spec.snapshots import snapshots_from
+        from neurovis_spec.snapshots import frames_of, snapshots_from
 
         suffix = Path(path).suffix
-        renderer_for(suffix, moving=True)
+        renderer = renderer_for(suffix, moving=True)
         if fps is None:
             fps = min(1 / self.network.dt, MOST_FPS) if self.network.dt_given else DEFAULT_FPS
         if not (math.isfinite(fps) and fps > 0):
             raise ValueError(f"frames a second are above 0, not {fps}")
+        check_film(self.network, frames_of(self.network, start, steps, recording), suffix, renderer.capabilities)
         run = partial(self.run, progress=progress)
         snapshots = snapshots_from(self.network, start, steps, recording, run)
         film = pipeline.moving(self.network, self._layout, snapshots, self.gains, self._settings(theme), fps)

@@ -13,7 +13,7 @@ What the first four find at fault goes into Findings, all at once; ``Findings.ch
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -164,7 +164,7 @@ def picture(network: Network, layout: Layout, snapshot: Snapshot, gains: Gains, 
 def moving(
     network: Network,
     layout: Layout,
-    snapshots: Iterable[Snapshot],
+    snapshots: Collection[Snapshot],
     gains: Gains,
     settings: RenderSettings,
     fps: float,

@@ -5,8 +5,8 @@ In: a Network, the steps wanted, a Recording of it, or a function that runs so m
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from itertools import islice
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,21 +29,47 @@ def snapshot_at(
     return recording.snapshot(int(recording.step[-1]) if step is None else step)
 
 
-def snapshots_from(
-    network: Network, start: int, steps: int | None, recording: Recording | None, run: Callable[[int], Recording]
-) -> list[Snapshot]:
-    """The snapshots of ``steps`` steps from ``start`` on, by default of all that follow. Raises InputError,
-    RecordingError."""
+@dataclass(frozen=True)
+class Snapshots(Collection[Snapshot]):
+    """Snapshots of a recording, each made when it is its turn."""
+
+    recording: Recording
+    steps: tuple[int, ...]
+
+    def __len__(self) -> int:
+        return len(self.steps)
+
+    def __iter__(self) -> Iterator[Snapshot]:
+        return map(self.recording.snapshot, self.steps)
+
+    def __contains__(self, snapshot: object) -> bool:
+        return isinstance(snapshot, Snapshot) and snapshot.step in self.steps
+
+
+def frames_of(network: Network, start: int, steps: int | None, recording: Recording | None) -> int:
+    """How many snapshots ``snapshots_from`` gives, known before anything is run. Raises InputError, RecordingError."""
     if start < 0 or (steps is not None and steps < 1):
         raise InputError(f"{steps} frames from step {start}: at least one frame from step 0 on is wanted")
     if recording is None:
-        count = max(1, network.steps - start) if steps is None else steps
-        recording = run(start + count)
+        return max(1, network.steps - start) if steps is None else steps
     check_same(recording, network)
-    rows = recording.step[recording.step >= start].tolist()
+    rows = int((recording.step >= start).sum())
     if not rows:
         raise RecordingError(f"the recording holds no step from {start} on")
-    return [recording.snapshot(step) for step in islice(rows, steps)]
+    return rows if steps is None else min(rows, steps)
+
+
+def snapshots_from(
+    network: Network, start: int, steps: int | None, recording: Recording | None, run: Callable[[int], Recording]
+) -> Snapshots:
+    """The snapshots of ``steps`` steps from ``start`` on, by default of all that follow. Raises InputError,
+    RecordingError."""
+    count = frames_of(network, start, steps, recording)
+    if recording is None:
+        recording = run(start + count)
+        check_same(recording, network)
+    rows = recording.step[recording.step >= start]
+    return Snapshots(recording, tuple(rows[:count].tolist()))
 
 
 def check_same(recording: Recording, network: Network) -> None:

@@ -44,7 +44,7 @@ def test_nothing_glows_at_step_0() -> None:
 
 
 def test_lines_are_never_thinner_than_the_thinnest_and_else_exact() -> None:
-    widths = encoding.line_width(np.array([0.0, 0.1, -0.1499, 0.15, -2.0, np.nan, np.inf]), 4.0)
+    widths = encoding.line_width(np.array([0.0, 0.1, -0.1499, 0.15, -2.0, np.nan, np.inf]), 4.0, 5000.0)
     assert widths.tolist() == [0.6, 0.6, 0.6, 0.6, 8.0, 0.6, 0.6]
 
 

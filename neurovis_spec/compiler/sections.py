@@ -26,6 +26,8 @@ from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.source import Mapping as SourceMapping
 from neurovis_spec.language.spec import Spec
 
+#: The most pixels of a picture: 8K is a little less. Its bytes take some 250 MB of memory.
+_MOST_PIXELS = 1 << 25
 _NOTHING = LayoutModel.model_validate(SourceMapping((), Span("", 1, 1, 1, 1)), context=Findings())
 
 
@@ -146,6 +148,10 @@ def render_settings(model: RenderModel | None, constants: Constants) -> RenderSe
     if model.size is not None:
         width, height = (_side(side, constants) for side in model.size)
         size = None if width is None or height is None else (width, height)
+        if size is not None and size[0] * size[1] > _MOST_PIXELS:
+            message = f"a picture has at most {_MOST_PIXELS:,} pixels, this one {size[0] * size[1]:,}"
+            hint = "an '.svg' can be shown as large as one likes"
+            constants.findings.error("out-of-range", model.size[1].span, message, hint)
     return RenderSettings(
         activity=None if gain is None else factor(gain.activity),
         signal=None if gain is None else factor(gain.signal),

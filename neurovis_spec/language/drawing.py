@@ -142,7 +142,7 @@ class RenderModel(Model):
         tuple[FormulaField, FormulaField] | None,
         BeforeValidator(lambda node, info: _size(node, info)),
         WithJsonSchema({"type": "array", "items": FORMULA, "minItems": 2, "maxItems": 2}),
-    ] = Field(None, description="[width, height] in pixels.")
+    ] = Field(None, description="[width, height] in pixels: 64 to 16384 each, and 33554432 in all.")
     labels: BoolField | None = Field(None, description="Whether neurons show their labels (default true).")
     legend: BoolField | None = Field(None, description="Whether there is a legend (default true).")
     title: TitleField | None = Field(

@@ -43,16 +43,16 @@ class Looks:
 def encode(network: Network, layout: Layout, snapshot: Snapshot, gains: Gains, settings: RenderSettings) -> Scene:
     """The picture of one step. Raises KeyError for an unknown theme or a neuron without a position."""
     planned = plan(network, layout, gains, settings)
-    seen = looks(network, snapshot, gains)
+    seen = looks(network, snapshot, gains, planned.frame.widest)
     words = tooltips(network, snapshot.activity[None], snapshot.weights[None])
     said = caption(network, snapshot.step, snapshot.activity)
     return paint(planned, seen, seen.glows > 0, said, words, snapshot.step)
 
 
-def looks(network: Network, snapshot: Snapshot, gains: Gains) -> Looks:
-    """What a step looks like."""
+def looks(network: Network, snapshot: Snapshot, gains: Gains, widest: float) -> Looks:
+    """What a step looks like, with lines of at most this width."""
     connections = network.connections
-    widths = encoding.line_width(snapshot.weights, gains.thickness)
+    widths = encoding.line_width(snapshot.weights, gains.thickness, widest)
     changes = encoding.glow(snapshot.weights, snapshot.previous_weights, gains.change)
     sent = snapshot.activity[connections.sources]
     return Looks(

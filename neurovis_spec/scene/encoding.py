@@ -45,10 +45,11 @@ def thickness(weight: FloatArray, gain: float) -> FloatArray:
     return result
 
 
-def line_width(weight: FloatArray, gain: float) -> FloatArray:
-    """The width of a line: Eq. 4, and never thinner than ``THINNEST``. Weights that are no number are drawn so."""
-    drawn = thickness(weight, gain)
-    result: FloatArray = np.where(np.isfinite(drawn), np.maximum(THINNEST, drawn), THINNEST)
+def line_width(weight: FloatArray, gain: float, widest: float) -> FloatArray:
+    """The width of a line: Eq. 4, never thinner than ``THINNEST``, never wider than ``widest``, which covers the whole
+    picture. Weights that are no finite number are drawn as thin as can be."""
+    drawn = np.clip(thickness(weight, gain), THINNEST, widest)
+    result: FloatArray = np.where(np.isfinite(weight), drawn, THINNEST)
     return result
 
 

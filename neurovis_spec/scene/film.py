@@ -6,7 +6,7 @@ of one frame, the same picture as ``encode`` makes of that step.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.scene.caption import caption
-from neurovis_spec.scene.encode import CAPTION, lesions_by_id, looks, paint, tooltips
+from neurovis_spec.scene.encode import CAPTION, Looks, lesions_by_id, looks, paint, tooltips
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.lesions import FAINT
 from neurovis_spec.scene.model import Arrowhead, Disc, Film, Group, Scene, Shape, Spline, Text, head_half_width
@@ -31,16 +31,23 @@ if TYPE_CHECKING:
 def film(
     network: Network,
     layout: Layout,
-    snapshots: Iterable[Snapshot],
+    snapshots: Collection[Snapshot],
     gains: Gains,
     settings: RenderSettings,
     fps: float,
 ) -> Film:
     """One frame a snapshot, ``fps`` frames a second. Raises ValueError without a snapshot."""
     planned = plan(network, layout, gains, settings)
-    seen, captions, steps, low, high = [], [], list[int](), None, None
-    for snapshot in snapshots:
-        seen.append(looks(network, snapshot, gains))
+    frames, neurons, connections = len(snapshots), len(network.neurons), len(network.connections)
+    if not frames:
+        raise ValueError("a film has at least one frame")
+    disc_values, line_values = np.empty((frames, neurons)), np.empty((frames, connections))
+    widths, glows = np.empty((2, frames, connections))
+    captions, steps, low, high = list[str](), list[int](), None, None
+    for frame, snapshot in enumerate(snapshots):
+        seen = looks(network, snapshot, gains, planned.frame.widest)
+        disc_values[frame], line_values[frame] = seen.discs, seen.lines
+        widths[frame], glows[frame] = seen.widths, seen.glows
         steps.append(snapshot.step)
         words = caption(network, snapshot.step, snapshot.activity)
         shape = planned.caption_shape(words)
@@ -48,19 +55,19 @@ def film(
         now = (snapshot.activity, snapshot.weights)
         low = now if low is None else (np.minimum(low[0], now[0]), np.minimum(low[1], now[1]))
         high = now if high is None else (np.maximum(high[0], now[0]), np.maximum(high[1], now[1]))
-    if low is None or high is None:
-        raise ValueError("a film has at least one frame")
-    glows = np.stack([look.glows for look in seen])
-    glowing: npt.NDArray[np.bool_] = np.max(glows > 0, axis=0)
+    assert low is not None
+    assert high is not None
+    glowing: npt.NDArray[np.bool_] = glows.max(axis=0) > 0
+    first = Looks(disc_values[0], line_values[0], widths[0], glows[0])
     titles = tooltips(network, np.stack([low[0], high[0]]), np.stack([low[1], high[1]]))
     return Film(
-        scene=paint(planned, seen[0], glowing, captions[0], titles, steps[0]),
+        scene=paint(planned, first, glowing, captions[0], titles, steps[0]),
         fps=fps,
         discs=tuple(f"n{index}" for index in range(len(network.neurons))),
         lines=tuple(f"c{index}" for index in range(len(network.connections))),
-        disc_values=np.stack([look.discs for look in seen]),
-        line_values=np.stack([look.lines for look in seen]),
-        line_widths=np.stack([look.widths for look in seen]),
+        disc_values=disc_values,
+        line_values=line_values,
+        line_widths=widths,
         glow_widths=glows,
         caption=CAPTION,
         captions=tuple(captions),

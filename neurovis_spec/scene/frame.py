@@ -36,6 +36,11 @@ class Frame:
     top: float
     density: float
 
+    @property
+    def widest(self) -> float:
+        """The width of a line that covers the picture wherever it runs: a wider one cannot be told from it."""
+        return 2 * float(np.hypot(self.width, self.height))
+
     def map(self, points: FloatArray) -> FloatArray:
         """Layout units (…, 2) to user units."""
         result: FloatArray = points * self.scale + np.array([self.left, self.top])

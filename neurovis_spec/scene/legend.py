@@ -56,7 +56,7 @@ class Contents:
 def entries(contents: Contents, gains: Gains, theme: Theme) -> list[Entry]:
     """The entries that this picture needs."""
     result = [_colour(contents, gains, theme)]
-    if contents.lines and gains.thickness:
+    if contents.lines and gains.thickness and math.isfinite(_WIDEST / gains.thickness):  # else all are thin
         result.append(_thickness(contents, gains, theme))
     if contents.learns and gains.change:
         result.append(_glow(gains, theme))

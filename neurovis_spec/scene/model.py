@@ -224,10 +224,12 @@ class Film:
 
 @dataclass(frozen=True, slots=True)
 class RendererCapabilities:
-    """File suffixes (with the dot) of the stills and of the films that a renderer makes."""
+    """File suffixes (with the dot) of the stills and of the films that a renderer makes; of a film the most ``pixels``,
+    those of all frames together (None: it does not depend on them)."""
 
     stills: frozenset[str] = frozenset()
     films: frozenset[str] = frozenset()
+    pixels: int | None = None
 
 
 class Renderer(Protocol):

@@ -84,7 +84,7 @@ def plan(network: Network, layout: Layout, gains: Gains, settings: RenderSetting
     radius = RADIUS * frame.scale
     gap, head = min(1.5, 0.1 * radius), _head(radius)
     lines = trimmed([frame.map(route) for route in routes], radius, gap, head)
-    obstacles = Obstacles(_dots(lines), _reaches(network, gains), centres, radius)
+    obstacles = Obstacles(_dots(lines), _reaches(network, gains, frame.widest), centres, radius)
     dots = [(teacher, dotted(teacher, centres, radius, gap, head, obstacles)) for teacher in teachers]
     for points in _dots([line for _, line in dots]):
         obstacles.add_line(points)
@@ -210,9 +210,9 @@ def _head(radius: float) -> float:
     return min(10.0, max(0.5 * radius, min(6.5, 0.75 * radius)))
 
 
-def _reaches(network: Network, gains: Gains) -> list[float]:
+def _reaches(network: Network, gains: Gains, widest: float) -> list[float]:
     """How far lines reach from their middle: half their width and a little air; those that learn glow as well."""
-    widths = encoding.line_width(network.connections.weights, gains.thickness)
+    widths = encoding.line_width(network.connections.weights, gains.thickness, widest)
     reaches = np.maximum(2.5, 0.5 * widths + 1.5)
     reaches[network.changing] = np.maximum(reaches[network.changing], 3.5)
     result: list[float] = reaches.tolist()

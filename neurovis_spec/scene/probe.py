@@ -34,7 +34,8 @@ def probe(network: Network, progress: Progress | None = None) -> Gains:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # the run that the author asks for warns
         recording = record(network, steps, progress=progress)
-    return choose_gains(network, settings, *peaks(network, recording))
+    with np.errstate(over="ignore", invalid="ignore"):  # what is no finite number counts for nothing
+        return choose_gains(network, settings, *peaks(network, recording))
 
 
 def peaks(network: Network, recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

@@ -76,8 +76,6 @@ class _Writer:
         self._film = film
         self._discs = {name: place for place, name in enumerate(film.discs)}
         self._lines = {name: place for place, name in enumerate(film.lines)}
-        self._disc_levels = _levels(film.disc_values)
-        self._line_levels = _levels(film.line_values)
         self._changing = film.changing
         self._width_step = _step(film.line_widths)
         self._glow_step = _step(film.glow_widths)
@@ -91,7 +89,7 @@ class _Writer:
         if group.id == self._film.caption:
             return self._caption(group)
         if group.id in self._discs:
-            levels = self._disc_levels[:, self._discs[group.id]]
+            levels = _levels(self._film.disc_values[:, self._discs[group.id]])
             return self._animated(group, [self._letter(level) for level in levels.tolist()])
         if group.id in self._lines:
             return self._connection(group, self._lines[group.id])
@@ -103,7 +101,7 @@ class _Writer:
         return LETTERS[level]
 
     def _connection(self, group: Group, place: int) -> str:
-        tokens = [self._letter(level) for level in self._line_levels[:, place].tolist()]
+        tokens = [self._letter(level) for level in _levels(self._film.line_values[:, place]).tolist()]
         if self._changing[place]:
             widths = np.rint(self._film.line_widths[:, place] / self._width_step).astype(int).tolist()
             glows = np.rint(self._film.glow_widths[:, place] / self._glow_step).astype(int).tolist()

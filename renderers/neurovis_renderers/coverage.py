@@ -96,7 +96,11 @@ def stroke_field(points: Sequence[Point], widest: float, size: Size) -> Field:
     lengths = np.hypot(*tangents.T)[:, None]
     tangents = np.divide(tangents, lengths, out=np.tile([1.0, 0.0], (len(dots), 1)), where=lengths > 1e-12)
     if reach > _FAR:
-        some = np.linspace(0, len(dots) - 1, max(2, int(len(dots) * _FAR / reach))).round().astype(np.int64)
+        some = (
+            np.linspace(0, len(dots) - 1, min(len(dots), max(2, int(2 * len(dots) * _FAR / reach))))
+            .round()
+            .astype(np.int64)
+        )
         dots, tangents = dots[some], tangents[some]
     pixels, centres, nearest = _near(dots, reach, size)
     away = centres - dots[nearest]

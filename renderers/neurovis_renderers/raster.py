@@ -41,6 +41,8 @@ from neurovis_spec.scene import (
 _MOST_KEPT = 1 << 27
 #: pixels that are painted at a time: a picture that has more is painted in bands, one after the other
 _MOST_AT_ONCE = 1 << 21
+#: pixels of all frames of a film: compressed they are kept until the end, some 50 MB for each 2^30
+MOST_PIXELS = 1 << 34
 _FORMATS = {".png": "PNG", ".gif": "GIF", ".webp": "WEBP"}
 
 
@@ -48,7 +50,9 @@ class PillowRenderer:
     """Stills as PNG, GIF and WebP, films as GIF and WebP."""
 
     name = "pillow"
-    capabilities = RendererCapabilities(stills=frozenset({".png", ".gif", ".webp"}), films=frozenset({".gif", ".webp"}))
+    capabilities = RendererCapabilities(
+        stills=frozenset({".png", ".gif", ".webp"}), films=frozenset({".gif", ".webp"}), pixels=MOST_PIXELS
+    )
 
     def draw(self, scene: Scene, suffix: str) -> bytes:
         """The picture as a file."""

@@ -1,0 +1,33 @@
+"""How long a film may be: known, and refused, before anything is run.
+
+In: a network, the number of frames, the kind of file. Out: nothing, or RendererError that says the limit and the way
+out. What a film takes of memory grows with its frames: all colours and widths, and of pixels what is left of them when
+they are compressed.
+"""
+
+from __future__ import annotations
+
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.scene.frame import MOST
+from neurovis_spec.scene.model import RendererCapabilities
+from neurovis_spec.scene.renderers import RendererError
+
+#: The most colours of a film: frames times neurons and connections; with the widths half a gigabyte.
+MOST_COLOURS = 20_000_000
+
+
+def check_film(network: Network, frames: int, suffix: str, capabilities: RendererCapabilities) -> None:
+    """Refuse a film that would take more memory than is reasonable. Raises RendererError."""
+    parts = len(network.neurons) + len(network.connections)
+    if frames * parts > MOST_COLOURS:
+        most = max(1, MOST_COLOURS // parts)
+        message = f"a film of {frames:,} frames of {parts:,} neurons and connections is too long: {most:,} is the most"
+        raise RendererError(message, f"draw fewer steps (--steps {most}), or one by one (neurovis render --step N)")
+    if capabilities.pixels is None:
+        return
+    wide, high = network.render.size or (int(MOST[0]), int(MOST[1]))
+    most = max(1, capabilities.pixels // (wide * high))
+    if frames > most:
+        message = f"a '{suffix}' of {frames:,} frames of {wide} × {high} pixels is too long: {most:,} is the most"
+        hint = f"draw fewer steps (--steps {most}), a smaller picture (render: size), or an '.svg', which has no pixels"
+        raise RendererError(message, hint)

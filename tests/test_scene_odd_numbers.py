@@ -1,0 +1,129 @@
+"""Pictures of numbers that are hard to draw: huge, tiny, infinite, none. Each is drawn, in bounded memory."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import neurovis_spec as nv
+from neurovis_spec import pipeline
+from neurovis_spec.runtime.record import Course
+from neurovis_spec.runtime.recording import Recording, Snapshot
+from neurovis_spec.scene import RendererCapabilities, Spline, encoding
+from neurovis_spec.scene.film_size import MOST_COLOURS, check_film
+from neurovis_spec.scene.renderers import RendererError
+from neurovis_spec.snapshots import snapshots_from
+
+TEXT = """neurovis: 1
+name: x
+time: {{steps: 6}}
+neurons: {{A: {{bias: {bias}, activation: identity}}, B: {{count: 2}}}}
+connections:
+  A -> B: {{weight: {weight}, plasticity: {{hebbian: {{rate: 0.5}}}}}}
+  B1 -> B1: {{weight: {weight}}}
+  B2 -> A: {{weight: {weight}}}
+render: {{gain: {{{gain}}}}}
+"""
+GAINS = (
+    "",
+    "thickness: 1",
+    "thickness: 1e308",
+    "thickness: 5e-324",
+    "thickness: 0, change: 0, signal: 0, activity: 0",
+    "change: 1e308, signal: 1e308, activity: 1e308",
+    "change: 5e-324, signal: 5e-324, activity: 5e-324",
+)
+
+
+@pytest.mark.parametrize(("weight", "bias"), [*itertools.product(("1000", "-1e308", "5e-324"), ("0.3", "1e308"))])
+def test_every_number_can_be_drawn_without_a_warning_of_numpy(weight: str, bias: str, tmp_path: Path) -> None:
+    for place, gain in enumerate(GAINS):
+        network = nv.compile_text(TEXT.format(weight=weight, bias=bias, gain=gain))
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            warnings.filterwarnings("ignore", message=r".* is (inf|-inf|nan) (at|after) step \d+, in 'x'")
+            network.render(tmp_path / f"{place}.svg")
+            network.animate(tmp_path / f"m{place}.svg", steps=4)
+            network.render(tmp_path / f"{place}.webp")
+        content = (tmp_path / f"{place}.svg").read_text(encoding="utf-8")
+        assert not re.search(r'"[^"]*\b(nan|inf)\b', content)
+        assert max(map(float, re.findall(r'stroke-width="([^"]*)"', content))) < 4000
+
+
+def test_widths_follow_equation_4_until_they_cover_the_picture() -> None:
+    weights, widest = np.array([-3.0, 0.01, 900.0, 1e9, -1e308, np.inf, np.nan]), 2500.0
+    widths = encoding.line_width(weights, 2.0, widest)
+    assert widths.tolist() == [6.0, encoding.THINNEST, 1800.0, widest, widest, encoding.THINNEST, encoding.THINNEST]
+    network = nv.compile_text(TEXT.format(weight=1e6, bias=0, gain="thickness: 1"))
+    snapshot = network.run(1).snapshot(0)
+    scene = pipeline.picture(network.network, network.layout().value, snapshot, network.gains, network.network.render)
+    lines = [shape.width for group in scene.groups if "connection" in group.data for shape in group.shapes
+             if isinstance(shape, Spline)]  # fmt: skip
+    assert set(lines) == {2 * np.hypot(scene.width, scene.height)}
+
+
+_BOUNDED = """
+import resource, sys
+import neurovis_spec as nv
+from neurovis_renderers.raster import PillowRenderer
+text, path = sys.argv[1:]
+nv.compile_text("{neurovis: 1, name: w, neurons: {A: {}}}").render(path)
+pages = int(open("/proc/self/statm").read().split()[0])
+resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + (300 << 20), -1))
+nv.compile_text(text).render(path)
+"""
+
+
+@pytest.mark.parametrize(
+    "more",
+    ["connections: {A -> B: 1000, B -> A: 1e308}", "connections: {A -> B: 3}\nrender: {size: [4096, 3072]}"],
+    ids=["wide lines", "many pixels"],
+)
+def test_a_picture_takes_the_memory_of_its_pixels(more: str, tmp_path: Path) -> None:
+    """Not that of a line's pixels for each point along the line, nor that of numbers for all pixels at once."""
+    gain = "gain: {thickness: 1}"
+    more = more.replace("render: {", "render: {" + gain + ", ") if "render" in more else f"{more}\nrender: {{{gain}}}"
+    text = f"neurovis: 1\nname: x\nneurons: {{A: {{bias: 1}}, B: {{}}}}\n{more}\n"
+    command = [sys.executable, "-W", "ignore", "-c", _BOUNDED, text, str(tmp_path / "x.png")]
+    threads = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, env=threads)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_film_that_is_too_long_is_refused_before_anything_is_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    network = nv.compile_text("neurovis: 1\nname: x\nneurons: {A: {}, B: {}}\nconnections: {A -> B: 1}")
+    monkeypatch.setattr(pipeline, "simulate", lambda *_: pytest.fail("it was run"))
+    with pytest.raises(RendererError, match=r"20,000 frames of 1280 × 960 pixels is too long: 13,981") as caught:
+        network.animate(tmp_path / "x.gif", steps=20_000)
+    assert "--steps 13981" in str(caught.value.hint)
+    assert "'.svg'" in str(caught.value.hint)
+    with pytest.raises(RendererError, match="of 3 neurons and connections is too long"):
+        network.animate(tmp_path / "x.svg", steps=MOST_COLOURS // 3 + 1)
+    check_film(network.network, MOST_COLOURS // 3, ".svg", RendererCapabilities())
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_film_takes_snapshots_one_after_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    network = nv.compile_text("neurovis: 1\nname: x\nneurons: {A: {}, B: {}}\nconnections: {A -> B: 1}").network
+    made: list[int] = []
+    take = Recording.snapshot
+
+    def counted(recording: Recording, step: int) -> Snapshot:
+        made.append(step)
+        return take(recording, step)
+
+    monkeypatch.setattr(Recording, "snapshot", counted)
+    found = snapshots_from(network, 2, 5, None, lambda steps: pipeline.simulate(network, Course(steps)))
+    assert (len(found), made) == (5, [])
+    assert [snapshot.step for snapshot, _ in zip(found, range(3), strict=False)] == [2, 3, 4]
+    assert len(made) <= 4
