@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
 import neurovis_spec as nv
 from neurovis_spec.compiler.draws import Stream
+from neurovis_spec.runtime import inputs
+from neurovis_spec.runtime.inputs import InputReader
 
 SPEC = """
 neurovis: 1
@@ -64,3 +68,40 @@ def test_noise_that_draws_nothing_is_a_finding() -> None:
     with pytest.raises(nv.SpecError) as caught:
         nv.compile_text("neurovis: 1\nname: x\nneurons: {A: {noise: 0.5}}")
     assert [(d.code, d.span.line, d.span.column) for d in caught.value.diagnostics] == [("no-draw", 3, 22)]
+
+
+def test_noise_is_drawn_as_it_is_needed() -> None:
+    """A step of 20,000 neurons takes the memory of some steps, not of hundreds: 256 of them would be 40 MB and more."""
+    network = nv.compile_text(
+        "neurovis: 1\nname: x\nneurons: {A: {count: 20000, noise: 'normal(0, 1)'}}\ninputs: {s: {expression: sin(k)}}"
+    ).network
+    reader = InputReader(network)
+    tracemalloc.start()
+    reader.at(0)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 8 << 20
+
+
+def test_how_many_steps_are_drawn_at_once_changes_no_bit(monkeypatch: pytest.MonkeyPatch) -> None:
+    network = nv.compile_text(
+        "neurovis: 1\nname: x\nneurons: {A: {count: 30, noise: 'exp(normal(0, 1)) * sin(k + i) + uniform(0, t)'}}\n"
+        "inputs: {s: {expression: sin(k/7)*exp(-k)}, v: {values: [[1, 2], [3, 4]]}}"
+    ).network
+    whole = np.stack(list(InputReader(network).rows(200, 600)))
+    assert whole.shape == (400, 33)
+    for values in (1, 100, 1000, 1 << 20):
+        monkeypatch.setattr(inputs, "_MOST_VALUES", values)
+        reader = InputReader(network)
+        assert np.array_equal(np.stack(list(reader.rows(200, 600))), whole)
+        assert np.array_equal(reader.at(317), whole[117])
+
+
+def test_normal_numbers_in_pieces_are_those_that_are_drawn_one_by_one() -> None:
+    stream = Stream(3, "noise", "A")
+    i, step = np.arange(9000).reshape(1, -1), np.array([[0], [7], [2**32 + 1]])
+    drawn = stream.normal(i, 0, step, 2)
+    assert drawn.shape == (3, 9000)
+    for row, column in ((0, 0), (1, 8191), (1, 8192), (2, 8999)):
+        assert drawn[row, column] == stream.normal(column, 0, int(step[row, 0]) % 2**32, 2)
+    assert stream.uniform(np.zeros((0, 4), int), 0, 0, 0).shape == (0, 4)

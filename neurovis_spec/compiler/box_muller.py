@@ -17,6 +17,8 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.float64]
 
 _LN2_HIGH, _LN2_LOW = float.fromhex("0x1.62e42feep-1"), float.fromhex("0x1.a39ef35793c76p-33")
+#: the bits of √½, rounded, and those of a number's fraction
+_ROOT_HALF, _FRACTION = int(np.float64(math.sqrt(0.5)).view(np.int64)), (1 << 52) - 1
 _LOG = (
     6.666666666666735130e-01,
     3.999999999940941908e-01,
@@ -46,27 +48,45 @@ _COS = (
 
 def log(x: FloatArray) -> FloatArray:
     """The natural logarithm of normal positive numbers, within 1 unit of the last place."""
-    mantissa, exponent = np.frexp(x)
-    low = mantissa < math.sqrt(0.5)
-    f = np.where(low, 2.0 * mantissa, mantissa) - 1.0
-    k = (exponent - low).astype(np.float64)
+    # x is (1 + f)·2^k with 1 + f from √½ to √2: k and f stand in the bits of the number
+    bits = np.ravel(x).view(np.int64) - _ROOT_HALF
+    k = (bits >> 52).astype(np.float64)
+    f = ((bits & _FRACTION) + _ROOT_HALF).view(np.float64)
+    f -= 1.0
     s = f / (2.0 + f)
-    z = s * s
-    r = z * _polynomial(_LOG, z)
-    half = 0.5 * f * f
-    return k * _LN2_HIGH - ((half - (s * (half + r) + k * _LN2_LOW)) - f)
+    r = s * s
+    r *= _polynomial(_LOG, r)
+    half = 0.5 * f
+    half *= f
+    # k·ln 2 (high) − ((half − (s·(half + r) + k·ln 2 (low))) − f)
+    r += half
+    r *= s
+    r += k * _LN2_LOW
+    half -= r
+    half -= f
+    k *= _LN2_HIGH
+    k -= half
+    return k.reshape(np.shape(x))
 
 
 def cos_turns(u: FloatArray) -> FloatArray:
     """cos(2πu) for u in [0, 1]: 0 and ±1 exactly where they are, else within some 1e-16."""
-    quarter = np.rint(4.0 * u)
-    x = (u - 0.25 * quarter) * math.tau  # the difference is exact, and |x| is at most π/4
+    flat = np.ravel(u)
+    quarter = np.rint(4.0 * flat)
+    x = flat - 0.25 * quarter  # the difference is exact, and |x| is at most π/4
+    x *= math.tau
     z = x * x
-    cosine = 1.0 - (0.5 * z - z * z * _polynomial(_COS, z))
-    sine = x + x * z * _polynomial(_SIN, z)
-    turn = np.mod(quarter, 4.0)
-    value = np.where(np.mod(turn, 2.0) == 0.0, cosine, sine)
-    return np.where((turn == 1.0) | (turn == 2.0), -value, value)
+    sine = _polynomial(_SIN, z)  # x + x·z·polynomial
+    sine *= x * z
+    sine += x
+    cosine = _polynomial(_COS, z)  # 1 − (z/2 − z²·polynomial)
+    cosine *= z * z
+    z *= 0.5
+    z -= cosine
+    np.subtract(1.0, z, out=cosine)
+    turn = quarter.astype(np.int8)
+    value = np.where(turn & 1, sine, cosine)
+    return np.negative(value, out=value, where=(turn == 1) | (turn == 2)).reshape(np.shape(u))
 
 
 def normal(first: FloatArray, second: FloatArray) -> FloatArray:
@@ -80,7 +100,9 @@ def normal(first: FloatArray, second: FloatArray) -> FloatArray:
 
 def _polynomial(coefficients: tuple[float, ...], z: FloatArray) -> FloatArray:
     """c0 + z·(c1 + z·(c2 + …)), by Horner."""
-    total = np.full_like(z, coefficients[-1])
-    for coefficient in reversed(coefficients[:-1]):
-        total = coefficient + z * total
+    total = coefficients[-1] * z
+    total += coefficients[-2]
+    for coefficient in reversed(coefficients[:-2]):
+        total *= z
+        total += coefficient
     return total

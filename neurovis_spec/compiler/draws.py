@@ -12,6 +12,8 @@ over 2^53, in [0, 1); a normal one comes from two such, of w0 w1 and of w2 w3, b
 from __future__ import annotations
 
 import hashlib
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal, TypeAlias
@@ -24,6 +26,9 @@ from neurovis_spec.compiler import box_muller
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 IntArray: TypeAlias = npt.NDArray[np.int64]
 WordArray: TypeAlias = npt.NDArray[np.uint32]
+LongArray: TypeAlias = npt.NDArray[np.uint64]
+#: the four words of counters, or of what becomes of them
+Block: TypeAlias = tuple[LongArray, LongArray, LongArray, LongArray]
 #: One part of a counter: integers that broadcast with the other parts; taken modulo 2^32.
 Index: TypeAlias = int | npt.NDArray[np.integer]
 Value: TypeAlias = float | FloatArray
@@ -33,7 +38,7 @@ _WEYL = (0x9E3779B9, 0xBB67AE85)
 _ROUNDS = 10
 _LOW, _HIGH = np.uint64(0xFFFFFFFF), np.uint64(32)
 #: Blocks made at once: what fits into a processor's cache.
-_CHUNK = 16384
+_CHUNK = 8192
 
 
 def philox4x32(counter: WordArray, key: tuple[int, int]) -> WordArray:
@@ -46,24 +51,52 @@ def philox4x32(counter: WordArray, key: tuple[int, int]) -> WordArray:
     flat = counters.reshape(-1, 4)
     blocks = np.empty_like(flat)
     for start in range(0, len(flat), _CHUNK):
-        blocks[start : start + _CHUNK] = _rounds(flat[start : start + _CHUNK], key)
+        parts = flat[start : start + _CHUNK].T.astype(np.uint64)
+        blocks[start : start + _CHUNK] = np.stack(_rounds((parts[0], parts[1], parts[2], parts[3]), key), axis=-1)
     return blocks.reshape(counters.shape)
 
 
-def _rounds(counters: WordArray, key: tuple[int, int]) -> WordArray:
-    c0, c1, c2, c3 = counters.T.astype(np.uint64)
+def _rounds(parts: Block, key: tuple[int, int]) -> Block:
+    """The words w0 … w3 of counters, each below 2^32 in 64 bits. What the parts of a counter have in common is computed
+    once: they broadcast, and so do the words."""
+    c0, c1, c2, c3 = parts
     k0, k1 = key
     for _ in range(_ROUNDS):
         first, second = _MULTIPLIERS[0] * c0, _MULTIPLIERS[1] * c2
-        c0, c1 = (second >> _HIGH) ^ c1 ^ np.uint64(k0), second & _LOW
-        c2, c3 = (first >> _HIGH) ^ c3 ^ np.uint64(k1), first & _LOW
+        c0, c1 = (second >> _HIGH) ^ (c1 ^ np.uint64(k0)), second & _LOW
+        c2, c3 = (first >> _HIGH) ^ (c3 ^ np.uint64(k1)), first & _LOW
         k0, k1 = (k0 + _WEYL[0]) & 0xFFFFFFFF, (k1 + _WEYL[1]) & 0xFFFFFFFF
-    return np.stack((c0, c1, c2, c3), axis=-1).astype(np.uint32)
+    return c0, c1, c2, c3
 
 
-def _fraction(high: WordArray, low: WordArray) -> FloatArray:
+def _pieces(shape: tuple[int, ...]) -> Iterator[tuple[slice, ...]]:
+    """An array of this shape in pieces of at most ``_CHUNK`` items."""
+    if not shape:
+        yield ()
+        return
+    behind = math.prod(shape[1:])
+    if behind <= _CHUNK:
+        rows = max(1, _CHUNK // max(behind, 1))
+        for start in range(0, shape[0], rows):
+            yield slice(start, start + rows), *(slice(None) for _ in shape[1:])
+        return
+    for row in range(shape[0]):
+        for piece in _pieces(shape[1:]):
+            yield slice(row, row + 1), *piece
+
+
+def _fraction(high: LongArray, low: LongArray) -> FloatArray:
     """53 bits of two words, as a number in [0, 1)."""
-    return ((high >> np.uint32(5)) * 67108864.0 + (low >> np.uint32(6))) * 2.0**-53
+    return (((high >> np.uint64(5)) << np.uint64(26)) | (low >> np.uint64(6))).astype(np.float64) * 2.0**-53
+
+
+def _normal(block: Block) -> FloatArray:
+    return box_muller.normal(_fraction(block[0], block[1]), _fraction(block[2], block[3]))
+
+
+def _word(part: IntArray) -> LongArray:
+    """A part of a counter modulo 2^32."""
+    return part.astype(np.uint64) & _LOW
 
 
 @dataclass(frozen=True)
@@ -95,14 +128,26 @@ class Stream:
 
     def uniform(self, i: Index, j: Index, step: Index, draw: Index) -> FloatArray:
         """Uniform numbers in [0, 1), of the shape to which the parts of the counter broadcast."""
-        words = self.words(i, j, step, draw)
-        return np.asarray(_fraction(words[..., 0], words[..., 1]))
+        return self._numbers((i, j, step, draw), lambda block: _fraction(block[0], block[1]))
 
     def normal(self, i: Index, j: Index, step: Index, draw: Index) -> FloatArray:
         """Standard normal numbers, of the shape to which the parts of the counter broadcast."""
-        words = self.words(i, j, step, draw)
-        first = _fraction(words[..., 0], words[..., 1])
-        return np.asarray(box_muller.normal(first, _fraction(words[..., 2], words[..., 3])))
+        return self._numbers((i, j, step, draw), _normal)
+
+    def _numbers(self, parts: tuple[Index, Index, Index, Index], make: Callable[[Block], FloatArray]) -> FloatArray:
+        """A number of each counter, so many at a time that what they are made of stays in a processor's cache."""
+        shape = np.broadcast_shapes(*(np.shape(part) for part in parts))
+        aligned = [np.asarray(part, dtype=np.int64) for part in parts]
+        aligned = [part.reshape((1,) * (len(shape) - part.ndim) + part.shape) for part in aligned]
+        numbers = np.empty(shape)
+        for piece in _pieces(shape):
+            c0, c1, c2, c3 = (
+                part[tuple(taken if size > 1 else slice(None) for taken, size in zip(piece, part.shape, strict=True))]
+                for part in aligned
+            )
+            block = _rounds((_word(c0), _word(c1), _word(c2), _word(c3)), self.key)
+            numbers[piece] = make(block)
+        return numbers
 
     def drawn(
         self,

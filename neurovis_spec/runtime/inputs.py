@@ -1,13 +1,14 @@
 """Inputs: s[t] as one vector, from expressions, tables and what the caller supplies; behind them the noise.
 
-In: a Network and the caller's values. Out: for each step the vector of all inputs. Rows are made a stretch of steps
-at a time, the same stretches however one runs, so that stepping and running give the same bits.
+In: a Network and the caller's values. Out: for each step the vector of all inputs. Expressions are evaluated a stretch
+of steps at a time, the same stretches however one runs, so that stepping and running give the same bits; rows are made
+from them for as many of these steps as make a fixed number of values, so that memory does not grow with the steps.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -20,8 +21,10 @@ from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.tree import Draw
 from neurovis_spec.runtime.state import State, constants
 
-#: steps of a stretch
+#: steps of a stretch, a power of two
 STRETCH = 256
+#: values of rows that are made together, at least one row
+_MOST_VALUES = 1 << 16
 
 
 class InputError(ValueError):
@@ -32,11 +35,17 @@ class InputReader:
     """The inputs of a network, step by step.
 
     ``supplied`` maps names to whole arrays that replace their sources: (steps, size), (steps,) for size 1, or one
-    number or (size,) for all steps; past its end the last row stays. Raises InputError.
+    number or (size,) for all steps; past its end the last row stays. ``made`` is told of rows when they are made: the
+    first step, and a row for each from there on. Raises InputError.
     """
 
-    def __init__(self, network: Network, supplied: Mapping[str, npt.ArrayLike] | None = None) -> None:
-        self.network = network
+    def __init__(
+        self,
+        network: Network,
+        supplied: Mapping[str, npt.ArrayLike] | None = None,
+        made: Callable[[int, FloatArray], None] | None = None,
+    ) -> None:
+        self.network, self._told = network, made
         self._supplied = {name: _whole(_entry(network, name), value) for name, value in (supplied or {}).items()}
         self._parameters, self._variables, self._drawn_before = network.settable.parameters, network.settable.initial, 0
         read = (*(entry.slots for entry in network.inputs), *(noise.slots for noise in network.noises))
@@ -44,6 +53,10 @@ class InputReader:
         self._tables = any(name.startswith("table/") for name in network.settable.variables)
         self._first = -1
         self._rows: FloatArray = np.zeros((0, network.vector_size))
+        together = min(STRETCH, max(1, _MOST_VALUES // max(1, network.vector_size)))
+        self._steps = 1 << (together.bit_length() - 1)  # a power of two, too: no rows are of two stretches
+        #: the values of expressions over a stretch, by input, and where the stretch begins
+        self._expressions: dict[str, tuple[int, FloatArray]] = {}
 
     def use(self, state: State) -> None:
         """Take parameters as a state has them by now."""
@@ -56,16 +69,19 @@ class InputReader:
         ):
             self._drawn_before = state.drawn
             self._first, self._rows = -1, self._rows[:0]
+            self._expressions.clear()
 
-    def rows(self, first: int, stop: int) -> FloatArray:
-        """The vectors of steps ``first`` … ``stop`` − 1, in one stretch: (stop − first, inputs), read-only."""
-        if not self._first <= first < self._first + len(self._rows):
-            self._make(first - first % STRETCH)
-        return self._rows[first - self._first : stop - self._first]
+    def rows(self, first: int, stop: int) -> Iterator[FloatArray]:
+        """The vectors of steps ``first`` … ``stop`` − 1, each (inputs,), read-only."""
+        while first < stop:
+            if not self._first <= first < self._first + len(self._rows):
+                self._make(first - first % self._steps)
+            yield from self._rows[first - self._first : stop - self._first]
+            first = self._first + len(self._rows)
 
     def at(self, k: int, values: Mapping[str, npt.ArrayLike] | None = None) -> FloatArray:
         """The vector of step k; ``values`` replace the sources for this step only."""
-        row: FloatArray = self.rows(k, k + 1)[0]
+        row = next(self.rows(k, k + 1))
         if values:
             row = row.copy()
             for name, value in values.items():
@@ -74,14 +90,16 @@ class InputReader:
         return row
 
     def _make(self, first: int) -> None:
-        steps = np.arange(first, first + STRETCH)
-        rows = np.zeros((STRETCH, self.network.vector_size))
+        steps = np.arange(first, first + self._steps)
+        rows = np.zeros((self._steps, self.network.vector_size))
         for entry in self.network.inputs:
             rows[:, entry.start : entry.start + entry.size] = self._source(entry, steps)
         for noise in self.network.noises:
             rows[:, noise.start : noise.start + len(noise.members)] = self._drawn(noise, steps)
         rows.flags.writeable = False
         self._first, self._rows = first, rows
+        if self._told is not None:
+            self._told(first, rows)
 
     def _source(self, entry: Input, steps: npt.NDArray[np.int64]) -> FloatArray | float:
         table = self._supplied.get(entry.name, self._table(entry))
@@ -90,12 +108,21 @@ class InputReader:
             return chosen.reshape(len(steps), -1)
         if entry.expression is None:
             return 0.0
-        k = steps.astype(np.float64)
+        within = int(steps[0]) % STRETCH
+        begin = int(steps[0]) - within
+        kept = self._expressions.get(entry.name)
+        if kept is None or kept[0] != begin:
+            kept = self._expressions[entry.name] = begin, self._evaluated(entry, begin)
+        return kept[1][within : within + len(steps)].reshape(-1, 1)
+
+    def _evaluated(self, entry: Input, begin: int) -> FloatArray:
+        """An expression over the stretch that begins here: (steps,)."""
+        assert entry.expression is not None
+        k = np.arange(begin, begin + STRETCH).astype(np.float64)
         dt = self.network.dt
         known: dict[str, float | FloatArray] = {**constants(dt), **self.network.parameters, "k": k, "t": k * dt}
         known |= self._set(entry.slots)
-        values = np.broadcast_to(evaluate_array(entry.expression, known), (len(steps),))
-        return np.asarray(values, dtype=np.float64).reshape(-1, 1)
+        return np.asarray(np.broadcast_to(evaluate_array(entry.expression, known), (STRETCH,)), dtype=np.float64)
 
     def _set(self, slots: Mapping[str, int]) -> dict[str, float]:
         """The parameters of an expression that can be set, as they are by now."""

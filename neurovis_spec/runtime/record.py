@@ -133,7 +133,7 @@ def go(network: Network, state: State, course: Course, rows: Rows, progress: Pro
     changing = _subscript(network.changing)
     watch, due, step = Watch(network), rows.due, prepare(network, course.backend).step
     look = watch.look
-    reader = InputReader(network, course.inputs)
+    reader = InputReader(network, course.inputs, watch.given)
     controls, changes = Controls(network), {change.at: change for change in network.changes}
     edges = [0, *(at for at in changes if 0 < at < steps), steps]
     with np.errstate(all="ignore"):
@@ -146,9 +146,8 @@ def go(network: Network, state: State, course: Course, rows: Rows, progress: Pro
                     return
                 wanted = (stop - 1) // every - (first - 1) // every
                 activity, weights = rows.begin(wanted)
-                row, vectors = 0, reader.rows(first, stop)
-                watch.given(first, vectors)
-                for k, vector in enumerate(vectors, first):
+                row = 0
+                for k, vector in enumerate(reader.rows(first, stop), first):
                     keep = k % every == 0
                     if keep and changing is not None:
                         weights[row] = state.weights[changing]

@@ -7,7 +7,6 @@ can be kept and gone back to.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from functools import cached_property
 
@@ -47,7 +46,7 @@ class Simulation:
     def __init__(self, network: Network, backend: str | Backend | None = None, start: Recording | None = None) -> None:
         self.network = network
         self._stepper = prepare(network, backend)
-        self._reader = InputReader(network)
+        self._reader = InputReader(network, made=lambda first, rows: self._watch.given(first, rows))
         self._controls = Controls(network)
         self._changes = {change.at: change for change in network.changes}
         self._begin = initial_state(network) if start is None else resumed_state(network, start)
@@ -106,8 +105,6 @@ class Simulation:
         state = self._state
         vector = self._reader.at(state.k, {**(values or {}), **inputs})
         with np.errstate(all="ignore"):
-            if not math.isfinite(vector.dot(vector)):
-                self._watch.given(state.k, vector.reshape(1, -1))
             self._stepper.step(state, vector)
             self._watch.look(state)
         if state.k in self._changes:  # those of the next step apply now, so that ``weights`` are those of the next step
