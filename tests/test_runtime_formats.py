@@ -241,7 +241,12 @@ def test_a_recording_by_another_program_is_read(tmp_path: Path) -> None:
 BAD: Mapping[str, Mapping[str, object]] = {
     "no 'plastic'": {"plastic": None},
     "'activity' is of another type": {"activity": np.zeros(2)},
-    "'activity' is of another": {"activity": np.array([["a", "b"]] * 2)},
+    "an array of texts is no array of real numbers": {"activity": np.array([["a", "b"]] * 2)},
+    "an array of dates is no array of texts": {"neurons": np.array(["2020-01-01"] * 2, dtype="M8[D]")},
+    "an array of spans of time is no array of integers": {"sources": np.array([0, 0], dtype="m8[s]")},
+    "an array of byte strings is no array of texts": {"neurons": np.array([b"A", b"B"])},
+    "an array of truth values is no array of texts": {"neurons": np.array([True, False])},
+    "an array of integers is no array of texts": {"about": np.array(3)},
     "'sources' is of another type": {"sources": np.array([0.0, 0.0])},
     "'neurons' has the shape": {"neurons": np.array(["A"])},
     "'neurons' holds a name twice": {"neurons": np.array(["A", "A"])},

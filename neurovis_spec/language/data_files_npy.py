@@ -29,8 +29,12 @@ _VERSIONS: Final = {b"\x01\x00": 2, b"\x02\x00": 4, b"\x03\x00": 4}
 _ITEM: Final = rb"\s*(?:'descr'\s*:\s*'([^'\\]*)'|'fortran_order'\s*:\s*(True|False)|'shape'\s*:\s*\(([0-9L,\s]*)\))\s*"
 _HEADER: Final = re.compile(rb"\s*\{%b,%b,%b(?:,\s*)?\}\s*" % (_ITEM, _ITEM, _ITEM))
 _STRUCTURE: Final = re.compile(rb"'descr'\s*:\s*[\[(]")
-_TYPE: Final = re.compile(r"[<>|=]?([a-zA-Z])[0-9]{0,9}")
-_KINDS: Final = {"O": "Python objects", "c": "complex numbers", "b": "truth values", "V": "structures"}
+_TYPE: Final = re.compile(r"[<>|=]?(?:([a-zA-Z])[0-9]{0,9}|([Mm])8\[.*\])")
+_KINDS: Final = {
+    **dict.fromkeys("iu", "integers"),
+    **{"f": "real numbers", "c": "complex numbers", "b": "truth values", "U": "texts", "S": "byte strings"},
+    **{"M": "dates", "m": "spans of time", "O": "Python objects", "V": "structures"},
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,9 +76,8 @@ def read_header(data: bytes, size: int, kinds: str, dimensions: tuple[int, ...],
     dimensions, and of at most so many cells. Raises CellError."""
     kind, description, column_major, shape, offset = _header(data)
     if kind not in kinds:
-        wanted = "real numbers" if kinds == REAL else _named(kinds)
-        hint = "array.astype(float) makes 0 and 1 of them" if kind == "b" else None
-        raise CellError("file-format", f"an array of {_named(kind)} is no array of {wanted}", hint)
+        hint = "array.astype(float) makes 0 and 1 of them" if kind == "b" and set(kinds) <= set(REAL) else None
+        raise CellError("file-format", f"an array of {_named(kind)} is no array of {_named(kinds)}", hint)
     try:
         dtype = np.dtype(description)
     except (TypeError, ValueError):
@@ -114,7 +117,7 @@ def _header(data: bytes) -> tuple[str, str, bool, tuple[int, ...], int]:
     if any(len(number) > _LONGEST_SIZE for number in numbers):
         raise CellError("file-format", f"its header promises {_bytes(10**_LONGEST_SIZE)} of numbers")
     kind = _TYPE.fullmatch(text := description.decode("latin-1"))
-    return kind[1] if kind else "?", text, order == b"True", tuple(map(int, numbers)), end
+    return (kind[1] or kind[2]) if kind else "?", text, order == b"True", tuple(map(int, numbers)), end
 
 
 def _unreadable() -> CellError:
@@ -122,9 +125,15 @@ def _unreadable() -> CellError:
 
 
 def _named(kinds: str) -> str:
-    if kinds == "iu":
-        return "integers"
-    return "numbers" if kinds and kinds in REAL else _KINDS.get(kinds, "texts or dates")
+    """What values of these kinds are called.
+
+    >>> _named("iuf"), _named("fiu"), _named("iu"), _named("SU"), _named("?")
+    ('real numbers', 'real numbers', 'integers', 'byte strings or texts', 'values of an unknown type')
+    """
+    found = dict.fromkeys(_KINDS[kind] for kind in kinds if kind in _KINDS)
+    if "real numbers" in found:
+        found.pop("integers", None)
+    return " or ".join(found) or "values of an unknown type"
 
 
 def _bytes(number: int) -> str:
