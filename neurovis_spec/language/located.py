@@ -19,6 +19,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import PydanticCustomError, core_schema
 
 from neurovis_spec.diagnostics import Findings, Span, meant, nearest, shown, suggest
+from neurovis_spec.language.expressions.lexer import decimal_hint
 from neurovis_spec.language.scalars import INTEGER_HIGH, INTEGER_LOW
 from neurovis_spec.language.source import Node, Packed, Scalar, Sequence, describe
 
@@ -160,7 +161,8 @@ def as_formula(node: Node, info: ValidationInfo) -> Formula:
 def as_number(node: Node, info: ValidationInfo) -> Located[float]:
     """A finite number as such, no expression."""
     if not isinstance(node, Scalar) or isinstance(node.value, (str, bool)) or node.value is None:
-        refuse(info, node, "a number")
+        text = node.value if isinstance(node, Scalar) else None
+        refuse(info, node, "a number", decimal_hint(text) if isinstance(text, str) else None)
     formula = as_formula(node, info)
     return Located(float(formula.value), formula.node)
 

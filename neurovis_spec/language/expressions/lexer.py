@@ -37,6 +37,9 @@ _BLANK = re.compile(r"[ \t\r\n]+")
 _NUMBER = re.compile(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _TAIL = re.compile(r"[A-Za-z0-9_.]+")
+#: An integer with zeros in front of it: a text in YAML, an octal number in other languages.
+_ZEROS = re.compile(r"0+[0-9]+")
+_DATE = re.compile(r"\s*([0-9]{4}-[0-9]{1,2}-[0-9]{1,2})\s*")
 _QUOTED = re.compile(r"(?P<quote>['\"`“”‘’]).*?(?:['\"`“”‘’]|$)", re.DOTALL)
 _OPERATOR = re.compile(r"\*\*|<=|>=|==|!=|[-+*/%^<>(),]")
 
@@ -80,6 +83,9 @@ def tokens(text: str) -> tuple[Token, ...]:
         message = f"this expression has {len(text)} characters; {MAX_LENGTH} are the most"
         hint = "give its parts names, as parameters or in 'let'"
         raise ExpressionError("expression-too-long", message, MAX_LENGTH, len(text), hint)
+    if date := _DATE.fullmatch(text):
+        hint = "a difference has blanks around its signs: 9 - 8 - 7"
+        raise ExpressionError("malformed-number", f"'{date[1]}' is a date, no number", *date.span(1), hint)
     found: list[Token] = []
     at = 0
     while at < len(text):
@@ -126,10 +132,25 @@ def _number(text: str, number: re.Match[str]) -> Token:
             tail.end(),
             _number_hint(number.group(), tail.group()),
         )
+    if _ZEROS.fullmatch(number.group()):
+        message = f"'{shown(number.group())}' is no number: it begins with a zero"
+        raise ExpressionError("malformed-number", message, start, end, decimal_hint(number.group()))
     if math.isinf(float(number.group())):
         message = f"{shown(number.group(), 20)} is beyond the range of numbers, which ends near 1.8e308"
         raise ExpressionError("number-overflow", message, start, end)
     return Token("number", number.group(), start, end)
+
+
+def decimal_hint(text: str) -> str | None:
+    """What to write instead of an integer with zeros in front of it; None where a text is none.
+
+    >>> decimal_hint("010"), decimal_hint("10")
+    ('numbers are decimal here: write 10', None)
+    """
+    digits = text.strip().lstrip("+-")
+    if not _ZEROS.fullmatch(digits):
+        return None
+    return f"numbers are decimal here: write {shown(digits.lstrip('0') or '0')}"
 
 
 def _number_hint(number: str, tail: str) -> str | None:
