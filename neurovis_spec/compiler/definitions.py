@@ -22,7 +22,7 @@ from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.errors import ExpressionError
 from neurovis_spec.language.expressions.functions import CONSTANTS
-from neurovis_spec.language.expressions.tree import Number, Tree, substitute
+from neurovis_spec.language.expressions.tree import Name, Number, Tree, substitute
 from neurovis_spec.language.library import ActivationModel, Library, ModelModel, RuleModel, StateModel
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, bad_name
 from neurovis_spec.language.model import Model as LanguageModel
@@ -181,8 +181,14 @@ def check_bounds(value: Value, default: Default, values: Mapping[str, Value], sp
     first = np.unravel_index(int(outside.argmax()), outside.shape)
     one, least, most = (float(np.broadcast_to(part, outside.shape)[first]) for part in (value, low, high))
     bounds = f"{least:g} to {most:g}".replace("-inf", "-∞").replace("inf", "∞")
-    findings.error("out-of-range", span, f"'{default.name}' is {one:g}; its bounds are {bounds}")
+    hint = _bound(default, "at least", default.low) if one < least else _bound(default, "at most", default.high)
+    findings.error("out-of-range", span, f"'{default.name}' is {one:g}; its bounds are {bounds}", hint)
     return False
+
+
+def _bound(default: Default, how: str, bound: Tree | None) -> str | None:
+    """What a parameter must not pass, where that is another one."""
+    return f"'{default.name}' is {how} '{bound.name}'" if isinstance(bound, Name) else None
 
 
 def _activation(name: str, model: ActivationModel, findings: Findings, dt: float) -> tuple[Activation, Defaults] | None:
