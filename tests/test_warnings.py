@@ -131,7 +131,8 @@ def test_a_neuron_that_stays_at_zero() -> None:
 
 @pytest.mark.parametrize("model", ["leaky_integrator", "adaptive", "hysteresis", "integrate_and_fire"])
 def test_a_state_that_nothing_drives_stays(model: str) -> None:
-    body = f"neurons: {{A: {{model: {model}, activation: tanh}}, B: {{}}}}\nconnections: {{A -> B: 1}}\n"
+    activation = "" if model == "integrate_and_fire" else ", activation: tanh"  # which that model does not use
+    body = f"neurons: {{A: {{model: {model}{activation}}}, B: {{}}}}\nconnections: {{A -> B: 1}}\n"
     run = nv.compile_text(f"neurovis: 1\nname: x\n{body}").run(50)
     assert not run["A"].any()
     assert warnings(body) == [("idle-neuron", "A")]

@@ -16,6 +16,7 @@ import numpy as np
 
 from neurovis_spec.compiler.arrays import IntArray
 from neurovis_spec.compiler.bound import make_settable, own_weights
+from neurovis_spec.compiler.compiled import Compiled
 from neurovis_spec.compiler.connect import Connected, connect, join
 from neurovis_spec.compiler.constants import Constants, parse_formula
 from neurovis_spec.compiler.crowds import crowded
@@ -36,7 +37,7 @@ from neurovis_spec.compiler.sections import layout_settings, make_outputs, rende
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.compiler.units import Expander, constants_of
-from neurovis_spec.compiler.warnings import Compiled, warn
+from neurovis_spec.compiler.warnings import warn
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.includes import Includes, read_includes
@@ -155,7 +156,8 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
     )
     eventful = _eventful(spec, network, directory, constants, made)
     if eventful is not None and not findings.failed:  # the shape may have been at fault
-        warn(Compiled(spec, units, library, expander.used, eventful, bundles), findings)
+        files = tuple(file.model for file in includes.files)
+        warn(Compiled(spec, units, library, expander.used, eventful, bundles, population, files), findings)
     return eventful
 
 

@@ -7,20 +7,20 @@ one: what may be meant (a rate that is a parameter and can be set in a run, a bi
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator
-from typing import Final, NamedTuple
+from collections.abc import Iterator
+from typing import Final
 
-from neurovis_spec.compiler.entries import Bundle
+from neurovis_spec.compiler.beyond import look_beyond
+from neurovis_spec.compiler.compiled import Compiled
+from neurovis_spec.compiler.doubled import look_for_doubled
 from neurovis_spec.compiler.idle import idle_neurons
+from neurovis_spec.compiler.ignored import look_for_ignored
 from neurovis_spec.compiler.inert import changes_nothing
-from neurovis_spec.compiler.modules import Library
+from neurovis_spec.compiler.lone_indices import look_for_lone_indices
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.own_ends import look_for_own_ends
 from neurovis_spec.compiler.references import Section, key_span
-from neurovis_spec.compiler.unit import Unit
-from neurovis_spec.compiler.units import COUNTED
 from neurovis_spec.diagnostics import Findings, Span
-from neurovis_spec.language.expressions.parser import parse, unknown_names
-from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.sections import ConnectionModel
 from neurovis_spec.language.source import Mapping, Node, Packed, Scalar, Sequence
 from neurovis_spec.language.spec import Spec
@@ -33,31 +33,17 @@ _NO_EXPRESSIONS: Final = frozenset(
 )
 
 
-class Compiled(NamedTuple):
-    """What the warnings look at: a spec without errors, what it became, and which modules are used in it."""
-
-    spec: Spec
-    units: tuple[Unit, ...]
-    library: Library
-    used: Collection[str]
-    network: Network
-    bundles: tuple[Bundle, ...]
-
-    def sections(self) -> Iterator[tuple[Section, list[Unit]]]:
-        """The spec, and every module that is used, with the units that were made of it."""
-        made: dict[str | None, list[Unit]] = {}
-        for unit in self.units:
-            made.setdefault(unit.module, []).append(unit)
-        for units in made.values():
-            yield units[0].section, units
-
-
 def warn(compiled: Compiled, findings: Findings) -> None:
     """Note everything that is surely not meant in a spec that compiled."""
     _inputs(compiled, findings)
     for section, _ in compiled.sections():
         _parameters(section, findings)
-        _numbers(section, findings)
+    look_for_lone_indices(compiled, findings)
+    look_for_doubled(compiled, findings)
+    look_for_ignored(compiled, findings)
+    look_for_own_ends(compiled, findings)
+    look_beyond(compiled, findings)
+    _events(compiled, findings)
     _definitions(compiled.spec, compiled.network, findings)
     _modules(compiled, findings)
     _neurons(compiled, findings)
@@ -65,6 +51,17 @@ def warn(compiled: Compiled, findings: Findings) -> None:
     _rates(compiled, findings)
     _episodes(compiled, findings)
     _vain(compiled, findings)
+
+
+def _events(compiled: Compiled, findings: Findings) -> None:
+    """Events that come too late, or are lost among others. Most specs have none: nothing is imported then."""
+    spec, network = compiled.spec, compiled.network
+    if spec.events:
+        from neurovis_spec.compiler.event_warnings import look_at_events
+
+        steps = None if spec.time is None or spec.time.steps is None else network.steps
+        directory, constants = compiled.population.directory, compiled.units[0].constants
+        look_at_events(spec.events, directory, constants, steps, findings)
 
 
 def _inputs(compiled: Compiled, findings: Findings) -> None:
@@ -99,17 +96,6 @@ def _parameters(section: Section, findings: Findings) -> None:
         if name not in used:
             message = f"no expression uses the parameter '{name}'"
             findings.warning("unused-parameter", key_span(section, "parameters", name), message, "remove it, or use it")
-
-
-def _numbers(section: Section, findings: Findings) -> None:
-    """``i`` and ``n`` in what is set in the one instance of an entry without ``count``."""
-    for name, model in section.instances.items():
-        for formula in model.set.values() if model.count is None else ():
-            tree = parse(formula.value) if isinstance(formula.value, str) else None
-            for node in () if tree is None else unknown_names(tree, names(tree).difference(COUNTED)):
-                message = f"'{node.name}' is always {COUNTED.index(node.name)} here: '{name}' is one instance"
-                hint = "'i' and 'n' count the instances of an entry; give it a 'count'"
-                findings.warning("lone-index", formula.node.at(node.start, node.end), message, hint)
 
 
 def _definitions(spec: Spec, network: Network, findings: Findings) -> None:
