@@ -20,6 +20,8 @@ from neurovis_spec.compiler.lone_indices import look_for_lone_indices
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.own_ends import look_for_own_ends
 from neurovis_spec.compiler.references import Section, key_span
+from neurovis_spec.compiler.replaced import look_for_replaced_weights
+from neurovis_spec.compiler.unused_parts import look_for_unused_parts
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.sections import ConnectionModel
 from neurovis_spec.language.source import Mapping, Node, Packed, Scalar, Sequence
@@ -42,6 +44,8 @@ def warn(compiled: Compiled, findings: Findings) -> None:
     look_for_doubled(compiled, findings)
     look_for_ignored(compiled, findings)
     look_for_own_ends(compiled, findings)
+    look_for_unused_parts(compiled, findings)
+    look_for_replaced_weights(compiled, findings)
     look_beyond(compiled, findings)
     _events(compiled, findings)
     _definitions(compiled.spec, compiled.network, findings)
