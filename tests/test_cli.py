@@ -349,6 +349,13 @@ def test_run_writes_what_the_api_gives(folder: Path) -> None:
         assert file["step"].tolist() == list(range(7))
 
 
+def test_run_warns_of_an_input_that_begins_with_the_numbers_of_its_columns(folder: Path) -> None:
+    (folder / "pull.csv").write_text("0,1\n0.5,0.25\n0.75,0.125\n", encoding="utf-8")
+    result = CliRunner().invoke(neurovis, ["run", "small.yaml", "--input", "pull=pull.csv", "-o", "x.npz"])
+    assert result.exit_code == 0
+    assert "pull.csv:1:1: warning[numbered-columns]: the first row, 0, 1, …" in result.stderr
+
+
 def test_run_reads_inputs_from_csv_with_and_without_a_header(folder: Path) -> None:
     (folder / "a.csv").write_text("1,2\n3,4\n", encoding="utf-8")
     (folder / "b.csv").write_text("left,right\n1,2\n3,4\n", encoding="utf-8")

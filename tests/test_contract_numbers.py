@@ -46,7 +46,7 @@ PLACES = [
     NINE + "{pattern: {small_world: {degree: ‹two|2›, rewire: ‹half|0.5›}}}}",
     NINE + "{pattern: {band: {width: ‹two|2›}}}}",
     MODULE + "instances: {a: {module: m, count: ‹two|2›, set: {p: ‹half|0.5›}}}",
-    ONE + "events: [{at: ‹two|2›, lesion: A}, {from: ‹two|2›, to: ‹two + 1|3›, clamp: {A: ‹half|0.5›}}]",
+    ONE + "events: [{at: ‹two + 1|3›, lesion: A}, {from: ‹two|2›, to: ‹two + 1|3›, clamp: {A: ‹half|0.5›}}]",
     ONE + "layout: {positions: {A: [‹two|2›, ‹-half|-0.5›]}, spacing: {neuron: ‹two|2›, rank: ‹2*two|4›}}",
     MODULE + "instances: {a: {module: m, set: {p: ‹half|0.5›}}}\nlayout: {positions: {a: [‹two|2›, 0]}}",
     ONE + "render: {gain: {activity: ‹two|2›, signal: ‹half|0.5›, thickness: ‹two|2›, change: ‹1/two|0.5›}}",

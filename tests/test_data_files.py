@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import pickle
 import struct
@@ -49,6 +50,28 @@ def test_csv_without_header_takes_the_quick_way_to_the_same_numbers(tmp_path: Pa
     np.testing.assert_array_equal(got.values, [[1, 2.5, -3e-7], [4, 5, 0.1]])
     assert got.present.all()
     np.testing.assert_array_equal(table(tmp_path, "b.csv", "a,b,c\n" + body).values, got.values)
+
+
+@pytest.mark.parametrize(
+    ("data", "numbered"),
+    [
+        ("0,1\n0.5,0.25\n0.75,0.125\n", True),
+        ('"0","1"\r\n0.5,0.25\r\n0.75,1e-05\r\n', True),
+        ("0,1,2\n-0.5,0.25,0.1\n0.5,0.5,0.2\n0.1,0.9,0.4\n", True),
+        ("0.0,1.0\n0.5,0.25\n0.75,0.125\n", False),  # floats, as the others
+        ("0,1\n1,0\n0,1\n", False),  # integers, as the others
+        ("0,1\n0.5,0.25\n0.75,0\n", False),  # somebody who writes no needless points
+        ("0,1\n0.5,0.25\n", False),
+        ("0\n0.5\n0.4\n", False),
+        ("1,2\n0.5,0.25\n0.75,0.125\n", False),
+        ("\n".join(f"{math.sin(k / 10):g},{math.cos(k / 10):g}" for k in range(50)), False),
+        ("\n".join(f"{k / 100:g},{1 + k / 100:g}" for k in range(99)), False),
+    ],
+)
+def test_a_first_row_that_numbers_the_columns(tmp_path: Path, data: str, numbered: bool) -> None:
+    got = table(tmp_path, "x.csv", data)
+    assert got.numbered == numbered
+    assert len(got.values) == len(data.split())  # it is read all the same
 
 
 def test_an_empty_line_of_one_column_is_an_empty_cell(tmp_path: Path) -> None:

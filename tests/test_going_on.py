@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import neurovis_spec as nv
-from neurovis_spec.runtime.recording import RecordingError
+from neurovis_spec.runtime.recording import Recording, RecordingError
 
 HEAD = "neurovis: 1\nname: x\nseed: 5\nparameters: {g: 1, h: 2*g}\n"
 PLAIN = (
@@ -17,7 +17,7 @@ PLAIN = (
 )
 
 
-def saved(recording: nv.Recording, folder: Path) -> nv.Recording:
+def saved(recording: Recording, folder: Path) -> Recording:
     """The recording, written and read."""
     recording.save(folder / "x.npz")
     return nv.load(folder / "x.npz")

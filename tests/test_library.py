@@ -151,7 +151,8 @@ MODELS: tuple[tuple[Model, dict[str, float]], ...] = (
 
 
 def neuron(model: str, activation: str = "tanh") -> str:
-    group = f"{{input: u, activation: {activation}, model: {model}}}"
+    used = "" if "integrate_and_fire" in model else f", activation: {activation}"
+    group = f"{{input: u{used}, model: {model}}}"
     return f"neurovis: 1\nname: x\ninputs: {{u: {{}}}}\nneurons: {{A: {group}}}"
 
 
@@ -376,7 +377,7 @@ def one_target(rule: str, delay: int = 0, episode: str = "") -> str:
     return f"""
 neurovis: 1
 name: one_target
-time: {{steps: 10{episode}}}
+time: {{steps: {STEPS}{episode}}}
 inputs: {{x: {{size: 2}}, one: {{}}, two: {{}}}}
 neurons: {{X: {{count: 2, input: x}}, Y: {{}}, Z: {{input: two}}, W: {{input: one}}}}
 connections: {{X -> Y: {{weight: 0.3 - 0.5*i, delay: {delay}, plasticity: {rule}}}}}

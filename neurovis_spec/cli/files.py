@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from neurovis_spec.compiled import CompiledNetwork, NetworkLayout
     from neurovis_spec.compiler.arrays import FloatArray
     from neurovis_spec.compiler.network import Network
+    from neurovis_spec.diagnostics import Findings
     from neurovis_spec.layout import Layout
     from neurovis_spec.runtime.recording import Recording
 
@@ -131,9 +132,22 @@ def tables(named: Mapping[str, str], network: Network) -> dict[str, FloatArray]:
         if not table.present.all():
             row = int((~table.present).any(axis=1).argmax()) + 1
             findings.error("cell-empty", place, f"a cell is empty, in row {row} of the numbers")
+        if table.numbered:
+            from neurovis_spec.language.data_files_header import AS_TEXTS, NUMBERED
+
+            findings.warning("numbered-columns", place, NUMBERED, AS_TEXTS)
         arrays[name] = table.values
     findings.check()
+    _show(findings)
     return arrays
+
+
+def _show(findings: Findings) -> None:
+    """Warnings on standard error."""
+    if findings.sorted():
+        from neurovis_spec.findings import show_text
+
+        click.echo(show_text(findings.sorted(), findings.sources), err=True)
 
 
 @contextmanager

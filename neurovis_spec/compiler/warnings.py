@@ -21,8 +21,10 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.own_ends import look_for_own_ends
 from neurovis_spec.compiler.references import Section, key_span
 from neurovis_spec.compiler.replaced import look_for_replaced_weights
+from neurovis_spec.compiler.tables import Files
 from neurovis_spec.compiler.unused_parts import look_for_unused_parts
 from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.language.data_files_header import AS_TEXTS, NUMBERED
 from neurovis_spec.language.sections import ConnectionModel
 from neurovis_spec.language.source import Mapping, Node, Packed, Scalar, Sequence
 from neurovis_spec.language.spec import Spec
@@ -38,7 +40,8 @@ _NO_EXPRESSIONS: Final = frozenset(
 def warn(compiled: Compiled, findings: Findings) -> None:
     """Note everything that is surely not meant in a spec that compiled."""
     _inputs(compiled, findings)
-    for section, _ in compiled.sections():
+    for section, units in compiled.sections():
+        _files(section, units[0].files, findings)
         _parameters(section, findings)
     look_for_lone_indices(compiled, findings)
     look_for_doubled(compiled, findings)
@@ -86,6 +89,14 @@ def _inputs(compiled: Compiled, findings: Findings) -> None:
 
 
 _READ: Final = "give it to a group, as in {{input: {0}}}, or to a rule as a signal, or remove it"
+
+
+def _files(section: Section, files: Files, findings: Findings) -> None:
+    """Files of inputs that begin with the numbers of their columns. The file has been read: nothing is read again."""
+    for model in section.inputs.values():
+        table = None if model.file is None else files.table_at(model.file)
+        if model.file is not None and table is not None and table.numbered:
+            findings.warning("numbered-columns", model.file.span, NUMBERED, AS_TEXTS)
 
 
 def _parameters(section: Section, findings: Findings) -> None:

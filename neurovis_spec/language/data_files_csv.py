@@ -11,6 +11,7 @@ import csv
 import io
 from array import array
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from itertools import chain
 from typing import Final, NamedTuple
 
@@ -27,6 +28,7 @@ from neurovis_spec.language.data_files_cells import (
     numbers_in,
     numbers_of,
 )
+from neurovis_spec.language.data_files_header import numbers_columns
 from neurovis_spec.language.data_files_table import CellError, Faults, Room, Table, check_cells
 
 #: bytes, and cells, that are made numbers of together; and cells among which one that is at fault is looked for
@@ -92,6 +94,13 @@ def plain_lines(data: bytes) -> bytes:
 
 def parse_numbers(data: bytes, room: Room | None = None) -> Table:
     """Numbers in rows of one width, after a header of texts, if there is one. Raises CellError."""
+    table = _parsed(data, room)
+    if table.header is None and numbers_columns(data, table.values):
+        return replace(table, numbered=True)
+    return table
+
+
+def _parsed(data: bytes, room: Room | None) -> Table:
     data = data.rstrip(b"\r\n")
     # the separators bound the cells, before any are made
     cells = 1 + data.count(b",") + max(data.count(b"\n"), data.count(b"\r"))

@@ -70,11 +70,13 @@ class Faults:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Table:
-    """Numbers (rows × columns; NaN where not ``present``), and the names of the columns, if any."""
+    """Numbers (rows × columns; NaN where not ``present``), and the names of the columns, if any. ``numbered``: the
+    first row seems to number the columns."""
 
     values: NDArray[np.float64]
     present: NDArray[np.bool_]
     header: tuple[str, ...] | None = None
+    numbered: bool = False
 
 
 def check_cells(cells: int, most: int = MOST_CELLS, *, hint: str | None = None) -> None:
