@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
+import numpy as np
+
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.constants import Constants
-from neurovis_spec.compiler.references import Directory, key_of, resolve_end, resolve_ends
+from neurovis_spec.compiler.references import Directory, key_of, piece, resolve_end
 from neurovis_spec.diagnostics import Findings, Span, shown
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.sections import EventModel
@@ -24,16 +27,17 @@ class _Clamp(NamedTuple):
 
     number: int
     key: Located[str]
-    neurons: tuple[int, ...]
+    neurons: IntArray
     begin: float
     end: float
 
 
-class _Lesion(NamedTuple):
-    """Since when a neuron is lesioned, and where that is said."""
+class _Lesions(NamedTuple):
+    """Since when each neuron is lesioned, and the number of the place that says so."""
 
-    begin: float
-    span: Span
+    since: FloatArray
+    number: IntArray
+    places: list[Span]
 
 
 def look_at_events(
@@ -47,7 +51,7 @@ def look_at_events(
             _look_beyond(model, reader, steps, findings)
     lesions = _lesions(models, reader, findings)
     clamps = [clamp for clamp in reader.clamps(models) if not _is_lesioned(clamp, lesions, findings)]
-    _look_at_overlaps(clamps, findings)
+    _look_at_overlaps(clamps, reader.count, findings)
 
 
 @dataclass(frozen=True)
@@ -56,15 +60,30 @@ class _Reader:
 
     directory: Directory
     constants: Constants
+    known: dict[str, IntArray] = field(default_factory=dict)
+
+    @property
+    def count(self) -> int:
+        """How many neurons there are."""
+        return self.directory.members.stop
 
     def step(self, formula: Formula | None) -> float | None:
         """A step, which may be an expression."""
-        value = None if formula is None else self.constants.scalar(formula)
-        return value
+        return None if formula is None else self.constants.scalar(formula)
 
-    def neurons(self, text: Located[str]) -> tuple[int, ...]:
-        """The neurons of a reference."""
-        return resolve_end(text, self.directory, self.constants.findings) or ()
+    def neurons(self, text: Located[str]) -> IntArray:
+        """The neurons of a reference, or of the end of a connection."""
+        if text.value not in self.known:
+            found = resolve_end(text, self.directory, self.constants.findings) or ()
+            self.known[text.value] = np.array(found, dtype=np.int64)
+        return self.known[text.value]
+
+    def ends(self, text: Located[str]) -> tuple[IntArray, ...]:
+        """The neurons of a reference, or those of either end of a connection."""
+        arrow = text.value.find("->")
+        if arrow < 0:
+            return (self.neurons(text),)
+        return self.neurons(piece(text, 0, arrow)), self.neurons(piece(text, arrow + 2, len(text.value)))
 
     def clamps(self, models: tuple[EventModel, ...]) -> Iterator[_Clamp]:
         """All clamps, key by key."""
@@ -81,66 +100,68 @@ def _look_beyond(model: EventModel, reader: _Reader, steps: int, findings: Findi
     formula = model.at if model.at is not None else model.from_
     begin = reader.step(formula)
     if formula is not None and begin is not None and begin >= steps:
-        message = f"step {begin:g} is never reached: a run has the steps 0 to {steps - 1} ('steps')"
-        hint = f"let it be earlier, or lengthen the run: time: {{steps: {begin + 1:g}}}"
+        message = f"step {begin:.0f} is never reached: a run has the steps 0 to {steps - 1} ('steps')"
+        hint = f"let it be earlier, or lengthen the run: time: {{steps: {begin + 1:.0f}}}"
         findings.warning("beyond-steps", formula.span, message, hint)
 
 
-def _lesions(models: tuple[EventModel, ...], reader: _Reader, findings: Findings) -> dict[int, _Lesion]:
+def _lesions(models: tuple[EventModel, ...], reader: _Reader, findings: Findings) -> _Lesions:
     """Since when each neuron is lesioned; a warning at what is lesioned again."""
-    lesions: dict[int, _Lesion] = {}
+    lesions = _Lesions(np.full(reader.count, np.inf), np.zeros(reader.count, dtype=np.int64), [])
     timed = [(begin, model) for model in models if model.lesion and (begin := reader.step(model.at)) is not None]
     for begin, model in sorted(timed, key=lambda one: one[0]):
         for text in model.lesion:
-            ends = [reader.neurons(text)] if "->" not in text.value else _ends(text, reader)
-            gone = next((end for end in ends if end and all(neuron in lesions for neuron in end)), None)
+            ends = reader.ends(text)
+            gone = next((end for end in ends if len(end) and np.isfinite(lesions.since[end]).all()), None)
             if gone is not None:
-                before = lesions[gone[-1]]
-                message = f"'{shown(text.value)}' is lesioned already, since step {before.begin:g}"
-                findings.warning("no-effect", text.span, f"{message} ({_place(before.span, text.span)})", "remove it")
+                since, place = _last(lesions, gone)
+                message = f"'{shown(text.value)}' is lesioned already, since step {since:.0f}"
+                findings.warning("no-effect", text.span, f"{message} ({_place(place, text.span)})", "remove it")
             elif len(ends) == 1:
-                for neuron in ends[0]:
-                    lesions.setdefault(neuron, _Lesion(begin, text.span))
+                new = ends[0][np.isinf(lesions.since[ends[0]])]
+                lesions.since[new], lesions.number[new] = begin, len(lesions.places)
+                lesions.places.append(text.span)
     return lesions
 
 
-def _ends(text: Located[str], reader: _Reader) -> tuple[tuple[int, ...], ...]:
-    return resolve_ends(text, reader.directory, reader.constants.findings) or ()
+def _last(lesions: _Lesions, neurons: IntArray) -> tuple[float, Span]:
+    """Since when all of some lesioned neurons are, and where that is said."""
+    last = int(neurons[np.argmax(lesions.since[neurons])])
+    return float(lesions.since[last]), lesions.places[int(lesions.number[last])]
 
 
-def _is_lesioned(clamp: _Clamp, lesions: dict[int, _Lesion], findings: Findings) -> bool:
+def _is_lesioned(clamp: _Clamp, lesions: _Lesions, findings: Findings) -> bool:
     """Whether the neurons of a clamp are all lesioned before it begins; a warning if so."""
-    before = [lesions.get(neuron) for neuron in clamp.neurons]
-    last = max((one for one in before if one is not None), key=lambda one: one.begin, default=None)
-    if last is None or not all(before) or last.begin > clamp.begin:
+    if not len(clamp.neurons) or (lesions.since[clamp.neurons] > clamp.begin).any():
         return False
-    message = f"'{shown(clamp.key.value)}' is lesioned from step {last.begin:g} on"
-    place = _place(last.span, clamp.key.span)
-    findings.warning("no-effect", clamp.key.span, f"{message} ({place}): clamping it changes nothing", "remove it")
+    since, place = _last(lesions, clamp.neurons)
+    message = f"'{shown(clamp.key.value)}' is lesioned from step {since:.0f} on ({_place(place, clamp.key.span)})"
+    findings.warning("no-effect", clamp.key.span, f"{message}: clamping it changes nothing", "remove it")
     return True
 
 
-def _look_at_overlaps(clamps: list[_Clamp], findings: Findings) -> None:
+def _look_at_overlaps(clamps: list[_Clamp], count: int, findings: Findings) -> None:
     """Clamps that hold a neuron while another one does; a warning at the one written later."""
-    last: dict[int, _Clamp] = {}
+    end, owner = np.zeros(count), np.zeros(count, dtype=np.int64)  # until when a neuron is clamped, and by which
+    order = sorted(clamps, key=lambda one: one.begin)
     told: set[int] = set()
-    for clamp in sorted(clamps, key=lambda one: one.begin):
-        for neuron in clamp.neurons:
-            other = last.get(neuron)
-            if other is None or other.end < clamp.end:
-                last[neuron] = clamp
-            if other is None or other.end <= clamp.begin:
-                continue
-            first, second = sorted((other, clamp))
+    for number, clamp in enumerate(order):
+        for other in np.unique(owner[clamp.neurons[end[clamp.neurons] > clamp.begin]]).tolist():
+            first, second = sorted((order[other], clamp), key=lambda one: one.number)
             if second.number not in told:
                 told.add(second.number)
-                begin, end = clamp.begin, min(other.end, clamp.end) - 1
-                when = f"from step {begin:g} on" if math.isinf(end) else f"at the steps {begin:g} to {end:g}"
-                when = f"at step {begin:g}" if begin == end else when
-                place = _place(first.key.span, second.key.span)
-                both = f"'{shown(second.key.value)}' and '{shown(first.key.value)}' ({place})"
-                message = f"{both} clamp the same neuron {when}: this one, written last, holds"
-                findings.warning("clamps-overlap", second.key.span, message, "end one, with 'to', before the other")
+                _tell(first, second, findings)
+        longer = clamp.neurons[end[clamp.neurons] < clamp.end]
+        end[longer], owner[longer] = clamp.end, number
+
+
+def _tell(first: _Clamp, second: _Clamp, findings: Findings) -> None:
+    begin, end = max(first.begin, second.begin), min(first.end, second.end) - 1
+    when = f"from step {begin:.0f} on" if math.isinf(end) else f"at the steps {begin:.0f} to {end:.0f}"
+    when = f"at step {begin:.0f}" if begin == end else when
+    both = f"'{shown(second.key.value)}' and '{shown(first.key.value)}' ({_place(first.key.span, second.key.span)})"
+    message = f"{both} clamp the same neuron {when}: this one, written last, holds"
+    findings.warning("clamps-overlap", second.key.span, message, "end one, with 'to', before the other")
 
 
 def _place(other: Span, here: Span) -> str:
