@@ -108,6 +108,10 @@ def _look_beyond(model: EventModel, reader: _Reader, steps: int, findings: Findi
 def _lesions(models: tuple[EventModel, ...], reader: _Reader, findings: Findings) -> _Lesions:
     """Since when each neuron is lesioned; a warning at what is lesioned again."""
     lesions = _Lesions(np.full(reader.count, np.inf), np.zeros(reader.count, dtype=np.int64), [])
+    mended = np.zeros(reader.count, dtype=np.bool_)  # these come and go
+    for model in models:
+        for text in model.mend:
+            mended[np.concatenate(reader.ends(text))] = True
     timed = [(begin, model) for model in models if model.lesion and (begin := reader.step(model.at)) is not None]
     for begin, model in sorted(timed, key=lambda one: one[0]):
         for text in model.lesion:
@@ -118,7 +122,7 @@ def _lesions(models: tuple[EventModel, ...], reader: _Reader, findings: Findings
                 message = f"'{shown(text.value)}' is lesioned already, since step {since:.0f}"
                 findings.warning("no-effect", text.span, f"{message} ({_place(place, text.span)})", "remove it")
             elif len(ends) == 1:
-                new = ends[0][np.isinf(lesions.since[ends[0]])]
+                new = ends[0][np.isinf(lesions.since[ends[0]]) & ~mended[ends[0]]]
                 lesions.since[new], lesions.number[new] = begin, len(lesions.places)
                 lesions.places.append(text.span)
     return lesions

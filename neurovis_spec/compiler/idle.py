@@ -48,9 +48,14 @@ def idle_neurons(network: Network) -> Iterator[Idle]:
         quiet &= _needed(network)
     if not quiet.any():
         return
-    for phase in (network, *(phase for _, phase in network.phases)):
-        for block in phase.blocks:
-            quiet[block.members] &= _stays_at_zero(block, network.dt)
+    for block in network.blocks:
+        quiet[block.members] &= _stays_at_zero(block, network.dt)
+    for binding in network.set_by_events:  # what an event makes of a neuron is not looked at
+        kind, _, number = binding.array.partition("/")
+        if kind == "bias":
+            quiet[binding.places] = False
+        elif kind in ("activation", "model"):
+            quiet[network.blocks[int(number.partition("/")[0])].members] = False
     idle = _unreached(quiet, connections.sources, connections.targets)
     if not idle.any():
         return

@@ -19,7 +19,7 @@ from neurovis_spec.compiler.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.changes import Change
 from neurovis_spec.compiler.program import Block, Combine, Operation, Plasticity
 from neurovis_spec.compiler.ros_settings import RosSettings
-from neurovis_spec.compiler.settable import Part, Settable
+from neurovis_spec.compiler.settable import Binding, Part, Settable
 from neurovis_spec.compiler.wishes import LayoutSettings, RenderSettings
 from neurovis_spec.language.expressions.tree import Tree
 
@@ -230,14 +230,19 @@ class Network:
         return result
 
     @cached_property
+    def set_by_events(self) -> tuple[Binding, ...]:
+        """What follows the parameters that events set."""
+        events = sorted({slot for change in self.changes for slot, _ in change.parameters})
+        slots = [*events, *self.settable.reached(events, [False] * len(self.settable.slots))]
+        return tuple(self.settable.bindings[number] for number in self.settable.bound_to(slots))
+
+    @cached_property
     def changing(self) -> IntArray:
         """Indices of the connections whose weight can change in a run, by a rule or by an event (reached or not)."""
         can = self.connections.rules >= 0
-        events = {slot for change in self.changes for slot, _ in change.parameters}
-        slots = [*events, *self.settable.reached(sorted(events), [False] * len(self.settable.slots))]
-        for number in self.settable.bound_to(slots):
-            if self.settable.bindings[number].weights:
-                can[self.settable.bindings[number].indices] = True
+        for binding in self.set_by_events:
+            if binding.weights:
+                can[binding.indices] = True
         result = np.flatnonzero(can).astype(np.int64)
         frozen(result)
         return result
