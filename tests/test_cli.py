@@ -117,6 +117,25 @@ def test_wrong_usage_is_status_2_and_says_what_was_meant(folder: Path, arguments
 
 
 @pytest.mark.parametrize(
+    ("content", "found"),
+    [
+        (b"1,2\n,3\n4,\n", ["x.csv:2:1: error[cell-empty]", "x.csv:3:3: error[cell-empty]"]),
+        (b"a,b\r\n1,2\r\n3, nan\r\n 4x,5\r\n", ["x.csv:3:4: error[not-finite]", "x.csv:4:2: error[file-format]"]),
+        (b"\xef\xbb\xbf1,2\n3,4,5\n6\n", ["x.csv:2:5: error[file-format]", "x.csv:3:1: error[file-format]"]),
+        (b'"a, b","c"\n"1",inf\n', ["x.csv:2:5: error[not-finite]"]),
+        (b"1,2\n3,\xff\n", ["x.csv:2:1: error[invalid-utf8]"]),
+        (b"", ["x.csv:1:1: error[file-format]"]),
+    ],
+)
+def test_a_finding_in_a_file_of_an_input_stands_at_the_cell(folder: Path, content: bytes, found: list[str]) -> None:
+    (folder / "x.csv").write_bytes(content)
+    result = call("run", "small.yaml", "--input", "pull=x.csv")
+    assert result.exit_code == 1
+    assert [line.partition("]")[0] + "]" for line in result.stderr.splitlines() if "error[" in line] == found
+    assert "an empty cell" not in result.stderr, "what is advised would be refused as well"
+
+
+@pytest.mark.parametrize(
     ("arguments", "words"),
     [
         ("validate nothing.yaml", "nothing.yaml:1:1: error[file-missing]"),
