@@ -126,6 +126,11 @@ class CompiledNetwork:
 
         return Course(self.network.steps if steps is None else steps, every, inputs, backend)
 
+    def refusal(self) -> Diagnostic | None:
+        """What ``layout`` and all that draws would refuse, as far as that is known before an engine begins; None where
+        there is nothing of the kind."""
+        return pipeline.refusal(self.spec, self.request, self.network, self.memory)
+
     def layout(
         self, engine: str | None = None, *, earlier: Layout | None = None, progress: Progress | None = None
     ) -> NetworkLayout:
