@@ -16,6 +16,7 @@ import numpy as np
 
 from neurovis_spec.compiler.arrays import IntArray
 from neurovis_spec.compiler.bound import make_settable, own_weights
+from neurovis_spec.compiler.canonical import canonical
 from neurovis_spec.compiler.compiled import Compiled
 from neurovis_spec.compiler.connect import Connected, connect, join
 from neurovis_spec.compiler.constants import Constants, parse_formula
@@ -111,6 +112,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         return None
     blocks = make_blocks(population, connections.sources, connections.targets, level)
     program = make_program(blocks, plasticity)
+    ordered = canonical(population.neurons, inputs, outputs, blocks, plasticity)
     content = digest(
         "neurovis 1",
         spec.name.value,
@@ -118,12 +120,9 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         episode,
         seed,
         constants.parameters,
-        population.neurons,
+        ordered[0],
         connections,
-        inputs,
-        outputs,
-        blocks,
-        plasticity,
+        *ordered[1:],
         noises,
     )
     slots = tuple(constants.slots)
