@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from neurovis_spec import arguments
 from neurovis_spec.compiler.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.names import Names, names_of, unknown_text
@@ -109,7 +110,7 @@ class Recording:
     def __getitem__(self, name: str) -> FloatArray:
         """Activities by the name of a neuron, a group or an output, or by another reference. Raises KeyError with the
         nearest names."""
-        found = self._names.find(name)
+        found = self._names.find(arguments.text("name", name))
         if isinstance(found, str):
             raise UnknownNameError(found)
         return self.activity[:, found.neurons[0]] if found.single else self.activity[:, list(found.neurons)]
@@ -136,7 +137,7 @@ class Recording:
 
     def weight(self, name: str) -> FloatArray:
         """w[t] of a connection by name, (rows,), also of one that stays. Raises KeyError with the nearest names."""
-        index = self.connection_index.get(name)
+        index = self.connection_index.get(arguments.text("name", name))
         if index is None:
             raise unknown("connection", name, self.connection_names)
         column = int(np.searchsorted(self.plastic, index))
@@ -157,7 +158,8 @@ class Recording:
 
     def row(self, step: int) -> int:
         """The row that holds a step. Raises RecordingError where it was not recorded."""
-        row = int(np.searchsorted(self.step, step))
+        arguments.integer("step", step)
+        row = int(np.searchsorted(self.step, step)) if abs(step) < 1 << 63 else len(self.step)
         if row == len(self.step) or self.step[row] != step:
             span = f"steps {self.step[0]} to {self.step[-1]}" if len(self.step) else "no steps"
             raise RecordingError(f"step {step} is not in the recording, which has {span} in {len(self.step)} rows")
@@ -173,7 +175,7 @@ class Recording:
         """Write a file of the format that the suffix names. Raises RecordingError, OSError."""
         from neurovis_spec.runtime import formats
 
-        formats.save(self, path)
+        formats.save(self, arguments.path("path", path))
 
     def _repr_svg_(self) -> str:
         """Its traces, for a notebook."""
