@@ -5,6 +5,7 @@ In: a Recording. Out: an SVG as text. It needs no network, so that a recording t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from html import escape
 from typing import TYPE_CHECKING
@@ -66,6 +67,8 @@ def _points(values: npt.NDArray[np.float64], low: float, high: float, top: int) 
     if not len(values):
         return ""
     right = WIDTH - 108
+    exponent = int(np.frexp(max(abs(low), abs(high)))[1])  # of values near 1 no difference and no ratio overflows
+    values, low, high = np.ldexp(values, -exponent), math.ldexp(low, -exponent), math.ldexp(high, -exponent)
     edges = np.linspace(0, len(values), min(COLUMNS, len(values)) + 1).astype(np.int64)
     scale = (ROW - 8) / (high - low) if high > low else 0.0
     places = []
