@@ -270,9 +270,26 @@ def test_other_commands_end_at_a_signal_and_leave_nothing(folder: Path, command:
     assert files(folder) == ["long.yaml"]
 
 
+@pytest.mark.parametrize("suffix", ["npz", "csv"])
+def test_a_file_of_somebody_else_is_left_alone(tmp_path: Path, suffix: str) -> None:
+    """It has the name of a part, and something else in it; what was begun and holds no step is cleared."""
+    path, part = tmp_path / f"x.{suffix}", tmp_path / f".x.{suffix}.part"
+    network = compiled("neurons: {A: {}}")
+    part.write_bytes(b"somebody's own\n1\n2\n")
+    with pytest.raises(RecordingError, match=rf"x\.{suffix}: No such file"):
+        nv.load(path)
+    network.run_to(path, 3)
+    assert len(nv.load(path)) == 3
+    assert part.read_bytes() == b"somebody's own\n1\n2\n"
+    for begun in (b"", b"neurovis r" if suffix == "npz" else b"step,t,A\n0,"):
+        part.write_bytes(begun)
+        network.run_to(path, 3)
+        assert files(tmp_path) == [path.name]
+
+
 def test_what_a_writer_that_was_killed_has_left_is_cleared(tmp_path: Path) -> None:
     """A file that is of no use before it is whole goes without a word."""
-    (tmp_path / ".x.svg.new").write_bytes(b"half")
-    (tmp_path / ".x.svg.3.new").write_bytes(b"half")
+    (tmp_path / ".x.svg.neurovis-new").write_bytes(b"half")
+    (tmp_path / ".x.svg.3.neurovis-new").write_bytes(b"half")
     compiled("neurons: {A: {}}").render(tmp_path / "x.svg", step=0)
     assert files(tmp_path) == ["x.svg"]

@@ -30,6 +30,8 @@ _CONNECTION = re.compile(r"(?P<source>\S+) -> (?P<target>\S+)(?: \((?P<rank>[0-9
 
 #: bytes that are read together
 _BLOCK = 1 << 16
+#: what a table begins with
+_FIRST = b"step,t"
 
 
 def write_csv(recording: Recording, path: Path) -> None:
@@ -97,7 +99,10 @@ class _Table:
 
 
 def held_csv(file: FileIO) -> int | None:
-    """The last step that a part holds, None for none. Raises OSError."""
+    """The last step that a part holds, None for none. Raises RecordingError for a file that is no part, OSError."""
+    file.seek(0)
+    if not _FIRST.startswith(file.read(len(_FIRST))):
+        raise RecordingError("not a recording in progress")
     end = _whole(file, file.seek(0, io.SEEK_END))
     begin = _whole(file, end - 1)
     file.seek(begin)

@@ -105,6 +105,12 @@ class Journal:
         return np.frombuffer(b"".join(self.pieces(what)), dtype="<f8").astype(np.float64).reshape(self.rows, width)
 
 
+def is_begun(file: FileIO) -> bool:
+    """Whether a file is a journal, or was to become one."""
+    file.seek(0)
+    return MAGIC.startswith(file.read(len(MAGIC)))
+
+
 def read_journal(file: FileIO, columns: Callable[[bytes], tuple[int, int]]) -> Journal:
     """Read a journal as far as it is whole. ``columns`` says from a frame how many neurons and changing connections
     there are. Raises RecordingError, OSError."""

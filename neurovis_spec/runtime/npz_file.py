@@ -29,7 +29,7 @@ from neurovis_spec.compiler.limits import DEEPEST
 from neurovis_spec.language.data_files_npy import LONGEST_HEADER, read_header
 from neurovis_spec.language.data_files_table import CellError
 from neurovis_spec.runtime.files import regular_size, replacing
-from neurovis_spec.runtime.journal import Journal, JournalWriter, read_journal
+from neurovis_spec.runtime.journal import Journal, JournalWriter, is_begun, read_journal
 from neurovis_spec.runtime.recording import After, Recording, RecordingError, after_rows, ended
 from neurovis_spec.runtime.rows import RowWriter, Steps
 from neurovis_spec.runtime.unfinished import Part, part_of
@@ -112,7 +112,9 @@ def _archive(file: FileIO, path: Path) -> None:
 
 
 def held_npz(file: FileIO) -> int | None:
-    """The last step that a part holds, None for none. Raises OSError."""
+    """The last step that a part holds, None for none. Raises RecordingError for a file that is no part, OSError."""
+    if not is_begun(file):
+        raise RecordingError("not a recording in progress")
     try:
         journal, _ = _journal(file)
     except RecordingError:
