@@ -138,7 +138,7 @@ def test_what_was_taken_over_stays_when_the_next_run_is_killed_too(folder: Path)
     for wanted in ([], ["x.npz"]):
         process = start("run", "long.yaml", "--every", 20, "-o", "x.npz")
         for name in wanted:
-            until_it_records(folder / name)
+            until_it_records(folder / name, 100)
         until_it_records(folder / ".x.npz.part")
         ended(process, signal.SIGKILL)
     assert files(folder) == [".x.npz.part", "long.yaml", "x.npz"]
