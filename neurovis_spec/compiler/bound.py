@@ -135,7 +135,7 @@ def _of_connections(
     start = 0
     for bundle in bundles:
         count = len(bundle.sources)
-        for part in bundle.parts:
+        for part in bundle.parts if count else ():
             members = start + part.within(count)
             if part.field == "first":
                 continue

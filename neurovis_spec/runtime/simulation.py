@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec import arguments
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.changes import Clamp
 from neurovis_spec.compiler.network import Network
@@ -89,7 +90,7 @@ class Simulation:
 
     def weight(self, name: str) -> float:
         """w[k] of any connection by name. Raises KeyError with the nearest names."""
-        index = self.network.connection_index.get(name)
+        index = self.network.connection_index.get(arguments.text("name", name))
         if index is None:
             raise unknown("connection", name, self.network.connection_names)
         return float(self._state.weights[index])
@@ -103,6 +104,8 @@ class Simulation:
         none. Raises InputError, and then no step was made.
         """
         state = self._state
+        if values is not None and not isinstance(values, Mapping):
+            raise TypeError(f"inputs are given by name, not as {type(values).__name__}: step(target=0.3)")
         vector = self._reader.at(state.k, {**(values or {}), **inputs})
         with np.errstate(all="ignore"):
             self._stepper.step(state, vector)
@@ -122,7 +125,7 @@ class Simulation:
         Fixed weights, biases, inputs, clamps and parameters of models and rules follow; plastic weights, states,
         signals under way and ``initial`` stay. Raises ParameterError, and then nothing has changed.
         """
-        checked = self._checked({**(values or {}), **parameters})
+        checked = self._checked({**arguments.mapping("values", values), **parameters})
         state = self._state
         try:
             with np.errstate(all="ignore"):
@@ -131,8 +134,8 @@ class Simulation:
             raise ParameterError(str(error)) from None
         self._reader.use(state)
 
-    def _checked(self, values: Mapping[str, float]) -> dict[int, float]:
-        slots = self.network.settable.index
+    def _checked(self, values: Mapping[str, object]) -> dict[int, float]:
+        slots, result = self.network.settable.index, {}
         for name, value in values.items():
             if name not in self.network.parameters:
                 hint = suggest(name, self.network.parameters, "the parameters are")
@@ -143,7 +146,8 @@ class Simulation:
                 )
             if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
                 raise ParameterError(f"parameter '{name}' takes a finite number, not {value!r}")
-        return {slots[name]: float(value) for name, value in values.items()}
+            result[slots[name]] = float(value)
+        return result
 
     def clamp(self, neurons: str, value: float) -> None:
         """Hold neurons (``K1..K3``, ``K + O``, ``left.K``) at a value from step k on, whatever their model says; its
@@ -185,7 +189,7 @@ class Simulation:
         self._controls.learn(self._state.conditions, members, on)
 
     def _neurons(self, text: str) -> IntArray:
-        found = self._names.find(text)
+        found = self._names.find(arguments.text("reference", text))
         if isinstance(found, str):
             raise UnknownNameError(found)
         return np.array(found.neurons, dtype=np.int64)
@@ -193,7 +197,7 @@ class Simulation:
     def _parts(self, text: str) -> tuple[IntArray, IntArray]:
         """The neurons, or else the connections, that a reference names."""
         none = np.zeros(0, dtype=np.int64)
-        if "->" not in text:
+        if "->" not in arguments.text("reference", text):
             return self._neurons(text), none
         index = self.network.connection_index.get(text)
         if index is not None and text.endswith(")"):
@@ -218,6 +222,7 @@ class Simulation:
 
     def restore(self, state: State) -> None:
         """Go on from a state of this network, exactly as it was. Raises ValueError for one of another network."""
+        arguments.instance("state", state, State, "a state, as state() gives it")
         if state.network != self.network.hash or len(state.activity) != len(self.network.neurons):
             raise ValueError("this is a state of another network")
         self._state = state.copy()
