@@ -55,7 +55,7 @@ def make_settable(
         *_of_connections(bundles, connections, plasticity),
         *_of_inputs(inputs),
     ]
-    merged = list(_merged(found))
+    merged = list(_merged([one for one in found if len(one.places)]))
     variables: dict[str, Variable] = {}
     initial: list[FloatArray] = []
     start = 0
