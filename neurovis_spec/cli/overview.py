@@ -101,13 +101,12 @@ def _entry(network: Network, index: int, name: str) -> tuple[str, ...]:
     members = np.flatnonzero(connections.entry == index)
     if not len(members):
         return name, "0", "", "", "", ""
-    rules = dict.fromkeys(connections.rules[members].tolist())
     return (
         name,
         f"{len(members):,}",
         spread(connections.weights[members].tolist()),
         _delays(connections.delays[members]),
-        ", ".join(network.plasticity[rule].title for rule in rules if rule >= 0),
+        connections.learns[index] or "",
         _bounds(float(connections.low[members[0]]), float(connections.high[members[0]])),
     )
 

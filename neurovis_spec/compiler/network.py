@@ -114,6 +114,8 @@ class Connections:
     entries: tuple[str, ...]
     #: what the spec says of each entry
     descriptions: tuple[str | None, ...]
+    #: the rule of each entry as the author wrote it, for display (``delta(rate=0.01)``); None without one
+    learns: tuple[str | None, ...]
 
     def __len__(self) -> int:
         return len(self.sources)
