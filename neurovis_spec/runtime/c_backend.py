@@ -133,6 +133,11 @@ def written(network: Network) -> Written:
     return found
 
 
+def forget() -> None:
+    """Write all networks anew when they are asked for."""
+    _written.clear()
+
+
 def _write(network: Network) -> Written:
     emitter, tables = Emitter(), Tables("double", LONGEST)
     small = len(network.neurons) + len(network.connections) <= SMALL
@@ -145,7 +150,9 @@ def _write(network: Network) -> Written:
         StepCode(network, code, form).write()
         head = f"static void {name}(const nv_state *p, int64_t k, const double *restrict s{more})"
         lines = [*code.head.values(), *(line[4:] for line in code.lines)]
-        bodies.append("\n".join([head, "{", *(f"    {line}" for line in (*_taken(network, tables, lines), *lines)), "}"]))
+        bodies.append(
+            "\n".join([head, "{", *(f"    {line}" for line in (*_taken(network, tables, lines), *lines)), "}"])
+        )
     counts = {"NEURONS": len(network.neurons), "INPUTS": network.vector_size, "CHANGING": len(network.changing)}
     defined = [f"#define {name} {value}" for name, value in counts.items()]
     defined.append(f"#define LOOK ({_look(network)})")
@@ -156,9 +163,15 @@ def _write(network: Network) -> Written:
 def _taken(network: Network, tables: Tables, lines: list[str]) -> list[str]:
     """The arrays of the state, and those handed over, by the names that these lines use."""
     used = set(re.findall(r"[A-Za-z_]\w*", "\n".join(lines)))
-    taken = [f"double *restrict const {name} = p->{name};" for name in ("activity", "weights", "signals", "history") if name in used]
+    taken = [
+        f"double *restrict const {name} = p->{name};"
+        for name in ("activity", "weights", "signals", "history")
+        if name in used
+    ]
     taken += [f"const double *restrict const {name} = p->{name};" for name in ("x", "holding") if name in used]
-    taken += [f"const uint8_t *restrict const {name} = p->{name};" for name in ("held", "gone", "still") if name in used]
+    taken += [
+        f"const uint8_t *restrict const {name} = p->{name};" for name in ("held", "gone", "still") if name in used
+    ]
     number = 0
     for kind, counts in (
         ("cells", [len(block.model.state) for block in network.blocks]),

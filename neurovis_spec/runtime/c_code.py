@@ -75,6 +75,8 @@ class Code:
         self.lines: list[str] = []
         self.indent = 1
         self._count = 0
+        #: identifiers whose values stay
+        self._constant: set[str] = set()
         #: what stands at the head of the function, each once
         self.head: dict[str, str] = {}
         self.clock: dict[str, Value] = {**constants(dt), "k": "kd", "t": "td"}
@@ -109,9 +111,10 @@ class Code:
 
     def let(self, prefix: str, value: Value) -> Value:
         """Give code an identifier; a number stays one."""
-        if isinstance(value, float):
+        if isinstance(value, float) or value in self._constant:
             return value
         name = self.name(prefix)
+        self._constant.add(name)
         self.line(f"const {self.real} {name} = {value};")
         return name
 

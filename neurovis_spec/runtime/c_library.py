@@ -104,7 +104,15 @@ def folder() -> Path:
 def place(text: str) -> Path:
     """Where the library of a text is, once it is compiled. Raises CompilerError."""
     made_by = compiler()
-    parts = (text, *made_by.command, made_by.stamp, *FLAGS, platform.machine(), sys.platform, str(ctypes.sizeof(ctypes.c_void_p)))
+    parts = (
+        text,
+        *made_by.command,
+        made_by.stamp,
+        *FLAGS,
+        platform.machine(),
+        sys.platform,
+        str(ctypes.sizeof(ctypes.c_void_p)),
+    )
     return folder() / (hashlib.sha256("\0".join(parts).encode()).hexdigest()[:40] + _SUFFIX)
 
 

@@ -171,7 +171,9 @@ class StepCode:
         self.code.head["ends"] = f"const int ends = (k + 1) % {self.network.episode} == 0;"
         return "ends"
 
-    def replace(self, variables: Mapping[str, Value], known: Mapping[str, Value], trees: Mapping[str, Tree | None]) -> None:
+    def replace(
+        self, variables: Mapping[str, Value], known: Mapping[str, Value], trees: Mapping[str, Tree | None]
+    ) -> None:
         """All right-hand sides, then all variables."""
         code = self.code
         made = {name: code.let("n", code.value(tree, known)) for name, tree in trees.items() if tree is not None}
@@ -297,7 +299,7 @@ class StepCode:
             )
             return f"h{own[0]}[{source}]"
         code.head["depth"] = f"const int32_t now = (int32_t)(k % {self.depth});"
-        row = f"(now + {self.depth} - {code.at(delays, place)}) % {self.depth}"
+        row = f"(now + {self.depth} - ({code.at(delays, place)})) % {self.depth}"
         return f"history[(size_t)({row})*{n} + {source}]"
 
     def signal(self, indices: IntArray, place: Place) -> str:

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.progress import Progress
-from neurovis_spec.runtime.backend import Backend, prepare
+from neurovis_spec.runtime.backend import Backend, Runner, Stepper, prepare
 from neurovis_spec.runtime.conditions import Controls
 from neurovis_spec.runtime.inputs import STRETCH, InputReader
 from neurovis_spec.runtime.memory import check_room
@@ -130,10 +130,10 @@ def checked_steps(network: Network, steps: int | None, every: int) -> int:
 def go(network: Network, state: State, course: Course, rows: Rows, progress: Progress | None = None) -> None:
     """Run a network from a state, and hand on the rows that are kept."""
     every, steps = course.every, course.steps
-    changing = _subscript(network.changing)
-    watch, due, step = Watch(network), rows.due, prepare(network, course.backend).step
-    look = watch.look
+    watch = Watch(network)
     reader = InputReader(network, course.inputs, watch.given)
+    stepper = prepare(network, course.backend, steps)
+    make: _Make = _Together(stepper) if isinstance(stepper, Runner) else _OneByOne(network, stepper)
     controls, changes = Controls(network), {change.at: change for change in network.changes}
     edges = [0, *(at for at in changes if 0 < at < steps), steps]
     with np.errstate(all="ignore"):
@@ -142,30 +142,91 @@ def go(network: Network, state: State, course: Course, rows: Rows, progress: Pro
                 controls.apply(state.conditions, state.weights, state.signals, changes[begin])
             reader.use(state)
             for first, stop in _stretches(begin, end):
-                if rows.over():
+                if rows.over() or not make.steps(state, first, stop, every, rows, reader, watch):
                     return
-                wanted = (stop - 1) // every - (first - 1) // every
-                activity, weights = rows.begin(wanted)
-                row = 0
-                for k, vector in enumerate(reader.rows(first, stop), first):
-                    keep = k % every == 0
-                    if keep and changing is not None:
-                        weights[row] = state.weights[changing]
-                    step(state, vector)
-                    look(state)
-                    if keep:
-                        activity[row] = state.activity
-                        row += 1
-                    if due():
-                        rows.end(row)
-                        if rows.over():
-                            return
-                        wanted -= row
-                        activity, weights = rows.begin(wanted)
-                        row = 0
-                rows.end(row)
                 if progress is not None:
                     progress(stop, steps)
+
+
+class _Make(Protocol):
+    """A way to make the steps of a stretch."""
+
+    def steps(
+        self, state: State, first: int, stop: int, every: int, rows: Rows, reader: InputReader, watch: Watch
+    ) -> bool:
+        """Make the steps from ``first`` to ``stop``; False where the rows say that the run is over."""
+        ...
+
+
+@dataclass(frozen=True)
+class _OneByOne:
+    """Each step by a call."""
+
+    network: Network
+    stepper: Stepper
+
+    def steps(
+        self, state: State, first: int, stop: int, every: int, rows: Rows, reader: InputReader, watch: Watch
+    ) -> bool:
+        step, look, due, changing = self.stepper.step, watch.look, rows.due, _subscript(self.network.changing)
+        wanted = _kept(first, stop, every)
+        activity, weights = rows.begin(wanted)
+        row = 0
+        for k, vector in enumerate(reader.rows(first, stop), first):
+            keep = k % every == 0
+            if keep and changing is not None:
+                weights[row] = state.weights[changing]
+            step(state, vector)
+            look(state)
+            if keep:
+                activity[row] = state.activity
+                row += 1
+            if due():
+                rows.end(row)
+                if rows.over():
+                    return False
+                wanted -= row
+                activity, weights = rows.begin(wanted)
+                row = 0
+        rows.end(row)
+        return True
+
+
+@dataclass(frozen=True)
+class _Together:
+    """Many steps by a call."""
+
+    runner: Runner
+
+    def steps(
+        self, state: State, first: int, stop: int, every: int, rows: Rows, reader: InputReader, watch: Watch
+    ) -> bool:
+        wanted, most = _kept(first, stop, every), self.runner.at_once
+        activity, weights = rows.begin(wanted)
+        row, k = 0, first
+        for part in reader.parts(first, stop):
+            begin = k
+            while k < begin + len(part):
+                until = watch.until(k, min(k + most, begin + len(part)))
+                vectors = part[k - begin : until - begin]
+                made = self.runner.run(state, vectors, activity[row:], weights[row:], every, not watch.warned)
+                row += _kept(k, k + made, every)
+                k += made
+                watch.look(state)
+                if rows.due():
+                    rows.end(row)
+                    if rows.over():
+                        return False
+                    wanted -= row
+                    activity, weights = rows.begin(wanted)
+                    row = 0
+        rows.end(row)
+        return True
+
+
+def _kept(first: int, stop: int, every: int) -> int:
+    """How many of the steps from ``first`` to ``stop`` are recorded."""
+    return (stop - 1) // every - (first - 1) // every
 
 
 def _stretches(begin: int, end: int) -> Iterator[tuple[int, int]]:

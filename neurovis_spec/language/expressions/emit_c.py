@@ -49,7 +49,10 @@ _NONE: Mapping[str, Made] = MappingProxyType({})
 
 #: Functions of C's library that are what the language means.
 _LIBRARY: Mapping[str, str] = MappingProxyType(
-    {name: name for name in "floor ceil sqrt exp log log1p expm1 sin cos tan sinh cosh tanh asin acos atan atan2".split()}
+    {
+        name: name
+        for name in "floor ceil sqrt exp log log1p expm1 sin cos tan sinh cosh tanh asin acos atan atan2".split()
+    }
     | {"abs": "fabs", "round": "rint"}
 )
 #: Functions of the library whose results a compiler must not work out itself: it rounds better than the library.
@@ -157,9 +160,7 @@ class Emitter:
         tree = known_in(tree, names)
         return tree.value if isinstance(tree, Number) else _Writer(self, names).value(tree)[0]
 
-    def _called(
-        self, tree: Tree, names: dict[str, Value], calls: Mapping[str, Made]
-    ) -> tuple[Tree, dict[str, Value]]:
+    def _called(self, tree: Tree, names: dict[str, Value], calls: Mapping[str, Made]) -> tuple[Tree, dict[str, Value]]:
         """The tree with a name for each call of a function of the place, and what these names are."""
 
         def replaced(node: Tree) -> Tree:
