@@ -8,7 +8,6 @@ forms of the step, a plain one and one that looks after everything.
 from __future__ import annotations
 
 import ctypes
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -22,7 +21,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.language.expressions.emit_c import Emitter
 from neurovis_spec.runtime import c_library
 from neurovis_spec.runtime.backend import Availability, BackendError, Capabilities
-from neurovis_spec.runtime.c_code import Code, Tables
+from neurovis_spec.runtime.c_code import Code, Tables, function, words_of
 from neurovis_spec.runtime.c_step import Form, StepCode
 from neurovis_spec.runtime.conditions import Conditions, Mask, Structure
 from neurovis_spec.runtime.state import State
@@ -141,7 +140,8 @@ def forget() -> None:
 def _write(network: Network) -> Written:
     emitter, tables = Emitter(), Tables("double", LONGEST)
     small = len(network.neurons) + len(network.connections) <= SMALL
-    bodies = []
+    bodies: list[str] = []
+    taken = _taken(network)
     for name, form, more in (
         ("nv_plain", Form(written_out=small), ""),
         ("nv_general", Form(first=True, held=True, gone=True, still=True), ", int first"),
@@ -149,43 +149,38 @@ def _write(network: Network) -> Written:
         code = Code(emitter, tables, network.dt, network.settable.variables)
         StepCode(network, code, form).write()
         head = f"static void {name}(const nv_state *p, int64_t k, const double *restrict s{more})"
-        lines = [*code.head.values(), *(line[4:] for line in code.lines)]
-        bodies.append(
-            "\n".join([head, "{", *(f"    {line}" for line in (*_taken(network, tables, lines), *lines)), "}"])
-        )
+        bodies += [*function(code, head, taken | tables.taken()), ""]
     counts = {"NEURONS": len(network.neurons), "INPUTS": network.vector_size, "CHANGING": len(network.changing)}
     defined = [f"#define {name} {value}" for name, value in counts.items()]
     defined.append(f"#define LOOK ({_look(network)})")
-    parts = [_HEAD, "\n".join(defined), emitter.helpers(), tables.text(), *bodies]
-    return Written("\n\n".join(part for part in parts if part) + "\n" + _TAIL, tuple(tables.given))
+    used = words_of(bodies)
+    parts = [_HEAD, "\n".join(defined), emitter.helpers(used), tables.text(used), "\n".join(bodies)]
+    return Written("\n\n".join(part for part in parts if part) + _TAIL, tuple(tables.given))
 
 
-def _taken(network: Network, tables: Tables, lines: list[str]) -> list[str]:
-    """The arrays of the state, and those handed over, by the names that these lines use."""
-    used = set(re.findall(r"[A-Za-z_]\w*", "\n".join(lines)))
-    taken = [
-        f"double *restrict const {name} = p->{name};"
-        for name in ("activity", "weights", "signals", "history")
-        if name in used
-    ]
-    taken += [f"const double *restrict const {name} = p->{name};" for name in ("x", "holding") if name in used]
-    taken += [
-        f"const uint8_t *restrict const {name} = p->{name};" for name in ("held", "gone", "still") if name in used
-    ]
-    number = 0
-    for kind, counts in (
-        ("cells", [len(block.model.state) for block in network.blocks]),
-        ("traces", [len(plasticity.rule.state) for plasticity in network.plasticity]),
-    ):
+def _taken(network: Network) -> dict[str, str]:
+    """For each array of the state, and for what is handed over, the line that gives it its name."""
+    kinds = (
+        ("double", ("activity", "weights", "signals", "history")),
+        ("const double", ("x", "holding")),
+        ("const uint8_t", ("held", "gone", "still")),
+    )
+    taken = {name: f"{kind} *restrict const {name} = p->{name};" for kind, names in kinds for name in names}
+    for kind, counts in owned(network):
         number = 0
         for owner, count in enumerate(counts):
             for i in range(count):
-                name = f"{kind}{owner}_{i}"
-                if name in used:
-                    taken.append(f"double *restrict const {name} = p->{kind}[{number}];")
+                taken[f"{kind}{owner}_{i}"] = f"double *restrict const {kind}{owner}_{i} = p->{kind}[{number}];"
                 number += 1
-    handed = [line for name, line in tables.taken().items() if name in used]
-    return [*taken, *(["const void *const *const given = p->given;"] if handed else []), *handed]
+    return taken
+
+
+def owned(network: Network) -> tuple[tuple[str, list[int]], ...]:
+    """How many states each block (``cells``) and each plasticity (``traces``) has."""
+    return (
+        ("cells", [len(block.model.state) for block in network.blocks]),
+        ("traces", [len(plasticity.rule.state) for plasticity in network.plasticity]),
+    )
 
 
 def _look(network: Network) -> str:
@@ -206,11 +201,14 @@ def _look(network: Network) -> str:
     return " || ".join(tests)
 
 
+_POINTERS: Final = (
+    *("activity", "weights", "signals", "history", "x", "s", "holding"),
+    *("held", "gone", "still", "given", "cells", "traces"),
+)
+
+
 class _State(ctypes.Structure):
-    _fields_ = [
-        (name, ctypes.c_void_p)
-        for name in "activity weights signals history x s holding held gone still given cells traces".split()
-    ]
+    _fields_ = [(name, ctypes.c_void_p) for name in _POINTERS]
 
 
 class _Course(ctypes.Structure):

@@ -7,7 +7,8 @@ one by one, else the code of a loop's variable.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Container, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TypeAlias
 
@@ -15,7 +16,7 @@ import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.settable import Variable
-from neurovis_spec.language.expressions.emit_c import Emitter, Made, Value
+from neurovis_spec.language.expressions.emit_c import Drawn, Emitter, Made, Value
 from neurovis_spec.language.expressions.tree import Tree, names
 from neurovis_spec.runtime.state import constants
 
@@ -33,7 +34,7 @@ class Tables:
     def __init__(self, real: str, longest: int | None) -> None:
         self._real, self._longest = real, longest
         self._names: dict[tuple[str, bytes], str] = {}
-        self._text: list[str] = []
+        self._text: dict[str, str] = {}
         self.given: list[FloatArray | IntArray] = []
         self._taken: dict[str, str] = {}
 
@@ -46,10 +47,10 @@ class Tables:
             name = self._names[key] = f"t{len(self._names)}"
             kind = self._real if real else "int32_t"
             if self._longest is not None and len(array) > self._longest:
-                self._taken[name] = f"const {kind} *const {name} = (const {kind} *)given[{len(self.given)}];"
+                self._taken[name] = f"const {kind} *const {name} = (const {kind} *)p->given[{len(self.given)}];"
                 self.given.append(array)
             else:
-                self._text.append(f"static const {kind} {name}[{len(array)}] = {{\n{self._items(array)}\n}};")
+                self._text[name] = f"static const {kind} {name}[{len(array)}] = {{\n{self._items(array)}\n}};"
         return self._names[key]
 
     def _items(self, array: FloatArray | IntArray) -> str:
@@ -58,11 +59,11 @@ class Tables:
         texts = [emitter.text(item) if isinstance(item, float) else str(item) for item in items]
         return ",\n".join("    " + ", ".join(texts[i : i + _ROW]) for i in range(0, len(texts), _ROW))
 
-    def text(self) -> str:
-        """The definitions."""
-        return "\n\n".join(self._text)
+    def text(self, used: Container[str]) -> str:
+        """The definitions of those that are used."""
+        return "\n\n".join(text for name, text in self._text.items() if name in used)
 
-    def taken(self) -> Mapping[str, str]:
+    def taken(self) -> dict[str, str]:
         """For each array that is handed over, the line that gives it its name."""
         return self._taken
 
@@ -168,14 +169,16 @@ class Code:
         """The parameters of a definition in use."""
         return {name: self.settable(f"{owner}/{name}", values, None, place) for name, values in arrays.items()}
 
-    def value(self, tree: Tree, known: Mapping[str, Value], calls: Mapping[str, Made] = _NONE) -> Value:
+    def value(
+        self, tree: Tree, known: Mapping[str, Value], calls: Mapping[str, Made] = _NONE, drawn: Drawn | None = None
+    ) -> Value:
         """An expression as a number or code."""
         read = names(tree) & {"k", "t"}
         if read:
             self.head["kd"] = f"const {self.real} kd = ({self.real})k;"
         if "t" in read:
             self.head["td"] = f"const {self.real} td = kd * {self.emitter.literal(self._dt)[0]};"
-        return self.emitter.value(tree, {**self.clock, **known}, calls)
+        return self.emitter.value(tree, {**self.clock, **known}, calls, drawn)
 
     def remainder(self, divisor: int) -> str:
         """k mod a number."""
@@ -184,3 +187,19 @@ class Code:
         name = f"r{divisor}"
         self.head[name] = f"const int32_t {name} = (int32_t)(k % {divisor});"
         return name
+
+
+def words_of(lines: Iterable[str]) -> set[str]:
+    """All identifiers in some lines, but for members of a struct."""
+    return set(re.findall(r"(?<!->)(?<![\w.])[A-Za-z_]\w*", "\n".join(lines)))
+
+
+def function(code: Code, head: str, taken: Mapping[str, str]) -> list[str]:
+    """A function of the lines of ``code``, with what stands at their head and those of ``taken`` that are used."""
+    head_lines = dict(code.head)
+    used = words_of(code.lines)
+    for name in reversed(list(head_lines)):
+        if name in used:
+            used |= words_of([head_lines[name]])
+    heads = [f"    {line}" for name, line in head_lines.items() if name in used]
+    return [head, "{", *(f"    {line}" for name, line in taken.items() if name in used), *heads, *code.lines, "}"]

@@ -268,7 +268,7 @@ class StepCode:
             own = values[members] if not isinstance(place, int) else values[members[place : place + 1]]
             if code.is_set(array) or np.isfinite(own).any():
                 bound = code.text(code.settable(array, values, members, place))
-                weight = f"{code.emitter.helper(function)}({code.text(weight)}, {bound})"
+                weight = f"{function}({code.text(weight)}, {bound})"
         return code.let("n", weight)
 
     def seen(self, plasticity: Plasticity, place: Place) -> dict[str, Value]:
@@ -298,7 +298,7 @@ class StepCode:
                 f"const {code.real} *const h{own[0]} = history + (size_t)((k + {self.depth - own[0]}) % {self.depth})*{n};"
             )
             return f"h{own[0]}[{source}]"
-        code.head["depth"] = f"const int32_t now = (int32_t)(k % {self.depth});"
+        code.head["now"] = f"const int32_t now = (int32_t)(k % {self.depth});"
         row = f"(now + {self.depth} - ({code.at(delays, place)})) % {self.depth}"
         return f"history[(size_t)({row})*{n} + {source}]"
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from types import MappingProxyType
 from typing import TypeAlias
 
@@ -18,6 +18,7 @@ from neurovis_spec.language.expressions.tree import (
     Binary,
     Call,
     Conditional,
+    Draw,
     Name,
     Number,
     Tree,
@@ -29,8 +30,9 @@ from neurovis_spec.language.expressions.tree import (
 
 #: What a name may be: a number, or code.
 Value: TypeAlias = float | str
-#: Makes the value of a call or a draw from the values of its arguments.
+#: Makes the value of a call from the values of its arguments, that of a draw from its two.
 Made: TypeAlias = Callable[..., Value]
+Drawn: TypeAlias = Callable[[Draw, Value, Value], Value]
 #: Code, and how tight its outermost operator binds in C.
 _Code: TypeAlias = tuple[str, int]
 
@@ -137,16 +139,21 @@ def _exponent(tree: Tree) -> Tree | None:
 
 
 class Emitter:
-    """Makes C for one type of numbers, and remembers which helpers it has used."""
+    """Makes C for one type of numbers."""
 
     def __init__(self, real: str = "double") -> None:
         self.real = real
         self.suffix = "f" if real == "float" else ""
-        self.used: set[str] = set()
 
-    def value(self, tree: Tree, names: Mapping[str, Value], calls: Mapping[str, Made] = _NONE) -> Value:
-        """The number, or the code of one. ``calls`` makes the values of functions of the place (``f`` of a model).
-        Raises KeyError for a name or a function that is not given.
+    def value(
+        self,
+        tree: Tree,
+        names: Mapping[str, Value],
+        calls: Mapping[str, Made] = _NONE,
+        drawn: Drawn | None = None,
+    ) -> Value:
+        """The number, or the code of one. ``calls`` makes the values of functions of the place (``f`` of a model),
+        ``drawn`` those of draws. Raises KeyError for a name or a function that is not given.
 
         >>> from neurovis_spec.language.expressions.parser import parse
         >>> c = Emitter()
@@ -155,19 +162,25 @@ class Emitter:
         >>> c.value(parse("x^2 if x < 0 or c else tanh(x)"), {"x": "a", "c": "p"})
         'a < 0.0 || p != 0.0 ? nv_square(a) : tanh(a)'
         """
-        if calls:
-            tree, names = self._called(tree, dict(names), calls)
+        if calls or drawn is not None:
+            tree, names = self._called(tree, dict(names), calls, drawn)
         tree = known_in(tree, names)
         return tree.value if isinstance(tree, Number) else _Writer(self, names).value(tree)[0]
 
-    def _called(self, tree: Tree, names: dict[str, Value], calls: Mapping[str, Made]) -> tuple[Tree, dict[str, Value]]:
-        """The tree with a name for each call of a function of the place, and what these names are."""
+    def _called(
+        self, tree: Tree, names: dict[str, Value], calls: Mapping[str, Made], drawn: Drawn | None
+    ) -> tuple[Tree, dict[str, Value]]:
+        """The tree with a name for each call of a function of the place and each draw, and what these names are."""
 
         def replaced(node: Tree) -> Tree:
             if isinstance(node, Call) and node.function in calls:
                 arguments = [self.value(replaced(argument), names) for argument in node.arguments]
                 name = f" {len(names)}"  # no name of an author
                 names[name] = calls[node.function](*arguments)
+                return Name(name, node.start, node.end)
+            if isinstance(node, Draw) and drawn is not None:
+                name = f" {len(names)}"
+                names[name] = drawn(node, *(self.value(replaced(part), names) for part in children(node)))
                 return Name(name, node.start, node.end)
             parts = children(node)
             return rebuild(node, tuple(map(replaced, parts))) if parts else node
@@ -187,16 +200,9 @@ class Emitter:
             return (huge, _ATOM) if value > 0 else (f"-{huge}", _SIGN)
         return repr(float(value)) + self.suffix, _ATOM if math.copysign(1.0, value) > 0 else _SIGN
 
-    def helper(self, name: str) -> str:
-        """The name of a helper that is used."""
-        self.used.add(name)
-        return name
-
-    def helpers(self) -> str:
-        """The text of all helpers used so far."""
-        return "\n\n".join(
-            text.format(real=self.real, s=self.suffix) for name, text in HELPERS.items() if name in self.used
-        )
+    def helpers(self, used: Container[str]) -> str:
+        """The text of these helpers."""
+        return "\n\n".join(text.format(real=self.real, s=self.suffix) for name, text in HELPERS.items() if name in used)
 
 
 class _Writer:
@@ -207,7 +213,7 @@ class _Writer:
 
     def value(self, tree: Tree) -> _Code:
         if (square := is_square(tree)) is not None:
-            return f"{self.emitter.helper('nv_square')}({self.loose(square)})", _ATOM
+            return f"nv_square({self.loose(square)})", _ATOM
         match tree:
             case Number(value=value):
                 return self.emitter.literal(value)
@@ -225,7 +231,7 @@ class _Writer:
                 joined = f" {operator} " if level == _ADD else operator
                 return f"{self.tight(left, level)}{joined}{self.tight(right, level + 1)}", level
             case Binary(operator="%", left=left, right=right):
-                return f"{self.emitter.helper('nv_mod')}({self.loose(left)}, {self.loose(right)})", _ATOM
+                return f"nv_mod({self.loose(left)}, {self.loose(right)})", _ATOM
             case Binary(operator="^", left=left, right=right):
                 return self.power(left, right)
             case Conditional(condition=condition, then=then, otherwise=otherwise):
@@ -254,7 +260,7 @@ class _Writer:
     def power(self, base: Tree, exponent: Tree) -> _Code:
         code = self.loose(exponent)
         if _LITERAL.fullmatch(code):
-            return f"{self.emitter.helper('nv_power')}({self.loose(base)}, {code})", _ATOM
+            return f"nv_power({self.loose(base)}, {code})", _ATOM
         return f"pow{self.emitter.suffix}({self.loose(base)}, {code})", _ATOM
 
     def call(self, function: str, arguments: tuple[Tree, ...]) -> _Code:
@@ -265,10 +271,10 @@ class _Writer:
             case "min" | "max":
                 return self.folded(f"nv_{function}", codes), _ATOM
             case "clip":
-                greater = f"{self.emitter.helper('nv_max')}({codes[0]}, {codes[1]})"
-                return f"{self.emitter.helper('nv_min')}({greater}, {codes[2]})", _ATOM
+                greater = f"nv_max({codes[0]}, {codes[1]})"
+                return f"nv_min({greater}, {codes[2]})", _ATOM
             case "sign" | "step" | "sigmoid":
-                return f"{self.emitter.helper(f'nv_{function}')}({codes[0]})", _ATOM
+                return f"nv_{function}({codes[0]})", _ATOM
             case _:
                 return f"{_LIBRARY[function]}{self.emitter.suffix}({', '.join(codes)})", _ATOM
 
@@ -277,7 +283,7 @@ class _Writer:
         if len(codes) == 1:
             return codes[0]
         middle = (len(codes) + 1) // 2
-        return f"{self.emitter.helper(name)}({self.folded(name, codes[:middle])}, {self.folded(name, codes[middle:])})"
+        return f"{name}({self.folded(name, codes[:middle])}, {self.folded(name, codes[middle:])})"
 
     def number(self, value: float) -> str:
         return self.emitter.literal(value)[0]
