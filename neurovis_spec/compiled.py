@@ -7,11 +7,11 @@ does so: a spec is compiled, and thereby checked, without it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +28,7 @@ from neurovis_spec.runtime.files import replacing
 if TYPE_CHECKING:
     from neurovis_spec.compiler.arrays import FloatArray
     from neurovis_spec.layout import Layout, Point, Route
+    from neurovis_spec.runtime.columns import Keep
     from neurovis_spec.runtime.record import Course
     from neurovis_spec.runtime.recording import Recording, Snapshot
     from neurovis_spec.runtime.simulation import Simulation
@@ -38,6 +39,16 @@ if TYPE_CHECKING:
 DEFAULT_FPS, MOST_FPS = 25.0, 60.0
 #: The most steps of a run: beyond it a step is no number that a double can hold.
 _MOST_STEPS = 1 << 53
+
+
+def _keep(states: str | Sequence[str], neurons: str | Sequence[str], weights: str) -> Keep:
+    """What of a step is recorded. Raises ValueError."""
+    from neurovis_spec.runtime.columns import Keep
+
+    if weights not in ("plastic", "none"):
+        raise ValueError(f"weights are 'plastic' or 'none', not {weights!r}")
+    states, neurons = ((one,) if isinstance(one, str) else tuple(one) for one in (states, neurons))
+    return Keep(neurons, weights == "plastic", states)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,15 +110,23 @@ class CompiledNetwork:
         start: Recording | None = None,
         until: str | Until | None = None,
         progress: Progress | None = None,
+        states: str | Sequence[str] = (),
+        neurons: str | Sequence[str] = (),
+        weights: Literal["plastic", "none"] = "plastic",
     ) -> Recording:
         """Run ``steps`` steps (default ``time.steps``) and record every ``every``-th.
 
-        ``inputs`` replace the sources of inputs: arrays of (steps,) or (steps, size). The run ends at the first step
-        after which ``until`` is true (``"rms(O - T, last=129) < 0.01"``). Raises InputError, BackendError,
-        RecordingError, SpecError where ``until`` is invalid.
+        ``inputs`` replace the sources of inputs: arrays of (steps,) or (steps, size). ``states`` are recorded as well
+        (``K.v``, ``(K -> O).eligibility``), and so are those that outputs name; ``neurons`` (``O + K``) are the only
+        ones that are recorded, ``weights="none"`` leaves the weights out.
+        The run ends at the first step after which ``until`` is true (``"rms(O - T, last=129) < 0.01"``). Raises
+        InputError, BackendError, RecordingError, KeyError for a name that there is not, SpecError where ``until`` is
+        invalid.
         """
         _check(backend=backend, start=start, progress=progress)
-        return pipeline.simulate(self.network, self._course(steps, inputs, backend, every, until), start, progress)
+        keep = _keep(states, neurons, weights)
+        course = self._course(steps, inputs, backend, every, until, keep)
+        return pipeline.simulate(self.network, course, start, progress)
 
     def until(self, text: str) -> Until:
         """A measure that ends runs, ``rms(O - T, last=129) < 0.01``: its ``ending`` says how the last one ended. Raises
@@ -132,13 +151,16 @@ class CompiledNetwork:
         start: Recording | None = None,
         until: str | Until | None = None,
         progress: Progress | None = None,
+        states: str | Sequence[str] = (),
+        neurons: str | Sequence[str] = (),
+        weights: Literal["plastic", "none"] = "plastic",
     ) -> None:
         """Run as ``run`` does and write the recording to a file while it is made, in memory that does not grow with the
         steps. What was there stays until the end. Raises what ``run`` and ``Recording.save`` raise, RecordingError
         where the disk has not the room, and after Ctrl-C a KeyboardInterrupt; the file holds the steps until then.
         After any other exception a part beside the file holds them, which is read where the file is not there."""
         _check(backend=backend, start=start, progress=progress)
-        course = self._course(steps, inputs, backend, every, until)
+        course = self._course(steps, inputs, backend, every, until, _keep(states, neurons, weights))
         pipeline.simulate_to(self.network, arguments.path("path", path), course, start, progress)
 
     def _course(
@@ -148,6 +170,7 @@ class CompiledNetwork:
         backend: str | None,
         every: int,
         until: str | Until | None,
+        keep: Keep,
     ) -> Course:
         from neurovis_spec.runtime.record import Course
 
@@ -155,7 +178,7 @@ class CompiledNetwork:
         if inputs is not None:
             arguments.mapping("inputs", inputs)
         whole = self.network.steps if steps is None else arguments.integer("steps", steps, 0, _MOST_STEPS)
-        return Course(whole, arguments.integer("every", every, 1, _MOST_STEPS), inputs, backend, ends)
+        return Course(whole, arguments.integer("every", every, 1, _MOST_STEPS), inputs, backend, ends, keep)
 
     def refusal(self) -> Diagnostic | None:
         """What ``layout`` and all that draws would refuse, as far as that is known before an engine begins; None where

@@ -79,7 +79,7 @@ def simulate(
     """Run the update program, record activities and weights."""
     from neurovis_spec.runtime.record import record
 
-    how = (course.steps, course.inputs, course.backend, course.every, start, progress, course.until)
+    how = (course.steps, course.inputs, course.backend, course.every, start, progress, course.until, course.keep)
     return record(network, *how)
 
 

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.runtime.columns import columns_of
 from neurovis_spec.runtime.inputs import InputError
-from neurovis_spec.runtime.recording import After, Recording, RecordingError, Snapshot, recording_of
+from neurovis_spec.runtime.recording import After, Numbers, Recording, RecordingError, Snapshot, recording_of
 
 
 def snapshot_at(
@@ -86,7 +87,7 @@ def fitted(recording: Recording, network: Network) -> Recording:
     changing = tuple(network.connection_names[index] for index in network.changing.tolist())
     if own and len(recording.plastic) == len(recording.sources) and recording.connection_names == changing:
         after = After(recording.weights_after, recording.reached)
-        rows = recording.step, recording.activity, recording.weights
-        return recording_of(network, *rows, network.connections.weights, after)
+        rows = Numbers(recording.step, recording.activity, recording.weights, recording.states)
+        return recording_of(network, columns_of(network), rows, network.connections.weights, after)
     whose = f"{recording.network or 'unnamed'}, {len(recording.neurons)} neurons"
     raise RecordingError(f"the recording is of another network ({whose})")

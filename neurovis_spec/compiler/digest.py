@@ -35,6 +35,7 @@ _SHOWN = frozenset(
         "learns",
         "slots",
         "parts",
+        "states",
     )
 )
 

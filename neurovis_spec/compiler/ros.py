@@ -119,11 +119,11 @@ def _publications(model: RosModel, around: Surroundings, constants: Constants) -
         if output is None:
             _report_output(name, model, around.spec, constants.findings)
         safe = None if entry.safe is None else constants.scalar(entry.safe)
-        size = None if output is None else len(output.neurons)
+        size = None if output is None else output.size
         _check_numbers(entry, size, f"the output '{name}' has", constants.findings)
         if output is not None:
             field = _DATA if entry.field is None else entry.field.value
-            yield Publication(name, entry.topic.value, _type(entry, len(output.neurons)), field, safe)
+            yield Publication(name, entry.topic.value, _type(entry, output.size), field, safe)
 
 
 def _type(entry: SubscribeModel | PublishModel, size: int) -> str:

@@ -7,7 +7,7 @@ can be kept and gone back to.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 
 import numpy as np
@@ -16,12 +16,13 @@ import numpy.typing as npt
 from neurovis_spec import arguments
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.changes import Clamp
-from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.network import Network, Output
 from neurovis_spec.compiler.patch import PatchError
 from neurovis_spec.compiler.settable import ParameterFormula
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.expressions.tree import Number
 from neurovis_spec.runtime.backend import Backend, prepare
+from neurovis_spec.runtime.columns import probe_of
 from neurovis_spec.runtime.conditions import Controls
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.names import Names, names_of
@@ -57,6 +58,11 @@ class Simulation:
     @cached_property
     def _names(self) -> Names:
         return names_of(self.network)
+
+    @cached_property
+    def _outputs(self) -> Mapping[str, Callable[[State], np.float64 | FloatArray]]:
+        """How each output is read."""
+        return {entry.name: _reader(self.network, entry) for entry in self.network.outputs}
 
     def _apply(self, state: State) -> None:
         """What events change at the step to come."""
@@ -113,11 +119,7 @@ class Simulation:
         if state.k in self._changes:  # those of the next step apply now, so that ``weights`` are those of the next step
             self._apply(state)
             self._reader.use(state)
-        activity = state.activity
-        return {
-            entry.name: np.float64(activity[entry.neurons[0]]) if entry.scalar else activity[entry.neurons]
-            for entry in self.network.outputs
-        }
+        return {name: read(state) for name, read in self._outputs.items()}
 
     def set(self, values: Mapping[str, float] | None = None, /, **parameters: float) -> None:
         """Give parameters other values from step k on, until an event of a later step sets them again.
@@ -227,3 +229,14 @@ class Simulation:
             raise ValueError("this is a state of another network")
         self._state = state.copy()
         self._reader.use(self._state)
+
+
+def _reader(network: Network, output: Output) -> Callable[[State], np.float64 | FloatArray]:
+    """What reads an output from the state after a step."""
+    if output.states:
+        probe = probe_of(network, output.states)
+        return (lambda state: np.float64(probe.now(state)[0])) if output.scalar else probe.now
+    if output.scalar:
+        index = int(output.neurons[0])
+        return lambda state: np.float64(state.activity[index])
+    return lambda state: state.activity[output.neurons]

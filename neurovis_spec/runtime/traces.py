@@ -22,15 +22,17 @@ MOST, COLUMNS = 24, 300
 
 
 def traces(recording: Recording) -> str:
-    """The activities and the changing weights over the steps; every line has its own range, which is written beside
-    it."""
-    names = [recording.connection_names[index] for index in recording.plastic[:MOST].tolist()]
+    """The activities, the changing weights and the states over the steps; every line has its own range, which is
+    written beside it."""
+    plastic = recording.plastic if recording.weights.shape[1] else recording.plastic[:0]
+    names = [recording.connection_names[index] for index in plastic[:MOST].tolist()]
     rows = [
-        *_rows("activity", recording.neurons[:MOST], recording.activity, "#0072b2"),
+        *_rows("activity", recording.columns[:MOST], recording.activity, "#0072b2"),
         *_rows("weight", names, recording.weights, "#b07d00"),
+        *_rows("state", recording.state_names[:MOST], recording.states, "#009e73"),
     ]
     height = TOP + ROW * len(rows) + 8
-    hidden = max(0, len(recording.neurons) - MOST) + max(0, len(recording.plastic) - MOST)
+    hidden = sum(max(0, width - MOST) for width in recording.widths)
     span = f"steps {recording.step[0]} … {recording.step[-1]}" if len(recording) else "no steps"
     more = f" · {hidden} more" if hidden else ""
     title = escape(f"{recording.network or 'recording'} · {span}{more}")
