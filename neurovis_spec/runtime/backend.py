@@ -126,14 +126,14 @@ def listing() -> tuple[str, ...]:
 
 
 def choose_backend(network: Network, steps: int | None = None) -> tuple[str, str]:
-    """The name of the backend that runs this network unless another is asked for, and why. Without ``steps`` a run of
-    ``time.steps`` is meant."""
+    """The name of the backend that runs this network unless another is asked for, and why. It goes by the length of the
+    network's default run, or of a longer one (``steps``): shorter runs, and steps by hand, give the same bits."""
     size = f"{len(network.neurons)} neurons, {len(network.connections)} connections"
     if "c" not in names():
         return "numpy", f"array code made for this network ({size}); needs nothing but NumPy"
     from neurovis_spec.runtime.c_choice import pays
 
-    better, why = pays(network, network.steps if steps is None else steps)
+    better, why = pays(network, max(network.steps, steps or 0))
     return ("c", f"{why} ({size})") if better else ("numpy", f"array code made for this network ({size}); {why}")
 
 
