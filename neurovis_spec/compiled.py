@@ -227,6 +227,20 @@ class CompiledNetwork:
         """The gains of Eqs. 2–5 for this network: the author's, else from the range of its default run."""
         return pipeline.measure(self.network)
 
+    def export(
+        self, folder: str | Path, to: str = "c", *, start: Recording | None = None, real: str = "double"
+    ) -> tuple[list[Path], list[Path]]:
+        """Write the network as source code into a folder: ``c`` is C99 that is C++17, too, with numbers of type
+        ``real``, double or float. ``start`` is a recording whose last weights and activities it begins with. Gives the
+        files written, and those that were there and stay. Raises ExportError, RecordingError, OSError, ValueError."""
+        from neurovis_spec.runtime.c_package import files, write
+        from neurovis_spec.runtime.resume import resumed_state
+
+        if to != "c" or real not in ("double", "float"):
+            raise ValueError(f"a network is exported to c, of double or float, not to {to} of {real}")
+        state = None if start is None else resumed_state(self.network, start)
+        return write(Path(folder), files(self.network, state, real))
+
     def choose_engine(self) -> tuple[str, str]:
         """The layout engine, and why."""
         from neurovis_spec.layout.choose import choose_engine

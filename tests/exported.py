@@ -36,7 +36,9 @@ def compiled(
         pytest.fail(f"this test needs {command}")
     library = folder / "controller.so"
     subprocess.run(
-        [command, *rest, *STRICT, "-O1", "-shared", "-fPIC", "with_size.c", "-o", str(library), "-lm"], cwd=folder, check=True
+        [command, *rest, *STRICT, "-O1", "-shared", "-fPIC", "with_size.c", "-o", str(library), "-lm"],
+        cwd=folder,
+        check=True,
     )
     return Controller(made, ctypes.CDLL(str(library)))
 

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
-from exported import LANGUAGES, compiled
+from click.testing import CliRunner
+from exported import LANGUAGES, STRICT, compiled
 from test_runtime_conformance import EVENTS, SPECS
 
 import neurovis_spec as nv
+from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.runtime.c_package import files, size_of_state
 from neurovis_spec.runtime.record import record
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.simulation import Simulation
@@ -65,3 +69,97 @@ def test_a_controller_begins_with_what_was_learned(tmp_path: Path) -> None:
         controller.step()
         np.testing.assert_array_equal(controller.activity, expected.activity[k])
     assert expected.weights[0].any()
+
+
+HOSTILE = """
+neurovis: 1
+name: "{name}"
+title: '*/ int main??/ \\ "'
+parameters: {{NAN: 0.5, double: 0.25, a_b: 1}}
+inputs: {{int: {{size: 2}}, "NULL": {{expression: NAN*sin(k)}}, main: {{}}, template: {{}}}}
+neurons:
+  for: {{count: 2, input: int, bias: double}}
+  while: {{input: "NULL", model: {{leaky_integrator: {{leak: double}}}}}}
+  x: {{input: main}}
+  s: {{input: template, bias: a_b}}
+  k: {{noise: "normal(0, NAN)"}}
+  activity: {{combine: product}}
+connections:
+  for -> while: NAN
+  x -> activity: {{weight: 1, delay: 3, plasticity: {{hebbian: {{rate: double}}}}}}
+outputs: {{class: while, errno: k, HUGE_VAL: for}}
+"""
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize("name", ["double", "math", "main", "NULL", "__x", "INT8_MAX"])
+def test_no_name_of_an_author_breaks_the_code(name: str, language: str, tmp_path: Path) -> None:
+    network = nv.compile_text(HOSTILE.format(name=name)).network
+    controller, simulation = compiled(network, tmp_path, language), Simulation(network, "reference")
+    for _ in range(5):
+        controller.step(np.array([0.1, 0.2, 0.3, 0.4]))
+        simulation.step({"int": [0.1, 0.2], "main": 0.3, "template": 0.4})
+        np.testing.assert_array_equal(controller.activity, simulation.activity)
+
+
+def test_numbers_of_32_bits(tmp_path: Path) -> None:
+    network = nv.compile_text(EVENTS).network
+    expected, controller = record(network, 10, backend="reference"), compiled(network, tmp_path, real="float")
+    for k in range(10):
+        controller.step()
+        np.testing.assert_allclose(controller.activity, expected.activity[k], rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize("path", [path for path in SPECS if path.stem in ("hexapod", "reward")], ids=lambda p: p.stem)
+def test_nothing_is_touched_that_is_not_its_own(path: Path, tmp_path: Path) -> None:
+    """Under the sanitizers, with the example program that comes along."""
+    written, kept = nv.compile(path).export(tmp_path)
+    assert len(written) == 5
+    assert not kept
+    name = next(file.stem for file in written if file.suffix == ".h")
+    flags = ("-std=c99", *STRICT, "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+    command = ["gcc", *flags, "main.c", f"{name}.c", "-o", "example", "-lm"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    done = subprocess.run([tmp_path / "example"], capture_output=True, text=True, check=True)
+    assert len(done.stdout.splitlines()) == 10
+
+
+def test_events_under_the_sanitizers(tmp_path: Path) -> None:
+    texts = files(nv.compile_text(EVENTS).network)
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text.replace("k < 10", "k < 40"), encoding="ascii")
+    flags = ("-std=c99", *STRICT, "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+    subprocess.run(["gcc", *flags, "main.c", "events.c", "-o", "example", "-lm"], cwd=tmp_path, check=True)
+    done = subprocess.run([tmp_path / "example"], capture_output=True, text=True, check=True)
+    network = nv.compile_text(EVENTS).network
+    expected = record(network, 40, backend="reference")["O"]
+    assert [float(line.split()[1]) for line in done.stdout.splitlines()] == pytest.approx(expected, rel=1e-5)
+
+
+def test_the_command_writes_a_folder_and_leaves_what_is_not_its_own(tmp_path: Path) -> None:
+    spec = str(next(path for path in SPECS if path.stem == "mlp"))
+    runner, folder = CliRunner(), tmp_path / "controller"
+    done = runner.invoke(neurovis, ["export", spec, "--to", "c", "-o", str(folder)])
+    assert done.exit_code == 0, done.output
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "CMakeLists.txt",
+        "README.md",
+        "main.c",
+        "mlp.c",
+        "mlp.h",
+    ]
+    (folder / "main.c").write_text("mine")
+    assert runner.invoke(neurovis, ["export", spec, "--to", "c", "--float", "-o", str(folder)]).exit_code == 0
+    assert (folder / "main.c").read_text() == "mine"
+    assert "float activity" in (folder / "mlp.h").read_text()
+    (folder / "README.md").write_text("mine")
+    done = runner.invoke(neurovis, ["export", spec, "--to", "c", "-o", str(folder)])
+    assert done.exit_code == 1
+    assert "would be lost" in done.output
+    assert (folder / "README.md").read_text() == "mine"
+
+
+def test_the_size_in_the_readme_is_that_of_the_struct(tmp_path: Path) -> None:
+    for text in (EVENTS, "neurovis: 1\nname: x\nneurons: {A: {}, B: {}, C: {}}\n"):
+        controller = compiled(nv.compile_text(text).network, tmp_path / str(len(text)))
+        assert size_of_state(controller.made) == len(controller.memory)

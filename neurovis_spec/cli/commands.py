@@ -33,9 +33,10 @@ COMMANDS: Final[Mapping[str, str]] = {
     "run": "Run a network and write a recording.",
     "render": "Draw one step as a picture.",
     "animate": "Draw a run as a moving picture.",
+    "export": "Write a network as source code for a robot.",
 }
 #: What the language names and this version does not have yet.
-LATER: Final = ("live", "ros", "analyze", "import", "export")
+LATER: Final = ("live", "ros", "analyze", "import")
 NO_READER: Final = 141  # as a process that SIGPIPE has ended
 
 EPILOG = """\b

@@ -167,8 +167,7 @@ class Exported:
         lines += [f"}} {name}_state;", "", "/* The inputs of a step that have no source of their own. */"]
         lines.append(f"typedef struct {name}_inputs {{")
         lines += [
-            f"    {self.real} {own}[{entry.size}];"
-            for own, entry in zip(self.input_names, self.inputs, strict=True)
+            f"    {self.real} {own}[{entry.size}];" for own, entry in zip(self.input_names, self.inputs, strict=True)
         ] or ["    char unused;"]
         lines += [f"}} {name}_inputs;", "", "/* The outputs of a step. */", f"typedef struct {name}_outputs {{"]
         lines += [
@@ -212,7 +211,7 @@ class Exported:
             body = [*self._hold(), "", *body]
         used = words_of(body)
         parts = [
-            f'/* {words(self.network.title or self.network.name)}: see {self.name}.h. */\n#include "{self.name}.h"',
+            f'/* {words(self.network.title or self.network.name)}: made by neurovis export, see {self.name}.h. */\n#include "{self.name}.h"',
             "#include <math.h>\n#include <stddef.h>\n#include <string.h>",
             _restrict(self.macro) if f"{self.macro}_RESTRICT" in used else "",
             self._names(),
@@ -245,7 +244,8 @@ class Exported:
         """For each array of the state, and its parts, the line that gives it its name."""
         network, real, quick = self.network, self.real, f"{self.macro}_RESTRICT"
         taken = {
-            name: f"{real} *{quick} const {name} = state->{name};" for name in ("activity", "weights", "signals", "history")
+            name: f"{real} *{quick} const {name} = state->{name};"
+            for name in ("activity", "weights", "signals", "history")
         }
         taken["x"] = f"{real} *{quick} const x = state->variables;"
         taken["s"] = f"const {real} *{quick} const s = state->vector;"
@@ -508,6 +508,4 @@ def _masks(name: str, masks: list[Mask]) -> tuple[list[str], str]:
 
 def _restrict(macro: str) -> str:
     """What says that arrays do not overlap."""
-    return (
-        f"#ifdef __cplusplus\n#define {macro}_RESTRICT __restrict\n#else\n#define {macro}_RESTRICT restrict\n#endif"
-    )
+    return f"#ifdef __cplusplus\n#define {macro}_RESTRICT __restrict\n#else\n#define {macro}_RESTRICT restrict\n#endif"

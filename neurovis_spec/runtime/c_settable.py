@@ -128,7 +128,9 @@ def _write_binding(code: Code, binding: Binding) -> None:
                     _write_number(code, binding, "i", array)
                 return
         if count > _MOST_WRITTEN_OUT:
-            raise ExportError(f"{count} numbers follow parameters by positions or data: {_MOST_WRITTEN_OUT} are the most")
+            raise ExportError(
+                f"{count} numbers follow parameters by positions or data: {_MOST_WRITTEN_OUT} are the most"
+            )
         for place in range(count):
             with code.block(""):
                 _write_number(code, binding, place, array)
@@ -143,4 +145,3 @@ def _write_number(code: Code, binding: Binding, place: Place, array: str) -> Non
     code.line("    return 0;")
     code.line("if (write)")
     code.line(f"    {array}[{code.at(binding.indices, place)}] = value;")
-

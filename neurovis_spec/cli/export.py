@@ -1,0 +1,58 @@
+"""``neurovis export``: a network in another form, for a robot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from neurovis_spec.cli.completion import paths
+from neurovis_spec.cli.failure import fault
+from neurovis_spec.cli.files import network_of, recording_of, writing
+from neurovis_spec.cli.options import examples, set_option, spec_argument
+
+
+@click.command(
+    epilog=examples(
+        "neurovis export first.yaml --to c -o controller",
+        "neurovis export first.yaml --to c --float -o controller",
+        "neurovis export first.yaml --to c --from first.npz -o controller",
+    )
+)
+@spec_argument
+@click.option("--to", "form", type=click.Choice(["c"]), required=True, help="The format: c, C99 that is C++17, too.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="DIR",
+    required=True,
+    help="The folder for the files, made if it is not there.",
+)
+@click.option("--float", "single", is_flag=True, help="Numbers of 32 bits instead of 64.")
+@click.option(
+    "--from",
+    "start",
+    metavar="RECORDING",
+    shell_complete=paths,
+    help="Begin with the last weights and activities of this recording: what was learned is kept.",
+)
+@set_option
+def command(spec: str, form: str, output: Path, single: bool, start: str | None, settings: dict[str, float]) -> None:
+    """Write a network as source code for a robot.
+
+    NAME.h and NAME.c need nothing but libm: no heap, no variables that change but a struct of the caller's. The README
+    beside them says what a step takes; main.c and CMakeLists.txt are an example, and stay if they are there.
+    """
+    network, before = network_of(spec, settings), recording_of(start)
+    from neurovis_spec.runtime.c_settable import ExportError
+
+    with writing(output):
+        try:
+            written, kept = network.export(output, form, start=before, real="float" if single else "double")
+        except ExportError as error:
+            raise fault(str(error)) from error
+    for path in written:
+        click.echo(path)
+    for path in kept:
+        click.echo(f"{path} stays as it is", err=True)

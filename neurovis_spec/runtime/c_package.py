@@ -1,0 +1,216 @@
+"""An exported network as a folder: header, source, an example, how to build it, and what it costs.
+
+In: a Network, the State that it begins in, the type of numbers, a folder. Out: files. What somebody else has written
+there is left alone: an example and a CMakeLists.txt that are there stay, and of the others a strange one is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.language.expressions.emit_c import INEXACT
+from neurovis_spec.language.expressions.tree import Call, Tree, walk
+from neurovis_spec.runtime.c_export import Exported
+from neurovis_spec.runtime.c_names import words
+from neurovis_spec.runtime.c_settable import ExportError
+from neurovis_spec.runtime.files import replacing
+from neurovis_spec.runtime.state import State
+
+#: what says that a file is ours
+_MARK = "neurovis export"
+
+
+def files(network: Network, start: State | None = None, real: str = "double") -> dict[str, str]:
+    """The texts of all files by name. Raises ExportError."""
+    made = Exported(network, start, real)
+    return {
+        f"{made.name}.h": made.header(),
+        f"{made.name}.c": made.source(),
+        "README.md": _readme(made),
+        "main.c": _example(made),
+        "CMakeLists.txt": _cmake(made),
+    }
+
+
+def write(folder: Path, texts: dict[str, str]) -> tuple[list[Path], list[Path]]:
+    """Write the files; what was written, and what was there and stays. Raises ExportError for a file of somebody else's
+    in the way, OSError."""
+    folder.mkdir(parents=True, exist_ok=True)
+    written, kept = [], []
+    for name in texts:
+        path = folder / name
+        if not path.exists():
+            written.append(path)
+        elif name in ("main.c", "CMakeLists.txt"):
+            kept.append(path)
+        elif path.is_file() and _MARK in path.read_text(encoding="utf-8", errors="replace")[:2000]:
+            written.append(path)
+        else:
+            raise ExportError(f"{path} was not made by neurovis export and would be lost: name another folder")
+    for path in written:
+        with replacing(path) as file:
+            file.write(texts[path.name].encode("ascii"))
+    return written, kept
+
+
+def size_of_state(made: Exported) -> int:
+    """The bytes of the struct on common machines."""
+    network = made.network
+    number = 4 if made.real == "float" else 8
+    numbers = sum(len(member.begin) for member in made.members)
+    numbers += sum(not any(member.name == name for member in made.members) for name in ("activity", "weights"))
+    size = -(-numbers * number // 8) * 8 + 8 + len(network.settable.slots)
+    if len(made.phases) > 1:
+        size = -(-size // 4) * 4 + 4
+    if made.holding:
+        size += len(network.neurons)
+    return -(-size // 8) * 8
+
+
+def _calls(trees: Iterable[Tree | None]) -> int:
+    """The functions of the library that some expressions call."""
+    called = (*INEXACT, "sigmoid")
+    found = (node for tree in trees if tree is not None for node in walk(tree))
+    return sum(isinstance(node, Call) and node.function in called for node in found)
+
+
+def _cost(made: Exported) -> str:
+    network = made.network
+    functions = 0
+    for block in network.blocks:
+        model = block.model
+        trees = [*(tree for _, tree in model.let), *(q.each_step for q in model.state), model.activity]
+        each = _calls(trees)
+        if any(isinstance(node, Call) and node.function == "f" for node in walk(model.activity)):
+            each += _calls([block.activation.value])
+        functions += each * len(block.members)
+    learning = 0
+    for plasticity in network.plasticity:
+        rule = plasticity.rule
+        learning += len(plasticity.members)
+        trees = [*(tree for _, tree in rule.let), *(q.each_step for q in rule.state), rule.each_step]
+        functions += _calls(trees) * len(plasticity.members)
+    functions += _calls(entry.expression for entry in network.inputs)
+    drawn = sum(len(noise.members) for noise in network.noises)
+    lines = [
+        f"- {len(network.connections)} connections: a multiplication and an addition each",
+        f"- {functions} calls of functions such as exp and tanh",
+    ]
+    if learning:
+        lines.append(f"- {learning} weights that learn")
+    if drawn:
+        lines.append(f"- {drawn} random numbers")
+    return "\n".join(lines)
+
+
+def _readme(made: Exported) -> str:
+    name, network = made.name, made.network
+    sets = "\n".join(
+        f"- `{name}_set_{own}`: {words(parameter)}"
+        for parameter, own in zip(made.settable, made.settable_names, strict=True)
+    )
+    inputs = "\n".join(
+        f"- `in->{own}`: {entry.size} number{'s' * (entry.size > 1)} for {words(entry.name)}"
+        for own, entry in zip(made.input_names, made.inputs, strict=True)
+    )
+    outputs = "\n".join(
+        f"- `out->{own}`: {len(entry.neurons)} number{'s' * (len(entry.neurons) > 1)} of {words(entry.name)}"
+        for own, entry in zip(made.output_names, network.outputs, strict=True)
+    )
+    return f"""# {words(network.title or network.name)}
+
+Made by neurovis export: a network of {len(network.neurons)} neurons and {len(network.connections)} connections as C99 (or C++17). It needs libm
+and nothing else: no heap, no files, no variables that change but the struct that you hand over.
+
+```c
+{name}_state state;
+{name}_inputs in = {{0}};
+{name}_outputs out;
+
+{name}_init(&state);
+{name}_step(&state, &in, &out);   /* once a step, every {network.dt:g} s */
+```
+
+After call k, `state.activity` is a[k - 1] and `state.weights` w[k], in the order of a recording. Events of the spec apply
+at their steps. A copy of the struct is a copy of all that the run carries.
+
+## Inputs
+
+{inputs or "None: all inputs have a source of their own."}
+
+## Outputs
+
+{outputs or "The spec names none; read `state.activity`."}
+
+## Parameters
+
+{sets or "None can be set."}
+
+Each gives 1, or 0 where the value cannot be taken; then nothing has changed.
+
+## Cost
+
+The state takes {size_of_state(made)} bytes where a pointer has 8. A step takes
+
+{_cost(made)}
+
+## Building
+
+    cc -std=c99 -O2 -ffp-contract=off -c {name}.c
+    cmake -B build && cmake --build build && build/{name}_example
+
+`-ffp-contract=off` keeps a compiler from joining a product and a sum, which rounds otherwise than the reference does;
+so the numbers are those of `neurovis run --backend reference`, where the C library is the same.
+"""
+
+
+def _example(made: Exported) -> str:
+    name, network = made.name, made.network
+    lines = [
+        f"/* An example, made by neurovis export: ten steps of {name}. */",
+        f'#include "{name}.h"',
+        "",
+        "#include <stdio.h>",
+        "#include <string.h>",
+        "",
+        "int main(void)",
+        "{",
+        f"    static {name}_state state;",
+        f"    {name}_inputs in;",
+        f"    {name}_outputs out;",
+        "    memset(&in, 0, sizeof in);",
+        f"    {name}_init(&state);",
+        "    for (int k = 0; k < 10; k++) {",
+    ]
+    lines += [f"        in.{own}[0] = 0; /* what a sensor says */" for own in made.input_names[:1]]
+    lines += [f"        {name}_step(&state, &in, &out);"]
+    if network.outputs:
+        lines.append(f'        printf("%d %g\\n", k, (double)out.{made.output_names[0]}[0]);')
+    else:
+        lines.append('        printf("%d %g\\n", k, (double)state.activity[0]);')
+    return "\n".join([*lines, "    }", "    return 0;", "}", ""])
+
+
+def _cmake(made: Exported) -> str:
+    name = made.name
+    kept = " ".join(f"-fno-builtin-{function}" for function in (*INEXACT, "pow"))
+    return f"""# made by neurovis export
+cmake_minimum_required(VERSION 3.10)
+project({name} C)
+
+add_library({name} STATIC {name}.c)
+target_include_directories({name} INTERFACE "${{CMAKE_CURRENT_SOURCE_DIR}}")
+set_target_properties({name} PROPERTIES C_STANDARD 99 C_STANDARD_REQUIRED ON)
+if(CMAKE_C_COMPILER_ID MATCHES "GNU|Clang")
+  # the same bits as the reference: no operation is joined to another, and no function worked out by the compiler
+  target_compile_options({name} PRIVATE -O2 -ffp-contract=off {kept})
+endif()
+if(UNIX)
+  target_link_libraries({name} PUBLIC m)
+endif()
+
+add_executable({name}_example main.c)
+target_link_libraries({name}_example PRIVATE {name})
+"""
