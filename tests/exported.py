@@ -29,7 +29,13 @@ def compiled(
     (folder / f"{made.name}.h").write_text(made.header(), encoding="ascii")
     source = made.source()
     (folder / f"{made.name}.c").write_text(source, encoding="ascii")
-    size = f'\n#ifdef __cplusplus\nextern "C"\n#endif\nsize_t size_of_state(void);\nsize_t size_of_state(void) {{ return sizeof({made.name}_state); }}\n'
+    size = f"""
+#ifdef __cplusplus
+extern "C"
+#endif
+size_t size_of_state(void);
+size_t size_of_state(void) {{ return sizeof({made.name}_state); }}
+"""
     (folder / "with_size.c").write_text(source + size, encoding="ascii")
     command, *rest = LANGUAGES[language]
     if shutil.which(command) is None:

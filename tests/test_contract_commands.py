@@ -44,13 +44,13 @@ def good(words: str, stdin: str | None = None) -> str:
 
 READS = {
     "validate": "", "inspect": "", "layout": "", "run": "--steps 3", "fmt": "", "render": "--step 2 -o x.svg",
-    "animate": "--steps 3 -o y.svg",
+    "animate": "--steps 3 -o y.svg", "export": "--to c -o made",
 }  # fmt: skip
 OPTIONS = {
     "new": "--from", "validate": "--format --strict --limit --root", "fmt": "--check --diff", "inspect": "--format",
     "layout": "--output --engine --update --metrics", "render": "--output --step --recording --theme",
     "run": "--steps --set --input --backend --every --from --until --output",
-    "animate": "--output --steps --from --fps --recording",
+    "animate": "--output --steps --from --fps --recording", "export": "--to --output --float --from --set",
     "explain": "", "docs": "", "lsp": "", "schema": "",
 }  # fmt: skip
 
@@ -67,9 +67,9 @@ def test_there_are_these_commands_with_these_options() -> None:
 def test_a_spec_is_a_path_or_standard_input(folder: Path, name: str) -> None:
     """A dash is standard input; the results are the same."""
     by_path = good(f"{name} small.yaml {READS[name]}")
-    written = {path.name: path.read_bytes() for path in folder.iterdir()}
+    written = {path.name: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     piped = good(f"{name} - {READS[name]}", SMALL)
-    assert {path.name: path.read_bytes() for path in folder.iterdir()} == written
+    assert {path.name: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == written
     if name != "fmt":  # which rewrites a file, and prints what it reads from standard input
         assert re.sub(r"in [\d.]+ s", "", by_path) == re.sub(r"in [\d.]+ s", "", piped).replace("<stdin>", "small.yaml")
 

@@ -13,15 +13,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
-from hypothesis import strategies as st
 from networks_by_hand import TANH, Link, Unit, build, cpg_rbf, model
 from random_specs import specs
 from test_runtime_backends import networks, parts
 
 import neurovis_spec as nv
 from neurovis_spec.compiler.network import Input, Network
-from neurovis_spec.runtime import c_backend
-from neurovis_spec.runtime.backend import Backend, load
+from neurovis_spec.runtime import c_backend, c_library
+from neurovis_spec.runtime.backend import Backend, Stepper, load
 from neurovis_spec.runtime.c_backend import CBackend
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.numpy_backend import NumpyBackend
@@ -207,7 +206,7 @@ def test_setting_clamping_and_lesioning_compile_nothing(size: int, monkeypatch: 
     monkeypatch.setattr(c_backend, "SMALL", size)
     network = nv.compile_text(EVENTS).network
     simulation = Simulation(network, "c")
-    monkeypatch.setattr(c_backend.c_library, "load", lambda text: pytest.fail("something was compiled"))
+    monkeypatch.setattr(c_library, "load", lambda text: pytest.fail("something was compiled"))
     simulation.set(gain=0.9)
     simulation.clamp("S1", 1)
     simulation.lesion("L2")
@@ -219,7 +218,11 @@ def test_setting_clamping_and_lesioning_compile_nothing(size: int, monkeypatch: 
 @pytest.mark.compiler
 def test_one_state_goes_from_backend_to_backend() -> None:
     network = cpg_rbf()
-    steppers = [ReferenceBackend().prepare(network), CBackend().prepare(network), NumpyBackend().prepare(network)]
+    steppers: list[Stepper] = [
+        ReferenceBackend().prepare(network),
+        CBackend().prepare(network),
+        NumpyBackend().prepare(network),
+    ]
     reader, state, plain = InputReader(network), initial_state(network), initial_state(network)
     for k in range(30):
         steppers[k % 3].step(state, reader.at(k))

@@ -16,12 +16,12 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.language.expressions.emit_c import Emitter
 from neurovis_spec.runtime import c_library
 from neurovis_spec.runtime.backend import Availability, BackendError, Capabilities
-from neurovis_spec.runtime.c_code import Code, Tables, function, words_of
+from neurovis_spec.runtime.c_code import Code, Table, Tables, function, words_of
 from neurovis_spec.runtime.c_step import Form, StepCode
 from neurovis_spec.runtime.conditions import Conditions, Mask, Structure
 from neurovis_spec.runtime.state import State
@@ -118,7 +118,7 @@ class Written:
     """The text of a network, and the arrays that it is handed."""
 
     text: str
-    given: tuple[FloatArray | IntArray, ...]
+    given: tuple[Table, ...]
 
 
 _written: WeakKeyDictionary[Network, Written] = WeakKeyDictionary()

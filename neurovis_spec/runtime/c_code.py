@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from typing import TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.settable import Variable
@@ -21,6 +22,7 @@ from neurovis_spec.language.expressions.tree import Tree, names
 from neurovis_spec.runtime.state import constants
 
 Place: TypeAlias = int | str
+Table: TypeAlias = npt.NDArray[np.float64] | npt.NDArray[np.int32]
 
 #: items of a table in a line of the text
 _ROW = 16
@@ -35,13 +37,13 @@ class Tables:
         self._real, self._longest = real, longest
         self._names: dict[tuple[str, bytes], str] = {}
         self._text: dict[str, str] = {}
-        self.given: list[FloatArray | IntArray] = []
+        self.given: list[Table] = []
         self._taken: dict[str, str] = {}
 
-    def name(self, values: FloatArray | IntArray | np.ndarray[tuple[int], np.dtype[np.int32]]) -> str:
+    def name(self, values: FloatArray | IntArray) -> str:
         """The identifier of an array of numbers or indices."""
         real = values.dtype.kind == "f"
-        array = np.ascontiguousarray(values, dtype=np.float64 if real else np.int32)
+        array: Table = np.ascontiguousarray(values, np.float64) if real else np.ascontiguousarray(values, np.int32)
         key = array.dtype.char, array.tobytes()
         if key not in self._names:
             name = self._names[key] = f"t{len(self._names)}"
@@ -53,7 +55,7 @@ class Tables:
                 self._text[name] = f"static const {kind} {name}[{len(array)}] = {{\n{self._items(array)}\n}};"
         return self._names[key]
 
-    def _items(self, array: FloatArray | IntArray) -> str:
+    def _items(self, array: Table) -> str:
         items = array.tolist()
         emitter = Emitter(self._real)
         texts = [emitter.text(item) if isinstance(item, float) else str(item) for item in items]

@@ -95,7 +95,6 @@ class Exported:
 
     def _members(self) -> list[Member]:
         network, state = self.network, self.state
-        settable = network.settable
         cells = [array for block in state.cells for array in block]
         traces = [array for rule in state.traces for array in rule]
         none = np.zeros(0)
@@ -186,8 +185,8 @@ class Exported:
         for parameter, own in zip(self.settable, self.settable_names, strict=True):
             lines += [
                 "",
-                f"/* Set the parameter {words(parameter)} from the next step on, and all that follows it. Gives 1; or 0, and",
-                "   nothing has changed, where a number would not be finite or leave its bounds. */",
+                f"/* Set the parameter {words(parameter, 40)} from the next step on, and what follows it. Gives 1; or",
+                "   0, and nothing has changed, where a number would not be finite or leave its bounds. */",
                 f"int {name}_set_{own}({name}_state *state, {self.real} value);",
             ]
         lines += ["", "#ifdef __cplusplus", "}", "#endif", "", "#endif", ""]
@@ -211,7 +210,8 @@ class Exported:
             body = [*self._hold(), "", *body]
         used = words_of(body)
         parts = [
-            f'/* {words(self.network.title or self.network.name)}: made by neurovis export, see {self.name}.h. */\n#include "{self.name}.h"',
+            f"/* {words(self.network.title or self.network.name)}: made by neurovis export, see {self.name}.h. */",
+            f'#include "{self.name}.h"',
             "#include <math.h>\n#include <stddef.h>\n#include <string.h>",
             _restrict(self.macro) if f"{self.macro}_RESTRICT" in used else "",
             self._names(),

@@ -17,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
@@ -123,10 +124,8 @@ def load(text: str) -> ctypes.CDLL:
         library = ctypes.CDLL(str(path))
     except OSError:  # not there, or no library
         return _made(text, path)
-    try:
+    with suppress(OSError):
         os.utime(path)
-    except OSError:
-        pass
     return library
 
 
@@ -136,7 +135,7 @@ def _made(text: str, path: Path) -> ctypes.CDLL:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=path.parent, prefix=".making") as beside:
             made = _compiled(text, Path(beside))
-            os.replace(made, path)
+            made.replace(path)
             library = ctypes.CDLL(str(path))
         _trim(path.parent, path)
         return library

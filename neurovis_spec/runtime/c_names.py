@@ -13,24 +13,32 @@ from collections.abc import Iterable
 _LONGEST = 60
 #: Longer literals are more than a compiler of C99 must take.
 LONGEST_STRING = 4000
-_KEYWORDS = frozenset(
+
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+_KEYWORDS = _words(
     """alignas alignof and and_eq asm auto bitand bitor bool break case catch char char8_t char16_t char32_t class compl
     concept const consteval constexpr constinit const_cast continue co_await co_return co_yield decltype default delete
     do double dynamic_cast else enum explicit export extern false float for friend goto if inline int long mutable
     namespace new noexcept not not_eq nullptr operator or or_eq private protected public register reinterpret_cast
     requires restrict return short signed sizeof static static_assert static_cast struct switch template this
     thread_local throw true try typedef typeid typename typeof typeof_unqual union unsigned using virtual void volatile
-    wchar_t while xor xor_eq""".split()
+    wchar_t while xor xor_eq"""
 )
 #: Macros of the headers used, and of compilers, that are no calls.
-_MACROS = frozenset(
-    """NULL NAN INFINITY HUGE_VAL HUGE_VALF HUGE_VALL MAXFLOAT DOMAIN SING OVERFLOW UNDERFLOW TLOSS PLOSS X_TLOSS EOF
-    errno linux unix i386 near far small huge interface max min complex imaginary I stdin stdout stderr math_errhandling
-    noreturn""".split()
+_MACROS = _words(
+    "NULL NAN INFINITY HUGE_VAL HUGE_VALF HUGE_VALL MAXFLOAT DOMAIN SING OVERFLOW UNDERFLOW TLOSS PLOSS X_TLOSS EOF "
+    "errno linux unix i386 stdin stdout stderr math_errhandling BUFSIZ"
 )
-_MACRO = re.compile(r"(?:FP|MATH|M|INT|UINT|INTPTR|UINTPTR|SIZE|PTRDIFF|WCHAR|WINT|SIG|INTMAX|UINTMAX|_)_?[A-Z0-9_]*")
+_MACRO = re.compile(
+    r"(?:FP|MATH|M|INTPTR|UINTPTR|SIZE|PTRDIFF|WCHAR|WINT|SIG_ATOMIC|INTMAX|UINTMAX)_[A-Z0-9_]+"
+    r"|U?INT(?:_LEAST|_FAST)?[0-9]+_(?:MAX|MIN|C)|SEEK_[A-Z]+|L_tmpnam|[A-Z]+_MAX"
+)
 #: Files that stand beside ours, or that other headers mean.
-_FILES = frozenset("main math string stdint stddef stdio stdlib errno limits float features wchar strings".split())
+_FILES = _words("main math string stdint stddef stdio stdlib errno limits float features wchar strings")
 
 
 def identifier(name: str) -> str:

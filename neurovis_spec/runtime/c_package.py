@@ -41,7 +41,7 @@ def write(folder: Path, texts: dict[str, str]) -> tuple[list[Path], list[Path]]:
     written, kept = [], []
     for name in texts:
         path = folder / name
-        if not path.exists():
+        if not path.exists() or _holds(path, texts[name]):
             written.append(path)
         elif name in ("main.c", "CMakeLists.txt"):
             kept.append(path)
@@ -53,6 +53,10 @@ def write(folder: Path, texts: dict[str, str]) -> tuple[list[Path], list[Path]]:
         with replacing(path) as file:
             file.write(texts[path.name].encode("ascii"))
     return written, kept
+
+
+def _holds(path: Path, text: str) -> bool:
+    return path.is_file() and path.read_bytes() == text.encode("ascii")
 
 
 def size_of_state(made: Exported) -> int:
@@ -71,7 +75,7 @@ def size_of_state(made: Exported) -> int:
 
 def _calls(trees: Iterable[Tree | None]) -> int:
     """The functions of the library that some expressions call."""
-    called = (*INEXACT, "sigmoid")
+    called = {*INEXACT, "sigmoid"}
     found = (node for tree in trees if tree is not None for node in walk(tree))
     return sum(isinstance(node, Call) and node.function in called for node in found)
 
@@ -107,6 +111,7 @@ def _cost(made: Exported) -> str:
 
 def _readme(made: Exported) -> str:
     name, network = made.name, made.network
+    neurons, connections = len(network.neurons), len(network.connections)
     sets = "\n".join(
         f"- `{name}_set_{own}`: {words(parameter)}"
         for parameter, own in zip(made.settable, made.settable_names, strict=True)
@@ -121,7 +126,7 @@ def _readme(made: Exported) -> str:
     )
     return f"""# {words(network.title or network.name)}
 
-Made by neurovis export: a network of {len(network.neurons)} neurons and {len(network.connections)} connections as C99 (or C++17). It needs libm
+Made by neurovis export: a network of {neurons} neurons and {connections} connections as C99 (or C++17). It needs libm
 and nothing else: no heap, no files, no variables that change but the struct that you hand over.
 
 ```c
@@ -133,8 +138,8 @@ and nothing else: no heap, no files, no variables that change but the struct tha
 {name}_step(&state, &in, &out);   /* once a step, every {network.dt:g} s */
 ```
 
-After call k, `state.activity` is a[k - 1] and `state.weights` w[k], in the order of a recording. Events of the spec apply
-at their steps. A copy of the struct is a copy of all that the run carries.
+After call k, `state.activity` is a[k - 1] and `state.weights` w[k], in the order of a recording. Events of the spec
+apply at their steps. A copy of the struct is a copy of all that the run carries.
 
 ## Inputs
 
@@ -195,7 +200,7 @@ def _example(made: Exported) -> str:
 
 def _cmake(made: Exported) -> str:
     name = made.name
-    kept = " ".join(f"-fno-builtin-{function}" for function in (*INEXACT, "pow"))
+    kept = " ".join(f"-fno-builtin-{function}" for function in INEXACT)
     return f"""# made by neurovis export
 cmake_minimum_required(VERSION 3.10)
 project({name} C)

@@ -122,11 +122,10 @@ def _write_binding(code: Code, binding: Binding) -> None:
     array = "weights" if binding.weights else "x"
     bounds = [bound for bound in (binding.low, binding.high) if bound is not None]
     with code.block(f"if ({condition})"):
-        if all(regular(one) for one in (binding.formula, *bounds)):
-            if count > 1 or not bounds:
-                with code.block(code.loop("i", count)):
-                    _write_number(code, binding, "i", array)
-                return
+        if count > 1 and all(regular(one) for one in (binding.formula, *bounds)):
+            with code.block(code.loop("i", count)):
+                _write_number(code, binding, "i", array)
+            return
         if count > _MOST_WRITTEN_OUT:
             raise ExportError(
                 f"{count} numbers follow parameters by positions or data: {_MOST_WRITTEN_OUT} are the most"

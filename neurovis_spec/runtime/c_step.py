@@ -294,10 +294,9 @@ class StepCode:
         if not own.any():
             return f"activity[{source}]"
         if (own == own[0]).all():
-            code.head[f"h{own[0]}"] = (
-                f"const {code.real} *const h{own[0]} = history + (size_t)((k + {self.depth - own[0]}) % {self.depth})*{n};"
-            )
-            return f"h{own[0]}[{source}]"
+            name, row = f"h{own[0]}", f"(size_t)((k + {self.depth - own[0]}) % {self.depth})*{n}"
+            code.head[name] = f"const {code.real} *const {name} = history + {row};"
+            return f"{name}[{source}]"
         code.head["now"] = f"const int32_t now = (int32_t)(k % {self.depth});"
         row = f"(now + {self.depth} - ({code.at(delays, place)})) % {self.depth}"
         return f"history[(size_t)({row})*{n} + {source}]"

@@ -1,4 +1,4 @@
-"""From a tree to C99, for what is compiled: the same values as ``evaluate``, bit for bit where the C library is the same.
+"""From a tree to C99: the same values as ``evaluate`` gives, bit for bit where the C library is the same.
 
 In: a tree, and for each of its names a number or an identifier (or code of our own making). Out: a number where nothing
 but numbers are in it, else one C expression. Nothing of the author's text gets into it. What C has no operator or
@@ -49,16 +49,15 @@ _COMPARISONS: Mapping[str, int] = {
 _LITERAL = re.compile(r"[0-9.e+-]+f?")
 _NONE: Mapping[str, Made] = MappingProxyType({})
 
+#: Functions of C's library whose results a compiler must not work out itself: it rounds better than the library.
+INEXACT: tuple[str, ...] = (
+    *("exp", "log", "log1p", "expm1", "pow", "sin", "cos", "tan", "sinh", "cosh", "tanh"),
+    *("asin", "acos", "atan", "atan2"),
+)
 #: Functions of C's library that are what the language means.
 _LIBRARY: Mapping[str, str] = MappingProxyType(
-    {
-        name: name
-        for name in "floor ceil sqrt exp log log1p expm1 sin cos tan sinh cosh tanh asin acos atan atan2".split()
-    }
-    | {"abs": "fabs", "round": "rint"}
+    {name: name for name in (*INEXACT, "floor", "ceil", "sqrt")} | {"abs": "fabs", "round": "rint"}
 )
-#: Functions of the library whose results a compiler must not work out itself: it rounds better than the library.
-INEXACT = tuple("exp log log1p expm1 sin cos tan sinh cosh tanh asin acos atan atan2 pow".split())
 #: What the language means and C lacks: ``{real}`` is the type of numbers, ``{s}`` the suffix of functions and literals.
 HELPERS: Mapping[str, str] = MappingProxyType(
     {
@@ -96,7 +95,7 @@ HELPERS: Mapping[str, str] = MappingProxyType(
 {{
     return 1.0{s} / (1.0{s} + exp{s}(-x));
 }}""",
-        # a compiler makes a product or a quotient of a power whose exponent it knows, which is not what the library gives
+        # of a power whose exponent it knows a compiler makes a product, which is not what the library gives
         "nv_power": """static {real} nv_power({real} x, {real} exponent)
 {{
     volatile {real} e = exponent;
@@ -125,11 +124,13 @@ def _put(tree: Tree, names: Mapping[str, Value]) -> Tree:
         return tree
     made = tuple(_put(part, names) for part in parts)
     exponent = _exponent(tree)
-    if exponent is not None and exponent != Number(2.0, exponent.start, exponent.end):
-        # an exponent that only comes to 2 is a power, not a square: it keeps its name
-        if isinstance(made[1], Number) and made[1].value == 2.0:
-            made = (made[0], exponent)
+    if exponent is not None and not isinstance(exponent, Number) and _is_two(made[1]):
+        made = (made[0], exponent)  # an exponent that only comes to 2 is a power, not a square: it keeps its name
     return rebuild(tree, made)
+
+
+def _is_two(tree: Tree) -> bool:
+    return isinstance(tree, Number) and tree.value == 2.0
 
 
 def _exponent(tree: Tree) -> Tree | None:
@@ -157,7 +158,8 @@ class Emitter:
 
         >>> from neurovis_spec.language.expressions.parser import parse
         >>> c = Emitter()
-        >>> c.value(parse("w + 2 * rate * pre * (target - post)"), {"w": "w", "rate": 0.5, "pre": "a[1]", "target": "s", "post": "y"})
+        >>> names = {"rate": 0.5, "w": "w", "pre": "a[1]", "target": "s", "post": "y"}
+        >>> c.value(parse("w + 2 * rate * pre * (target - post)"), names)
         'w + 1.0*a[1]*(s - y)'
         >>> c.value(parse("x^2 if x < 0 or c else tanh(x)"), {"x": "a", "c": "p"})
         'a < 0.0 || p != 0.0 ? nv_square(a) : tanh(a)'
