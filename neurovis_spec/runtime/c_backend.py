@@ -34,6 +34,7 @@ LONGEST = 1024
 _AT_ONCE = 1 << 22
 #: forms of the step
 _PLAIN, _GENERAL, _FIRST = 0, 1, 2
+_FORMS = tuple(ctypes.c_int32(form) for form in (_PLAIN, _GENERAL, _FIRST))
 
 _HEAD: Final = """#include <math.h>
 #include <stddef.h>
@@ -227,7 +228,7 @@ class CStepper:
         library = c_library.load(made.text)
         self._library = library
         self._step, self._run = library.nv_once, library.nv_run
-        self._step.argtypes, self._step.restype = (ctypes.c_void_p, ctypes.c_int64, ctypes.c_int32), None
+        self._step.restype = None
         self._run.argtypes, self._run.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64
         self._given = made.given
         self._vector = np.zeros(network.vector_size)
@@ -236,6 +237,8 @@ class CStepper:
         self._pointers = _State()
         self._pointers.s = self._vector.ctypes.data
         self._here = ctypes.addressof(self._pointers)
+        #: arguments that need not be converted anew
+        self._there, self._number = ctypes.c_void_p(self._here), ctypes.c_int64(0)
         self._handed = _addresses(self._given)
         self._pointers.given = ctypes.addressof(self._handed)
         self._of: State | None = None
@@ -260,7 +263,8 @@ class CStepper:
             self._take(state)
         k = state.k
         self._vector[:] = inputs
-        self._step(self._here, k, self._form(state) if k == 0 or self._general else _PLAIN)
+        self._number.value = k
+        self._step(self._there, self._number, _FORMS[self._form(state) if k == 0 or self._general else _PLAIN])
         state.k = k + 1
 
     def run(

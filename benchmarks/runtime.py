@@ -1,0 +1,414 @@
+"""How long a step takes: the C backend beside C by hand, NumPy beside NumPy by hand, and Brian2 where it is installed.
+
+In: nothing. Out: a table of microseconds a step and ratios, on standard output. Run it with
+``python benchmarks/runtime.py``; only the ratios of one run can be compared. C by hand is what a careful author would
+write for the one network: a loop over neurons, one over the connections of each (CSR), arrays that are made beforehand;
+it is compiled by the same compiler with the same flags. All keep every activity, and every weight that learns. Inputs
+are given beforehand. Brian2 runs ``cpp_standalone`` and keeps nothing.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from networks_by_hand import cpg_rbf, rule
+from stepping import cpg_by_hand, random_by_hand, random_network
+
+import neurovis_spec as nv
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Learn, Plasticity
+from neurovis_spec.runtime import c_library
+from neurovis_spec.runtime.c_backend import CBackend
+from neurovis_spec.runtime.inputs import InputReader
+from neurovis_spec.runtime.numpy_backend import NumpyBackend
+from neurovis_spec.runtime.record import record
+from neurovis_spec.runtime.state import initial_state
+
+Run = Callable[[int], None]
+HERE = Path(__file__).resolve().parent
+_HEAD = "#include <math.h>\n#include <stdint.h>\n#include <string.h>\n"
+
+#: tanh(Σ w·a + bias), connections of delay 1, Oja's rule where they learn
+TANH_BY_HAND = """
+void run(int64_t steps, int64_t n, int64_t learns, const int32_t *first, const int32_t *source, double *restrict w,
+         const double *bias, double *restrict a, double *restrict next, double *restrict rows, double *restrict kept)
+{
+    for (int64_t k = 0; k < steps; k++) {
+        if (learns)
+            memcpy(kept + k*first[n], w, first[n]*sizeof(double));
+        for (int64_t i = 0; i < n; i++) {
+            double u = 0.0;
+            for (int32_t e = first[i]; e < first[i + 1]; e++)
+                u += w[e]*a[source[e]];
+            next[i] = tanh(u + bias[i]);
+        }
+        if (learns)
+            for (int64_t i = 0; i < n; i++)
+                for (int32_t e = first[i]; e < first[i + 1]; e++)
+                    w[e] += 0.01*next[i]*(a[source[e]] - next[i]*w[e]);
+        memcpy(a, next, n*sizeof(double));
+        memcpy(rows + k*n, a, n*sizeof(double));
+    }
+}
+"""
+
+#: use case 1: a rhythm of two neurons, eight kernels, an output that learns a target
+CPG_BY_HAND = """
+void run(int64_t steps, const double *matrix, const double *centres, const double *target, double *restrict rows,
+         double *restrict kept)
+{
+    static const int32_t first[11] = {0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20};
+    static const int32_t source[20] = {0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1};
+    double a[12] = {0}, w[8] = {0}, c[2];
+    for (int64_t k = 0; k < steps; k++) {
+        memcpy(kept + 8*k, w, sizeof w);
+        c[0] = a[0];
+        c[1] = a[1];
+        for (int i = 0; i < 2; i++) {
+            double u = 0.0;
+            for (int32_t e = first[i]; e < first[i + 1]; e++)
+                u += matrix[e]*c[source[e]];
+            a[i] = tanh(u);
+        }
+        if (k == 0) {
+            a[0] = 0.1;
+            a[1] = 0.0;
+        }
+        for (int i = 2; i < 10; i++) {
+            double u = 0.0, d;
+            for (int32_t e = first[i]; e < first[i + 1]; e++) {
+                d = a[source[e]] - centres[e - 4];
+                u += d*d;
+            }
+            d = sqrt(u);
+            a[i] = exp(-40.0*(d*d));
+        }
+        double u = 0.0;
+        for (int i = 0; i < 8; i++)
+            u += w[i]*a[2 + i];
+        a[10] = u;
+        a[11] = target[k];
+        for (int i = 0; i < 8; i++)
+            w[i] += 0.01*a[2 + i]*(a[11] - a[10]);
+        memcpy(rows + 12*k, a, sizeof a);
+    }
+}
+"""
+
+#: the six-legged robot: groups of neurons one after the other, each with its function, signals in rings
+HEXAPOD_BY_HAND = """
+void run(int64_t steps, int64_t n, int64_t m, const int32_t *group, const int32_t *neuron, const int32_t *first,
+         const int32_t *edge, const int32_t *source, const int32_t *delay, const int32_t *start,
+         const int32_t *fed, const double *bias, const double *initial, const double *one, const double *two, double *restrict w,
+         double *restrict ring, double *restrict v, double *restrict a, const double *inputs, const int32_t *learned,
+         const int32_t *reflex, double *restrict last, double *restrict rows, double *restrict kept)
+{
+    for (int64_t k = 0; k < steps; k++, inputs += 9) {
+        for (int i = 0; i < 4; i++)
+            kept[4*k + i] = w[learned[i]];
+        for (int g = 0; g < 10; g++) {
+            for (int32_t p = group[g]; p < group[g + 1]; p++) {
+                const int32_t i = neuron[p];
+                double u = g == 9 ? 1.0 : 0.0, y;
+                for (int32_t e = first[p]; e < first[p + 1]; e++) {
+                    const int32_t c = edge[e];
+                    const double signal = ring[start[c] + k % delay[c]];
+                    if (g == 9)
+                        u *= signal;
+                    else
+                        u += signal;
+                }
+                u += bias[i];
+                if (fed[i] >= 0)
+                    u += inputs[fed[i]];
+                switch (g) {
+                case 0: y = tanh(u); break;
+                case 1: y = u - one[p] >= 0 ? 1.0 : 0.0; break;
+                case 2: y = v[p] = (1 - one[p])*v[p] + one[p]*u; break;
+                case 3: y = u > 0 ? u : 0.0; break;
+                case 5: y = u < one[p] ? one[p] : u > two[p] ? two[p] : u; break;
+                case 6:
+                    v[p] = u > one[p] ? 0.0 : v[p] + 1 < two[p] ? v[p] + 1 : two[p];
+                    y = v[p] < two[p] ? 1.0 : 0.0;
+                    break;
+                case 7: y = v[p] = u > (1 - one[p])*v[p] ? u : (1 - one[p])*v[p]; break;
+                case 8:
+                    v[p] = (1 - one[p])*v[p] + one[p]*u;
+                    y = v[p] > 0 ? v[p] : 0.0;
+                    break;
+                default: y = u;
+                }
+                a[i] = k == 0 && initial[i] == initial[i] ? initial[i] : y;
+            }
+        }
+        for (int64_t c = 0; c < m; c++)
+            ring[start[c] + k % delay[c]] = w[c]*a[source[c]];
+        for (int i = 0; i < 4; i++) {
+            const int32_t c = learned[i];
+            const double change = k ? a[reflex[i]] - last[i] : 0.0;
+            w[c] += 0.01*a[source[c]]*change;
+            last[i] = a[reflex[i]];
+        }
+        memcpy(rows + k*n, a, n*sizeof(double));
+    }
+}
+"""
+
+
+def loaded(text: str) -> Callable[..., None]:
+    """C by hand, compiled as the backend compiles."""
+    run: Callable[..., None] = c_library.load(_HEAD + text).run
+    return run
+
+
+def at(array: npt.NDArray[np.generic]) -> ctypes.c_void_p:
+    return ctypes.c_void_p(array.ctypes.data)
+
+
+def rows_of(network: Network) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32], npt.NDArray[np.int64]]:
+    """CSR: where each neuron's connections begin, their sources, and which connections they are."""
+    targets = network.connections.targets
+    order = np.argsort(targets, kind="stable")
+    first = np.searchsorted(targets[order], np.arange(len(network.neurons) + 1)).astype(np.int32)
+    return first, network.connections.sources[order].astype(np.int32), order
+
+
+def tanh_in_c(network: Network) -> Run:
+    run, n, m = loaded(TANH_BY_HAND), len(network.neurons), len(network.connections)
+    first, source, order = rows_of(network)
+
+    def made(steps: int) -> None:
+        w, a, following = network.connections.weights[order].copy(), np.zeros(n), np.zeros(n)
+        learns = bool(network.plasticity)
+        rows, kept = ROOM[: steps * n], ROOM[steps * n :]
+        numbers = (ctypes.c_int64(steps), ctypes.c_int64(n), ctypes.c_int64(learns))
+        arrays = (first, source, w, network.neurons.bias, a, following, rows, kept)
+        assert len(ROOM) >= steps * (n + m * learns)
+        run(*numbers, *map(at, arrays))
+
+    return made
+
+
+def cpg_in_c(network: Network) -> Run:
+    run = loaded(CPG_BY_HAND)
+    matrix, centres = network.connections.weights[[0, 2, 1, 3]].copy(), network.connections.centres
+    by_target = centres[4:20].reshape(2, 8).T.ravel().copy()
+
+    def made(steps: int) -> None:
+        target = INPUTS.setdefault("cpg", np.ascontiguousarray(vectors(network, 20000).ravel()))
+        arrays = (matrix, by_target, target, ROOM[: 12 * steps], ROOM[12 * steps :])
+        run(ctypes.c_int64(steps), *map(at, arrays))
+
+    return made
+
+
+def hexapod_in_c(network: Network) -> Run:
+    run, n, m = loaded(HEXAPOD_BY_HAND), len(network.neurons), len(network.connections)
+    blocks, links = network.blocks, network.connections
+    group = np.cumsum([0, *(len(b.members) for b in blocks)]).astype(np.int32)
+    neuron = np.concatenate([b.members for b in blocks]).astype(np.int32)
+    edges = [b.incoming[np.argsort(b.slots, kind="stable")] for b in blocks]
+    counts = np.concatenate([np.bincount(b.slots, minlength=len(b.members)) for b in blocks])
+    first, edge = np.cumsum([0, *counts]).astype(np.int32), np.concatenate(edges).astype(np.int32)
+    delay = links.delays.astype(np.int32)
+    start = np.cumsum([0, *delay[:-1]]).astype(np.int32)
+    one, two, v = np.zeros(n), np.zeros(n), np.zeros(n)
+    for number, b in enumerate(blocks):
+        own = [*b.model_parameters.values(), *b.activation_parameters.values()]
+        for array, values in zip((one, two), own, strict=False):
+            array[group[number] : group[number + 1]] = values
+    v[group[6] : group[7]] = two[group[6] : group[7]]
+    learned = np.array([p.members[0] for p in network.plasticity], dtype=np.int32)
+    reflex = np.array([next(iter(p.signals.values()))[0] for p in network.plasticity], dtype=np.int32)
+    source, fed = links.sources.astype(np.int32), network.neurons.input.astype(np.int32)
+
+    initial = network.neurons.initial
+
+    def made(steps: int) -> None:
+        given = INPUTS.setdefault("hexapod", vectors(network, 20000))
+        w, ring, a, last = links.weights.copy(), np.zeros(int(delay.sum())), np.zeros(n), np.zeros(4)
+        arrays = (
+            group,
+            neuron,
+            first,
+            edge,
+            source,
+            delay,
+            start,
+            fed,
+            network.neurons.bias,
+            initial,
+            one,
+            two,
+            w,
+            ring,
+        )
+        rest = (v.copy(), a, given, learned, reflex, last, ROOM[: n * steps], ROOM[n * steps :])
+        run(ctypes.c_int64(steps), ctypes.c_int64(n), ctypes.c_int64(m), *map(at, (*arrays, *rest)))
+
+    return made
+
+
+#: where recordings go: made once, and touched, so that nobody pays for fresh memory
+ROOM = np.ones(30_000_000)
+INPUTS: dict[str, npt.NDArray[np.float64]] = {}
+
+
+def vectors(network: Network, steps: int) -> npt.NDArray[np.float64]:
+    """The inputs of all steps."""
+    parts = list(InputReader(network).parts(0, steps))
+    return np.ascontiguousarray(np.concatenate(parts)[:steps])
+
+
+def ours_in_c(network: Network) -> Run:
+    """Whole runs, as ``record`` makes them, with inputs given."""
+    stepper, n = CBackend().prepare(network), len(network.neurons)
+    given = vectors(network, 20000 if network.vector_size else 1)
+
+    def made(steps: int) -> None:
+        state = initial_state(network)
+        rows = given[:steps] if network.vector_size else np.zeros((steps, 0))
+        activity = ROOM[: steps * n].reshape(steps, n)
+        kept = (
+            ROOM[steps * n : steps * (n + len(network.changing))].reshape(steps, -1) if len(network.changing) else ROOM
+        )
+        stepper.run(state, rows, activity, kept, 1, True)
+
+    return made
+
+
+def one_by_one(network: Network) -> Run:
+    """Steps called from Python, one by one."""
+    stepper, vector = CBackend().prepare(network), vectors(network, 1)[0]
+    state = initial_state(network)
+
+    def made(steps: int) -> None:
+        step = stepper.step
+        for _ in range(steps):
+            step(state, vector)
+
+    return made
+
+
+def recorded(network: Network, backend: str) -> Run:
+    def made(steps: int) -> None:
+        record(network, steps, backend=backend)
+
+    return made
+
+
+def numpy_steps(network: Network) -> Run:
+    stepper = NumpyBackend().prepare(network)
+
+    def made(steps: int) -> None:
+        state, reader = initial_state(network), InputReader(network)
+        with np.errstate(all="ignore"):
+            for vector in reader.rows(0, steps):
+                stepper.step(state, vector)
+
+    return made
+
+
+def learning(network: Network) -> Network:
+    """The same, its connections learning by Oja's rule."""
+    oja = rule("weight + 0.01 * post * (pre - post * weight)")
+    members = np.arange(len(network.connections))
+    links = replace(network.connections, rules=np.zeros(len(members), dtype=np.int64))
+    plasticity = Plasticity(oja, members, {}, {}, "oja")
+    program = (*network.program, Learn(0))
+    return replace(network, connections=links, plasticity=(plasticity,), program=program)
+
+
+def brian(network: Network, steps: int) -> float:
+    """Microseconds a step of the same network in Brian2, NaN where the Python in ``BRIAN_PYTHON`` has none."""
+    python = os.environ.get("BRIAN_PYTHON", sys.executable)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "network.npz"
+        links = network.connections
+        np.savez(path, sources=links.sources, targets=links.targets, weights=links.weights, bias=network.neurons.bias)
+        command = [python, str(HERE / "brian_peer.py"), str(path), str(steps), str(int(bool(network.plasticity)))]
+        done = [subprocess.run(command, capture_output=True, text=True, check=False) for _ in range(2)]
+    if any(one.returncode for one in done):
+        return float("nan")
+    return min(float(one.stdout.split()[-1]) for one in done) / steps * 1e6
+
+
+def same(case: Case) -> None:
+    """Refuse to compare what does not compute the same."""
+    n, kept = len(case.network.neurons), []
+    for run in (ours_in_c(case.network), case.in_c(case.network)):
+        run(50)
+        kept.append(ROOM[: 50 * n].copy())
+    np.testing.assert_allclose(kept[1], kept[0], rtol=0, atol=1e-12, err_msg=case.name)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A network, and what stands beside it."""
+
+    name: str
+    network: Network
+    in_c: Callable[[Network], Run]
+    in_numpy: Callable[[Network], Run] | None
+    steps: int
+    brian: bool = True
+
+
+def microseconds(runs: dict[str, Run], steps: int, repeats: int = 7) -> dict[str, float]:
+    """The best of several runs of each, in turn, a step."""
+    best = dict.fromkeys(runs, float("inf"))
+    for _ in range(repeats):
+        for name, run in runs.items():
+            start = time.perf_counter()
+            run(steps)
+            best[name] = min(best[name], (time.perf_counter() - start) / steps * 1e6)
+    return best
+
+
+def main() -> None:
+    hexapod = nv.compile(HERE.parent / "specs" / "hexapod" / "hexapod.yaml").network
+    cases = (
+        Case("12/28, use case 1", cpg_rbf(), cpg_in_c, cpg_by_hand, 20000, False),
+        Case("148/203, hexapod", hexapod, hexapod_in_c, None, 10000, False),
+        Case("150/200", random_network(150, 200), tanh_in_c, random_by_hand, 10000),
+        Case("302/7,000 plastic", learning(random_network(302, 7000)), tanh_in_c, None, 1000),
+        Case("1,000/10,000", random_network(1000, 10000), tanh_in_c, random_by_hand, 1000),
+        Case("10,000/100,000", random_network(10000, 100000), tanh_in_c, random_by_hand, 100),
+    )
+    heads = ("c", "c by hand", "ratio", "a step", "above", "record", "numpy", "by hand", "ratio", "brian2", "/c")
+    print(f"{'µs a step':20}" + "".join(f"{head:>10}" for head in heads))
+    for case in cases:
+        network = case.network
+        same(case)
+        runs = {"c": ours_in_c(network), "c by hand": case.in_c(network), "a step": one_by_one(network)}
+        found = microseconds(runs, case.steps)
+        slower = {"record": recorded(network, "c"), "numpy": numpy_steps(network)}
+        if case.in_numpy is not None:
+            slower["numpy by hand"] = case.in_numpy(network)
+        found |= microseconds(slower, max(case.steps // 5, 20), 5)
+        if case.brian:
+            found["brian2"] = brian(network, case.steps * 2)
+        above = found["a step"] - found["c"]
+        numbers = [found["c"], found["c by hand"], found["c"] / found["c by hand"], found["a step"], above]
+        numbers += [found["record"], found["numpy"], found.get("numpy by hand", np.nan)]
+        numbers += [found["numpy"] / numbers[-1], found.get("brian2", np.nan)]
+        numbers.append(numbers[-1] / found["c"])
+        print(f"{case.name:20}" + "".join(f"{'-' if np.isnan(x) else f'{x:.2f}':>10}" for x in numbers), flush=True)
+
+
+if __name__ == "__main__":
+    main()
