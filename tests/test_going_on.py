@@ -114,3 +114,21 @@ def test_random_numbers_go_on(backend: str, tmp_path: Path) -> None:
     assert (second.reached, third.reached) == (17, 30)
     np.testing.assert_array_equal(np.concatenate([first["A"], second["A"], third["A"]]), whole["A"])
     np.testing.assert_allclose(third["B"] / np.arange(1, 14), whole["B"][17:] / np.arange(18, 31), rtol=1e-14)
+
+
+def test_events_that_no_longer_fit_are_refused_before_the_run(tmp_path: Path) -> None:
+    """What a recording has set goes before the events, which have been tried out from the spec's own values."""
+    head = "neurovis: 1\nname: x\nparameters: {g: {value: 1, max: 3}}\nneurons: {A: {bias: g}}\n"
+    network = nv.compile_text(head + "events: [{at: 2, set: {g: 2*g}}]")
+    recording = saved(network.run(4), tmp_path)
+    with pytest.raises(RecordingError, match="do not fit the events: from step 2 on 'g' is 4; its bounds are -∞ to 3"):
+        network.run(4, start=recording)
+    assert network.run(2, start=recording)["A"].tolist() == [2.0, 2.0]
+
+
+def test_signals_under_way_were_sent_with_the_weights_of_their_time(tmp_path: Path) -> None:
+    text = HEAD + "neurons: {A: {bias: 1}, B: {}}\nconnections: {A -> B: {weight: g, delay: 4}}\n"
+    network = nv.compile_text(text + "events: [{at: 8, set: {g: 5}}]")
+    first = saved(network.run(10), tmp_path)
+    assert network.run(8, start=first)["B"].tolist() == network.run(18)["B"][10:].tolist() == [1.0] * 2 + [5.0] * 6
+    assert nv.compile_text(text, g=3).run(6, start=first)["B"].tolist() == [1.0, 1.0, 5.0, 5.0, 3.0, 3.0]

@@ -292,3 +292,25 @@ def test_arguments_of_another_kind_are_named() -> None:
         simulation.lesion(wrong)
     with pytest.raises(TypeError, match="'state' is a state, as state"):
         simulation.restore(cast("State", 3))
+
+
+@BACKENDS
+def test_an_event_that_cannot_be_after_what_was_set_by_hand_is_left_out(backend: str) -> None:
+    text = HEAD + "neurons: {A: {bias: r}}\nevents: [{at: 2, set: {r: 2*r}}, {at: 2, lesion: A}]"
+    simulation = nv.compile_text(text).simulator(backend)
+    simulation.set(r=3)
+    simulation.step()
+    with pytest.raises(ParameterError, match="the events at step 2: 'r' is 6; its bounds are 0 to 4"):
+        simulation.step()
+    assert (simulation.k, simulation.activity.tolist()) == (2, [3.0])
+    simulation.step()
+    assert simulation.activity.tolist() == [3.0]
+
+
+def test_a_state_in_which_other_numbers_follow_parameters_is_refused() -> None:
+    """The hash does not see what follows a parameter; a state has the numbers that do."""
+    one = nv.compile_text(HEAD + "neurons: {A: {bias: p}, B: {bias: 0.5}}")
+    other = nv.compile_text(HEAD + "neurons: {A: {bias: 0.5}, B: {bias: p}}")
+    assert one.hash == other.hash
+    with pytest.raises(ValueError, match="a state of another network"):
+        other.simulator().restore(one.simulator().state())

@@ -122,3 +122,16 @@ def test_a_clamp_that_was_covered_holds_again() -> None:
     assert recording["A1"][1:].tolist() == [2.0] * 4 + [3.0] * 2 + [1.0] * 2
     assert recording["A2"][1:].tolist() == [2.0] * 5 + [1.0] * 3
     assert recording["A3"][4:].tolist() == [1.0] * 5
+
+
+def test_events_that_name_the_same_share_its_indices() -> None:
+    """So a thousand events on all connections take no more memory than one."""
+    kinds = ("lesion: A -> B", "mend: A -> B", "lesion: A + B", "mend: A + B", "learning: {B -> A: false}")
+    events = [f"  - {{at: {at}, {kind}}}\n" for at in (1, 2) for kind in kinds]
+    clamps = [f"  - {{from: {at}, clamp: {{A + B: {at}}}}}\n" for at in (1, 2)]
+    first, second = nv.compile_text(HEAD + "events:\n" + "".join(events + clamps)).network.changes
+    for kind in ("lesioned_neurons", "lesioned_connections", "mended_neurons", "mended_connections"):
+        assert len(getattr(first, kind))
+        assert getattr(first, kind) is getattr(second, kind)
+    assert first.learning[0][0] is second.learning[0][0]
+    assert first.clamps[0].neurons is second.clamps[0].neurons is first.lesioned_neurons

@@ -102,6 +102,8 @@ class Held:
 
     def follow(self, changed: Collection[int], parameters: FloatArray) -> None:
         """Parameters have other values now: what is held follows them."""
+        if not changed:
+            return
         for order, clamp in self.active.items():
             if not clamp.value.slots.isdisjoint(changed):
                 self.value[self.order == order] = clamp.value.values(parameters)

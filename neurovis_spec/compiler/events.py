@@ -1,7 +1,7 @@
 """Events: what changes during a run (§9).
 
-In: the ``events`` section, the neurons and connections that it names. Out: the events, resolved. What becomes of the
-network is for ``phases``.
+In: the ``events`` section, the neurons and connections that it names. Out: the events, resolved; those that name the
+same share one array. What they change in a run is for ``timeline``.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.arrays import IntArray
+from neurovis_spec.compiler.arrays import IntArray, frozen
 from neurovis_spec.compiler.connect import Connected
 from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.references import (
@@ -36,18 +36,18 @@ _ACTIONS = ("set", "clamp", "lesion", "mend", "learning")
 @dataclass(frozen=True)
 class Event:
     """One event, resolved: it applies from step ``at`` on; a clamp ends before step ``to``. What is set and what is
-    clamped follow the parameters, as these are by then."""
+    clamped follow the parameters, as these are by then. Each reference is an array of ascending indices."""
 
     at: int
     to: int | None = None
     set: Mapping[str, Formula] = field(default_factory=dict)
-    clamp: tuple[tuple[tuple[int, ...], Formula], ...] = ()
-    neurons: tuple[int, ...] = ()
-    connections: tuple[int, ...] = ()
-    mended_neurons: tuple[int, ...] = ()
-    mended_connections: tuple[int, ...] = ()
+    clamp: tuple[tuple[IntArray, Formula], ...] = ()
+    neurons: tuple[IntArray, ...] = ()
+    connections: tuple[IntArray, ...] = ()
+    mended_neurons: tuple[IntArray, ...] = ()
+    mended_connections: tuple[IntArray, ...] = ()
     #: connections whose rules are switched on or off
-    learning: tuple[tuple[tuple[int, ...], bool], ...] = ()
+    learning: tuple[tuple[IntArray, bool], ...] = ()
     #: where each parameter that is set is named
     keys: Mapping[str, Span] = field(default_factory=dict)
 
@@ -62,9 +62,9 @@ class Wires:
     #: whether each of them learns
     plastic: npt.NDArray[np.bool_]
 
-    def between(self, sources: tuple[int, ...], targets: tuple[int, ...]) -> list[int]:
+    def between(self, sources: tuple[int, ...], targets: tuple[int, ...]) -> IntArray:
         """The connections from any of some neurons to any of others."""
-        return np.flatnonzero(np.isin(self.sources, sources) & np.isin(self.targets, targets)).tolist()
+        return np.flatnonzero(np.isin(self.sources, sources) & np.isin(self.targets, targets))
 
 
 def wires_of(made: Connected) -> Wires | None:
@@ -82,14 +82,16 @@ class EventReader:
     wires: Wires | None
     directory: Directory
     constants: Constants
+    #: what references mean, those that are valid
+    known: dict[str, IntArray] = field(default_factory=dict)
 
     @property
     def findings(self) -> Findings:
-        """Where what is at fault is noted."""
+        """Where findings go."""
         return self.constants.findings
 
     def read(self, models: tuple[EventModel, ...]) -> tuple[Event, ...]:
-        """All events, in the order written; those at fault are left out, and noted."""
+        """All events, in the order written; those that are invalid are left out, and reported."""
         events = [self._event(model) for model in models]
         return tuple(event for event in events if event is not None)
 
@@ -162,23 +164,36 @@ class EventReader:
             message = f"'{name}' cannot be set in a run: the structure of the network depends on it"
             self.findings.error("structural-parameter", span, message)
 
-    def _clamp(self, model: EventModel, name: str, formula: Formula) -> list[tuple[tuple[int, ...], Formula]]:
-        neurons = resolve_end(key_of(model.source, "clamp", name), self.directory, self.findings)
+    def _clamp(self, model: EventModel, name: str, formula: Formula) -> list[tuple[IntArray, Formula]]:
+        neurons = self._neurons(key_of(model.source, "clamp", name))
         value = self.constants.scalar(formula)
         return [] if neurons is None or value is None else [(neurons, formula)]
 
-    def _parts(self, texts: Iterable[Located[str]]) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    def _neurons(self, text: Located[str]) -> IntArray | None:
+        """The neurons of a reference; None where it is invalid."""
+        if text.value not in self.known:
+            found = resolve_end(text, self.directory, self.findings)
+            if found is None:
+                return None
+            self._know(text, np.unique(np.array(found, dtype=np.int64)))
+        return self.known[text.value]
+
+    def _know(self, text: Located[str], indices: IntArray) -> None:
+        frozen(indices)
+        self.known[text.value] = indices
+
+    def _parts(self, texts: Iterable[Located[str]]) -> tuple[tuple[IntArray, ...], tuple[IntArray, ...]]:
         """The neurons and the connections that are lesioned or mended."""
-        neurons: list[int] = []
-        connections: list[int] = []
+        neurons: list[IntArray] = []
+        connections: list[IntArray] = []
         for text in texts:
-            if "->" in text.value:
-                connections.extend(self._connections(text))
-            else:
-                neurons.extend(resolve_end(text, self.directory, self.findings) or ())
+            joined = "->" in text.value
+            found = self._connections(text) if joined else self._neurons(text)
+            if found is not None:
+                (connections if joined else neurons).append(found)
         return tuple(neurons), tuple(connections)
 
-    def _learning(self, name: Located[str], on: bool) -> list[tuple[tuple[int, ...], bool]]:
+    def _learning(self, name: Located[str], on: bool) -> list[tuple[IntArray, bool]]:
         """The connections whose rules are stopped or started."""
         if "->" not in name.value:
             self.findings.error(
@@ -186,27 +201,32 @@ class EventReader:
             )
             return []
         found = self._connections(name)
-        if found and self.wires is not None and not self.wires.plastic[list(found)].any():
+        if found is None or self.wires is None:
+            return []
+        if not self.wires.plastic[found].any():
             message = f"nothing learns at '{shown(name.value)}'"
             self.findings.error("no-rule", name.span, message, "name a connection that has a 'plasticity'")
         return [(found, on)]
 
-    def _connections(self, text: Located[str]) -> tuple[int, ...]:
-        """The connections between two ends; a finding where there is none."""
-        ends = resolve_ends(text, self.directory, self.findings)
-        if ends is None or self.wires is None:
-            return ()
-        found = self.wires.between(*ends)
-        if not found:
-            message = f"there is no connection '{shown(text.value)}'"
-            self.findings.error("no-connection", text.span, message, self._other(text, ends))
-        return tuple(found)
+    def _connections(self, text: Located[str]) -> IntArray | None:
+        """The connections between two ends; None, and a finding, where there is none."""
+        if text.value not in self.known:
+            ends = resolve_ends(text, self.directory, self.findings)
+            if ends is None or self.wires is None:
+                return None
+            found = self.wires.between(*ends)
+            if not len(found):
+                message = f"there is no connection '{shown(text.value)}'"
+                self.findings.error("no-connection", text.span, message, self._other(text, ends))
+                return None
+            self._know(text, found)
+        return self.known[text.value]
 
     def _other(self, text: Located[str], ends: tuple[tuple[int, ...], tuple[int, ...]]) -> str | None:
         """Which connection may be meant: the one the other way, those that are called alike, those of either end."""
         assert self.wires is not None
         source, target = (part.strip() for part in text.value.split("->", 1))
-        if self.wires.between(ends[1], ends[0]):
+        if len(self.wires.between(ends[1], ends[0])):
             return f"there is '{shown(target)} -> {shown(source)}', the other way"
         names = self.wires.names
         near = [name for name in names if source in name.split(" -> ")[0] or target in name.split(" -> ")[-1]]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -59,17 +59,17 @@ def _change(step: int, new: list[tuple[int, Event]], over: list[int], constants:
             values[constants.settable[name]] = _formula(formula, constants)
         for place, (neurons, formula) in enumerate(event.clamp):
             order = number * _MOST_CLAMPS + place
-            clamps.append(Clamp(order, number, _indices(neurons), _formula(formula, constants)))
-        learning += ((_indices(members), on) for members, on in event.learning)
+            clamps.append(Clamp(order, number, neurons, _formula(formula, constants)))
+        learning += event.learning
     return Change(
         step,
         tuple(values.items()),
         tuple(clamps),
         tuple(over),
-        lesioned_neurons=_indices({one for _, event in new for one in event.neurons}),
-        lesioned_connections=_indices({one for _, event in new for one in event.connections}),
-        mended_neurons=_indices({one for _, event in new for one in event.mended_neurons}),
-        mended_connections=_indices({one for _, event in new for one in event.mended_connections}),
+        lesioned_neurons=_indices([one for _, event in new for one in event.neurons]),
+        lesioned_connections=_indices([one for _, event in new for one in event.connections]),
+        mended_neurons=_indices([one for _, event in new for one in event.mended_neurons]),
+        mended_connections=_indices([one for _, event in new for one in event.mended_connections]),
         learning=tuple(learning),
     )
 
@@ -78,10 +78,11 @@ def _change(step: int, new: list[tuple[int, Event]], over: list[int], constants:
 _MOST_CLAMPS = 1 << 32
 
 
-def _indices(found: Iterable[int]) -> IntArray:
-    result = np.array(sorted(found), dtype=np.int64)
-    if not len(result):
-        return NO_INDICES
+def _indices(found: Sequence[IntArray]) -> IntArray:
+    """All of these indices, ascending; of one array that one."""
+    if len(found) < 2:
+        return found[0] if found else NO_INDICES
+    result = np.unique(np.concatenate(found))
     frozen(result)
     return result
 

@@ -112,10 +112,9 @@ class Controls:
             self.hold(now)
 
     def apply(self, now: Conditions, weights: FloatArray, signals: FloatArray, change: Change) -> None:
-        """What the events of a step change."""
-        if change.parameters:
-            values = {slot: float(formula.values(now.parameters)) for slot, formula in change.parameters}
-            self.set(now, weights, values)
+        """What the events of a step change; all or nothing. Raises PatchError, which it cannot where nothing was set
+        but by the events before."""
+        self.set_parameters(now, weights, change)
         if change.released or change.clamps:
             now.held.end(change.released, now.parameters)
             for clamp in change.clamps:
@@ -127,6 +126,12 @@ class Controls:
             self.lesion(now, change.lesioned_neurons, change.lesioned_connections)
         for members, on in change.learning:
             self.learn(now, members, on)
+
+    def set_parameters(self, now: Conditions, weights: FloatArray, change: Change) -> None:
+        """Set the parameters that the events of a step set. Raises PatchError."""
+        if change.parameters:
+            values = {slot: float(formula.values(now.parameters)) for slot, formula in change.parameters}
+            self.set(now, weights, values)
 
     def lesion(self, now: Conditions, neurons: IntArray, connections: IntArray) -> None:
         """Neurons and connections are silent from now on."""

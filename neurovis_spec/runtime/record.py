@@ -6,7 +6,7 @@ hands the rows on while it runs.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Protocol
@@ -15,14 +15,16 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.changes import Change
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.patch import PatchError
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.backend import Backend, Runner, Stepper, prepare
 from neurovis_spec.runtime.columns import ALL, Columns, Keep, columns_of
 from neurovis_spec.runtime.conditions import Controls
 from neurovis_spec.runtime.inputs import STRETCH, InputReader
 from neurovis_spec.runtime.memory import check_room
-from neurovis_spec.runtime.recording import After, Numbers, Recording, recording_of
+from neurovis_spec.runtime.recording import After, Numbers, Recording, RecordingError, recording_of
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.runtime.until import Until
@@ -159,6 +161,7 @@ def go(network: Network, state: State, course: Course, rows: Rows, progress: Pro
     if isinstance(stepper, Runner) and plain and course.until is None:  # which is asked after each step
         make = _Together(stepper)
     controls, changes = Controls(network), {change.at: change for change in network.changes}
+    _check_events(controls, state, [change for change in network.changes if change.at < steps])
     edges = [0, *(at for at in changes if 0 < at < steps), steps]
     with np.errstate(all="ignore"):
         for begin, end in pairwise(edges):
@@ -255,6 +258,21 @@ class _Together:
 def _kept(first: int, stop: int, every: int) -> int:
     """How many of the steps from ``first`` to ``stop`` are recorded."""
     return (stop - 1) // every - (first - 1) // every
+
+
+def _check_events(controls: Controls, state: State, changes: Sequence[Change]) -> None:
+    """Refuse events that could not set what they say, now that a recording has set parameters before them; the compiler
+    has tried them from the beginning. Raises RecordingError."""
+    if not state.conditions.chosen.any():
+        return
+    now, weights = state.conditions.copy(), state.weights.copy()
+    with np.errstate(all="ignore"):
+        for change in changes:
+            try:
+                controls.set_parameters(now, weights, change)
+            except PatchError as error:
+                message = f"the parameters of the recording do not fit the events: from step {change.at} on {error}"
+                raise RecordingError(message) from None
 
 
 def _stretches(begin: int, end: int) -> Iterator[tuple[int, int]]:

@@ -5,8 +5,9 @@ In: a Network and a Recording of it, or of a network with the same neurons. Out:
 What was learned and what was changed is kept, unless it is given anew. The last activities recorded become a[−1]; the
 weights after the last step become w[0] of the connections that learned. Parameters that were set (by ``--set``, an
 event or a caller) keep their values, and all that follows them with them; one that this network is given (``--set``)
-goes before that. Lesions stay. The signals under way are formed again from the last rows, as far back as the delays
-reach and consecutive steps were recorded (what lies before is 0). ``initial`` is not taken again.
+goes before that. Lesions stay. The signals under way are formed again from the activities and the weights of the last
+rows, as far back as the delays reach and consecutive steps were recorded (what lies before is 0). ``initial`` is not
+taken again.
 
 Steps count from 0, so inputs, events and episodes begin anew; random numbers go on behind the steps that were made.
 Clamps, stopped rules and the states of models and rules are no part of a recording.
@@ -42,11 +43,11 @@ def resumed_state(network: Network, recording: Recording) -> State:
     _lesion_again(network, recording, state, controls)
     depth = int(network.connections.delays.max(initial=1))
     columns, places = learned
+    recorded, same = _same_connections(network, recording)
     for ago, row in _last_rows(recording, depth):
-        activity = recording.activity[row][order]
         weights = state.weights.copy()
-        weights[places] = recording.weights[row][columns]
-        _send(network, state, -ago, activity, weights)
+        weights[same] = recording.all_weights(row)[recorded]
+        _send(network, state, -ago, recording.activity[row][order], weights)
     state.activity = recording.activity[-1][order]
     state.weights[places] = recording.weights_after[columns]
     return state
@@ -117,6 +118,13 @@ def _matching_neurons(network: Network, recording: Recording) -> IntArray:
         if name not in network.neuron_index:
             raise RecordingError(_without("neuron", name, f"'{network.name}'", network.neuron_index))
     return np.array([columns[name] for name in network.neurons.names], dtype=np.int64)
+
+
+def _same_connections(network: Network, recording: Recording) -> tuple[IntArray, IntArray]:
+    """The connections of the recording that the network has, too, and their places there."""
+    places = np.array([network.connection_index.get(name, -1) for name in recording.connection_names], dtype=np.int64)
+    known = np.flatnonzero(places >= 0)
+    return known, places[known]
 
 
 def _learned(network: Network, recording: Recording) -> tuple[IntArray, IntArray]:

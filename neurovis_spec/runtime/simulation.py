@@ -42,7 +42,7 @@ class ParameterError(ValueError):
 class Simulation:
     """A run in the making; ``start`` is a recording to go on from (see ``resume``). Events of the spec apply at their
     steps; what is done by hand between two steps comes after the events of the step to come. Raises BackendError,
-    RecordingError.
+    RecordingError, ParameterError (see ``step``).
     """
 
     def __init__(self, network: Network, backend: str | Backend | None = None, start: Recording | None = None) -> None:
@@ -68,8 +68,11 @@ class Simulation:
         """What events change at the step to come."""
         change = self._changes.get(state.k)
         if change is not None:
-            with np.errstate(all="ignore"):
-                self._controls.apply(state.conditions, state.weights, state.signals, change)
+            try:
+                with np.errstate(all="ignore"):
+                    self._controls.apply(state.conditions, state.weights, state.signals, change)
+            except PatchError as error:
+                raise ParameterError(f"the events at step {state.k}: {error}") from None
 
     @property
     def k(self) -> int:
@@ -107,7 +110,8 @@ class Simulation:
         """Compute step k; values replace the sources of inputs for this step only.
 
         Gives the outputs by name: a number for a single neuron, else an array; an empty mapping where the spec declares
-        none. Raises InputError, and then no step was made.
+        none. Raises InputError, and then no step was made; ParameterError where events of the step to come cannot set
+        what they say with what was set by hand, and then the step was made, and these events are left out.
         """
         state = self._state
         if values is not None and not isinstance(values, Mapping):
@@ -225,7 +229,7 @@ class Simulation:
     def restore(self, state: State) -> None:
         """Go on from a state of this network, exactly as it was. Raises ValueError for one of another network."""
         arguments.instance("state", state, State, "a state, as state() gives it")
-        if state.network != self.network.hash or len(state.activity) != len(self.network.neurons):
+        if state.network != self._begin.network:
             raise ValueError("this is a state of another network")
         self._state = state.copy()
         self._reader.use(self._state)

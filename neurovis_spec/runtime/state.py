@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Plasticity, Quantity, Rule
 from neurovis_spec.language.expressions.arrays import evaluate_array
@@ -42,7 +43,7 @@ class State:
     conditions: Conditions
     continued: bool = False
     drawn: int = 0
-    #: the hash of the network
+    #: the mark of the network
     network: str = ""
 
     def copy(self) -> State:
@@ -77,8 +78,17 @@ def initial_state(network: Network) -> State:
             for entry in network.plasticity
         ),
         conditions=first_conditions(network),
-        network=network.hash,
+        network=mark(network),
     )
+
+
+def mark(network: Network) -> str:
+    """What networks have in common that can take on each other's states: the content hash, and which of their numbers
+    follow parameters, which that hash does not see."""
+    settable = network.settable
+    names = [slot.name for slot in settable.slots]
+    follow = [(binding.array, binding.places, binding.slots) for binding in settable.bindings]
+    return digest(network.hash, names, [(array, places, sorted(slots)) for array, places, slots in follow])
 
 
 def history_depth(network: Network) -> int:
