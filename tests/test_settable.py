@@ -314,3 +314,11 @@ def test_a_state_in_which_other_numbers_follow_parameters_is_refused() -> None:
     assert one.hash == other.hash
     with pytest.raises(ValueError, match="a state of another network"):
         other.simulator().restore(one.simulator().state())
+
+
+def test_a_cell_of_no_connection_follows_nothing() -> None:
+    text = HEAD + (
+        "neurons: {A: {count: 2, bias: 1}, B: {combine: distance}}\n"
+        "connections: {A -> B: {matrix: [[p], [null]], centre: [[1], [p]]}}\nevents: [{at: 1, set: {p: 2}}]\n"
+    )
+    assert nv.compile_text(text).run(4)["B"].tolist() == [1.0, 0.5, 1.0, 1.0]

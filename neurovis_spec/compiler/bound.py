@@ -55,7 +55,7 @@ def make_settable(
         *_of_connections(bundles, connections, plasticity),
         *_of_inputs(inputs),
     ]
-    merged = list(_merged([one for one in found if len(one.places)]))
+    merged = list(_merged([one for one in found if len(one.places)]))  # a cell may be of no connection
     variables: dict[str, Variable] = {}
     initial: list[FloatArray] = []
     start = 0
