@@ -30,7 +30,11 @@ _CALLED: Mapping[str, str] = {
 
 
 class PatchError(ValueError):
-    """Values that parameters cannot take."""
+    """Values that parameters cannot take; ``slots`` are those that what is wrong reads, or the one that is wrong."""
+
+    def __init__(self, message: str, slots: frozenset[int]) -> None:
+        super().__init__(message)
+        self.slots = slots
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,23 +147,25 @@ class Patcher:
         """Raise PatchError where a parameter is out of its bounds."""
         entry = self.settable.slots[slot]
         if not math.isfinite(value):
-            raise PatchError(f"'{entry.name}' would be {'undefined' if math.isnan(value) else 'infinite'}")
+            what = "undefined" if math.isnan(value) else "infinite"
+            raise PatchError(f"'{entry.name}' would be {what}", frozenset((slot,)))
         if not entry.low <= value <= entry.high:
             bounds = f"{entry.low:g} to {entry.high:g}".replace("-inf", "-∞").replace("inf", "∞")
-            raise PatchError(f"'{entry.name}' is {value:g}; its bounds are {bounds}")
+            raise PatchError(f"'{entry.name}' is {value:g}; its bounds are {bounds}", frozenset((slot,)))
 
     def _check(self, binding: Binding, value: Value, parameters: FloatArray) -> None:
         """Raise PatchError where a number is not finite, or out of its bounds."""
         name = _called(binding.array)
         if not np.isfinite(value).all():
             what = "not finite" if np.ndim(value) else "undefined" if np.isnan(value) else "infinite"
-            raise PatchError(f"{name} would be {what}")
+            raise PatchError(f"{name} would be {what}", binding.slots)
         for bound, beyond, word in ((binding.low, np.less, "below"), (binding.high, np.greater, "above")):
             if bound is None:
                 continue
             edge = bound.values(parameters)
             if beyond(value, edge).any():
-                raise PatchError(f"{name} would be {word} its bound of {float(np.max(edge)):g}")
+                message = f"{name} would be {word} its bound of {float(np.max(edge)):g}"
+                raise PatchError(message, binding.slots)
 
 
 def _code(formula: object, space: dict[str, object]) -> str:

@@ -171,12 +171,14 @@ class _Trial:
         return due
 
     def _set(self, step: int, values: dict[int, float], keys: dict[int, Span]) -> tuple[bytes, frozenset[int]]:
-        """Set parameters; a finding, at each of them, where they cannot have these values."""
+        """Set parameters; a finding, at each of them from which it follows, where they cannot have these values."""
         try:
             patch = self._patcher.patch(self._parameters, self._chosen, values)
         except PatchError as error:
-            for key in keys.values():
-                self.findings.error("out-of-range", key, f"from step {step} on {error}")
+            own = [chosen or slot in values for slot, chosen in enumerate(self._chosen.tolist())]
+            for slot, key in keys.items():
+                if not error.slots.isdisjoint((slot, *self.network.settable.reached([slot], own))):
+                    self.findings.error("out-of-range", key, f"from step {step} on {error}")
             return b"", frozenset()
         self._chosen[list(values)] = True
         before, self._parameters = self._parameters, patch.parameters
