@@ -83,7 +83,7 @@ def compile_text(
 
 
 def load(path: str | Path) -> Recording:
-    """Read a recording. Raises RecordingError for a file that is none, OSError for one that cannot be read."""
+    """Read a recording. Raises RecordingError for a file that is none, or that cannot be read."""
     from neurovis_spec.runtime import formats
 
     return formats.load(arguments.path("path", path))

@@ -6,11 +6,14 @@ that names the argument, rather than an error from deep within.
 
 from __future__ import annotations
 
+import math
 import operator
 import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import SupportsFloat, SupportsIndex, TypeVar
+
+import numpy as np
 
 Kind = TypeVar("Kind")
 
@@ -56,7 +59,9 @@ def integer(name: str, value: object, least: int | None = None, most: int | None
 
 def number(name: str, value: object) -> float:
     """A number, which may be NaN or infinite."""
-    if isinstance(value, str | bytes | bytearray) or not isinstance(value, SupportsFloat | SupportsIndex):
+    if isinstance(value, bool | np.bool_ | str | bytes | bytearray):
+        raise _wrong(name, "a number", value)
+    if not isinstance(value, SupportsFloat | SupportsIndex):
         raise _wrong(name, "a number", value)
     try:
         return float(value)
@@ -64,6 +69,22 @@ def number(name: str, value: object) -> float:
         raise _wrong(name, "a number", value) from None
     except OverflowError:
         raise ValueError(f"'{name}' is beyond what a double can hold") from None
+
+
+def finite(value: object) -> float | None:
+    """A number that a double can hold; None where it is none, as texts, truth values and lists are."""
+    try:
+        result = number("value", value)
+    except (TypeError, ValueError):
+        return None
+    return result if math.isfinite(result) else None
+
+
+def truth(name: str, value: object) -> bool:
+    """True or False."""
+    if not isinstance(value, bool | np.bool_):
+        raise _wrong(name, "True or False", value)
+    return bool(value)
 
 
 def mapping(name: str, value: object) -> Mapping[str, object]:

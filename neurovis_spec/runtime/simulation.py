@@ -7,6 +7,7 @@ can be kept and gone back to.
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Callable, Mapping
 from functools import cached_property
 
@@ -150,19 +151,21 @@ class Simulation:
                 raise ParameterError(
                     f"parameter '{name}' cannot be set in a run: the structure of the network depends on it"
                 )
-            if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
-                raise ParameterError(f"parameter '{name}' takes a finite number, not {value!r}")
-            result[slots[name]] = float(value)
+            number = arguments.finite(value)
+            if number is None:
+                raise ParameterError(f"parameter '{name}' takes a finite number, not {reprlib.repr(value)}")
+            result[slots[name]] = number
         return result
 
     def clamp(self, neurons: str, value: float) -> None:
         """Hold neurons (``K1..K3``, ``K + O``, ``left.K``) at a value from step k on, whatever their model says; its
         states go on. Raises KeyError for a name that there is not, ValueError for a value that is not finite."""
-        if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
-            raise ValueError(f"a neuron is clamped to a finite number, not {value!r}")
+        number = arguments.finite(value)
+        if number is None:
+            raise ValueError(f"a neuron is clamped to a finite number, not {reprlib.repr(value)}")
         now = self._state.conditions
         order = max([_BY_HAND, *(order + 1 for order in now.held.active)])
-        clamp = Clamp(order, -1, self._neurons(neurons), ParameterFormula(Number(float(value)), {}))
+        clamp = Clamp(order, -1, self._neurons(neurons), ParameterFormula(Number(number), {}))
         now.held.begin(clamp, now.parameters)
         self._controls.hold(now)
 
@@ -188,11 +191,11 @@ class Simulation:
 
     def learning(self, connections: str, on: bool = True) -> None:
         """Carry out the rules of connections (``K -> O``) from step k on, or stop them: weights and states of rules
-        stay as they are then. Raises KeyError."""
+        stay as they are then. Raises KeyError; TypeError where ``on`` is neither True nor False."""
         _, members = self._parts(connections)
         if not len(members) or not (self.network.connections.rules[members] >= 0).any():
             raise UnknownNameError(f"there is no rule at '{connections}'")
-        self._controls.learn(self._state.conditions, members, on)
+        self._controls.learn(self._state.conditions, members, arguments.truth("on", on))
 
     def _neurons(self, text: str) -> IntArray:
         found = self._names.find(arguments.text("reference", text))
