@@ -26,10 +26,12 @@ from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.files import replacing
 
 if TYPE_CHECKING:
+    from neurovis_spec.compiler.arrays import FloatArray
     from neurovis_spec.layout import Layout, Point, Route
     from neurovis_spec.runtime.record import Course
     from neurovis_spec.runtime.recording import Recording, Snapshot
     from neurovis_spec.runtime.simulation import Simulation
+    from neurovis_spec.runtime.until import Until
     from neurovis_spec.scene.gains import Gains
 
 #: Frames a second where the spec writes no dt, and the most there are.
@@ -92,14 +94,28 @@ class CompiledNetwork:
         backend: str | None = None,
         every: int = 1,
         start: Recording | None = None,
+        until: str | Until | None = None,
         progress: Progress | None = None,
     ) -> Recording:
         """Run ``steps`` steps (default ``time.steps``) and record every ``every``-th.
 
-        ``inputs`` replace the sources of inputs: arrays of (steps,) or (steps, size). Raises InputError, BackendError,
-        RecordingError.
+        ``inputs`` replace the sources of inputs: arrays of (steps,) or (steps, size). The run ends at the first step
+        after which ``until`` is true (``"rms(O - T, last=129) < 0.01"``). Raises InputError, BackendError,
+        RecordingError, SpecError where ``until`` is invalid.
         """
-        return pipeline.simulate(self.network, self._course(steps, inputs, backend, every), start, progress)
+        return pipeline.simulate(self.network, self._course(steps, inputs, backend, every, until), start, progress)
+
+    def until(self, text: str) -> Until:
+        """A measure that ends runs, ``rms(O - T, last=129) < 0.01``: its ``ending`` says how the last one ended. Raises
+        SpecError."""
+        from neurovis_spec.runtime.until import Until
+
+        return Until(text, self.network)
+
+    def measure(self, text: str, recording: Recording) -> FloatArray:
+        """What a measure (``rms(O - T, last=129)``) is after each step of a recording of every step, (steps,): NaN
+        while it has no value. Raises SpecError, RecordingError."""
+        return pipeline.gauge(self.network, text, recording)
 
     def run_to(
         self,
@@ -110,21 +126,28 @@ class CompiledNetwork:
         backend: str | None = None,
         every: int = 1,
         start: Recording | None = None,
+        until: str | Until | None = None,
         progress: Progress | None = None,
     ) -> None:
         """Run as ``run`` does and write the recording to a file while it is made, in memory that does not grow with the
         steps. What was there stays until the end. Raises what ``run`` and ``Recording.save`` raise, RecordingError
         where the disk has not the room, and after Ctrl-C a KeyboardInterrupt; the file holds the steps until then.
         After any other exception a part beside the file holds them, which is read where the file is not there."""
-        course = self._course(steps, inputs, backend, every)
+        course = self._course(steps, inputs, backend, every, until)
         pipeline.simulate_to(self.network, Path(path), course, start, progress)
 
     def _course(
-        self, steps: int | None, inputs: Mapping[str, npt.ArrayLike] | None, backend: str | None, every: int
+        self,
+        steps: int | None,
+        inputs: Mapping[str, npt.ArrayLike] | None,
+        backend: str | None,
+        every: int,
+        until: str | Until | None,
     ) -> Course:
         from neurovis_spec.runtime.record import Course
 
-        return Course(self.network.steps if steps is None else steps, every, inputs, backend)
+        ends = self.until(until) if isinstance(until, str) else until
+        return Course(self.network.steps if steps is None else steps, every, inputs, backend, ends)
 
     def layout(
         self, engine: str | None = None, *, earlier: Layout | None = None, progress: Progress | None = None

@@ -31,6 +31,7 @@ from neurovis_spec.language.spec import Spec
 from neurovis_spec.progress import Progress
 
 if TYPE_CHECKING:  # what only some stages need is imported there: a spec is validated without all of it
+    from neurovis_spec.compiler.arrays import FloatArray
     from neurovis_spec.layout.model import Layout, LayoutRefusalError
     from neurovis_spec.runtime.record import Course
     from neurovis_spec.runtime.recording import Recording, Snapshot
@@ -78,7 +79,8 @@ def simulate(
     """Run the update program, record activities and weights."""
     from neurovis_spec.runtime.record import record
 
-    return record(network, course.steps, course.inputs, course.backend, course.every, start, progress)
+    how = (course.steps, course.inputs, course.backend, course.every, start, progress, course.until)
+    return record(network, *how)
 
 
 def simulate_to(
@@ -92,6 +94,13 @@ def simulate_to(
     from neurovis_spec.runtime.stream import record_to
 
     record_to(network, path, course, start, progress)
+
+
+def gauge(network: Network, text: str, recording: Recording) -> FloatArray:
+    """A measure after each step of a recording."""
+    from neurovis_spec.runtime.gauge import over
+
+    return over(text, network, recording)
 
 
 def remember(spec: Spec, request: Request, network: Network, findings: Findings) -> Layout | None:

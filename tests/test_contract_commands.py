@@ -49,7 +49,7 @@ READS = {
 OPTIONS = {
     "new": "--from", "validate": "--format --strict --limit --root", "fmt": "--check --diff", "inspect": "--format",
     "layout": "--output --engine --update --metrics", "render": "--output --step --recording --theme",
-    "run": "--steps --set --input --backend --every --from --output",
+    "run": "--steps --set --input --backend --every --from --until --output",
     "animate": "--output --steps --from --fps --recording",
     "explain": "", "docs": "", "lsp": "", "schema": "",
 }  # fmt: skip

@@ -17,6 +17,7 @@ from neurovis_spec.cli.targets import check_files, check_target
 if TYPE_CHECKING:
     from neurovis_spec.compiled import CompiledNetwork
     from neurovis_spec.runtime.recording import Recording
+    from neurovis_spec.runtime.until import Until
 
 #: activities shown where nothing is written to a file
 _MOST_SHOWN = 20
@@ -28,6 +29,7 @@ _MOST_SHOWN = 20
         "neurovis run first.yaml --steps 4000 --set gain=0.5 -o first.npz",
         "neurovis run first.yaml --input touch=touch.csv --every 10 -o first.csv",
         "neurovis run first.yaml --from first.npz -o second.npz",
+        'neurovis run first.yaml --steps 100000 --until "rms(O, last=100) < 0.01"',
         "neurovis run --backend list",
     )
 )
@@ -48,6 +50,12 @@ _MOST_SHOWN = 20
     shell_complete=paths,
     help="Begin with the last weights and activities of this recording; states of models begin anew.",
 )
+@click.option(
+    "--until",
+    metavar="EXPR",
+    help="End at the first step after which this is true: an expression of neurons, outputs, parameters, k and t, with "
+    "rms, mean, min and max over the last N steps. Steps are the most there are.",
+)
 @output_option("Write the recording here (.npz or .csv); without it a summary is printed.")
 @compile_options
 def command(
@@ -58,6 +66,7 @@ def command(
     backend: str | None,
     every: int,
     start: str | None,
+    until: str | None,
     output: Path | None,
 ) -> None:
     """Run a network and write a recording.
@@ -78,19 +87,32 @@ def command(
     network = network_of(spec, settings)
     check_files(output, network)
     arrays, before = tables(inputs, network.network), recording_of(start)
-    made = network.network.steps if steps is None else steps
+    ends = None if until is None else network.until(until)
     begun = perf_counter()
     if output is not None:
         with writing(output), progress("running") as bar:
-            network.run_to(output, steps, arrays, backend=backend, every=every, start=before, progress=bar)
-        click.echo(f"{output}: {_summary(network, made, perf_counter() - begun, backend)}")
+            network.run_to(output, steps, arrays, backend=backend, every=every, start=before, until=ends, progress=bar)
+        _tell(ends)
+        click.echo(f"{output}: {_summary(network, steps, perf_counter() - begun, backend, ends)}")
         return
     with progress("running") as bar:
-        recording = network.run(steps, arrays, backend=backend, every=every, start=before, progress=bar)
-    _print(network, recording, _summary(network, made, perf_counter() - begun, backend))
+        recording = network.run(steps, arrays, backend=backend, every=every, start=before, until=ends, progress=bar)
+    _tell(ends)
+    _print(network, recording, _summary(network, steps, perf_counter() - begun, backend, ends))
 
 
-def _summary(network: CompiledNetwork, steps: int, seconds: float, backend: str | None) -> str:
+def _tell(until: Until | None) -> None:
+    """How a run ended that was to end early."""
+    if until is not None and until.ending is not None:
+        click.echo(f"until {until.measure.text}: {until.ending}", err=True)
+
+
+def _summary(
+    network: CompiledNetwork, steps: int | None, seconds: float, backend: str | None, until: Until | None
+) -> str:
+    steps = network.network.steps if steps is None else steps
+    if until is not None and until.ending is not None:
+        steps = until.ending.step + 1
     return f"{count(steps, 'step')} in {seconds:.2f} s, backend {backend or network.choose_backend()[0]}"
 
 

@@ -24,6 +24,7 @@ from neurovis_spec.runtime.memory import check_room
 from neurovis_spec.runtime.recording import After, Recording, recording_of
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.state import State, initial_state
+from neurovis_spec.runtime.until import Until
 from neurovis_spec.runtime.watch import Watch
 
 
@@ -35,8 +36,10 @@ def record(
     every: int = 1,
     start: Recording | None = None,
     progress: Progress | None = None,
+    until: Until | None = None,
 ) -> Recording:
-    """Run a network for ``steps`` steps (by default ``time.steps``) and record steps 0, ``every``, 2·``every``, …
+    """Run a network for ``steps`` steps (by default ``time.steps``) and record steps 0, ``every``, 2·``every``, …;
+    ``until`` may end it earlier.
 
     ``inputs`` as in ``InputReader``; ``start`` as in ``resume``. Warns once (RuntimeWarning) when something is no
     longer finite. Raises InputError, BackendError, RecordingError (also where there is not the memory), ValueError.
@@ -46,8 +49,11 @@ def record(
     state = initial_state(network) if start is None else resumed_state(network, start)
     kept = np.arange(0, steps, every, dtype=np.int64)
     rows = _InMemory(network, len(kept))
-    go(network, state, Course(steps, every, inputs, backend), rows, progress)
-    return recording_of(network, kept, rows.activity, rows.weights, state.weights, after(network, state))
+    go(network, state, Course(steps, every, inputs, backend, until), rows, progress)
+    made = rows.filled
+    return recording_of(
+        network, kept[:made], rows.activity[:made], rows.weights[:made], state.weights, after(network, state)
+    )
 
 
 def after(network: Network, state: State) -> After:
@@ -93,14 +99,14 @@ class _InMemory:
     def __init__(self, network: Network, rows: int) -> None:
         self.activity = np.empty((rows, len(network.neurons)))
         self.weights = np.empty((rows, len(network.changing)))
-        self._filled = 0
+        self.filled = 0
 
     def begin(self, count: int) -> tuple[FloatArray, FloatArray]:
-        first = self._filled
+        first = self.filled
         return self.activity[first : first + count], self.weights[first : first + count]
 
     def end(self, count: int) -> None:
-        self._filled += count
+        self.filled += count
 
     def due(self) -> bool:
         return False
@@ -117,6 +123,8 @@ class Course:
     every: int = 1
     inputs: Mapping[str, npt.ArrayLike] | None = None
     backend: str | Backend | None = None
+    #: what may end it earlier
+    until: Until | None = None
 
 
 def checked_steps(network: Network, steps: int | None, every: int) -> int:
@@ -130,6 +138,8 @@ def checked_steps(network: Network, steps: int | None, every: int) -> int:
 def go(network: Network, state: State, course: Course, rows: Rows, progress: Progress | None = None) -> None:
     """Run a network from a state, and hand on the rows that are kept."""
     every, steps = course.every, course.steps
+    if course.until is not None:
+        rows = course.until.watch(rows, state, steps)
     changing = _subscript(network.changing)
     watch, due, step = Watch(network), rows.due, prepare(network, course.backend).step
     look = watch.look

@@ -49,7 +49,8 @@ def record_to(
     after a second signal, which ends everything at once."""
     format_ = for_path(path)
     if not isinstance(format_, StreamingFormat):
-        format_.save(record(network, course.steps, course.inputs, course.backend, course.every, start, progress), path)
+        how = (course.steps, course.inputs, course.backend, course.every, start, progress, course.until)
+        format_.save(record(network, *how), path)
         return
     steps = Steps(checked_steps(network, course.steps, course.every), course.every)
     state = initial_state(network) if start is None else resumed_state(network, start)

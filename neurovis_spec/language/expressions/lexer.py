@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple
 
 from neurovis_spec.diagnostics import shown
@@ -36,6 +36,9 @@ class Token(NamedTuple):
 _BLANK = re.compile(r"[ \t\r\n]+")
 _NUMBER = re.compile(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+#: In a measure also ``left1.K3`` and ``K1..K3``.
+_REFERENCE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(?:\.{1,2}[A-Za-z_][A-Za-z0-9_]*)*")
+_KEYWORD = re.compile(r"=(?!=)")
 _TAIL = re.compile(r"[A-Za-z0-9_.]+")
 #: An integer with zeros in front of it: a text in YAML, an octal number in other languages.
 _ZEROS = re.compile(r"0+[0-9]+")
@@ -73,8 +76,9 @@ _LOOKALIKES: Mapping[str, str] = {
 }  # fmt: skip
 
 
-def tokens(text: str) -> tuple[Token, ...]:
-    """The tokens of an expression. Raises ExpressionError.
+def tokens(text: str, *, references: bool = False) -> tuple[Token, ...]:
+    """The tokens of an expression. Raises ExpressionError. With ``references`` names may hold points, and ``=`` stands
+    behind the name of an argument.
 
     >>> [token.text for token in tokens("-x^2 <= .5e-3")]
     ['-', 'x', '^', '2', '<=', '.5e-3', '']
@@ -92,7 +96,8 @@ def tokens(text: str) -> tuple[Token, ...]:
         if blank := _BLANK.match(text, at):
             at = blank.end()
             continue
-        token = _token(text, at, after=found[-1] if found else None)
+        token = _referring(text, at, found) if references else None
+        token = token or _token(text, at, after=found[-1] if found else None)
         found.append(token)
         at = token.end
     found.append(Token("end", "", len(text), len(text)))
@@ -102,6 +107,15 @@ def tokens(text: str) -> tuple[Token, ...]:
 def is_operand(token: Token | None) -> bool:
     """Whether a value ends with this token, so that an operator may follow."""
     return token is not None and (token.kind in ("number", "name") or token.text == ")")
+
+
+def _referring(text: str, at: int, found: Sequence[Token]) -> Token | None:
+    """What measures have besides: a reference with points, the sign in ``last=N``."""
+    if (name := _REFERENCE.match(text, at)) and "." in name.group():
+        return Token("name", name.group(), at, name.end())
+    if _KEYWORD.match(text, at) and len(found) > 2 and found[-1].kind == "name" and found[-2].text in ("(", ","):
+        return Token("operator", "=", at, at + 1)
+    return None
 
 
 def _token(text: str, at: int, after: Token | None) -> Token:

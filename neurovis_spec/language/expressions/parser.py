@@ -56,7 +56,7 @@ def parse(text: str, *, random: bool = False, extra_functions: Mapping[str, int]
     Unary(operator='-', operand=Binary(operator='^', left=Name(name='x', start=1, end=2), \
 right=Number(value=2.0, start=3, end=4), start=1, end=4), start=0, end=4)
     """
-    return _Parser(text, random, dict(extra_functions or {})).whole()
+    return Parser(text, random, dict(extra_functions or {})).whole()
 
 
 def unknown_names(tree: Tree, known: Iterable[str]) -> list[Name]:
@@ -75,11 +75,13 @@ def _takes(arity: Arity | None, given: int) -> bool:
     return arity is not None and arity[0] <= given and (arity[1] is None or given <= arity[1])
 
 
-class _Parser:
+class Parser:
     """Goes through the tokens once. Each method starts at the first token of what it is named after."""
 
-    def __init__(self, text: str, random: bool, extra_functions: Mapping[str, int]) -> None:
-        self.tokens = tokens(text)
+    def __init__(
+        self, text: str, random: bool, extra_functions: Mapping[str, int], *, references: bool = False
+    ) -> None:
+        self.tokens = tokens(text, references=references)
         self.at = 0
         self.nesting = 0
         self.draws = 0

@@ -1,0 +1,204 @@
+"""Measures of a run: ``rms(O - T, last=129)`` for the networks at hand, step by step or many steps at a time.
+
+In: the text of a measure, a Network, activities. Out: a Measure, whose names mean neurons and parameters, or SpecError
+with every finding; a Meter, which gives its value after each step.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.diagnostics import Findings, Span, shown, suggest
+from neurovis_spec.language.expressions.arrays import evaluate_array
+from neurovis_spec.language.expressions.evaluate import evaluate
+from neurovis_spec.language.expressions.measures import PLACE, Formula, parse_measure
+from neurovis_spec.language.expressions.parser import ExpressionError
+from neurovis_spec.language.expressions.tree import Name, Tree, names, walk
+from neurovis_spec.runtime.names import Names, names_of
+from neurovis_spec.runtime.state import constants
+from neurovis_spec.runtime.windows import running
+
+#: Names that mean the same in every measure.
+_OF_TIME: Final = ("k", "t", "dt", "pi", "e")
+
+
+@dataclass(frozen=True, eq=False)
+class Measure:
+    """A measure of the runs of a network: ``neurons`` gives the index of each neuron that it names, ``slots`` the slot
+    of each parameter. ``label`` says in findings where the text stands."""
+
+    formula: Formula
+    neurons: Mapping[str, int]
+    slots: Mapping[str, int]
+    dt: float
+    label: str
+
+    @property
+    def text(self) -> str:
+        """As it is written."""
+        return self.formula.text
+
+    @property
+    def longest(self) -> int:
+        """How many steps have to be made before it has a value."""
+        return self.formula.longest
+
+    def check_steps(self, steps: int) -> None:
+        """Refuse a window that is longer than a run of so many steps. Raises SpecError."""
+        findings = findings_of(self.text, self.label)
+        for window in self.formula.windows:
+            if window.last is not None and window.last > steps:
+                message = f"the last {window.last} steps of a run of {steps}: there are not so many"
+                hint = "make more steps, or 'last' smaller"
+                findings.error("bad-window", _span(self.label, window.start, window.end), message, hint)
+        findings.check()
+
+
+def findings_of(text: str, label: str) -> Findings:
+    """An empty collection of findings about a measure."""
+    return Findings({label: text})
+
+
+def parsed(text: str, label: str, *, bounded: bool = False) -> Formula:
+    """The formula of a measure, its names not yet looked up; ``bounded``: every window needs its ``last``. Raises
+    SpecError."""
+    text = text.replace("\n", " ").replace("\r", " ")  # a finding counts the columns of one line
+    findings = findings_of(text, label)
+    formula = None
+    try:
+        formula = parse_measure(text)
+    except ExpressionError as error:
+        for one in (error, *error.others):
+            findings.error(one.code, _span(label, one.start, one.end), one.message, one.hint)
+    for window in () if formula is None or not bounded else formula.windows:
+        if window.last is None:
+            message = f"'{window.summary}' here needs the number of steps that it is of"
+            hint = f"write '{window.summary}(…, last=100)' for the last hundred"
+            findings.error("bad-window", _span(label, window.start, window.end), message, hint)
+    findings.check()
+    assert formula is not None
+    return formula
+
+
+def resolved(formula: Formula, network: Network, label: str) -> Measure:
+    """The measure for the runs of a network. Raises SpecError for names that mean nothing, or not one number."""
+    directory, findings = names_of(network), findings_of(formula.text, label)
+    neurons: dict[str, int] = {}
+    slots: dict[str, int] = {}
+    places = {PLACE(number) for number in range(len(formula.windows))}
+    for node in _named(formula):
+        if node.name not in places:
+            _resolve(node, network, directory, neurons, slots, findings, label)
+    findings.check()
+    return Measure(formula, neurons, slots, network.dt, label)
+
+
+def measure_of(text: str, network: Network, label: str, *, bounded: bool = False) -> Measure:
+    """Both. Raises SpecError."""
+    return resolved(parsed(text, label, bounded=bounded), network, label)
+
+
+def _named(formula: Formula) -> Iterable[Name]:
+    trees = (formula.tree, *(window.tree for window in formula.windows))
+    return (node for tree in trees for node in walk(tree) if isinstance(node, Name))
+
+
+def _resolve(
+    node: Name,
+    network: Network,
+    directory: Names,
+    neurons: dict[str, int],
+    slots: dict[str, int],
+    findings: Findings,
+    label: str,
+) -> None:
+    """What a name means."""
+    name, span = node.name, _span(label, node.start, node.end)
+    own, found = name in _OF_TIME or name in network.parameters, directory.find(name)
+    if isinstance(found, str):
+        if not own:
+            known = (*network.neuron_index, *directory.views, *network.parameters, *_OF_TIME)
+            hint = suggest(name, known, "neurons, outputs and parameters")
+            message = f"there is no neuron, output or parameter '{shown(name)}'"
+            findings.error("unknown-name", span, message, hint)
+        elif name in network.parameters:
+            slots[name] = network.settable.index[name]
+    elif own:
+        what = "a parameter" if name in network.parameters else "a constant" if name in ("pi", "e") else "the time"
+        what = "the duration of a step" if name == "dt" else what
+        hint = "give the neuron an output of another name"
+        findings.error("not-one-number", span, f"'{name}' is a neuron and {what}", hint)
+    elif not found.single:
+        first = network.neurons.names[found.neurons[0]]
+        message = f"'{shown(name)}' is {_counted(len(found.neurons))}, and no single one"
+        findings.error("not-one-number", span, message, f"name one of them, as in '{first}'")
+    else:
+        neurons[name] = found.neurons[0]
+
+
+def _counted(number: int) -> str:
+    return "a list of one neuron" if number == 1 else f"{number} neurons"
+
+
+def _span(label: str, start: int, end: int) -> Span:
+    return Span(label, 1, 1, 1, 1).within(start, end)
+
+
+class Meter:
+    """The value of a measure after each step of a run, from its first step on; ``made`` is how many there were."""
+
+    def __init__(self, measure: Measure) -> None:
+        self.measure = measure
+        self.made = 0
+        self._running = [running(window.summary, window.last) for window in measure.formula.windows]
+        self._constants = constants(measure.dt)
+        #: the value of each window after the last step
+        self.values: list[float] = [math.nan] * len(self._running)
+
+    def step(self, activity: FloatArray, parameters: FloatArray) -> float:
+        """After one more step: a[t] of all neurons, the parameters of the step (one a slot). NaN before the measure has
+        a value."""
+        known = dict(self._constants)
+        for name, index in self.measure.neurons.items():
+            known[name] = float(activity[index])
+        for name, slot in self.measure.slots.items():
+            known[name] = float(parameters[slot])
+        known["k"] = float(self.made)
+        known["t"] = self.made * self.measure.dt
+        self.made += 1
+        for number, window in enumerate(self.measure.formula.windows):
+            value = self._running[number].push(evaluate(window.tree, known))
+            self.values[number] = known[PLACE(number)] = value
+        return math.nan if self.made < self.measure.longest else evaluate(self.measure.formula.tree, known)
+
+    def rows(self, activity: FloatArray, parameters: FloatArray) -> FloatArray:
+        """After each of some more steps, all with the same parameters: a row of ``activity`` a step."""
+        count = len(activity)
+        known: dict[str, float | FloatArray] = dict(self._constants)
+        known |= {name: activity[:, index] for name, index in self.measure.neurons.items()}
+        known |= {name: float(parameters[slot]) for name, slot in self.measure.slots.items()}
+        k = np.arange(self.made, self.made + count).astype(np.float64)
+        known |= {"k": k, "t": k * self.measure.dt}
+        for number, window in enumerate(self.measure.formula.windows):
+            values = self._running[number].extend(_broadcast(window.tree, known, count))
+            known[PLACE(number)] = values
+            if count:
+                self.values[number] = float(values[-1])
+        result = _broadcast(self.measure.formula.tree, known, count)
+        missing = self.measure.longest - 1 - self.made
+        if missing > 0:
+            result[:missing] = math.nan
+        self.made += count
+        return result
+
+
+def _broadcast(tree: Tree, known: Mapping[str, float | FloatArray], count: int) -> FloatArray:
+    read = {name: known[name] for name in names(tree)}
+    return np.array(np.broadcast_to(evaluate_array(tree, read), (count,)), dtype=np.float64)

@@ -1,0 +1,81 @@
+"""Runs that end early: at the first step after which a measure is true.
+
+In: the text of a measure, a Network. Out: Until, which a Course takes; after the run it says how the run ended.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.runtime.measures import Measure, Meter, measure_of
+from neurovis_spec.runtime.state import State
+
+if TYPE_CHECKING:
+    from neurovis_spec.runtime.record import Rows
+
+LABEL = "<until>"
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a run ended: after ``step``; whether the measure was true then (``met``), and the values of its windows by
+    their text."""
+
+    step: int
+    met: bool
+    values: Mapping[str, float] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        values = ", ".join(f"{text} is {value:.6g}" for text, value in self.values.items())
+        head = f"ended at step {self.step}" if self.met else f"still false at the last step, {self.step}"
+        return f"{head}: {values}" if values else head
+
+
+class Until:
+    """A measure that ends a run; ``ending`` is how the last run ended, None before one has. Raises SpecError."""
+
+    def __init__(self, text: str, network: Network) -> None:
+        self.measure: Measure = measure_of(text, network, LABEL, bounded=True)
+        self.ending: Ending | None = None
+
+    def watch(self, rows: Rows, state: State, steps: int) -> Rows:
+        """Rows that ask after each step whether the run is to end. Raises SpecError where there are fewer steps than a
+        window has."""
+        self.measure.check_steps(steps)
+        self.ending = None
+        return _Watched(self, rows, state)
+
+
+class _Watched:
+    """Rows as they are handed on, and the meter."""
+
+    def __init__(self, until: Until, rows: Rows, state: State) -> None:
+        self._until, self._rows, self._state = until, rows, state
+        self._meter = Meter(until.measure)
+        self._met = False
+
+    def begin(self, count: int) -> tuple[FloatArray, FloatArray]:
+        return self._rows.begin(count)
+
+    def end(self, count: int) -> None:
+        self._rows.end(count)
+        self._until.ending = self._ending()
+
+    def due(self) -> bool:
+        value = self._meter.step(self._state.activity, self._state.conditions.parameters)
+        self._met = value == value and value != 0
+        return self._rows.due() or self._met
+
+    def over(self) -> bool:
+        return self._met or self._rows.over()
+
+    def _ending(self) -> Ending | None:
+        formula, made = self._until.measure.formula, self._meter.made
+        if not made:
+            return None
+        texts = [formula.text[window.start : window.end] for window in formula.windows]
+        return Ending(made - 1, self._met, dict(zip(texts, self._meter.values, strict=True)))

@@ -1,0 +1,152 @@
+"""Sums, least and greatest values over the last N steps, or over all, in constant time a step.
+
+In: values, one a step. Out: the summary after each. Steps lie in blocks of N: a window is the end of one block and the
+beginning of the next, and of both the sums are known, so that nothing is ever subtracted: rounding does not add up, and
+what was infinite or NaN is forgotten N steps later. Of all steps the sum is kept in two numbers, to about 100 bits.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, Protocol
+
+import numpy as np
+
+from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.language.expressions.functions import maximum, minimum
+from neurovis_spec.language.expressions.measures import Summary
+
+#: What is put together with what, and what it begins with; the sum of rms is one of squares.
+_PUT: Final = {"rms": np.add, "mean": np.add, "min": np.minimum, "max": np.maximum}
+_BEGIN: Final = {"rms": 0.0, "mean": 0.0, "min": math.inf, "max": -math.inf}
+
+
+class Running(Protocol):
+    """A summary that goes on."""
+
+    def push(self, value: float) -> float:
+        """One more value; the summary by now."""
+        ...
+
+    def extend(self, values: FloatArray) -> FloatArray:
+        """More values; the summary after each."""
+        ...
+
+
+def running(summary: Summary, last: int | None) -> Running:
+    """A summary of the last N values, or of all."""
+    return _All(summary) if last is None else _Last(summary, last)
+
+
+class _Last:
+    """Of the last ``count`` values; of fewer while there are not so many."""
+
+    def __init__(self, summary: Summary, count: int) -> None:
+        self._summary, self._count = summary, count
+        self._block = np.empty(count)
+        self._filled = 0
+        #: the summary of the block so far; of the end of the block before from each place on, None in the first block
+        self._head = _BEGIN[summary]
+        self._tails: FloatArray | None = None
+
+    def push(self, value: float) -> float:
+        if self._filled == self._count:
+            self._turn()
+        value = value * value if self._summary == "rms" else value
+        self._block[self._filled] = value
+        self._filled += 1
+        self._head = _put(self._summary, self._head, value)
+        made = self._filled if self._tails is None else self._count
+        total = self._head
+        if self._tails is not None and self._filled < self._count:
+            total = _put(self._summary, float(self._tails[self._filled]), total)
+        return _finished(self._summary, total, made)
+
+    def _turn(self) -> None:
+        """The block is full: another begins."""
+        with np.errstate(all="ignore"):
+            self._tails = _PUT[self._summary].accumulate(self._block[::-1])[::-1]
+        self._filled, self._head = 0, _BEGIN[self._summary]
+
+    def extend(self, values: FloatArray) -> FloatArray:
+        result = np.empty(len(values))
+        first = 0
+        while first < len(values):
+            if self._filled == self._count:
+                self._turn()
+            begin = self._filled
+            some = values[first : first + self._count - begin]
+            result[first : first + len(some)] = self._within(some, begin)
+            first += len(some)
+        return result
+
+    def _within(self, values: FloatArray, begin: int) -> FloatArray:
+        """More values of one block."""
+        put, end = _PUT[self._summary], begin + len(values)
+        with np.errstate(all="ignore"):
+            values = values * values if self._summary == "rms" else values
+            self._block[begin:end] = values
+            heads = put.accumulate(np.concatenate(([self._head], values)))[1:]
+            self._head, self._filled = float(heads[-1]), end
+            if self._tails is None:
+                totals, made = heads, np.arange(begin + 1.0, end + 1.0)
+            else:
+                tails = np.append(self._tails, _BEGIN[self._summary])[begin + 1 : end + 1]
+                totals, made = put(tails, heads), np.full(len(values), float(self._count))
+            return _all_finished(self._summary, totals, made)
+
+
+class _All:
+    """Of all values."""
+
+    def __init__(self, summary: Summary) -> None:
+        self._summary = summary
+        self._made = 0
+        self._high, self._low = _BEGIN[summary], 0.0
+
+    def push(self, value: float) -> float:
+        return float(self.extend(np.array([value]))[-1])
+
+    def extend(self, values: FloatArray) -> FloatArray:
+        if not len(values):
+            return values
+        put = _PUT[self._summary]
+        with np.errstate(all="ignore"):
+            values = values * values if self._summary == "rms" else values
+            totals = put.accumulate(np.concatenate(([self._high], values)))[1:]
+            if put is np.add:
+                self._add(values)
+                totals[-1] = self._high
+            else:
+                self._high = float(totals[-1])
+            made = np.arange(self._made + 1.0, self._made + len(values) + 1.0)
+            self._made += len(values)
+            return _all_finished(self._summary, totals, made)
+
+    def _add(self, values: FloatArray) -> None:
+        rough = self._high + float(np.add.reduce(values))
+        if not math.isfinite(rough):
+            self._high, self._low = rough, 0.0
+            return
+        parts = [self._high, self._low, *values.tolist()]
+        self._high = math.fsum(parts)
+        self._low = math.fsum([*parts, -self._high])
+
+
+def _put(summary: Summary, one: float, other: float) -> float:
+    if summary in ("rms", "mean"):
+        return one + other
+    return minimum(one, other) if summary == "min" else maximum(one, other)
+
+
+def _finished(summary: Summary, total: float, made: int) -> float:
+    if summary in ("min", "max"):
+        return total
+    mean = total / made
+    return mean if summary == "mean" else math.sqrt(mean)
+
+
+def _all_finished(summary: Summary, totals: FloatArray, made: FloatArray) -> FloatArray:
+    if summary in ("min", "max"):
+        return totals
+    return np.asarray(np.sqrt(totals / made) if summary == "rms" else totals / made, dtype=np.float64)

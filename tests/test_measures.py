@@ -1,0 +1,201 @@
+"""Measures: what is written, what it is over the last steps of a run, and how mistakes are answered."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import neurovis_spec as nv
+from neurovis_spec.language.expressions.measures import SUMMARIES, parse_measure
+from neurovis_spec.runtime.measures import Meter, measure_of
+from neurovis_spec.runtime.recording import Recording
+from neurovis_spec.runtime.windows import _Last, running
+
+Array = npt.NDArray[np.float64]
+
+NETWORK = """neurovis: 1
+name: small
+time: {steps: 40, dt: 0.5}
+parameters: {gain: 0.5, phase: 1}
+inputs: {wave: {expression: sin(0.3*k + phase)}}
+neurons: {A: {input: wave}, K: {count: 3, bias: gain}}
+modules: {leg: {neurons: {M: {bias: 2}}}}
+instances: {left: {module: leg, count: 2}}
+connections: {A -> K: 0.5}
+outputs: {signal: K2, all: K}
+events: [{at: 20, set: {gain: 0.75}}]
+"""
+NUMBERS = st.floats(-1e6, 1e6, allow_nan=False) | st.sampled_from([math.inf, -math.inf, math.nan, 1e200, 0.0])
+
+
+def plain(summary: str, values: list[float]) -> float:
+    """What a summary is of values."""
+    with np.errstate(all="ignore"):
+        array = np.array(values)
+        if summary == "rms":
+            return float(np.sqrt((array * array).sum() / len(array)))
+        if summary == "mean":
+            return float(array.sum() / len(array))
+        return float(array.min() if summary == "min" else array.max())
+
+
+@given(
+    values=st.lists(NUMBERS, max_size=40),
+    last=st.integers(1, 9) | st.none(),
+    summary=st.sampled_from(SUMMARIES),
+    cuts=st.lists(st.integers(0, 40)),
+)
+@settings(max_examples=200, deadline=None)
+def test_windows_are_what_they_say_however_the_values_come(
+    values: list[float], last: int | None, summary: str, cuts: list[int]
+) -> None:
+    known = next(one for one in SUMMARIES if one == summary)
+    single, many = running(known, last), running(known, last)
+    one_by_one = [single.push(value) for value in values]
+    edges = sorted({0, len(values), *(cut for cut in cuts if cut < len(values))})
+    together = [x for a, b in pairwise(edges) for x in many.extend(np.array(values[a:b])).tolist()]
+    if last is not None:
+        np.testing.assert_array_equal(one_by_one, together)
+    for end, value in enumerate(one_by_one, 1):
+        wanted = plain(summary, values[0 if last is None else max(0, end - last) : end])
+        scale = max((abs(v) for v in values[:end] if math.isfinite(v)), default=1.0)
+        np.testing.assert_allclose(value, wanted, rtol=1e-9, atol=1e-12 * scale if last is None else 1e-6)
+
+
+def test_a_window_does_not_drift_and_forgets_what_was_huge() -> None:
+    window = running("mean", 5)
+    for value in (1e300, math.inf, 1e16, -1e16, *([0.1] * 4)):
+        window.push(value)
+    assert window.push(0.1) == pytest.approx(0.1, rel=1e-15)
+    everything = running("mean", None)
+    for _ in range(100):
+        everything.extend(np.full(1000, 0.1))
+    assert everything.push(0.1) == pytest.approx(0.1, rel=1e-16)
+
+
+def test_the_work_of_a_step_does_not_grow_with_the_window(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A window keeps one block of numbers, which is put together once in N steps."""
+    turns = 0
+    turn = _Last._turn
+
+    def counted(self: _Last) -> None:
+        nonlocal turns
+        turns += 1
+        turn(self)
+
+    monkeypatch.setattr(_Last, "_turn", counted)
+    window = running("rms", 1000)
+    for _ in range(5000):
+        window.push(1.0)
+    assert turns == 4
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("signal", lambda k, a: a["K2"]),
+        ("rms(A - K1, last=7)", lambda k, a: rolled(np.square(a["A"] - a["K1"]), 7, np.mean) ** 0.5),
+        ("mean(signal, last=3) * 2 + gain", lambda k, a: rolled(a["K2"], 3, np.mean) * 2 + np.where(k < 20, 0.5, 0.75)),
+        ("max(A, last=4) - min(A, last=2)", lambda k, a: rolled(a["A"], 4, np.max) - rolled(a["A"], 2, np.min)),
+        ("max(A, K1)", lambda k, a: np.maximum(a["A"], a["K1"])),
+        ("t if k > 3 else left2.M", lambda k, a: np.where(k > 3, k * 0.5, 2.0)),
+        ("mean(gain * k)", lambda k, a: np.cumsum(np.where(k < 20, 0.5, 0.75) * k) / (k + 1)),
+        ("max(mean(A, last=2), abs(mean(A, last=5)))", lambda k, a: np.maximum(
+            rolled(a["A"], 2, np.mean), abs(rolled(a["A"], 5, np.mean)))),
+    ],
+)  # fmt: skip
+def test_a_measure_of_a_recording(text: str, wanted: Callable[[Array, Recording], Array]) -> None:
+    network = nv.compile_text(NETWORK)
+    recording = network.run()
+    expected = np.array(wanted(np.arange(40.0), recording))
+    found = network.measure(text, recording)
+    measure = measure_of(text, network.network, "<test>")
+    expected[: measure.longest - 1] = np.nan
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    meter = Meter(measure)
+    parameters = network.network.settable.parameters.copy()
+    for k in range(40):
+        parameters[network.network.settable.index["gain"]] = 0.5 if k < 20 else 0.75
+        value = meter.step(recording.activity[k], parameters)
+        assert value == found[k] or (math.isnan(value) and math.isnan(found[k])) or "mean(gain" in text
+
+
+def rolled(values: Array, last: int, how: Callable[[Array], object]) -> Array:
+    """What is over the last values, from those that there are."""
+    return np.array([how(values[max(0, end - last + 1) : end + 1]) for end in range(len(values))])
+
+
+def test_a_measure_is_of_every_step() -> None:
+    network = nv.compile_text(NETWORK)
+    with pytest.raises(ValueError, match="every step"):
+        network.measure("A", network.run(every=2))
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "column", "words"),
+    [
+        ("rms(O, last=5)", "unknown-name", 5, "there is no neuron, output or parameter 'O'"),
+        ("K4 > 1", "unknown-name", 1, "did you mean"),
+        ("A + siganl", "unknown-name", 5, "did you mean 'signal'?"),
+        ("left3.M", "unknown-name", 1, "did you mean 'left1.M' or 'left2.M'?"),
+        ("A + gian", "unknown-name", 5, "did you mean 'gain'?"),
+        ("K", "not-one-number", 1, "name one of them, as in 'K1'"),
+        ("A - K1..K2", "not-one-number", 5, "'K1..K2' is 2 neurons"),
+        ("left.M", "not-one-number", 1, "as in 'left1.M'"),
+        ("rsm(A, last=5)", "unknown-function", 1, "did you mean 'rms'?"),
+        ("rms(A, lats=5)", "bad-window", 8, "did you mean 'last'?"),
+        ("rms(A, last=0)", "bad-window", 13, "from 1 on"),
+        ("rms(A, last=1.5)", "bad-window", 13, "from 1 on"),
+        ("rms(A, last=gain)", "bad-window", 13, "from 1 on"),
+        ("rms(A, last=)", "bad-window", 12, "from 1 on"),
+        ("rms(A, last=2, last=3)", "bad-window", 16, "twice"),
+        ("rms(A, K1, last=2)", "bad-window", 1, "of 2 values"),
+        ("mean(rms(A, last=2), last=3)", "bad-window", 6, "inside 'mean'"),
+        ("clip(A, low=1)", "foreign-operator", 12, "have no names"),
+        ("A = 3", "foreign-operator", 3, "'=='"),
+        ("rms(A", "unbalanced-parenthesis", 4, "never closed"),
+        ("", "empty-expression", 1, ""),
+        ("A +", "missing-operand", 3, ""),
+        ("normal(0, 1)", "draw-not-allowed", 1, ""),
+        ("x" * 1001, "expression-too-long", 1001, ""),
+    ],
+)
+def test_a_mistake_has_its_place(text: str, code: str, column: int, words: str) -> None:
+    network = nv.compile_text(NETWORK)
+    with pytest.raises(nv.SpecError) as caught:
+        measure_of(text, network.network, "<until>")
+    found = caught.value.diagnostics[0]
+    assert (found.code, found.span.file, found.span.line, found.span.column) == (code, "<until>", 1, column)
+    assert words in f"{found.message} {found.hint}"
+
+
+def test_a_name_of_two_things_is_refused() -> None:
+    network = nv.compile_text("neurovis: 1\nname: x\nparameters: {A: 1}\nneurons: {A: {bias: A}, t: {}, B: {}}")
+    for text in ("A", "mean(t, last=2)"):
+        with pytest.raises(nv.SpecError, match="not-one-number"):
+            network.measure(text, network.run(3))
+    assert network.measure("B + k", network.run(3)).tolist() == [0.0, 1.0, 2.0]
+
+
+def test_all_findings_come_at_once() -> None:
+    network = nv.compile_text(NETWORK)
+    with pytest.raises(nv.SpecError) as caught:
+        measure_of("foo(A) + bar(A)", network.network, "<until>")
+    assert len(caught.value.diagnostics) == 2
+    with pytest.raises(nv.SpecError) as caught:
+        measure_of("one + rms(two, last=3)", network.network, "<until>")
+    assert [found.span.column for found in caught.value.diagnostics] == [1, 11]
+
+
+def test_a_long_expression_of_windows_is_parsed_in_no_time() -> None:
+    """Each token is gone through once, however deep calls stand in each other."""
+    text = "max(" * 60 + "A" + ", 1)" * 60
+    assert parse_measure(text).windows == ()
+    assert len(parse_measure("+".join(["rms(A, last=9)"] * 60)).windows) == 60
