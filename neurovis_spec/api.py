@@ -22,6 +22,9 @@ from neurovis_spec.language.source import SourceDocument
 if TYPE_CHECKING:
     from neurovis_spec.runtime.recording import Recording
 
+#: What findings call a spec that is given as a mapping.
+MAPPING = "<mapping>"
+
 
 def __getattr__(name: str) -> object:
     """``OutputError``, which what draws raises for a kind of file that nobody makes."""
@@ -49,10 +52,7 @@ def compile(
     """
     given = {**(parameters or {}), **more}
     if isinstance(source, Mapping):
-        import json
-
-        text = json.dumps(_plain(source), indent=1, ensure_ascii=False, allow_nan=True)
-        return compile_text(text, file="<mapping>", parameters=given, seed=seed, root=root, limit=limit)
+        return compile_text(text_of(source), file=MAPPING, parameters=given, seed=seed, root=root, limit=limit)
     path = Path(source)
     findings = Findings()
     document = pipeline.read(path, str(source), findings)
@@ -119,6 +119,13 @@ def _request(
     values = {name: float(value) for name, value in parameters.items()}
     whole = None if seed is None else operator.index(seed)
     return Request(folder, folder if root is None else Path(root), values, whole, limits)
+
+
+def text_of(source: Mapping[str, object]) -> str:
+    """A mapping with the content of a spec as a text."""
+    import json
+
+    return json.dumps(_plain(source), indent=1, ensure_ascii=False, allow_nan=True)
 
 
 def _plain(value: object) -> object:
