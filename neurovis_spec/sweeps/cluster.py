@@ -35,16 +35,16 @@ def on_cluster(job: Job, points: Sequence[Point], address: str) -> Generator[tup
         shared = client.submit(_same, job, key=f"{name}-job")
         for place, point in enumerate(points):
             futures[client.submit(run_point, shared, point, key=f"{name}-{place}")] = place
-        for future in as_completed(list(futures)):
-            wrong = None if future.status == "finished" else future.exception()
-            if isinstance(wrong, KilledWorker):
-                result: Result = failed(job, "worker-died", "one worker after the other ended while it ran this point")
-            elif future.status != "finished":
-                raise SweepError(f"the cluster gave up: {wrong or future.status}", "are all of its workers up to date?")
-            else:
+        for future in as_completed(list(futures), loop=client.loop):
+            try:
                 result = future.result()
+            except KilledWorker:
+                result = failed(job, "worker-died", "one worker after the other ended while it ran this point")
             yield futures.pop(future), result
             future.release()
+    except Exception as error:  # of whatever kind: run_point raises nothing, so it is one of the cluster's
+        message = f"the cluster gave up: {error or type(error).__name__}"
+        raise SweepError(message, "the rows until then are kept; do all of its workers have this version?") from None
     finally:
         if futures:
             client.cancel(list(futures))
