@@ -74,7 +74,7 @@ def command(
     scheduler: str | None,
     output: Path | None,
 ) -> None:
-    """Run a spec at every point of a grid, and measure each run.
+    """Run a spec over a grid of parameters and seeds, into a table.
 
     The table has a row for each point: its values, its metrics, and the finding where it failed. The rows of a file are
     not run again: what was ended, by Ctrl-C or otherwise, goes on where it was when it is called again. It goes by the
