@@ -12,6 +12,7 @@ import io
 import json
 import multiprocessing
 import os
+import random
 import resource
 import socket
 import struct
@@ -40,13 +41,15 @@ LONGEST = 60
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A spec, the files beside it, and what it may cost. ``closed``: no file but the spec may be opened."""
+    """A spec, the files beside it, and what it may cost. ``closed``: no file but the spec may be opened; ``drawn``: it
+    is laid out, too."""
 
     text: str
     files: Callable[[Path], None] | None = None
     seconds: float = 0.1
     mib: float = 20
     closed: bool = False
+    drawn: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -319,7 +322,28 @@ PATHS: dict[str, Case] = {
     "a path with NUL": _path("data\0.csv"),
     "a path of 100,000 characters": _path("a/" * 50_000 + "data.csv"),
 }
-GROUPS = {"bombs": BOMBS, "large texts": LARGE, "data files": FILES, "paths": PATHS}
+
+
+def _linked(count: int, links: int, engine: str) -> str:
+    """Instances, connected at random."""
+    draw = random.Random(1)
+    module = "modules: {leg: {neurons: {S: {bias: 1}, K: {}}, connections: {S -> K: 1}}}\n"
+    ends = [(draw.randint(1, count), draw.randint(1, count)) for _ in range(links)]
+    between = "".join(f"  - l{a}.K -> l{b}.S: 1\n" for a, b in ends)
+    instances = f"instances: {{l: {{module: leg, count: {count}}}}}\nlayout: {{engine: {engine}}}\n"
+    return f"{HEAD}{module}{instances}connections:\n{between}"
+
+
+_LOOPS = HEAD + "neurons: {A: {bias: 1}}\nconnections:\n" + "  - A -> A: 1\n" * 80
+_PARALLEL = HEAD + "neurons: {A: {bias: 1}, B: {}}\nconnections:\n" + "  - A -> B: 1\n" * 100
+#: What is hard to draw.
+LAYOUTS: dict[str, Case] = {
+    "80 loops of a neuron": Case(_LOOPS, seconds=1, mib=100, drawn=True),
+    "100 connections between two": Case(_PARALLEL, seconds=1.5, mib=100, drawn=True),
+    "200 instances in circles": Case(_linked(200, 400, "circular"), seconds=10, mib=100, drawn=True),
+    "1,000 instances in a grid": Case(_linked(1000, 1000, "grid"), seconds=20, mib=300, drawn=True),
+}
+GROUPS = {"bombs": BOMBS, "large texts": LARGE, "data files": FILES, "paths": PATHS, "layouts": LAYOUTS}
 
 
 def _peak() -> float:
@@ -339,24 +363,26 @@ def _forget() -> None:
         return
 
 
-def attempt(path: Path) -> list[str]:
-    """Compile a spec and show what was found; the codes."""
+def attempt(path: Path, drawn: bool = False) -> list[str]:
+    """Compile a spec, perhaps lay it out, and show what was found; the codes."""
     try:
-        nv.compile(path)
+        network = nv.compile(path)
+        if drawn:
+            network.layout()
     except nv.SpecError as error:
         show_text(error.diagnostics, error.sources)
         return [item.code for item in error.diagnostics]
     return []
 
 
-def measure(path: Path, answer: Connection) -> None:
-    """Compile a spec; to be called once in a process."""
+def measure(path: Path, drawn: bool, answer: Connection) -> None:
+    """Compile a spec, perhaps lay it out; to be called once in a process."""
     opened: list[str] = []
     sys.addaudithook(lambda event, given: opened.append(str(given[0])) if event == "open" else None)
     _forget()
     before, begun = _peak(), time.process_time()
     try:
-        codes = attempt(path)
+        codes = attempt(path, drawn)
     except BaseException as error:
         answer.send(f"{type(error).__name__}: {error}"[:100])
         return
@@ -375,7 +401,7 @@ def measured_apart(case: Case) -> Result | str:
         if case.files is not None:
             case.files(folder)
         ours, theirs = own.Pipe(duplex=False)
-        process = own.Process(target=measure, args=(path, theirs))
+        process = own.Process(target=measure, args=(path, case.drawn, theirs))
         process.start()
         theirs.close()
         try:

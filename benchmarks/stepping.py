@@ -19,8 +19,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
 from networks_by_hand import TANH, Link, Unit, build, cpg_rbf
 
+import neurovis_spec as nv
+from neurovis_spec import pipeline
+from neurovis_spec.compiler.compile import Request
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Block
+from neurovis_spec.diagnostics import Findings
 from neurovis_spec.runtime.backend import load
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.record import record
@@ -112,6 +116,43 @@ def microseconds(run: Run, steps: int, repeats: int = 7) -> float:
     return best / steps * 1e6
 
 
+def setting(path: str, name: str) -> tuple[float, float, int, float]:
+    """Setting a parameter beside a step of the NumPy backend, both by hand in one loop: microseconds of each, how many
+    numbers follow the parameter, the ratio."""
+    network = nv.compile(Path(__file__).resolve().parent.parent / path)
+    simulation, values = network.simulator("numpy"), [network.parameters[name] * (1 + 1e-6 * i) for i in range(7)]
+    simulation.step()
+    settable = network.network.settable
+    slot = settable.index[name]
+    slots = [slot, *settable.reached([slot], [False] * len(settable.slots))]
+    reach = sum(len(settable.bindings[number].indices) for number in settable.bound_to(slots))
+
+    def sets(count: int) -> None:
+        for i in range(count):
+            simulation.set({name: values[i % 7]})
+
+    def steps(count: int) -> None:
+        for _ in range(count):
+            simulation.step()
+
+    took, step = microseconds(sets, 2000), microseconds(steps, 2000)
+    return took, step, reach, took / step
+
+
+def many_events(count: int) -> tuple[float, float]:
+    """Seconds of the processor to read, and to compile, a spec with so many events that set a parameter."""
+    events = "".join(f"  - {{at: {k + 1}, set: {{g: {k * 0.5 + 2}}}}}\n" for k in range(count))
+    text = "neurovis: 1\nname: x\nparameters: {g: 1}\nneurons: {A: {count: 12, bias: g}}\nevents:\n" + events
+    begin = time.process_time()
+    findings = Findings()
+    document = pipeline.read_string(text, "x", findings)
+    spec = None if document is None else pipeline.shape(document, findings)
+    assert spec is not None
+    read = time.process_time()
+    assert pipeline.build(spec, Request(Path(), Path()), findings) is not None
+    return read - begin, time.process_time() - read
+
+
 def main() -> None:
     cases = (
         ("12/28, use case 1", cpg_rbf(), cpg_by_hand, 20000),
@@ -124,6 +165,12 @@ def main() -> None:
         whole = microseconds(recording(network), steps)
         peer = microseconds(hand(network), steps)
         print(f"{name:20}{plain:12.1f}{step:12.2f}{whole:14.2f}{peer:10.2f}{whole / peer:13.2f}")
+    print(f"\n{'setting a parameter':34}{'numbers':>8}{'set µs':>8}{'step µs':>9}{'set/step':>10}")
+    for path, parameter in (("specs/cpg_rbf.yaml", "phi"), ("specs/hexapod/hexapod.yaml", "phi")):
+        took, step, reach, ratio = setting(path, parameter)
+        print(f"{f'{Path(path).stem}, {parameter}':34}{reach:8}{took:8.2f}{step:9.2f}{ratio:10.2f}")
+    read, compiled = many_events(10_000)
+    print(f"\n10,000 different set events: read in {read:.2f} s, compiled in {compiled:.2f} s of the processor")
 
 
 if __name__ == "__main__":

@@ -5,14 +5,11 @@ In: a path, a text or a mapping. Out: a CompiledNetwork, or SpecError with every
 
 from __future__ import annotations
 
-import operator
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from neurovis_spec import pipeline
+from neurovis_spec import arguments, pipeline
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.compile import Request
 from neurovis_spec.compiler.limits import Limits
@@ -22,8 +19,9 @@ from neurovis_spec.language.source import SourceDocument
 if TYPE_CHECKING:
     from neurovis_spec.runtime.recording import Recording
 
-#: What findings call a spec that is given as a mapping.
-MAPPING = "<mapping>"
+
+#: A seed is an integer that a spec can hold: of 64 bits, signed.
+_SEEDS = 1 << 63
 
 
 def __getattr__(name: str) -> object:
@@ -48,15 +46,17 @@ def compile(
 
     ``parameters`` (and further keywords) replace the values of the spec's parameters, ``seed`` its seed. Data files
     may not lie outside ``root`` (default: the folder of the spec). ``limit`` is the most connections. Raises
-    SpecError with all findings.
+    SpecError with all findings; TypeError or ValueError for an argument that cannot be meant.
     """
-    given = {**(parameters or {}), **more}
     if isinstance(source, Mapping):
-        return compile_text(text_of(source), file=MAPPING, parameters=given, seed=seed, root=root, limit=limit)
-    path = Path(source)
+        from neurovis_spec.plain import text_of
+
+        request = _request(Path(), root, parameters, more, seed, limit)
+        return _compile_text(text_of(source), "<mapping>", request)
+    path = arguments.path("source", source)
+    request = _request(path.parent, root, parameters, more, seed, limit)
     findings = Findings()
     document = pipeline.read(path, str(source), findings)
-    request = _request(path.parent, root, given, seed, limit)
     return _finish(document, request, findings, str(source))
 
 
@@ -77,17 +77,16 @@ def compile_text(
     >>> network.network.neurons.names
     ('A',)
     """
-    findings = Findings()
-    document = pipeline.read_string(text, file, findings)
-    request = _request(Path(folder or "."), root, {**(parameters or {}), **more}, seed, limit)
-    return _finish(document, request, findings, file)
+    arguments.text("text", text)
+    request = _request(arguments.path("folder", "." if folder is None else folder), root, parameters, more, seed, limit)
+    return _compile_text(text, arguments.text("file", file), request)
 
 
 def load(path: str | Path) -> Recording:
     """Read a recording. Raises RecordingError for a file that is none, OSError for one that cannot be read."""
     from neurovis_spec.runtime import formats
 
-    return formats.load(path)
+    return formats.load(arguments.path("path", path))
 
 
 def schema(*, included: bool = False) -> dict[str, object]:
@@ -111,34 +110,21 @@ def backends() -> list[tuple[str, bool, str]]:
 def _request(
     folder: Path,
     root: str | Path | None,
-    parameters: Mapping[str, float],
+    parameters: Mapping[str, float] | None,
+    more: Mapping[str, float],
     seed: int | None,
     limit: int | None,
 ) -> Request:
-    limits = Limits.of(limit)
-    values = {name: float(value) for name, value in parameters.items()}
-    whole = None if seed is None else operator.index(seed)
-    return Request(folder, folder if root is None else Path(root), values, whole, limits)
+    limits = Limits.of(None if limit is None else arguments.integer("limit", limit, least=0))
+    given = {**arguments.mapping("parameters", parameters), **more}
+    values = {name: arguments.number(name, value) for name, value in given.items()}
+    whole = None if seed is None else arguments.integer("seed", seed, -_SEEDS, _SEEDS - 1)
+    return Request(folder, folder if root is None else arguments.path("root", root), values, whole, limits)
 
 
-def text_of(source: Mapping[str, object]) -> str:
-    """A mapping with the content of a spec as a text."""
-    import json
-
-    return json.dumps(_plain(source), indent=1, ensure_ascii=False, allow_nan=True)
-
-
-def _plain(value: object) -> object:
-    """Mappings, sequences and numbers of any make as those that JSON knows."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
-    if isinstance(value, str | int | float) or value is None:
-        return value
-    if isinstance(value, Iterable):
-        return [_plain(item) for item in value]
-    raise TypeError(f"a spec holds mappings, lists, texts and numbers, not {type(value).__name__}")
+def _compile_text(text: str, file: str, request: Request) -> CompiledNetwork:
+    findings = Findings()
+    return _finish(pipeline.read_string(text, file, findings), request, findings, file)
 
 
 def _finish(document: SourceDocument | None, request: Request, findings: Findings, file: str) -> CompiledNetwork:

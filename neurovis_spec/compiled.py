@@ -7,16 +7,16 @@ does so: a spec is compiled, and thereby checked, without it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec import pipeline
+from neurovis_spec import arguments, pipeline
 from neurovis_spec.compiler.compile import Request
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.wishes import RenderSettings
@@ -28,6 +28,7 @@ from neurovis_spec.runtime.files import replacing
 if TYPE_CHECKING:
     from neurovis_spec.compiler.arrays import FloatArray
     from neurovis_spec.layout import Layout, Point, Route
+    from neurovis_spec.runtime.columns import Keep
     from neurovis_spec.runtime.record import Course
     from neurovis_spec.runtime.recording import Recording, Snapshot
     from neurovis_spec.runtime.simulation import Simulation
@@ -36,6 +37,18 @@ if TYPE_CHECKING:
 
 #: Frames a second where the spec writes no dt, and the most there are.
 DEFAULT_FPS, MOST_FPS = 25.0, 60.0
+#: The most steps of a run: beyond it a step is no number that a double can hold.
+_MOST_STEPS = 1 << 53
+
+
+def _keep(states: str | Sequence[str], neurons: str | Sequence[str], weights: str) -> Keep:
+    """What of a step is recorded. Raises ValueError."""
+    from neurovis_spec.runtime.columns import Keep
+
+    if weights not in ("plastic", "none"):
+        raise ValueError(f"weights are 'plastic' or 'none', not {weights!r}")
+    states, neurons = ((one,) if isinstance(one, str) else tuple(one) for one in (states, neurons))
+    return Keep(neurons, weights == "plastic", states)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +97,7 @@ class CompiledNetwork:
         """Step by step, for a control loop; ``start`` is a recording to go on from."""
         from neurovis_spec.runtime.simulation import Simulation
 
+        _check(backend=backend, start=start)
         return Simulation(self.network, backend, start)
 
     def run(
@@ -96,14 +110,23 @@ class CompiledNetwork:
         start: Recording | None = None,
         until: str | Until | None = None,
         progress: Progress | None = None,
+        states: str | Sequence[str] = (),
+        neurons: str | Sequence[str] = (),
+        weights: Literal["plastic", "none"] = "plastic",
     ) -> Recording:
         """Run ``steps`` steps (default ``time.steps``) and record every ``every``-th.
 
-        ``inputs`` replace the sources of inputs: arrays of (steps,) or (steps, size). The run ends at the first step
-        after which ``until`` is true (``"rms(O - T, last=129) < 0.01"``). Raises InputError, BackendError,
-        RecordingError, SpecError where ``until`` is invalid.
+        ``inputs`` replace the sources of inputs: arrays of (steps,) or (steps, size). ``states`` are recorded as well
+        (``K.v``, ``(K -> O).eligibility``), and so are those that outputs name; ``neurons`` (``O + K``) are the only
+        ones that are recorded, ``weights="none"`` leaves the weights out.
+        The run ends at the first step after which ``until`` is true (``"rms(O - T, last=129) < 0.01"``). Raises
+        InputError, BackendError, RecordingError, KeyError for a name that there is not, SpecError where ``until`` is
+        invalid.
         """
-        return pipeline.simulate(self.network, self._course(steps, inputs, backend, every, until), start, progress)
+        _check(backend=backend, start=start, progress=progress)
+        keep = _keep(states, neurons, weights)
+        course = self._course(steps, inputs, backend, every, until, keep)
+        return pipeline.simulate(self.network, course, start, progress)
 
     def until(self, text: str) -> Until:
         """A measure that ends runs, ``rms(O - T, last=129) < 0.01``: its ``ending`` says how the last one ended. Raises
@@ -128,13 +151,17 @@ class CompiledNetwork:
         start: Recording | None = None,
         until: str | Until | None = None,
         progress: Progress | None = None,
+        states: str | Sequence[str] = (),
+        neurons: str | Sequence[str] = (),
+        weights: Literal["plastic", "none"] = "plastic",
     ) -> None:
         """Run as ``run`` does and write the recording to a file while it is made, in memory that does not grow with the
         steps. What was there stays until the end. Raises what ``run`` and ``Recording.save`` raise, RecordingError
         where the disk has not the room, and after Ctrl-C a KeyboardInterrupt; the file holds the steps until then.
         After any other exception a part beside the file holds them, which is read where the file is not there."""
-        course = self._course(steps, inputs, backend, every, until)
-        pipeline.simulate_to(self.network, Path(path), course, start, progress)
+        _check(backend=backend, start=start, progress=progress)
+        course = self._course(steps, inputs, backend, every, until, _keep(states, neurons, weights))
+        pipeline.simulate_to(self.network, arguments.path("path", path), course, start, progress)
 
     def _course(
         self,
@@ -143,11 +170,20 @@ class CompiledNetwork:
         backend: str | None,
         every: int,
         until: str | Until | None,
+        keep: Keep,
     ) -> Course:
         from neurovis_spec.runtime.record import Course
 
         ends = self.until(until) if isinstance(until, str) else until
-        return Course(self.network.steps if steps is None else steps, every, inputs, backend, ends)
+        if inputs is not None:
+            arguments.mapping("inputs", inputs)
+        whole = self.network.steps if steps is None else arguments.integer("steps", steps, 0, _MOST_STEPS)
+        return Course(whole, arguments.integer("every", every, 1, _MOST_STEPS), inputs, backend, ends, keep)
+
+    def refusal(self) -> Diagnostic | None:
+        """What ``layout`` and all that draws would refuse, as far as that is known before an engine begins; None where
+        there is nothing of the kind."""
+        return pipeline.refusal(self.spec, self.request, self.network, self.memory)
 
     def layout(
         self, engine: str | None = None, *, earlier: Layout | None = None, progress: Progress | None = None
@@ -155,6 +191,7 @@ class CompiledNetwork:
         """Where everything is. What an ``earlier`` layout knew (default: that of ``layout.file``) stays where it was.
         Raises LayoutRefusalError where an engine cannot do what is asked; its ``diagnostic`` says where the spec asks
         for it."""
+        _check(engine=engine, earlier=earlier, progress=progress)
         return NetworkLayout(self, self._arranged(engine, earlier, progress))
 
     def _arranged(
@@ -229,13 +266,14 @@ class CompiledNetwork:
         """
         from neurovis_spec.scene.renderers import renderer_for
 
-        suffix = Path(path).suffix
-        renderer_for(suffix, moving=False)
+        _check(recording=recording, theme=theme, engine=engine, progress=progress)
+        place, wanted = arguments.path("path", path), None if step is None else arguments.integer("step", step)
+        renderer_for(suffix := place.suffix, moving=False)
         layout = self.drawn(engine).value
-        snapshot = self._snapshot(step, recording, progress)
+        snapshot = self._snapshot(wanted, recording, progress)
         scene = pipeline.picture(self.network, layout, snapshot, self.gains, self._settings(theme))
         content = pipeline.draw(scene, suffix)
-        with replacing(path) as file:
+        with replacing(place) as file:
             file.write(content)
 
     def animate(
@@ -258,18 +296,20 @@ class CompiledNetwork:
         from neurovis_spec.scene.renderers import renderer_for
         from neurovis_spec.snapshots import frames_of, snapshots_from
 
-        suffix = Path(path).suffix
-        renderer = renderer_for(suffix, moving=True)
+        _check(recording=recording, theme=theme, progress=progress)
+        place, first = arguments.path("path", path), arguments.integer("start", start, most=_MOST_STEPS)
+        count = None if steps is None else arguments.integer("steps", steps, most=_MOST_STEPS)
+        renderer = renderer_for(suffix := place.suffix, moving=True)
         if fps is None:
             fps = min(1 / self.network.dt, MOST_FPS) if self.network.dt_given else DEFAULT_FPS
-        if not (math.isfinite(fps) and fps > 0):
+        if not (math.isfinite(arguments.number("fps", fps)) and fps > 0):
             raise ValueError(f"frames a second are above 0, not {fps}")
-        check_film(self.network, frames_of(self.network, start, steps, recording), suffix, renderer.capabilities)
+        check_film(self.network, frames_of(self.network, first, count, recording), suffix, renderer.capabilities)
         run = partial(self.run, progress=progress)
-        snapshots = snapshots_from(self.network, start, steps, recording, run)
+        snapshots = snapshots_from(self.network, first, count, recording, run)
         film = pipeline.moving(self.network, self._layout, snapshots, self.gains, self._settings(theme), fps)
         content = pipeline.animate(film, suffix, progress)
-        with replacing(path) as file:
+        with replacing(place) as file:
             file.write(content)
 
     def _settings(self, theme: str | None) -> RenderSettings:
@@ -290,6 +330,25 @@ class CompiledNetwork:
         snapshot = self._snapshot(None, None, None)
         scene = pipeline.picture(self.network, self._layout, snapshot, self.gains, self.network.render)
         return pipeline.draw(scene, ".svg").decode()
+
+
+def _check(**given: object) -> None:
+    """Refuse arguments of wrong types, by what they are called; None is the default of each. Raises TypeError."""
+    for name, value in given.items():
+        if value is None:
+            continue
+        if name in ("recording", "start"):
+            from neurovis_spec.runtime.recording import Recording
+
+            arguments.instance(name, value, Recording, "a recording")
+        elif name == "earlier":
+            from neurovis_spec.layout import Layout
+
+            arguments.instance(name, value, Layout, "a layout")
+        elif name == "progress":
+            arguments.function(name, value)
+        else:
+            arguments.text(name, value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -335,7 +394,7 @@ class NetworkLayout:
 
     def save(self, path: str | Path) -> None:
         """Write the layout file."""
-        with replacing(path) as file:
+        with replacing(arguments.path("path", path)) as file:
             file.write(self.dump().encode())
 
     def _repr_svg_(self) -> str:

@@ -6,6 +6,7 @@ In: a Network, and the layout engine with the reason for it. Out: a dict of plai
 from __future__ import annotations
 
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.states import names_of_states
 
 
 def describe(network: Network, engine: tuple[str, str]) -> dict[str, object]:
@@ -48,6 +49,7 @@ def describe(network: Network, engine: tuple[str, str]) -> dict[str, object]:
         ],
         "outputs": [
             {"name": entry.name, "neurons": [names[neuron] for neuron in entry.neurons.tolist()]}
+            | ({"states": list(names_of_states(network, entry.states))} if entry.states else {})
             for entry in network.outputs
         ],
         "engine": {"name": engine[0], "reason": engine[1]},

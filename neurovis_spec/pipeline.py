@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING
 
 from neurovis_spec.compiler.compile import Request, compile_spec
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.wishes import RenderSettings
-from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.compiler.wishes import LayoutSettings, RenderSettings
+from neurovis_spec.diagnostics import Diagnostic, Findings, Span
 from neurovis_spec.garbage import uncollected
 from neurovis_spec.language.includes import read_includes
 from neurovis_spec.language.reader import read_file, read_text
@@ -79,7 +79,7 @@ def simulate(
     """Run the update program, record activities and weights."""
     from neurovis_spec.runtime.record import record
 
-    how = (course.steps, course.inputs, course.backend, course.every, start, progress, course.until)
+    how = (course.steps, course.inputs, course.backend, course.every, start, progress, course.until, course.keep)
     return record(network, *how)
 
 
@@ -119,6 +119,19 @@ def foresee(spec: Spec, network: Network, findings: Findings) -> None:
     from neurovis_spec.layout.framing import look_at_engine
 
     look_at_engine(spec.layout.engine, network, findings)
+
+
+def refusal(spec: Spec, request: Request, network: Network, memory: Layout | None) -> Diagnostic | None:
+    """What laying it out would refuse before the engine begins, and where the spec asks for it."""
+    if network.layout == LayoutSettings():
+        return None
+    from neurovis_spec.layout.foreseen import foreseen
+
+    found = foreseen(network, memory)
+    if found is None:
+        return None
+    span = locate(found, spec, request, network) or Span(*spec.name.span)
+    return Diagnostic(found.code, str(found), span, "error", found.hint)
 
 
 def arrange(

@@ -5,14 +5,16 @@ In: a Network, the steps wanted, a Recording of it, or a function that runs so m
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.runtime.columns import columns_of
 from neurovis_spec.runtime.inputs import InputError
-from neurovis_spec.runtime.recording import Recording, RecordingError, Snapshot
+from neurovis_spec.runtime.recording import After, Numbers, Recording, RecordingError, Snapshot, recording_of
 
 
 def snapshot_at(
@@ -23,7 +25,7 @@ def snapshot_at(
         raise InputError(f"step {step}: steps count from 0")
     if recording is None:
         recording = run(network.steps if step is None else step + 1)
-    check_same(recording, network)
+    recording = fitted(recording, network)
     if not len(recording):
         raise RecordingError("the recording holds no step")
     return recording.snapshot(int(recording.step[-1]) if step is None else step)
@@ -52,7 +54,7 @@ def frames_of(network: Network, start: int, steps: int | None, recording: Record
         raise InputError(f"{steps} frames from step {start}: at least one frame from step 0 on is wanted")
     if recording is None:
         return max(1, network.steps - start) if steps is None else steps
-    check_same(recording, network)
+    recording = fitted(recording, network)
     rows = int((recording.step >= start).sum())
     if not rows:
         raise RecordingError(f"the recording holds no step from {start} on")
@@ -62,19 +64,30 @@ def frames_of(network: Network, start: int, steps: int | None, recording: Record
 def snapshots_from(
     network: Network, start: int, steps: int | None, recording: Recording | None, run: Callable[[int], Recording]
 ) -> Snapshots:
-    """The snapshots of ``steps`` steps from ``start`` on, by default of all that follow. Raises InputError,
-    RecordingError."""
+    """The snapshots of ``steps`` steps from ``start`` on, by default of all that follow; warns where a recording has
+    fewer. Raises InputError, RecordingError."""
     count = frames_of(network, start, steps, recording)
     if recording is None:
         recording = run(start + count)
-        check_same(recording, network)
+    recording = fitted(recording, network)
     rows = recording.step[recording.step >= start]
+    if steps is not None and len(rows) < steps:
+        frames = f"{len(rows):,} frame{'' if len(rows) == 1 else 's'} instead of {steps:,}"
+        warnings.warn(f"the recording holds no more than {frames} from step {start} on", stacklevel=2)
     return Snapshots(recording, tuple(rows[:count].tolist()))
 
 
-def check_same(recording: Recording, network: Network) -> None:
-    """Refuse a recording of another network: it has the same neurons and connections. Raises RecordingError."""
-    same = recording.neurons == network.neurons.names and np.array_equal(recording.sources, network.connections.sources)
-    if not same or not np.array_equal(recording.targets, network.connections.targets):
-        whose = f"{recording.network or 'unnamed'}, {len(recording.neurons)} neurons"
-        raise RecordingError(f"the recording is of another network ({whose})")
+def fitted(recording: Recording, network: Network) -> Recording:
+    """A recording with all connections of the network: a ``.csv`` holds the changing ones alone, and the others are the
+    network's. Raises RecordingError for a recording of another network: its neurons and connections are not the same.
+    """
+    ends, own = network.connections, recording.neurons == network.neurons.names
+    if own and np.array_equal(recording.sources, ends.sources) and np.array_equal(recording.targets, ends.targets):
+        return recording
+    changing = tuple(network.connection_names[index] for index in network.changing.tolist())
+    if own and len(recording.plastic) == len(recording.sources) and recording.connection_names == changing:
+        after = After(recording.weights_after, recording.reached)
+        rows = Numbers(recording.step, recording.activity, recording.weights, recording.states)
+        return recording_of(network, columns_of(network), rows, network.connections.weights, after)
+    whose = f"{recording.network or 'unnamed'}, {len(recording.neurons)} neurons"
+    raise RecordingError(f"the recording is of another network ({whose})")

@@ -83,13 +83,17 @@ def network(
         high=np.full(m, np.inf),
         entries=tuple(entries),
         descriptions=(None,) * len(entries),
+        learns=tuple(
+            next((f"{rules[c.rule][0]}(rate=0.01)" for c in connections if c.entry == entry and c.rule >= 0), None)
+            for entry in range(len(entries))
+        ),
     )
     plasticity = []
     for number, (rule, signals) in enumerate(rules):
         members = np.flatnonzero(wires.rules == number).astype(np.int64)
         sources: dict[str, IntArray] = {k: np.full(len(members), index[v], np.int64) for k, v in signals.items()}
         plain = Rule(rule, (), tuple(signals), (), (), None, None)
-        plasticity.append(Plasticity(plain, members, {}, sources, f"{rule}(rate=0.01)"))
+        plasticity.append(Plasticity(plain, members, {}, sources))
     return Network(
         name=name, title=title, description="", dt=1.0 if dt is None else dt, dt_given=dt is not None, steps=1000,
         episode=None, seed=0, parameters={}, structural=frozenset(),

@@ -190,6 +190,7 @@ def connections(links: Sequence[Link]) -> Connections:
         high=floats([link.high for link in links]),
         entries=("all",),
         descriptions=(None,),
+        learns=("rule" if any(link.learns >= 0 for link in links) else None,),
     )
 
 
@@ -235,7 +236,6 @@ def learning(number: int, use: Use, links: Sequence[Link]) -> Plasticity:
         members=np.array(members, dtype=np.int64),
         parameters={name: np.full(len(members), value) for name, value in use.parameters.items()},
         signals={name: np.full(len(members), index, dtype=np.int64) for name, index in use.signals.items()},
-        title="rule",
     )
 
 

@@ -117,6 +117,25 @@ def test_wrong_usage_is_status_2_and_says_what_was_meant(folder: Path, arguments
 
 
 @pytest.mark.parametrize(
+    ("content", "found"),
+    [
+        (b"1,2\n,3\n4,\n", ["x.csv:2:1: error[cell-empty]", "x.csv:3:3: error[cell-empty]"]),
+        (b"a,b\r\n1,2\r\n3, nan\r\n 4x,5\r\n", ["x.csv:3:4: error[not-finite]", "x.csv:4:2: error[file-format]"]),
+        (b"\xef\xbb\xbf1,2\n3,4,5\n6\n", ["x.csv:2:5: error[file-format]", "x.csv:3:1: error[file-format]"]),
+        (b'"a, b","c"\n"1",inf\n', ["x.csv:2:5: error[not-finite]"]),
+        (b"1,2\n3,\xff\n", ["x.csv:2:1: error[invalid-utf8]"]),
+        (b"", ["x.csv:1:1: error[file-format]"]),
+    ],
+)
+def test_a_finding_in_a_file_of_an_input_stands_at_the_cell(folder: Path, content: bytes, found: list[str]) -> None:
+    (folder / "x.csv").write_bytes(content)
+    result = call("run", "small.yaml", "--input", "pull=x.csv")
+    assert result.exit_code == 1
+    assert [line.partition("]")[0] + "]" for line in result.stderr.splitlines() if "error[" in line] == found
+    assert "an empty cell" not in result.stderr, "what is advised would be refused as well"
+
+
+@pytest.mark.parametrize(
     ("arguments", "words"),
     [
         ("validate nothing.yaml", "nothing.yaml:1:1: error[file-missing]"),
@@ -421,19 +440,26 @@ def test_render_draws_what_the_api_draws(folder: Path) -> None:
     assert content.count("data-connection=") == 4
 
 
-def test_render_with_and_without_a_recording_is_the_same_picture(folder: Path) -> None:
-    good("run", "small.yaml", "-o", "x.npz")
-    good("render", "small.yaml", "-o", "a.svg", "--step", 4, "--recording", "x.npz")
+@pytest.mark.parametrize("recording", ["x.npz", "x.csv"])
+def test_render_with_and_without_a_recording_is_the_same_picture(folder: Path, recording: str) -> None:
+    """A table holds the changing connections alone; the others are those of the spec."""
+    good("run", "small.yaml", "-o", recording)
+    good("render", "small.yaml", "-o", "a.svg", "--step", 4, "--recording", recording)
     good("render", "small.yaml", "-o", "b.svg", "--step", 4)
     assert (folder / "a.svg").read_bytes() == (folder / "b.svg").read_bytes()
-    result = call("render", "small.yaml", "-o", "c.svg", "--step", 400, "--recording", "x.npz")
+    result = call("render", "small.yaml", "-o", "c.svg", "--step", 400, "--recording", recording)
     assert result.exit_code == 1
     assert "step 400 is not in the recording" in result.stderr
 
 
-def test_render_refuses_the_recording_of_another_network(folder: Path) -> None:
-    good("run", SPECS / "mlp.yaml", "-o", "x.npz")
-    result = call("render", "small.yaml", "-o", "a.svg", "--recording", "x.npz")
+@pytest.mark.parametrize("recording", ["x.npz", "x.csv", "y.csv"])
+def test_render_refuses_the_recording_of_another_network(folder: Path, recording: str) -> None:
+    """Also of one with the same neurons, in which other connections change."""
+    text = Path("small.yaml").read_text()
+    Path("other.yaml").write_text(text.replace(", plasticity: {hebbian: {rate: 0.01}}, bounds: [-1, 1]", ""))
+    assert Path("other.yaml").read_text() != text
+    good("run", "other.yaml" if recording == "y.csv" else SPECS / "mlp.yaml", "-o", recording)
+    result = call("render", "small.yaml", "-o", "a.svg", "--recording", recording)
     assert result.exit_code == 1
     assert "another network" in result.stderr
     assert not (folder / "a.svg").exists()
@@ -449,6 +475,17 @@ def test_animate_has_one_frame_a_step(folder: Path) -> None:
     nv.compile("small.yaml").animate("y.svg", steps=4, start=2, fps=5)
     assert (folder / "x.svg").read_bytes() == (folder / "y.svg").read_bytes()
     assert b"<script" not in (folder / "x.svg").read_bytes()
+
+
+def test_animate_says_where_a_recording_has_fewer_steps_than_are_wanted(folder: Path) -> None:
+    good("run", "small.yaml", "--steps", 10, "-o", "x.npz")
+    result = call("animate", "small.yaml", "--recording", "x.npz", "-o", "x.svg", "--from", 5, "--steps", 50)
+    assert (result.exit_code, result.stdout) == (0, "x.svg\n")
+    words = "the recording holds no more than 5 frames instead of 50 from step 5 on"
+    assert result.stderr == f"warning: {words}\n"
+    good("animate", "small.yaml", "--recording", "x.npz", "-o", "x.svg", "--from", 5, "--steps", 5)
+    result = call("animate", "small.yaml", "--recording", "x.npz", "-o", "x.svg", "--from", 10, "--steps", 5)
+    assert (result.exit_code, result.stderr) == (1, "error: the recording holds no step from 10 on\n")
 
 
 # new
@@ -532,12 +569,29 @@ def test_a_closed_pipe_ends_it_without_noise() -> None:
 
 if sys.platform == "linux":  # which has a device that is always full; elsewhere there is nothing to test this with
 
-    def test_a_full_disk_is_one_message() -> None:
+    @pytest.mark.parametrize(
+        "arguments",
+        [
+            "--help",
+            "--version",
+            "run --help",
+            f"inspect {SPECS}/ring.yaml",
+            f"run {SPECS}/ring.yaml",
+            "schema",
+        ],
+    )
+    def test_a_full_disk_is_one_message(arguments: str) -> None:
         with Path("/dev/full").open("wb") as full:
-            process = start("inspect", SPECS / "ring.yaml", stdout=full.fileno(), stderr=subprocess.PIPE)
+            process = start(*arguments.split(), stdout=full.fileno(), stderr=subprocess.PIPE)
             _, complaint = process.communicate(timeout=60)
         assert process.returncode == 1
         assert complaint.decode() == "error: No space left on device\n"
+
+    @pytest.mark.parametrize(("arguments", "status"), [("nosuch", 2), ("inspect missing.yaml", 1)])
+    def test_where_no_message_fits_the_status_stays(arguments: str, status: int) -> None:
+        with Path("/dev/full").open("wb") as full:
+            process = start(*arguments.split(), stdout=full.fileno(), stderr=full.fileno())
+        assert process.wait(60) == status
 
 
 def test_a_terminal_without_utf_8_is_no_obstacle() -> None:

@@ -386,10 +386,9 @@ def test_signals_of_rules() -> None:
 
 def test_a_list_as_a_signal_is_named_where_the_rule_is_shown() -> None:
     text = "neurons: {O: {}, A: {count: %d}, T: {count: 9}}\nconnections: {O -> A: {plasticity: {delta: {target: %s}}}}"
-    (rule,) = network_of(text % (2, "[T1, T2]")).plasticity
-    assert rule.title == "delta(rate=0.01, target=[T1, T2])"
-    (rule,) = network_of(text % (4, "[T1, T2, T3, T4]")).plasticity
-    assert rule.title == "delta(rate=0.01, target=[T1, T2, T3, …])"
+    assert network_of(text % (2, "[T1, T2]")).connections.learns == ("delta(rate=0.01, target=[T1, T2])",)
+    (learns,) = network_of(text % (4, "[T1, T2, T3, T4]")).connections.learns
+    assert learns == "delta(rate=0.01, target=[T1, T2, T3, …])"
     code, message, _ = answer(text % (4, "[T1, T2]"))
     assert (code, message) == (
         "wrong-size",

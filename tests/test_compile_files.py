@@ -80,10 +80,11 @@ def test_a_file_is_read_once_for_each_key(folder: Path, monkeypatch: pytest.Monk
         key: Located[str] | None,
         *,
         keyed: bool,
+        gaps: bool,
         room: Room,
     ) -> Table | None:
         read.append((path, None if key is None else key.value))
-        return read_table(path, root, base, span, findings, key, keyed=keyed, room=room)
+        return read_table(path, root, base, span, findings, key, keyed=keyed, gaps=gaps, room=room)
 
     monkeypatch.setattr("neurovis_spec.compiler.tables.read_table", counting)
     bodies = ["{matrix: {file: w.npz, key: weights}}", "{matrix: {file: w.npz, key: turned}, rows: to}"]

@@ -64,7 +64,11 @@ def test_a_simulator_goes_step_by_step(network: nv.CompiledNetwork) -> None:
 
 @pytest.mark.parametrize(
     ("value", "words"),
-    [(5.0, "'g' is 5; its bounds are 0 to 2"), (0.25, "the lower bound 0.5 is above"), (0.0, "expression is infinite")],
+    [
+        (5.0, "'g' is 5; its bounds are 0 to 2"),
+        (0.25, "a lower bound of weights would be above its bound of 0.25"),
+        (0.0, "a bias would be infinite"),
+    ],
 )
 def test_what_set_cannot_take_is_a_parameter_error_and_changes_nothing(value: float, words: str) -> None:
     text = (

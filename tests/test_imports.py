@@ -57,11 +57,19 @@ def test_the_help_of_a_command_imports_nothing_heavy(name: str) -> None:
 
 
 def test_validating_imports_nothing_that_runs_lays_out_or_draws() -> None:
+    """The engine that the spec names is asked what it can do, for which nothing is loaded that lays out."""
     modules = loaded(command("validate", "specs/cpg_rbf.yaml"))
-    assert not modules & {"networkx", "scipy", "PIL", "rich", "neurovis_layouts", "neurovis_renderers"}
+    assert not modules & {"networkx", "scipy", "PIL", "rich", "neurovis_renderers"}
+    assert {name for name in modules if name.startswith("neurovis_layouts.")} == {"neurovis_layouts.layered"}
     later = ("runtime.", "layout.", "scene.", "describe", "snapshots")
+    asking = {f"layout.{name}" for name in ("engines", "foreseen", "geometry", "model", "naming", "refusals")}
     found = {name.removeprefix("neurovis_spec.") for name in modules}
-    assert not {name for name in found if name.startswith(later)} - {"runtime.files", "runtime.parts"}
+    assert not {name for name in found if name.startswith(later)} - {"runtime.files", "runtime.parts"} - asking
+
+
+def test_validating_asks_no_engine_where_the_spec_names_none() -> None:
+    modules = loaded(command("validate", "specs/hebbian.yaml"))
+    assert not {name for name in modules if name.startswith(("neurovis_layouts", "neurovis_spec.layout"))}
 
 
 def test_validating_imports_no_more_than_the_spec_needs() -> None:

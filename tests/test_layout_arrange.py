@@ -8,11 +8,12 @@ import pytest
 
 from neurovis_spec import plugins
 from neurovis_spec.layout import Capabilities, Layout, LayoutProblem, LayoutRefusalError, Point
-from neurovis_spec.layout.arrange import lay_out_problem, refuse_what_it_cannot
+from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.choose import choose_engine
 from neurovis_spec.layout.geometry import straight
 from neurovis_spec.layout.model import LayoutModule
 from neurovis_spec.layout.problem import canonical
+from neurovis_spec.layout.refusals import asked_by, refuse
 
 PAIR = canonical("pair", ["A", "B"], [("A", ["A"]), ("B", ["B"])], suite.named([("A", "B")]))
 
@@ -117,7 +118,7 @@ def test_an_unknown_engine_is_answered_with_the_nearest() -> None:
 
 
 def test_manual_names_a_neuron_without_a_position() -> None:
-    with pytest.raises(LayoutRefusalError, match="'A' and 1 more has none") as caught:
+    with pytest.raises(LayoutRefusalError, match="'A', 'B' have none") as caught:
         lay_out_problem(PAIR, "manual")
     assert caught.value.code == "position-missing"
 
@@ -147,7 +148,7 @@ def test_pins_just_a_disc_apart_are_fine() -> None:
 )
 def test_what_an_engine_cannot_do_is_refused(problem: LayoutProblem, code: str) -> None:
     with pytest.raises(LayoutRefusalError) as caught:
-        refuse_what_it_cannot(problem, "poor", Capabilities(neurons=2))
+        refuse(asked_by(problem), "poor", Capabilities(neurons=2))
     assert caught.value.code == code
 
 

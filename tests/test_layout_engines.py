@@ -191,7 +191,7 @@ def test_arranged_groups_keep_their_formation() -> None:
 def test_arranging_a_neuron_twice_is_refused() -> None:
     problem = canonical("twice", ["A", "B"], arrange=[(["A", "B"], "row"), (["A"], "ring")])
     with pytest.raises(LayoutRefusalError, match="'A' is arranged twice"):
-        LayeredEngine().lay_out(problem)
+        lay_out_problem(problem, "layered")
 
 
 def test_pins_stay_and_push_others_off() -> None:

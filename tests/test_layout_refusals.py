@@ -6,10 +6,12 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from lsp_marks import marked
 
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.layout import LayoutRefusalError
+from neurovis_spec.lsp.check import check
 
 LEGS = """\
 neurovis: 1
@@ -70,6 +72,61 @@ def test_a_refusal_is_a_finding_with_its_place(text: str, code: str, marked: str
         assert "^" * len(marked) in result.stderr
 
 
+#: what no engine has to begin for
+FORESEEN = {"arranged-twice", "align-conflict", "position-missing", "layout-align-unsupported",
+            "layout-mirror-unsupported", "layout-arrange-unsupported"}  # fmt: skip
+MORE = [
+    (f"{GROUPS}  engine: circular\n  arrange: {{A: row}}\n", "layout-arrange-unsupported", "A"),
+    (f"{GROUPS}  engine: organic\n  mirror: [[A1, A2]]\n", "layout-mirror-unsupported", "[A1, A2]"),
+    (f"{GROUPS}  direction: right\n  arrange: {{A: row}}\n  align: [[B, A3], [A1, A2]]\n", "align-conflict",
+     "[A1, A2]"),
+    (f"{GROUPS}  positions: {{B: [9, 9], {', '.join(f'A{i}: [{i}, 0]' for i in range(1, 5))}}}\n"
+     "  arrange: {A: row}\n", "layout-arrange-unsupported", "A"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "code", "marked"), [*REFUSED, *MORE])
+def test_validate_says_what_would_be_refused(text: str, code: str, marked: str, tmp_path: Path) -> None:
+    spec = tmp_path / "spec.yaml"
+    spec.write_text(text, encoding="utf-8")
+    validated = CliRunner().invoke(neurovis, ["validate", str(spec)])
+    laid_out = CliRunner().invoke(neurovis, ["layout", str(spec)])
+    assert laid_out.exit_code == 1
+    if code in FORESEEN:
+        assert validated.exit_code == 1
+        (line,) = [line for line in laid_out.stderr.split("\n") if "error[" in line]
+        assert line in validated.stderr
+        assert "ok" not in validated.stdout
+        assert "^" * len(marked) in validated.stderr
+    else:
+        assert (validated.exit_code, validated.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "engine: layered",
+        "engine: circular",
+        "engine: spatial\n  positions: {B: [0, 5]}",
+        "arrange: {A: row}\n  align: [[A1, A2]]",
+        "arrange: {A: column}\n  align: [[A1, A2]]\n  direction: right",
+        "arrange: {A: column}\n  align: [[A1, B]]",
+        "arrange: {A1..A2: row, A3..A4: row}\n  mirror: [[A1, A2]]",
+    ],
+)
+def test_what_can_be_drawn_is_not_refused(said: str) -> None:
+    network = nv.compile_text(f"{GROUPS}  {said}\n")
+    assert network.refusal() is None
+    assert network.layout().positions
+
+
+def test_an_arrangement_over_instances_and_one_within_them_do_not_contradict() -> None:
+    text = LEGS.replace("    conn", "    layout: {arrange: {S: row}}\n    conn") + "  arrange: {left.S: row}\n"
+    network = nv.compile_text(text)
+    assert network.refusal() is None
+    assert network.layout().positions
+
+
 def test_an_engine_that_the_caller_names_is_no_fault_of_the_spec() -> None:
     for said in ("engine: circular", "direction: up"):
         network = nv.compile_text(f"{GROUPS}  {said}\n")
@@ -90,3 +147,9 @@ def test_what_an_included_module_says_is_marked_in_its_file(tmp_path: Path) -> N
     assert found is not None
     assert (Path(found.span.file).name, found.span.line, found.span.column) == ("legs.yaml", 5, 32)
     assert found.span.file in caught.value.sources
+
+
+def test_an_editor_is_told_as_validate_tells_it() -> None:
+    found = check(marked(f"{GROUPS}  engine: circular\n  align: [[A1, B]]¦\n")[0])
+    assert [(item.code, item.span.line) for item in found.findings] == [("layout-align-unsupported", 9)]
+    assert found.network is not None

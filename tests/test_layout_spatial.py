@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import warnings
+
 import pytest
 
 import neurovis_spec as nv
@@ -61,3 +63,14 @@ def test_a_spec_draws_by_position() -> None:
     places = network.layout().positions
     assert places["L1"] == (0.0, 0.0)
     assert places["L3"][1] == pytest.approx(3 * places["L2"][0], abs=0.01)
+
+
+@pytest.mark.parametrize("unit", ["1e-300", "5e-324", "1e-160", "1e150"])
+def test_the_unit_of_positions_is_free(unit: str) -> None:
+    def places(value: str) -> dict[str, tuple[float, float]]:
+        text = f"neurons: {{A: {{count: 4, position: ['{value}*i', '{value}*i*i']}}}}\nlayout: {{engine: spatial}}\n"
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            return dict(nv.compile_text(f"neurovis: 1\nname: x\n{text}").layout().positions)
+
+    assert places(unit) == places("1")

@@ -110,6 +110,28 @@ def test_findings_follow_what_is_typed(tmp_path: Path) -> None:
     edit(tmp_path, scenario)
 
 
+ODD_URIS = ("file:///tmp/a%00b.yaml", "file:///" + 3000 * "a/", "file:", "file:///%ff", "file:///a%2520b.yaml")
+
+
+def test_a_uri_that_no_file_can_have_is_a_document_like_others(tmp_path: Path) -> None:
+    wrong = SPEC.replace("activation: swish", "activation: tahn")
+
+    async def scenario(editor: Editor) -> None:
+        odd = [Editor(editor.client, tmp_path / "odd.yaml") for _ in ODD_URIS]
+        for one, uri in zip(odd, ODD_URIS, strict=True):
+            one.uri = uri
+            (finding,) = await one.open(wrong)
+            assert finding.code == "unknown-activation"
+        assert await editor.open(SPEC) == []
+        for one in (*odd, editor):
+            where = types.HoverParams(one.document, one.at("count"))
+            assert await editor.client.text_document_hover_async(where) is not None
+        editor.type(wrong)
+        assert [finding.code for finding in await editor.findings()] == ["unknown-activation"]
+
+    edit(tmp_path, scenario)
+
+
 #: The server with a compiler that has a mistake.
 STUMBLING = """
 from neurovis_spec.lsp import server

@@ -61,6 +61,8 @@ def offered(text: str) -> dict[str, Completion]:
         (BASE + "  L: {model: ¦", ["leaky_integrator", "static"], ["tanh"]),
         (BASE + "  L: {input: ¦", ["go"], ["K", "alpha"]),
         (BASE + "  L: {bias: 2*a¦", ["alpha", "i", "n", "sin", "normal", "pi"], ["K", "j", "tanh "]),
+        (BASE + "  L: {model: adaptive}\noutputs: {membrane: L.¦", ["v", "b"], ["K", "drive"]),
+        (BASE + "  L: {count: 2, model: {izhikevich: {a: 1}}}\noutputs: {membrane: [L2.¦", ["v", "u"], ["K"]),
         (BASE + "connections:\n  K¦", ["K", "K1", "K5", "O", "T"], ["alpha", "go"]),
         (BASE + "connections:\n  K -> ¦", ["K", "O", "T"], ["alpha"]),
         (BASE + "connections:\n  K -> O: ¦", ["alpha", "j", "n_from"], ["K"]),

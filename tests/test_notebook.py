@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import warnings
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -42,3 +44,16 @@ def test_names_are_escaped_and_empty_runs_are_drawn() -> None:
     network = nv.compile_text("neurovis: 1\nname: x\nneurons: {A: {label: '<script>'}}")
     assert "<script" not in network._repr_svg_()
     assert "no steps" in network.run(0)._repr_svg_()
+
+
+@pytest.mark.parametrize("bias", ["5e-324", "1.7e308", "1e-310", "0"])
+def test_traces_of_huge_and_tiny_values_stay_in_their_rows(bias: str) -> None:
+    text = (
+        f"neurovis: 1\nname: x\ninputs: {{s: {{expression: '{bias}*(1 - 2*(k % 2))'}}}}\nneurons: {{A: {{input: s}}}}"
+    )
+    recording = nv.compile_text(text).run(6)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        drawn = recording._repr_svg_()
+    (points,) = re.findall(r'points="([^"]*)"', drawn)
+    assert all(0 < float(pair.split(",")[1]) < 100 for pair in points.split())

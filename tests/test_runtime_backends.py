@@ -26,6 +26,7 @@ from networks_by_hand import (
     tree,
 )
 
+from neurovis_spec.api import compile_text
 from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.network import Input, Network
 from neurovis_spec.compiler.program import Activation, Combine, Model
@@ -357,8 +358,9 @@ def test_names_of_the_author_never_reach_the_code() -> None:
 
 def test_backends_are_found_by_name_and_refused_with_the_nearest() -> None:
     assert load("reference").name == "reference"
-    assert [line.split()[:2] for line in listing()] == [["numpy", "available"], ["reference", "available"]]
-    name, why = choose_backend(cpg_rbf())
+    assert [line.split()[0] for line in listing()] == ["c", "numpy", "reference"]
+    assert [line.split()[1] for line in listing()][1:] == ["available", "available"]
+    name, why = choose_backend(cpg_rbf(), 10)
     assert name == "numpy"
     assert "28 connections" in why
     with pytest.raises(BackendError, match="'numpy'"):
@@ -383,3 +385,29 @@ def test_a_network_that_asks_for_more_is_refused_before_it_starts(capabilities: 
     network = build([Unit("A"), Unit("B")], links, [Use(COPYING)], episode=3)
     with pytest.raises(BackendError, match=words):
         prepare(network, Weak())
+
+
+@pytest.mark.parametrize("backend", ["reference", "numpy"])
+def test_entries_that_learn_by_one_rule_are_computed_together(backend: str) -> None:
+    """Whatever their parameters, signals and delays are, and what stands between them."""
+    head = "neurovis: 1\nname: x\nneurons: {A: {count: 3, bias: i + 1}, B: {count: 2}, T: {count: 2, bias: 0.5*i}}\n"
+    entries = [
+        "A1 -> B1: {weight: 0, plasticity: {delta: {rate: 0.1, target: T1}}}",
+        "A2 -> B1: 0.5",
+        "A3 -> B2: {weight: 0.1, delay: 3, plasticity: {delta: {rate: 0.2, target: T2}}}",
+        "A2 -> B2: {weight: 0, plasticity: oja}",
+        "A1 -> B2: {weight: 0.2, plasticity: {delta: {target: T1}}, bounds: [0, 0.3]}",
+    ]
+    network = compile_text(head + "connections:\n" + "".join(f"  {entry}\n" for entry in entries))
+    assert [rule.members.tolist() for rule in network.network.plasticity] == [[0, 2, 4], [3]]
+    titles = network.network.connections.learns
+    assert titles[2] == "delta(rate=0.2, target=T2)"
+    assert titles[1] is None
+    # the same rules under names of their own are computed one by one
+    apart = "".join(f"  {entry.replace('delta:', f'delta{i}:')}\n" for i, entry in enumerate(entries))
+    rule = "{parameters: {rate: 0.01}, signals: [target], weight: {each_step: weight + rate*pre*(target - post)}}"
+    rules = "".join(f"  delta{i}: {rule}\n" for i in (0, 2, 4))
+    alone = compile_text(f"{head}rules:\n{rules}connections:\n{apart}")
+    assert len(alone.network.plasticity) == 4
+    expected, found = alone.run(20, backend=backend), network.run(20, backend=backend)
+    np.testing.assert_array_equal(found.weights, expected.weights)

@@ -105,3 +105,8 @@ def test_the_print_theme_falls_in_lightness_so_that_greyscale_tells_values_apart
 
 def test_a_value_that_is_no_number_is_grey() -> None:
     assert colours(THEMES["default"], [float("nan")]) == ["#969696"]
+
+
+def test_a_glow_is_bounded_however_much_a_weight_changes() -> None:
+    widths = encoding.glow_width(np.full(4, 3.0), np.array([1e12, 1e307, 1.7e308, np.inf]))
+    assert widths == pytest.approx(3 + 2 * encoding.GLOW_REACH)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
 
 import neurovis_spec as nv
 from neurovis_spec.runtime.simulation import ParameterError
+from neurovis_spec.runtime.state import State
 
 HEAD = "neurovis: 1\nname: x\nseed: 3\nparameters: {p: 0.5, q: 2*p, r: {value: 0.25, min: 0, max: 4}}\n"
 BACKENDS = pytest.mark.parametrize("backend", ["reference", "numpy"])
@@ -109,7 +111,7 @@ def test_a_parameter_that_was_set_follows_no_other_any_more() -> None:
 @pytest.mark.parametrize(
     ("spec", "values", "words"),
     [
-        ("neurons: {A: {bias: p}}", {"r": 5}, "'r' would be 5; its bounds are 0 to 4"),
+        ("neurons: {A: {bias: p}}", {"r": 5}, "'r' is 5; its bounds are 0 to 4"),
         ("neurons: {A: {bias: 1/p}}", {"p": 0}, "a bias would be infinite"),
         ("neurons: {A: {count: 2, bias: 'log(p - i/4)'}}", {"p": 0.2}, "a bias would be not finite"),
         ("neurons: {A: {bias: 1}, B: {}}\nconnections: {A -> B: log(p)}", {"p": -1}, "a weight would be undefined"),
@@ -275,3 +277,18 @@ def test_by_hand_only_what_there_is() -> None:
         simulation.clamp("A", float("nan"))
     simulation.step()
     assert simulation.activity.tolist() == [1.0, 1.0, 0.0]
+
+
+def test_arguments_of_another_kind_are_named() -> None:
+    simulation = nv.compile_text(HEAD + "neurons: {A: {bias: p}}").simulator()
+    wrong = cast("str", 3)
+    with pytest.raises(TypeError, match="'name' is a text, not int"):
+        simulation.weight(wrong)
+    with pytest.raises(TypeError, match="'values' is a mapping, not int"):
+        simulation.set(cast("dict[str, float]", 3))
+    with pytest.raises(TypeError, match="given by name, not as int"):
+        simulation.step(cast("dict[str, float]", 3))
+    with pytest.raises(TypeError, match="'reference' is a text, not int"):
+        simulation.lesion(wrong)
+    with pytest.raises(TypeError, match="'state' is a state, as state"):
+        simulation.restore(cast("State", 3))

@@ -59,6 +59,22 @@ def test_texts_for_people_use_nothing() -> None:
     assert warnings(body) == [("unused-parameter", "gain")]
 
 
+def test_a_name_that_is_no_expression_uses_nothing() -> None:
+    body = "parameters: {tanh: 1, s: 2, A: 3, one: 4}\ninputs: {s: {}}\n"
+    body += "neurons: {A: {input: s, activation: tanh}, B: {names: [one]}}\n"
+    body += "connections: {A -> B: {edges: [[A, one]]}}\n"
+    assert warnings(body) == [("unused-parameter", name) for name in ("tanh", "s", "A", "one")]
+
+
+def test_a_definition_is_not_used_by_what_is_called_alike() -> None:
+    body = "activations: {cube: {value: x^3}}\nmodels: {kept: {activity: f(drive)}}\n"
+    assert warnings(body + "neurons: {cube: {bias: 1, model: kept}}\noutputs: {kept: cube}\n") == [
+        ("unused-definition", "cube")
+    ]
+    module = "modules: {leg: {neurons: {K: {bias: 1, activation: cube}}}}\n"
+    assert [code for code, _ in warnings(body + module + "neurons: {A: {bias: 1, model: kept}}\n")] == ["unused-module"]
+
+
 def test_a_definition_sees_its_own_parameters() -> None:
     body = "parameters: {beta: 1}\n"
     body += "activations: {swish: {parameters: {beta: 1}, value: x * sigmoid(beta * x)}}\n"

@@ -1,8 +1,7 @@
 """The spatial engine: neurons where the data says that they are, as in a body or a connectome.
 
 In: a problem whose neurons have a ``position``. Out: a layout with x to the right and y downwards, both as given and
-scaled by one factor that gives most discs room; those that are still too close move aside. Pins win. Neurons without a
-position are refused by name.
+scaled by one factor that gives most discs room; those that are still too close move aside. Pins win.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from neurovis_layouts.apart import apart, jitter
 from neurovis_layouts.finish import drawn, nearest, pinned_places
 from neurovis_layouts.frame import from_picture
 from neurovis_layouts.wiring import FloatArray
-from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem, LayoutRefusalError
+from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem
 
 #: In spacings: how far half of the discs are from their next, how far nine tenths of them (the picture may grow by this
 #: factor for it), and how far any two are kept apart.
@@ -30,11 +29,15 @@ class SpatialEngine:
     """Positions from data."""
 
     name = "spatial"
-    capabilities = Capabilities(pins=True, boxes=True, direction=True, memory=True, neurons=200_000, edges=2_000_000)
+    capabilities = Capabilities(
+        pins=True, places=True, boxes=True, direction=True, memory=True, neurons=200_000, edges=2_000_000
+    )
 
     def lay_out(self, problem: LayoutProblem) -> Layout:
-        """Scale the positions, keep discs apart, route the edges. Raises LayoutRefusalError (``position-missing``)."""
+        """Scale the positions, keep discs apart, route the edges."""
         data = _data(problem)
+        exponent = np.frexp(np.abs(data[np.isfinite(data)]).max(initial=0.0))[1]
+        data = np.ldexp(data, -exponent)  # their unit is free, and near 1 no distance is too small or too large
         fixed, there = pinned_places(problem)
         known = np.isfinite(data.sum(axis=1))
         places = data * _factor(data[known]) * problem.neuron_spacing
@@ -52,18 +55,6 @@ def _data(problem: LayoutProblem) -> FloatArray:
     for one."""
     nowhere = (math.nan, math.nan)
     given = problem.places or (nowhere,) * len(problem.neurons)
-    free = [i for i in range(len(given)) if i not in problem.pins]
-    lost = [problem.neurons[i] for i in free if not math.isfinite(sum(given[i]))]
-    if lost:
-        shown = ", ".join(f"'{name}'" for name in lost[:5])
-        more = f" and {len(lost) - 5} more" if len(lost) > 5 else ""
-        raise LayoutRefusalError(
-            "position-missing",
-            f"the engine 'spatial' draws neurons where their 'position' says; {shown}{more} "
-            f"{'has' if len(lost) == 1 else 'have'} none",
-            "give them a position, or pin them under layout.positions",
-            tuple(lost),
-        )
     return np.array([from_picture(point, problem.direction) for point in given], dtype=np.float64).reshape(-1, 2)
 
 

@@ -122,6 +122,11 @@ class Commands(click.Group):
         except click.ClickException as error:
             status = error.exit_code
             _show(error)
+        except OSError as error:  # of what is written before there is a command: --help on a full disk
+            from neurovis_spec.cli.failure import fault, said
+
+            status = 1
+            _show(fault(said(error)))
         except click.Abort as error:
             cause = error.__cause__
             status = 128 + (cause.number if isinstance(cause, Ended) else Ended().number)
@@ -151,7 +156,7 @@ def _plain_warnings() -> Iterator[None]:
 def _show(error: click.ClickException) -> None:
     try:
         error.show()
-    except BrokenPipeError:
+    except OSError:  # nobody reads it, or there is no room for it: the status says it all the same
         _silence(sys.stderr)
 
 

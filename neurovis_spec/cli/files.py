@@ -131,12 +131,9 @@ def tables(named: Mapping[str, str], network: Network) -> dict[str, FloatArray]:
     for name, text in named.items():
         place = Span(text, 1, 1, 1, 1)
         folder = Path(text).resolve().parent
-        table = read_table(Path(text).resolve().name, folder, folder, place, findings, kinds=_INPUTS)
+        table = read_table(Path(text).resolve().name, folder, folder, place, findings, inside=True, kinds=_INPUTS)
         if table is None:
             continue
-        if not table.present.all():
-            row = int((~table.present).any(axis=1).argmax()) + 1
-            findings.error("cell-empty", place, f"a cell is empty, in row {row} of the numbers")
         if table.numbered:
             from neurovis_spec.language.data_files_header import AS_TEXTS, NUMBERED
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from neurovis_spec.cli.files import count
 from neurovis_spec.cli.tables import number, spread, table
+from neurovis_spec.compiler.states import names_of_states
 from neurovis_spec.findings import printable
 
 if TYPE_CHECKING:
@@ -45,8 +46,11 @@ def _parts(compiled: CompiledNetwork, network: Network) -> Iterator[str]:
         yield "inputs\n" + table([_input(entry) for entry in network.inputs], ("name", "size", "source"))
     if network.outputs:
         names = network.neurons.names
-        outputs = [(o.name, _few([names[i] for i in o.neurons.tolist()])) for o in network.outputs]
-        yield "outputs\n" + table(outputs, ("name", "neurons"))
+        outputs = [
+            (o.name, _few([*names_of_states(network, o.states)] or [names[i] for i in o.neurons.tolist()]))
+            for o in network.outputs
+        ]
+        yield "outputs\n" + table(outputs, ("name", "of"))
     yield _matrix(network)
     choices = [("layout engine", *compiled.choose_engine()), ("backend", *compiled.choose_backend())]
     yield "choices\n" + table([(what, f"{name}: {why}") for what, name, why in choices])
@@ -101,13 +105,12 @@ def _entry(network: Network, index: int, name: str) -> tuple[str, ...]:
     members = np.flatnonzero(connections.entry == index)
     if not len(members):
         return name, "0", "", "", "", ""
-    rules = dict.fromkeys(connections.rules[members].tolist())
     return (
         name,
         f"{len(members):,}",
         spread(connections.weights[members].tolist()),
         _delays(connections.delays[members]),
-        ", ".join(network.plasticity[rule].title for rule in rules if rule >= 0),
+        connections.learns[index] or "",
         _bounds(float(connections.low[members[0]]), float(connections.high[members[0]])),
     )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, TypedDict
 
 import click
 
@@ -21,6 +21,18 @@ if TYPE_CHECKING:
 
 #: activities shown where nothing is written to a file
 _MOST_SHOWN = 20
+
+
+class Chosen(TypedDict):
+    """How the network runs, and what of a step is recorded."""
+
+    backend: str | None
+    every: int
+    start: Recording | None
+    until: Until | None
+    states: tuple[str, ...]
+    neurons: tuple[str, ...]
+    weights: Literal["plastic", "none"]
 
 
 @click.command(
@@ -51,6 +63,21 @@ _MOST_SHOWN = 20
     help="Begin with the last weights and activities of this recording; states of models begin anew.",
 )
 @click.option(
+    "--states",
+    metavar="REF",
+    multiple=True,
+    help="Record a state of models (K.v) or rules ('(K -> O).eligibility') as well. Repeatable.",
+)
+@click.option(
+    "--neurons", metavar="REFS", multiple=True, help="Record these neurons only, such as 'O + K'; default: all."
+)
+@click.option(
+    "--weights",
+    type=click.Choice(["plastic", "none"]),
+    default="plastic",
+    help="Record the weights that can change, the default, or none.",
+)
+@click.option(
     "--until",
     metavar="EXPR",
     help="End at the first step after which this is true: an expression of neurons, outputs, parameters, k and t, with "
@@ -67,11 +94,15 @@ def command(
     every: int,
     start: str | None,
     until: str | None,
+    states: tuple[str, ...],
+    neurons: tuple[str, ...],
+    weights: Literal["plastic", "none"],
     output: Path | None,
 ) -> None:
     """Run a network and write a recording.
 
-    A recording holds the activity of every neuron and every weight that can change, at every step. Without -o
+    A recording holds the activity of every neuron and every weight that can change, at every step, or what of it
+    --every, --neurons and --weights choose; and the states that the outputs of the spec or --states name. Without -o
     nothing is written, and the last step's values are printed. Ctrl-C ends a run, as do SIGTERM, SIGHUP and SIGQUIT;
     its recording holds the steps until then. If a run is killed, a part beside the file holds them (.x.npz.part), which
     is read where the file is not there.
@@ -88,17 +119,26 @@ def command(
     check_files(output, network)
     arrays, before = tables(inputs, network.network), recording_of(start)
     ends = None if until is None else network.until(until)
+    chosen: Chosen = {
+        "backend": backend,
+        "every": every,
+        "start": before,
+        "until": ends,
+        "states": states,
+        "neurons": neurons,
+        "weights": weights,
+    }
     begun = perf_counter()
     if output is not None:
         with writing(output), progress("running") as bar:
-            network.run_to(output, steps, arrays, backend=backend, every=every, start=before, until=ends, progress=bar)
+            network.run_to(output, steps, arrays, progress=bar, **chosen)
         _tell(ends)
         click.echo(f"{output}: {_summary(network, steps, perf_counter() - begun, backend, ends)}")
         return
     with progress("running") as bar:
-        recording = network.run(steps, arrays, backend=backend, every=every, start=before, until=ends, progress=bar)
+        recording = network.run(steps, arrays, progress=bar, **chosen)
     _tell(ends)
-    _print(network, recording, _summary(network, steps, perf_counter() - begun, backend, ends))
+    _print(network, recording, _summary(network, steps, perf_counter() - begun, backend, ends), states)
 
 
 def _tell(until: Until | None) -> None:
@@ -131,19 +171,17 @@ def _check_format(output: Path | None) -> None:
         for_path(output)
 
 
-def _print(network: CompiledNetwork, recording: Recording, summary: str) -> None:
+def _print(network: CompiledNetwork, recording: Recording, summary: str, asked: tuple[str, ...]) -> None:
     """The outputs at the last step recorded, or the activities where the spec names none."""
     from neurovis_spec.cli.tables import number, table
 
-    arrays = network.network
-    last = recording.activity[-1].tolist()
     click.echo(f"{network.name}: {summary}")
-    if arrays.outputs:
-        what = "outputs"
-        rows = [(o.name, " ".join(number(last[i]) for i in o.neurons.tolist()[:_MOST_SHOWN])) for o in arrays.outputs]
-    else:
-        what = "activities"
-        rows = [(name, number(value)) for name, value in zip(recording.neurons, last, strict=True)][:_MOST_SHOWN]
+    names = [output.name for output in network.network.outputs if output.name in recording]
+    what = "outputs" if names else "activities"
+    rows = []
+    for name in [*(names or recording.columns[:_MOST_SHOWN]), *asked]:
+        values = recording[name][-1:].ravel().tolist()
+        rows.append((name, " ".join(number(value) for value in values[:_MOST_SHOWN])))
     click.echo(f"{what} at step {recording.step[-1]}:")
     click.echo(table(rows))
     if recording.weights.shape[1]:

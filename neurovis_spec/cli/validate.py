@@ -32,6 +32,8 @@ FORMATS = ("text", "json", "sarif", "github")
 def command(specs: tuple[str, ...], form: str, strict: bool) -> None:
     """Show all errors and warnings of specs at once.
 
+    What the layout engine of a spec would refuse is an error here, too.
+
     Findings go to standard error, and a line for each spec without errors to standard output. The other formats go to
     standard output: json is an array, sarif is SARIF 2.1.0 for code scanning, github are workflow commands for GitHub
     Actions. The status is 1 if there is an error.
@@ -47,9 +49,10 @@ def command(specs: tuple[str, ...], form: str, strict: bool) -> None:
             found += error.diagnostics
             sources |= error.sources
             continue
-        found += network.warnings
+        refusal = network.refusal()
+        found += network.warnings if refusal is None else (*network.warnings, refusal)
         sources |= network.sources
-        if form == "text" and not (strict and network.warnings):
+        if form == "text" and refusal is None and not (strict and network.warnings):
             arrays = network.network
             size = f"{count(len(arrays.neurons), 'neuron')}, {count(len(arrays.connections), 'connection')}"
             click.echo(f"{STDIN if spec == '-' else printable(spec)}: ok ({size})")

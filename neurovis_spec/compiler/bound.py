@@ -55,7 +55,7 @@ def make_settable(
         *_of_connections(bundles, connections, plasticity),
         *_of_inputs(inputs),
     ]
-    merged = list(_merged(found))
+    merged = list(_merged([one for one in found if len(one.places)]))
     variables: dict[str, Variable] = {}
     initial: list[FloatArray] = []
     start = 0
@@ -135,7 +135,7 @@ def _of_connections(
     start = 0
     for bundle in bundles:
         count = len(bundle.sources)
-        for part in bundle.parts:
+        for part in bundle.parts if count else ():
             members = start + part.within(count)
             if part.field == "first":
                 continue

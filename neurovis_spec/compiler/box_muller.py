@@ -106,3 +106,13 @@ def _polynomial(coefficients: tuple[float, ...], z: FloatArray) -> FloatArray:
         total *= z
         total += coefficient
     return total
+
+
+def constants() -> dict[str, str]:
+    """The numbers above as C, by the names that the text of ``runtime.c_draws`` has for them."""
+    lists = {"LOG": _LOG, "SIN": _SIN, "COS": _COS}
+    counts = {f"{name}_COUNT": str(len(values)) for name, values in lists.items()}
+    texts = {f"{{{name}}}": f"{{{', '.join(map(repr, values))}}}" for name, values in lists.items()}
+    numbers = {"LN2_LOW": _LN2_LOW, "LN2_HIGH": _LN2_HIGH, "TAU": math.tau, "TWO_TO_MINUS_53": 2.0**-53}
+    integers = {"ROOT_HALF": f"INT64_C({_ROOT_HALF})", "FRACTION": f"UINT64_C({_FRACTION})"}
+    return {**counts, **texts, **{name: repr(value) for name, value in numbers.items()}, **integers}

@@ -16,6 +16,7 @@ import numpy as np
 
 from neurovis_spec.compiler.arrays import IntArray
 from neurovis_spec.compiler.bound import make_settable, own_weights
+from neurovis_spec.compiler.canonical import canonical
 from neurovis_spec.compiler.compiled import Compiled
 from neurovis_spec.compiler.connect import Connected, connect, join
 from neurovis_spec.compiler.constants import Constants, parse_formula
@@ -29,11 +30,13 @@ from neurovis_spec.compiler.modules import library_of
 from neurovis_spec.compiler.network import Input, Instance, Network, Output
 from neurovis_spec.compiler.noise import make_noises
 from neurovis_spec.compiler.order import Cycle, levels
+from neurovis_spec.compiler.outputs import make_outputs
 from neurovis_spec.compiler.parameters import make_parameters
 from neurovis_spec.compiler.populate import Population, populate, without_neurons
 from neurovis_spec.compiler.references import Directory, other_parameter
 from neurovis_spec.compiler.ros_settings import RosSettings
-from neurovis_spec.compiler.sections import layout_settings, make_outputs, render_settings
+from neurovis_spec.compiler.sections import layout_settings, render_settings
+from neurovis_spec.compiler.states import singles
 from neurovis_spec.compiler.tables import Files
 from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.compiler.units import Expander, constants_of
@@ -91,11 +94,11 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         _report_no_neurons(spec, population, findings)
         population = without_neurons(population)
     directory = population.directory
-    outputs = make_outputs(spec, directory, findings)
-    ros = _ros(spec, inputs, outputs, units[0].gaps, constants)
     layout = layout_settings(spec.layout, units, population, findings)
     made = connect(units, population, request.limits, seed)
     bundles = made.bundles
+    outputs = make_outputs(spec, population, made, findings)
+    ros = _ros(spec, inputs, outputs, units[0].gaps, constants)
     noises = make_noises(units, population, sum(entry.size for entry in inputs))
     expansion.depend()
     if not made.complete or findings.errors > before or not _under_way(bundles, findings):
@@ -111,6 +114,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         return None
     blocks = make_blocks(population, connections.sources, connections.targets, level)
     program = make_program(blocks, plasticity)
+    ordered = canonical(population.neurons, inputs, outputs, blocks, plasticity)
     content = digest(
         "neurovis 1",
         spec.name.value,
@@ -118,13 +122,11 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         episode,
         seed,
         constants.parameters,
-        population.neurons,
+        ordered[0],
         connections,
-        inputs,
-        outputs,
-        blocks,
-        plasticity,
+        *ordered[1:],
         noises,
+        *((output.name, *singles(output.states)) for output in outputs if output.states),
     )
     slots = tuple(constants.slots)
     network = Network(

@@ -14,6 +14,7 @@ import numpy as np
 from neurovis_spec.compiler.arrays import IntArray, frozen
 from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.entries import Bundle, EntryBuilder, Place
+from neurovis_spec.compiler.learning import title_of
 from neurovis_spec.compiler.limits import Limits
 from neurovis_spec.compiler.network import Connections
 from neurovis_spec.compiler.populate import Population
@@ -145,6 +146,7 @@ def join(bundles: tuple[Bundle, ...], rules: IntArray) -> Connections:
         high=np.repeat(np.array([bundle.high for bundle in bundles], dtype=np.float64), sizes),
         entries=tuple(bundle.name for bundle in bundles),
         descriptions=tuple(bundle.description for bundle in bundles),
+        learns=tuple(None if bundle.learning is None else title_of(bundle.learning) for bundle in bundles),
     )
     for array in (
         result.sources,

@@ -154,6 +154,8 @@ class Constants:
     #: parameter → the parameters that its own formula uses
     uses: dict[str, frozenset[str]] = field(default_factory=dict)
     structural: set[str] = field(default_factory=set)
+    #: names that formulas read, whatever became of these
+    read: set[str] = field(default_factory=set)
     #: parameters whose own formulas are at fault: no follow-up findings about these
     broken: set[str] = field(default_factory=set)
     #: whether there may be parameters that could not be read at all
@@ -225,7 +227,10 @@ class Constants:
         tree = parse_formula(
             formula, known, self.findings, random=random, what=what, incomplete=self.incomplete, later=later
         )
-        return None if tree is None or names(tree) & self.broken else tree
+        if tree is None:
+            return None
+        self.read |= names(tree)
+        return None if names(tree) & self.broken else tree
 
     def unchecked(
         self,

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 #: Where a node of an expression stood, and what is only shown, is no content.
 _SHOWN = frozenset(
-    {
+    # ``slots`` and ``parts`` are how something follows parameters
+    (
         "start",
         "end",
         "title",
@@ -31,9 +32,11 @@ _SHOWN = frozenset(
         "box",
         "role",
         "module",
+        "learns",
         "slots",
         "parts",
-    }
+        "states",
+    )
 )
 
 

@@ -161,7 +161,7 @@ class EntryBuilder:
                 *(part._replace(field="weights" if learning is None else "first") for part in weighted),
                 *(part._replace(field="centres") for part in centred),
                 *bounding,
-                *(part._replace(field="rule") for part in ruled),
+                *(part._replace(field="rule") for part in ruled if learning is not None),
             ),
         )
 

@@ -16,7 +16,7 @@ from neurovis_spec.compiler.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.definitions import Defaults, Definitions
 from neurovis_spec.compiler.draws import Stream
-from neurovis_spec.compiler.limits import PATIENCE, Limits, amount, plural
+from neurovis_spec.compiler.limits import MOST_HINTS, PATIENCE, Limits, amount, plural
 from neurovis_spec.compiler.network import Group, Role
 from neurovis_spec.compiler.positions import positions_of
 from neurovis_spec.compiler.program import Activation, Combine, Model
@@ -280,9 +280,12 @@ class Builder:
         if found is None:
             known = tuple(self.unit.section.inputs)
             if name not in known and not self.definitions.gaps.cover("inputs", name):
-                hint = suggest(name, known, "inputs") or "no inputs are declared; add it under 'inputs'"
+                many = findings.errors >= MOST_HINTS
+                hint = (
+                    None if many else suggest(name, known, "inputs") or "no inputs are declared; add it under 'inputs'"
+                )
                 findings.error("unknown-input", model.input.span, f"there is no input '{shown(name)}'", hint)
-                found = self.unit.inputs.get(meant(name, known) or "")
+                found = None if many else self.unit.inputs.get(meant(name, known) or "")
         if found is None or n is None:
             return None
         if found.size == 1:

@@ -160,11 +160,12 @@ def _text(node: Node) -> str:
     return str(node.value).strip() if isinstance(node, Scalar) else "…"
 
 
-def title_of(rule: Rule, values: Mapping[str, FloatArray], texts: Mapping[str, str]) -> str:
+def title_of(learning: Learning) -> str:
     """A rule in use for display: ``delta(rate=0.01, target=T)``; a parameter that has several values is ``…``."""
     parts = [
         f"{name}={array[0]:g}" if len(array) and (array == array[0]).all() else f"{name}=…"
-        for name, array in values.items()
+        for name, array in learning.parameters.items()
     ]
-    parts += [f"{signal}={texts[signal]}" for signal in rule.signals]
+    rule = learning.rule
+    parts += [f"{signal}={learning.texts[signal]}" for signal in rule.signals]
     return f"{rule.name}({', '.join(parts)})" if parts else rule.name

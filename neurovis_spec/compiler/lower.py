@@ -14,7 +14,7 @@ import numpy as np
 from neurovis_spec.compiler.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.entries import Bundle
 from neurovis_spec.compiler.groups import Kind
-from neurovis_spec.compiler.learning import Learning, title_of
+from neurovis_spec.compiler.learning import Learning
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.program import (
     Block,
@@ -27,7 +27,6 @@ from neurovis_spec.compiler.program import (
     Send,
     Update,
 )
-from neurovis_spec.diagnostics import Span
 
 #: What the neurons of a block have in common: level, activation, model, combination.
 _Key: TypeAlias = tuple[int, str, str, Combine]
@@ -109,9 +108,9 @@ def _column(parts: list[tuple[Mapping[str, FloatArray], IntArray]]) -> Mapping[s
 
 
 def make_plasticity(bundles: tuple[Bundle, ...]) -> tuple[tuple[Plasticity, ...], IntArray]:
-    """One Plasticity a plastic entry, the instances of a module together, and for each connection the number of its
-    Plasticity or −1. Which these are depends on no parameter: in a run it stays."""
-    numbers: dict[Span, int] = {}
+    """One Plasticity a rule, whichever entries learn by it, and for each connection the number of its Plasticity or −1:
+    what is learned by the same rule is computed together."""
+    numbers: dict[str, int] = {}
     parts: list[list[tuple[Learning, IntArray]]] = []
     rules: list[IntArray] = [np.zeros(0, dtype=np.int64)]
     start = 0
@@ -119,7 +118,7 @@ def make_plasticity(bundles: tuple[Bundle, ...]) -> tuple[tuple[Plasticity, ...]
         n, learning = len(bundle.sources), bundle.learning
         number = -1
         if learning is not None:
-            number = numbers.setdefault(bundle.key, len(parts))  # an entry has the same place in all instances
+            number = numbers.setdefault(learning.rule.name, len(parts))
             if number == len(parts):
                 parts.append([])
             parts[number].append((learning, np.arange(start, start + n, dtype=np.int64)))
@@ -136,7 +135,7 @@ def _together(parts: list[tuple[Learning, IntArray]]) -> Plasticity:
     signals = {name: np.concatenate([one.signals[name] for one, _ in parts]) for name in first.signals}
     for array in (members, *parameters.values(), *signals.values()):
         frozen(array)
-    return Plasticity(first.rule, members, parameters, signals, title_of(first.rule, parameters, first.texts))
+    return Plasticity(first.rule, members, parameters, signals)
 
 
 def make_program(blocks: tuple[Block, ...], plasticity: tuple[Plasticity, ...]) -> tuple[Operation, ...]:

@@ -20,6 +20,7 @@ from neurovis_spec.compiler.changes import Change
 from neurovis_spec.compiler.program import Block, Combine, Operation, Plasticity
 from neurovis_spec.compiler.ros_settings import RosSettings
 from neurovis_spec.compiler.settable import Binding, Part, Settable
+from neurovis_spec.compiler.states import StateOf
 from neurovis_spec.compiler.wishes import LayoutSettings, RenderSettings
 from neurovis_spec.language.expressions.tree import Tree
 
@@ -114,6 +115,8 @@ class Connections:
     entries: tuple[str, ...]
     #: what the spec says of each entry
     descriptions: tuple[str | None, ...]
+    #: the rule of each entry as the author wrote it, for display (``delta(rate=0.01)``); None without one
+    learns: tuple[str | None, ...]
 
     def __len__(self) -> int:
         return len(self.sources)
@@ -157,11 +160,18 @@ class Noise:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Output:
-    """A name for neurons whose activity leaves the network; ``scalar`` where it refers to a single neuron."""
+    """A name for what leaves the network: the activities of ``neurons``, or, where there are ``states``, these, and
+    ``neurons`` are those whose models have them. ``scalar`` where it is a single number."""
 
     name: str
     neurons: IntArray
     scalar: bool
+    states: tuple[StateOf, ...] = ()
+
+    @property
+    def size(self) -> int:
+        """How many numbers it is."""
+        return sum(one.size for one in self.states) if self.states else len(self.neurons)
 
 
 @dataclass(frozen=True, eq=False)

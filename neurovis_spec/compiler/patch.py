@@ -146,7 +146,7 @@ class Patcher:
             raise PatchError(f"'{entry.name}' would be {'undefined' if math.isnan(value) else 'infinite'}")
         if not entry.low <= value <= entry.high:
             bounds = f"{entry.low:g} to {entry.high:g}".replace("-inf", "-∞").replace("inf", "∞")
-            raise PatchError(f"'{entry.name}' would be {value:g}; its bounds are {bounds}")
+            raise PatchError(f"'{entry.name}' is {value:g}; its bounds are {bounds}")
 
     def _check(self, binding: Binding, value: Value, parameters: FloatArray) -> None:
         """Raise PatchError where a number is not finite, or out of its bounds."""

@@ -104,7 +104,7 @@ def depend_on_positions(node: FileReference | Sequence | Packed | None, constant
 def _look(node: FileReference | Sequence | Packed | None, constants: Constants, files: Files) -> None:
     """What can be said of positions of which it is not known how many there should be."""
     if isinstance(node, FileReference):
-        files.table(node)
+        files.table(node, gaps=False)
     for item in () if node is None or isinstance(node, FileReference) else node.items:
         for number in item.items if isinstance(item, (Sequence, Packed)) else (item,):
             formula = formula_of(number, constants.findings)
@@ -113,7 +113,7 @@ def _look(node: FileReference | Sequence | Packed | None, constants: Constants, 
 
 
 def _from_file(reference: FileReference, n: int, constants: Constants, files: Files) -> FloatArray | None:
-    table = files.table(reference, (n, 2))
+    table = files.table(reference, (n, 2), gaps=False)
     if table is None:
         return None
     rows, columns = table.values.shape
@@ -121,9 +121,9 @@ def _from_file(reference: FileReference, n: int, constants: Constants, files: Fi
         wanted = f"positions of {plural(n, 'neuron')} are {plural(n, 'row')} of 2 numbers"
         constants.findings.error("wrong-size", reference.path.span, f"{wanted}; the file has {rows} × {columns}")
         return None
-    if not table.present.all():
-        row, column = divmod(int(np.argmin(table.present)), 2)
-        message = f"row {row + 1}, column {column + 1} of the file is empty; a position is two numbers"
+    gap = next(table.gaps(), None)
+    if gap is not None:
+        message = f"row {gap[0]}, column {gap[1]} of the file is empty; a position is two numbers"
         constants.findings.error("file-format", reference.path.span, message)
         return None
     return np.array(table.values, dtype=np.float64)

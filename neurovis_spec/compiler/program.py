@@ -90,8 +90,6 @@ class Plasticity:
     members: IntArray
     parameters: Mapping[str, FloatArray]
     signals: Mapping[str, IntArray]
-    #: how the author wrote it, for display: ``delta(rate=0.01)``
-    title: str
 
 
 # The update program. Names in ``reads`` and ``writes``: inputs, activity, weights, signals (w·a under way), history

@@ -15,6 +15,7 @@ from typing import TypeAlias
 from neurovis_spec.compiler.gaps import Gaps
 from neurovis_spec.compiler.limits import MOST_HINTS, PATIENCE
 from neurovis_spec.compiler.network import Group
+from neurovis_spec.compiler.states import split_sum
 from neurovis_spec.diagnostics import Findings, Span, did_you_mean, listed, meant, nearest, shown, suggest
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.modules import ModuleModel
@@ -205,12 +206,10 @@ def parts(text: Located[str]) -> Iterator[tuple[str, Span]]:
     >>> [(name, span.column) for name, span in parts(Located("K1 + K3", node))]
     [('K1', 1), ('K3', 6)]
     """
-    start = 0
-    for piece in text.value.split("+"):
+    for start, piece in split_sum(text.value):
         stripped = piece.strip()
         offset = start + (len(piece) - len(piece.lstrip()))
         yield stripped, text.node.at(offset, offset + len(stripped))
-        start += len(piece) + 1
 
 
 def resolve_part(name: str, span: Span, directory: Directory, findings: Findings) -> tuple[int, ...] | None:

@@ -16,11 +16,11 @@ from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Input, Output
 from neurovis_spec.compiler.references import key_of
 from neurovis_spec.compiler.ros_settings import NAMESPACE, Publication, RosSettings, Subscription
-from neurovis_spec.diagnostics import Findings, meant, shown, suggest
+from neurovis_spec.diagnostics import Findings, shown, suggest
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.model import lost_names
 from neurovis_spec.language.ros import PublishModel, QosModel, RosModel, SubscribeModel
-from neurovis_spec.language.ros_types import COMPLETE, MESSAGES, Field, all_types, fields_of, numbers_of, plain
+from neurovis_spec.language.ros_types import Field, all_types, fields_of, misspelt, numbers_of, plain
 from neurovis_spec.language.spec import Spec
 
 #: Where a message has its numbers if nothing else is said.
@@ -119,11 +119,11 @@ def _publications(model: RosModel, around: Surroundings, constants: Constants) -
         if output is None:
             _report_output(name, model, around.spec, constants.findings)
         safe = None if entry.safe is None else constants.scalar(entry.safe)
-        size = None if output is None else len(output.neurons)
+        size = None if output is None else output.size
         _check_numbers(entry, size, f"the output '{name}' has", constants.findings)
         if output is not None:
             field = _DATA if entry.field is None else entry.field.value
-            yield Publication(name, entry.topic.value, _type(entry, len(output.neurons)), field, safe)
+            yield Publication(name, entry.topic.value, _type(entry, output.size), field, safe)
 
 
 def _type(entry: SubscribeModel | PublishModel, size: int) -> str:
@@ -158,8 +158,9 @@ def _check_numbers(entry: SubscribeModel | PublishModel, size: int | None, who: 
     name = _type(entry, size or 1)
     fields = fields_of(name)
     if fields is None:
-        assert entry.type is not None
-        _check_type(entry.type, name, findings)
+        if entry.type is not None and misspelt(name):
+            hint = suggest(name, all_types(), "types")
+            findings.error("unknown-message", entry.type.span, f"there is no message type '{shown(name)}'", hint)
         return
     path = _DATA if entry.field is None else entry.field.value
     span = (entry.field or entry.type or entry.topic).span
@@ -195,18 +196,6 @@ def _where(entry: SubscribeModel | PublishModel, path: str, name: str) -> str:
     inner = [one for one in known if one.startswith(f"{path}.")]
     hint = suggest(path, inner or known, "fields with numbers") or ""
     return f"say which with field: {', '.join(known[:8])}" if entry.field is None else hint
-
-
-def _check_type(written: Located[str], name: str, findings: Findings) -> None:
-    """A type that is not in the table is one of somebody's own, unless its package is known as a whole, or can only be
-    meant for one that is known."""
-    package, _, message = name.partition("/")
-    if package not in COMPLETE:
-        right = None if package in MESSAGES else meant(package, tuple(MESSAGES))
-        if right is None or message not in MESSAGES[right]:
-            return
-    hint = suggest(name, all_types(), "types")
-    findings.error("unknown-message", written.span, f"there is no message type '{shown(name)}'", hint)
 
 
 def _check_joints(entry: SubscribeModel, size: int | None, name: str, findings: Findings) -> None:

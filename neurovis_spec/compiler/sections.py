@@ -1,6 +1,6 @@
-"""The sections ``outputs``, ``layout`` and ``render``: references resolved, values checked.
+"""The sections ``layout`` and ``render``: references resolved, values checked.
 
-In: the sections as written and the Directory. Out: Outputs, LayoutSettings, RenderSettings.
+In: the sections as written and the Directory. Out: LayoutSettings, RenderSettings.
 """
 
 from __future__ import annotations
@@ -8,13 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Literal, cast
 
-import numpy as np
-
 from neurovis_spec import plugins
-from neurovis_spec.compiler.arrays import frozen
 from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.mirrors import check_pins, lines_of, mirrors_of
-from neurovis_spec.compiler.network import Output
 from neurovis_spec.compiler.pins import DIAMETER, FARTHEST, pins_of
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import Directory, key_of, look_at_keys, resolve, resolve_end
@@ -24,25 +20,10 @@ from neurovis_spec.diagnostics import Findings, Span, shown, suggest
 from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel, RenderModel
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.source import Mapping as SourceMapping
-from neurovis_spec.language.spec import Spec
 
 #: The most pixels of a picture: 8K is a little less. Its bytes take some 250 MB of memory.
 _MOST_PIXELS = 1 << 25
 _NOTHING = LayoutModel.model_validate(SourceMapping((), Span("", 1, 1, 1, 1)), context=Findings())
-
-
-def make_outputs(spec: Spec, directory: Directory, findings: Findings) -> tuple[Output, ...]:
-    """The named outputs. Without any, nothing leaves the network but its record."""
-    result = []
-    for name, reference in spec.outputs.items():
-        neurons = resolve(reference.parts, directory, findings)
-        if not reference.parts and not reference.failed:
-            findings.error("empty-reference", reference.span, f"the output '{name}' names no neuron")
-        elif neurons is not None:
-            array = np.array(neurons, dtype=np.int64)
-            frozen(array)
-            result.append(Output(name, array, len(neurons) == 1))
-    return tuple(result)
 
 
 def layout_settings(

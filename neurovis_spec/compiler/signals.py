@@ -59,9 +59,9 @@ def _by_file(name: str, path: Located[str], start: int, files: Files, findings: 
     table = files.table_at(path)
     if table is None:
         return None
-    if not table.present.all():
-        row, column = divmod(int(np.argmin(table.present)), table.present.shape[1])
-        message = f"row {row + 1}, column {column + 1} of the file is empty; an input needs a number everywhere"
+    gap = next(table.gaps(), None)
+    if gap is not None:
+        message = f"row {gap[0]}, column {gap[1]} of the file is empty; an input needs a number everywhere"
         findings.error("file-format", path.span, message)
         return None
     return _tabled(name, start, np.array(table.values, dtype=np.float64))

@@ -63,14 +63,17 @@ class Files:
     _tables: _Shelf[Table] = field(default_factory=_Shelf)
     _edges: _Shelf[EdgeTable] = field(default_factory=_Shelf)
 
-    def table(self, reference: FileReference, shape: tuple[int, int] | None = None) -> Table | None:
-        """The numbers of a file, and where it has none; None where it is at fault. A table of many more cells than the
-        ``shape`` that its place needs is refused; whether a smaller one fits, the caller has to say."""
-        return self._table(reference.path, reference.key, shape, keyed=True)
+    def table(
+        self, reference: FileReference, shape: tuple[int, int] | None = None, *, gaps: bool = True
+    ) -> Table | None:
+        """The numbers of a file, and where it has none, which the caller refuses if there may be no ``gaps``; None
+        where it is at fault. A table of many more cells than the ``shape`` that its place needs is refused; whether a
+        smaller one fits, the caller has to say."""
+        return self._table(reference.path, reference.key, shape, keyed=True, gaps=gaps)
 
     def table_at(self, path: Located[str]) -> Table | None:
-        """The same of a path alone, beside which no ``key`` can stand, and of any size."""
-        return self._table(path, None, None, keyed=False)
+        """The same of a path alone, beside which no ``key`` can stand, without gaps and of any size."""
+        return self._table(path, None, None, keyed=False, gaps=False)
 
     def edges(self, reference: FileReference, most: int | None = None) -> EdgeTable | None:
         """The edges of a ``.csv`` file, at most so many; None where it is at fault."""
@@ -87,13 +90,14 @@ class Files:
         return self._edges.get((path.value, None if key is None else key.value), most, room, read)
 
     def _table(
-        self, path: Located[str], key: Located[str] | None, shape: tuple[int, int] | None, *, keyed: bool
+        self, path: Located[str], key: Located[str] | None, shape: tuple[int, int] | None, *, keyed: bool, gaps: bool
     ) -> Table | None:
         def room(cells: int) -> None:
             if shape is not None and cells > max(_FEW, 2 * shape[0] * shape[1]):  # a header counts as well
                 raise CellError("wrong-size", f"it has {amount(cells)} cells; {shape[0]} × {shape[1]} are wanted")
 
         def read(room: Room) -> Table | None:
-            return read_table(path.value, self.root, self.base, path.span, self.findings, key, keyed=keyed, room=room)
+            where = (path.value, self.root, self.base, path.span)
+            return read_table(*where, self.findings, key, keyed=keyed, gaps=gaps, room=room)
 
-        return self._tables.get((path.value, None if key is None else key.value, keyed), shape, room, read)
+        return self._tables.get((path.value, None if key is None else key.value, keyed, gaps), shape, room, read)

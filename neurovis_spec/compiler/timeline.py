@@ -198,21 +198,28 @@ class _Trial:
             effect = effect or bool((now != value).any())
             arrays[binding.array].append(place)
         marks = [patch.parameters[self._root].tobytes()]
-        for name in sorted(arrays):
+        for called, name in sorted((self._called(name), name) for name in arrays):
             bindings = tuple(patch.bindings[place] for place in arrays[name])
             places = np.concatenate([binding.places for binding in bindings])
             values = np.concatenate(
                 [np.broadcast_to(patch.values[place], patch.bindings[place].places.shape) for place in arrays[name]]
             )
-            order = np.argsort(places, kind="stable")
+            same = bool((values == values[0]).all())
+            order = slice(1) if same else np.argsort(places, kind="stable")
             if bindings not in self._places:
-                self._places[bindings] = hashlib.sha256(places[order].tobytes()).digest()
-            same = (values == values[0]).all()
-            marks.append(name.encode() + self._places[bindings] + (values[:1] if same else values[order]).tobytes())
+                self._places[bindings] = hashlib.sha256(np.sort(places).tobytes()).digest()
+            marks.append(called.encode() + self._places[bindings] + values[order].tobytes())
         return b"/".join(marks), effect
+
+    def _called(self, array: str) -> str:
+        """An array by a name in which no order of the spec shows."""
+        kind, _, number = array.partition("/")
+        return f"table/{self.network.inputs[int(number)].name}" if kind == "table" else array
 
     def _clamp(self, change: Change, changed: frozenset[int]) -> bytes:
         """Begin and end clamps; a finding, at what it is clamped to, where that is not finite."""
+        if not (self._held.active or change.clamps):
+            return b""
         before = self._held.order.copy(), self._held.value.copy()
         self._held.follow(changed, self._parameters)
         self._held.end(change.released, self._parameters)

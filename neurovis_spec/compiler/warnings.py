@@ -6,7 +6,6 @@ one: what may be meant (a rate that is a parameter and can be set in a run, a bi
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from typing import Final
 
@@ -17,24 +16,16 @@ from neurovis_spec.compiler.idle import idle_neurons
 from neurovis_spec.compiler.ignored import look_for_ignored
 from neurovis_spec.compiler.inert import changes_nothing
 from neurovis_spec.compiler.lone_indices import look_for_lone_indices
-from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.own_ends import look_for_own_ends
 from neurovis_spec.compiler.references import Section, key_span
 from neurovis_spec.compiler.replaced import look_for_replaced_weights
 from neurovis_spec.compiler.tables import Files
+from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.compiler.unused_parts import look_for_unused_parts
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.data_files_header import AS_TEXTS, NUMBERED
 from neurovis_spec.language.sections import ConnectionModel
 from neurovis_spec.language.source import Mapping, Node, Packed, Scalar, Sequence
-from neurovis_spec.language.spec import Spec
-
-_WORD: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-_DEFINITIONS: Final = ("activations", "models", "rules")
-#: keys whose values are texts for people, or words of the language, never expressions
-_NO_EXPRESSIONS: Final = frozenset(
-    ("title", "description", "authors", "license", "references", "name", "label", "box", "role", "combine", "rows")
-)
 
 
 def warn(compiled: Compiled, findings: Findings) -> None:
@@ -42,7 +33,7 @@ def warn(compiled: Compiled, findings: Findings) -> None:
     _inputs(compiled, findings)
     for section, units in compiled.sections():
         _files(section, units[0].files, findings)
-        _parameters(section, findings)
+        _parameters(section, units, findings)
     look_for_lone_indices(compiled, findings)
     look_for_doubled(compiled, findings)
     look_for_ignored(compiled, findings)
@@ -51,7 +42,7 @@ def warn(compiled: Compiled, findings: Findings) -> None:
     look_for_replaced_weights(compiled, findings)
     look_beyond(compiled, findings)
     _events(compiled, findings)
-    _definitions(compiled.spec, compiled.network, findings)
+    _definitions(compiled, findings)
     _modules(compiled, findings)
     _neurons(compiled, findings)
     _outputs(compiled, findings)
@@ -99,31 +90,30 @@ def _files(section: Section, files: Files, findings: Findings) -> None:
             findings.warning("numbered-columns", model.file.span, NUMBERED, AS_TEXTS)
 
 
-def _parameters(section: Section, findings: Findings) -> None:
-    """Parameters that no expression names."""
-    used: set[str] = set()
-    for entry in section.source.entries:
-        # a definition and a module see their own parameters only
-        if entry.name not in _NO_EXPRESSIONS.union(_DEFINITIONS, ("modules",)):
-            for text in _texts(entry.value, _NO_EXPRESSIONS):
-                used.update(_WORD.findall(text))
+def _parameters(section: Section, units: list[Unit], findings: Findings) -> None:
+    """Parameters that no expression reads."""
+    used = {name for unit in units for name in unit.constants.read}
     for name in section.parameters:
         if name not in used:
             message = f"no expression uses the parameter '{name}'"
             findings.warning("unused-parameter", key_span(section, "parameters", name), message, "remove it, or use it")
 
 
-def _definitions(spec: Spec, network: Network, findings: Findings) -> None:
-    """Activations, models and rules of the spec's own that nothing names."""
-    used = {name for group in network.neurons.groups for name in (group.activation, group.model)}
-    used |= {plasticity.rule.name for plasticity in network.plasticity}
-    for entry in spec.source.entries:
-        if entry.name not in _DEFINITIONS:
-            used.update(_texts(entry.value, frozenset(), keys=True))
-    for section in _DEFINITIONS:
-        node = spec.source.get(section)
+def _definitions(compiled: Compiled, findings: Findings) -> None:
+    """Activations, models and rules of the spec's own that nobody uses. A module without an instance uses whatever it
+    names."""
+    network = compiled.network
+    used = {
+        "activations": {group.activation for group in network.neurons.groups},
+        "models": {group.model for group in network.neurons.groups},
+        "rules": {plasticity.rule.name for plasticity in network.plasticity},
+    }
+    modules = [library.source.get("modules") for library in (compiled.spec, *compiled.included)]
+    named = {text for node in modules if node is not None for text in _texts(node)}
+    for section, names in used.items():
+        node = compiled.spec.source.get(section)
         for entry in node.entries if isinstance(node, Mapping) else ():
-            if entry.name not in used:
+            if entry.name not in names | named:
                 message = f"nobody uses the {section.removesuffix('s')} '{entry.name}'"
                 findings.warning("unused-definition", entry.key.span, message, "remove it, or use it")
 
@@ -147,8 +137,7 @@ _INSTANCE: Final = "add one under 'instances', or remove it"
 def _neurons(compiled: Compiled, findings: Findings) -> None:
     """Neurons that stay at 0 for ever; a finding for each group as it is written."""
     spec, network = compiled.spec, compiled.network
-    events = spec.source.get("events")
-    if events is not None and any(text == "clamp" for text in _texts(events, frozenset(), keys=True)):
+    if any(event.clamp for event in spec.events):
         return  # what is clamped is active from outside
     written = {unit.called(name): (unit, name) for unit in compiled.units for name in unit.section.neurons}
     told: set[Span] = set()
@@ -243,8 +232,8 @@ def _rate(body: ConnectionModel) -> tuple[Span, bool]:
     return body.plasticity.name.span, True
 
 
-def _texts(node: Node, without: frozenset[str], keys: bool = False) -> Iterator[str]:
-    """Every text of a node; ``without`` are keys whose values are left out, ``keys`` adds the keys themselves."""
+def _texts(node: Node) -> Iterator[str]:
+    """Every text of a node, keys included."""
     waiting = [node]
     while waiting:
         node = waiting.pop()
@@ -252,9 +241,8 @@ def _texts(node: Node, without: frozenset[str], keys: bool = False) -> Iterator[
             case Scalar(value=str() as text):
                 yield text
             case Mapping(entries=entries):
-                if keys:
-                    yield from (entry.name for entry in entries)
-                waiting += [entry.value for entry in entries if entry.name not in without]
+                yield from (entry.name for entry in entries)
+                waiting += [entry.value for entry in entries]
             case Packed(texts=texts):
                 yield from texts
             case Sequence(items=items):

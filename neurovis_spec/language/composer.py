@@ -108,26 +108,27 @@ class Composer:
             if self._unread and index in self._unread:
                 scalar = Scalar(True, span, None)  # fits hardly anywhere
             elif event.style in ("'", '"'):
-                scalar = self._quoted(event.value, span, Written(self._text, index, end.index))
+                scalar = self._quoted(event.value, span, index, end.index)
             else:
-                scalar = self._plain(event.value, span, Written(self._text, index, end.index))
+                scalar = self._plain(event.value, span, index, end.index)
         if event.anchor is not None:
             self._anchored[event.anchor] = scalar
         return scalar
 
-    def _plain(self, text: str, span: Span, written: Written) -> Scalar:
-        inner = 0 if span.line == span.end_line else None
+    def _plain(self, text: str, span: Span, begin: int, end: int) -> Scalar:
+        written = None if span.line == span.end_line else Written(self._text, begin, end)
+        inner = 0 if written is None else None
         try:
-            return Scalar(resolve(text), span, inner, written if inner is None else None)
+            return Scalar(resolve(text), span, inner, written)
         except NumberRangeError as error:
             self._refuse.number(error, span)
             return Scalar(error.nearest, span, inner)
 
-    def _quoted(self, text: str, span: Span, written: Written) -> Scalar:
+    def _quoted(self, text: str, span: Span, begin: int, end: int) -> Scalar:
         # Escapes are longer than what they stand for: equal lengths mean that there are none.
-        if span.line == span.end_line and written.end - written.begin - 2 == len(text):
+        if span.line == span.end_line and end - begin - 2 == len(text):
             return Scalar(text, span, 1)
-        return Scalar(self._refuse.escaped_controls(text, span), span, None, written)
+        return Scalar(self._refuse.escaped_controls(text, span), span, None, Written(self._text, begin, end))
 
     def _block_scalar(self, event: ScalarEvent, index: int, line: int, column: int) -> Scalar:
         # Parsers differ in how much of the blank lines behind it belongs to a block scalar: none, we say.

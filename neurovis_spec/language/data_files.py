@@ -8,11 +8,12 @@ reads a kind of file is imported with the first file of that kind.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import islice
 from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Final
 
 from neurovis_spec.diagnostics import Findings, Span, suggest
-from neurovis_spec.language.data_files_table import CellError, Room, Table, full
+from neurovis_spec.language.data_files_table import EMPTY_CELL, MOST_FAULTS, CellError, Faults, Room, Table, full
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.reader_files import FileFault, read_bytes
 
@@ -24,6 +25,10 @@ __all__ = ["KINDS", "CellError", "Room", "Table", "locate", "read_data", "read_e
 LARGEST: Final = 256 << 20  # bytes; ten million connections in double precision are 80 MB
 #: characters of a path: what common systems take
 LONGEST_PATH: Final = 4096
+#: what is said of NaN and infinity where no cell may be empty
+NO_GAP: Final = "a finite number is needed in every cell"
+#: bytes of a file of text that is shown with what is wrong in it
+_SHOWN: Final = 1 << 20
 _FROM: Final = "paths are relative to the file that names them"
 #: files that hold a table of numbers
 KINDS: Final = (".csv", ".npy", ".npz", ".mtx")
@@ -81,6 +86,8 @@ def read_table(
     key: Located[str] | None = None,
     *,
     keyed: bool = True,
+    gaps: bool = True,
+    inside: bool = False,
     kinds: Iterable[str] = KINDS,
     room: Room | None = None,
 ) -> Table | None:
@@ -88,8 +95,10 @@ def read_table(
 
     A ``.csv`` may begin with a row of texts, the header; its empty cells are absent, and so is what an ``.mtx`` and a
     sparse ``.npz`` leave out. ``key`` names an array of an ``.npz``; ``keyed`` says whether the author can give one at
-    this place. ``room`` may refuse a table for its size before it is made. Codes: those of ``read_data`` and ``room``,
-    and ``file-format``, ``invalid-utf8``, ``not-finite``, ``missing-key``, ``unknown-array``, ``useless-key``.
+    this place, ``gaps`` whether cells may be empty there. ``inside``: none may, and findings stand at the cells of a
+    ``.csv``, not where it is named. ``room`` may refuse a table for its size before it is made. Codes: those of
+    ``read_data`` and ``room``, and ``file-format``, ``invalid-utf8``, ``not-finite``, ``cell-empty``, ``missing-key``,
+    ``unknown-array``, ``useless-key``.
     """
     suffix = Path(path_text).suffix.lower()
     if suffix not in kinds:
@@ -103,13 +112,27 @@ def read_table(
     if data is None:
         return None
     try:
-        return _parsed(suffix, data, None if key is None else key.value, room)
+        table = _parsed(suffix, data, None if key is None else key.value, room)
+        if inside:
+            _check_full(table)
+        return table
     except CellError as error:
         if error.code == "missing-key" and not keyed:
             error = CellError("file-format", str(error), "keep the one that is meant in a file of its own")
+        if inside and suffix == ".csv":
+            _refuse_inside(error, data, span, findings)
+            return None
         place = key.span if key is not None and error.code == "unknown-array" else span
-        _refuse(error, path_text, place, findings)
+        _refuse(error, path_text, place, findings, gaps)
         return None
+
+
+def _check_full(table: Table) -> None:
+    """Refuse empty cells. Raises CellError."""
+    faults = Faults()
+    for row, column in islice(table.gaps(), MOST_FAULTS):
+        faults.note(row, CellError("cell-empty", f"row {row}, column {column}: a cell is empty", NO_GAP, (row, column)))
+    faults.check()
 
 
 def _parsed(suffix: str, data: bytes, key: str | None, room: Room | None) -> Table:
@@ -172,9 +195,25 @@ def _refuse_key(key: Located[str], findings: Findings) -> None:
     findings.error("useless-key", key.span, "'key' names an array of an .npz file, and this file is none")
 
 
-def _refuse(error: CellError, path_text: str, span: Span, findings: Findings) -> None:
+def _refuse(error: CellError, path_text: str, span: Span, findings: Findings, gaps: bool = True) -> None:
     for one in (error, *error.others):
-        findings.error(one.code, span, f"the file '{_short(path_text)}': {one}", one.hint, several=True)
+        message = f"the file '{_short(path_text)}': {one}"
+        findings.error(one.code, span, message, _hint(one, gaps), several=True)
+
+
+def _hint(error: CellError, gaps: bool) -> str | None:
+    return NO_GAP if error.hint == EMPTY_CELL and not gaps else error.hint
+
+
+def _refuse_inside(error: CellError, data: bytes, span: Span, findings: Findings) -> None:
+    """The same at the cells of a file of text, whose lines are then shown."""
+    from neurovis_spec.language.data_files_csv import cell_at
+
+    for one in (error, *error.others):
+        place = span if one.at is None else cell_at(data, span.file, one.at)
+        findings.error(one.code, place, str(one), _hint(one, False))
+    if len(data) <= _SHOWN:
+        findings.sources[span.file] = data.decode("utf-8-sig", "replace")
 
 
 def _neighbours(path: Path) -> str | None:

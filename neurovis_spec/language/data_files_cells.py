@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from neurovis_spec.language.data_files_table import CellError, quoted
+from neurovis_spec.language.data_files_table import EMPTY_CELL, CellError, quoted
 
 #: bytes of a cell; Python's reader takes twice as many
 LONGEST_CELL: Final = 1 << 16
@@ -39,8 +39,9 @@ def check_lengths(data: bytes) -> None:
         ends = [end for mark in (b",", b"\n", b"\r") if (end := data.find(mark, start + half, high)) >= 0]
         if min(ends, default=min(len(data), high)) - max(begin, low) > LONGEST_CELL:
             *before, line = data[: max(begin, low)].replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
-            place = f"row {len(before) + 1}, column {line.count(b',') + 1}"
-            raise CellError("file-format", f"{place}: no number or name has more than {LONGEST_CELL:,} bytes")
+            at = len(before) + 1, line.count(b",") + 1
+            message = f"row {at[0]}, column {at[1]}: no number or name has more than {LONGEST_CELL:,} bytes"
+            raise CellError("file-format", message, at=at)
 
 
 def check_utf8(data: bytes) -> None:
@@ -56,7 +57,7 @@ def check_utf8(data: bytes) -> None:
             decoder.decode(part, final=fed == len(data))
     except UnicodeDecodeError as error:
         row = data.count(b"\n", 0, fed - len(error.object) + error.start) + 1
-        raise CellError("invalid-utf8", f"row {row} is not UTF-8", "save the file as UTF-8") from None
+        raise CellError("invalid-utf8", f"row {row} is not UTF-8", "save the file as UTF-8", (row, 0)) from None
 
 
 def is_number(cell: str) -> bool:
@@ -122,13 +123,13 @@ def number_of(cell: str, row: int, column: int) -> float:
     plain = len(cell) <= _LONGEST_NUMBER and _NUMBER.fullmatch(cell)
     if plain and math.isfinite(value := float(cell)):
         return value
-    place = f"row {row}, column {column}"
+    place, at = f"row {row}, column {column}", (row, column)
     if plain:
-        raise CellError("not-finite", f"{place}: {quoted(cell)} is beyond double precision")
+        raise CellError("not-finite", f"{place}: {quoted(cell)} is beyond double precision", at=at)
     if _NOT_FINITE.fullmatch(cell):
-        raise CellError("not-finite", f"{place}: '{cell}' is not finite", "an empty cell means that there is none")
+        raise CellError("not-finite", f"{place}: '{cell}' is not finite", EMPTY_CELL, at)
     hint = "columns are separated by commas" if ";" in cell or "\t" in cell else None
-    raise CellError("file-format", f"{place}: {quoted(cell)} is no number", hint)
+    raise CellError("file-format", f"{place}: {quoted(cell)} is no number", hint, at)
 
 
 def counted(cells: int) -> str:

@@ -18,6 +18,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.data_files_cells import (
     LONGEST_CELL,
     check_lengths,
@@ -60,7 +61,7 @@ def read_rows(data: bytes) -> Iterator[Row]:
         for cells in reader:
             yield Row(reader.line_num, cells)
     except csv.Error as error:
-        raise CellError("file-format", f"row {reader.line_num} is no CSV: {error}") from error
+        raise CellError("file-format", f"row {reader.line_num} is no CSV: {error}", at=(reader.line_num, 0)) from error
     if not reader.line_num:
         raise empty()
 
@@ -242,7 +243,28 @@ def _one_by_one(cells: list[str], row: int, column: int, width: int, faults: Fau
 
 def _ragged(row: int, cells: int, width: int, header: tuple[str, ...] | None) -> CellError:
     message = f"row {row} has {counted(cells)}, the first row {width}"
-    return CellError("file-format", message, NO_COMMENT if _comment(header) else "rows of a table are equally long")
+    hint = NO_COMMENT if _comment(header) else "rows of a table are equally long"
+    return CellError("file-format", message, hint, (row, min(cells, width + 1)))
+
+
+def cell_at(data: bytes, file: str, at: tuple[int, int]) -> Span:
+    """Where a cell of a file stands, by its row and its column; a column of 0 is the whole row."""
+    row, column = at
+    lines = data.removeprefix(_MARK).replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n", row)
+    line = lines[row - 1].decode("utf-8", "replace") if row <= len(lines) else ""
+    begin, end, count = 0, len(line), 1
+    quoted = False
+    for place, character in enumerate(line if column else ""):
+        if character == '"':
+            quoted = not quoted
+        elif character == "," and not quoted:
+            if count == column:
+                end = place
+                break
+            begin, count = place + 1, count + 1
+    cell = line[begin:end]
+    begin += (len(cell) - len(cell.lstrip())) % (len(cell) + 1)
+    return Span(file, row, begin + 1, row, max(begin + 1, begin + len(cell.strip())) + 1)
 
 
 def _comment(header: tuple[str, ...] | None) -> bool:

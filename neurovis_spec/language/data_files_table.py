@@ -6,7 +6,7 @@ In: shapes and entries as a file states them. Out: Table. Memory is taken only a
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Final, TypeAlias
 
@@ -24,13 +24,19 @@ Room: TypeAlias = Callable[[int], None]
 SPARSER: Final = "list its entries as 'edges', or divide it among several entries of 'connections'"
 
 
-class CellError(ValueError):
-    """What is wrong with a file: a finding's code, a sentence that names the place, and perhaps a hint."""
+#: what is said of NaN and infinity where a cell may be empty
+EMPTY_CELL: Final = "an empty cell means that there is none"
 
-    def __init__(self, code: str, message: str, hint: str | None = None) -> None:
+
+class CellError(ValueError):
+    """What is wrong with a file: a finding's code, a sentence that names the place, and perhaps a hint; of a file of
+    text also ``at``, the row and the column of the cell, from 1 (a column of 0: the whole row)."""
+
+    def __init__(self, code: str, message: str, hint: str | None = None, at: tuple[int, int] | None = None) -> None:
         super().__init__(message)
         self.code = code
         self.hint = hint
+        self.at = at
         #: what else is wrong with the file, in its order
         self.others: tuple[CellError, ...] = ()
 
@@ -77,6 +83,12 @@ class Table:
     present: NDArray[np.bool_]
     header: tuple[str, ...] | None = None
     numbered: bool = False
+
+    def gaps(self) -> Iterator[tuple[int, int]]:
+        """The rows and columns, from 1 and the header included, of the cells that are empty."""
+        for cell in np.flatnonzero(~self.present):
+            row, column = divmod(int(cell), self.present.shape[1])
+            yield 1 + row + (self.header is not None), 1 + column
 
 
 def check_cells(cells: int, most: int = MOST_CELLS, *, hint: str | None = None) -> None:

@@ -7,11 +7,15 @@ nothing is known, which is no mistake: there are thousands, and everybody may wr
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Final, Literal
 
+from neurovis_spec.diagnostics import meant
+
+_DIGITS: Final = re.compile("[0-9]+")
 _STAMPED: Final = "Header header"
 _COVARIANCE: Final = "float64[36] covariance"
 _MULTI: Final = "MultiArrayLayout layout, {}[] data"
@@ -98,6 +102,20 @@ MESSAGES: Final[Mapping[str, Mapping[str, str]]] = {
 }
 #: Packages of which the table has all types.
 COMPLETE: Final = frozenset({"std_msgs"})
+#: Other types of these packages, whose fields are no numbers to be taken, or differ between ROS 1 and ROS 2.
+_OTHERS: Final[Mapping[str, str]] = {
+    "geometry_msgs": (
+        "AccelWithCovariance AccelWithCovarianceStamped Inertia InertiaStamped Polygon PolygonInstance "
+        "PolygonInstanceStamped PolygonStamped PoseArray VelocityStamped"
+    ),
+    "sensor_msgs": (
+        "BatteryState CameraInfo ChannelFloat32 CompressedImage Image JoyFeedback JoyFeedbackArray LaserEcho "
+        "MultiDOFJointState MultiEchoLaserScan NavSatFix NavSatStatus PointCloud PointCloud2 PointField Range "
+        "RegionOfInterest TimeReference"
+    ),
+    "nav_msgs": "Goals GridCells MapMetaData OccupancyGrid Path Trajectory TrajectoryPoint",
+    "trajectory_msgs": "JointTrajectory MultiDOFJointTrajectory MultiDOFJointTrajectoryPoint",
+}
 
 _NUMBERS: Final = frozenset(
     ("bool", "byte", "char", "float32", "float64", *(f"{sign}int{bits}" for sign in ("", "u") for bits in _INTEGERS))
@@ -129,6 +147,28 @@ def plain(name: str) -> str:
 def all_types() -> tuple[str, ...]:
     """The types of the table."""
     return tuple(f"{package}/{name}" for package, names in MESSAGES.items() for name in names)
+
+
+def misspelt(name: str) -> bool:
+    """Whether there is surely no such type: its package is known as a whole, or it can only be meant for another one.
+
+    >>> misspelt("std_msgs/Flaot64"), misspelt("geometry_msgs/Twsit"), misspelt("sensor_msg/Imu")
+    (True, True, True)
+    >>> misspelt("geometry_msgs/Pose3D"), misspelt("geometry_msgs/Inertia"), misspelt("my_msgs/Twsit")
+    (False, False, False)
+    """
+    package, _, message = plain(name).partition("/")
+    if package not in MESSAGES:
+        right = meant(package, tuple(MESSAGES))
+        return right is not None and message in _known(right)
+    if package in COMPLETE or message in _known(package):
+        return message not in _known(package)
+    right = meant(message, _known(package))
+    return right is not None and _DIGITS.findall(right) == _DIGITS.findall(message)
+
+
+def _known(package: str) -> tuple[str, ...]:
+    return (*MESSAGES[package], *_OTHERS.get(package, "").split())
 
 
 @cache

@@ -7,20 +7,15 @@ before it starts; what it gives back is checked, put on the grid of 1/1024 and m
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import cast
 
-from neurovis_spec import plugins
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.diagnostics import suggest
 from neurovis_spec.garbage import uncollected
 from neurovis_spec.layout.choose import choose_engine
+from neurovis_spec.layout.engines import engine_of
 from neurovis_spec.layout.geometry import distance, snap
 from neurovis_spec.layout.model import (
-    RADIUS,
-    Capabilities,
     Layout,
-    LayoutEngine,
     LayoutProblem,
     LayoutRefusalError,
     Point,
@@ -28,10 +23,8 @@ from neurovis_spec.layout.model import (
     Route,
 )
 from neurovis_spec.layout.problem import problem_of
+from neurovis_spec.layout.refusals import asked_by, refuse
 from neurovis_spec.progress import Progress
-
-#: Rounding in the last bit does not make two pins overlap.
-_SLACK = 1e-9
 
 
 def lay_out(
@@ -48,9 +41,8 @@ def lay_out_problem(problem: LayoutProblem, engine: str = "auto", progress: Prog
     Raises LayoutRefusalError where the engine is unknown, or cannot do what the problem asks for.
     """
     name = choose_engine(problem)[0] if engine == "auto" else engine
-    chosen = _engine(name)
-    refuse_what_it_cannot(problem, name, chosen.capabilities)
-    _refuse_close_pins(problem)
+    chosen = engine_of(name)
+    refuse(asked_by(problem), name, chosen.capabilities)
     with uncollected():
         if progress is not None and chosen.capabilities.progress:
             result = cast(ReportingEngine, chosen).lay_out(problem, progress)
@@ -58,70 +50,6 @@ def lay_out_problem(problem: LayoutProblem, engine: str = "auto", progress: Prog
             result = chosen.lay_out(problem)
         _check(problem, name, result)
         return _tidy(problem, name, result)
-
-
-def _engine(name: str) -> LayoutEngine:
-    try:
-        made: object = plugins.load(plugins.LAYOUTS, name)
-    except KeyError:
-        known = plugins.names(plugins.LAYOUTS)
-        hint = suggest(name, ("auto", *known), "known engines")
-        raise LayoutRefusalError("unknown-engine", f"there is no layout engine '{name}' here", hint) from None
-    if not isinstance(made, LayoutEngine) or not isinstance(made.capabilities, Capabilities):
-        raise LayoutRefusalError("broken-engine", f"what is installed as layout engine '{name}' is none")
-    return made
-
-
-def refuse_what_it_cannot(problem: LayoutProblem, name: str, can: Capabilities) -> None:
-    """Raise LayoutRefusalError for the first thing that the problem asks for beyond the capabilities."""
-    neurons, edges = len(problem.neurons), len(problem.edges)
-    if neurons > can.neurons or edges > can.edges:
-        raise LayoutRefusalError(
-            "layout-too-large",
-            f"the engine '{name}' draws at most {can.neurons} neurons and {can.edges} connections; "
-            f"this network has {neurons} and {edges}",
-        )
-    if not can.free and len(problem.pins) < neurons:
-        free = [n for i, n in enumerate(problem.neurons) if i not in problem.pins]
-        more = f" and {len(free) - 1} more" if len(free) > 1 else ""
-        raise LayoutRefusalError(
-            "position-missing",
-            f"the engine '{name}' needs a position for every neuron; '{free[0]}'{more} has none",
-            "give it one in layout.positions, or choose the layered engine, which arranges the rest around the pins",
-            tuple(free),
-        )
-    asked: Mapping[str, tuple[bool, bool, str]] = {
-        "layout-pins-unsupported": (bool(problem.pins), can.pins, "keep pinned positions (layout.positions)"),
-        "layout-arrange-unsupported": (bool(problem.arrange), can.arrange, "arrange groups (layout.arrange)"),
-        "layout-boxes-unsupported": (bool(problem.boxes), can.boxes, "keep the members of a box together"),
-        "layout-mirror-unsupported": (bool(problem.mirrors), can.mirrors, "draw mirror images (layout.mirror)"),
-        "layout-align-unsupported": (bool(problem.align), can.align, "put neurons on one line (layout.align)"),
-        "layout-memory-unsupported": (problem.memory is not None, can.memory, "remember a layout (layout.file)"),
-        "layout-direction-unsupported": (problem.direction != "down", can.direction, "draw in another direction"),
-    }
-    for code, (wanted, possible, what) in asked.items():
-        if wanted and not possible:
-            raise LayoutRefusalError(code, f"the engine '{name}' cannot {what}", "the engine 'layered' can")
-
-
-def _refuse_close_pins(problem: LayoutProblem) -> None:
-    """Two pins whose discs would overlap, found through cells as wide as a disc."""
-    cells: dict[tuple[int, int], list[int]] = {}
-    for index, (x, y) in sorted(problem.pins.items()):
-        if not (math.isfinite(x) and math.isfinite(y)):
-            name = problem.neurons[index]
-            raise LayoutRefusalError("pin-not-finite", f"the pin of '{name}' is not finite", about=(name,))
-        column, row = math.floor(x / (2 * RADIUS)), math.floor(y / (2 * RADIUS))
-        for near in ((column + i, row + j) for i in (-1, 0, 1) for j in (-1, 0, 1)):
-            for other in cells.get(near, ()):
-                if distance(problem.pins[other], (x, y)) < 2 * RADIUS - _SLACK:
-                    raise LayoutRefusalError(
-                        "pins-too-close",
-                        f"the pins of '{problem.neurons[other]}' and '{problem.neurons[index]}' are closer than "
-                        f"{2 * RADIUS:g}: their discs would overlap",
-                        about=(problem.neurons[other], problem.neurons[index]),
-                    )
-        cells.setdefault((column, row), []).append(index)
 
 
 def _check(problem: LayoutProblem, name: str, result: Layout) -> None:

@@ -10,6 +10,7 @@ import json
 import math
 import re
 
+from neurovis_spec.compiler.pins import FARTHEST
 from neurovis_spec.diagnostics import Findings, suggest
 from neurovis_spec.language.reader import read_content, read_text
 from neurovis_spec.language.source import Mapping, Node, Packed, Scalar, Sequence, SourceDocument, describe
@@ -22,6 +23,8 @@ _NAME = r"[A-Za-z_][A-Za-z0-9_]*(?:\.[A-Za-z_][A-Za-z0-9_]*)*"
 _PLAIN = re.compile(rf"{_NAME}(?: -> {_NAME}(?: \([0-9]+\))?)?")
 #: What some YAML reader takes for something else than a text.
 _SPECIAL = frozenset({"null", "true", "false", "yes", "no", "on", "off", "y", "n"})
+#: How far out anything may stand: what is arranged around the farthest pins may lie beyond them.
+_FARTHEST = 2 * FARTHEST
 #: A YAML key this long has to be announced by a question mark.
 _LONG_KEY = 1000
 
@@ -163,6 +166,9 @@ def _read_number(node: Node, what: str, findings: Findings) -> float | None:
         return None
     if not math.isfinite(value):
         findings.error("not-finite", node.span, f"{what} has a number that is not finite")
+        return None
+    if abs(value) > _FARTHEST:
+        findings.error("out-of-range", node.span, f"{what} lies within {_FARTHEST:g} of the origin")
         return None
     return float(value)
 

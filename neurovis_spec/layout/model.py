@@ -124,6 +124,8 @@ class Capabilities:
     pins: bool = False
     #: lays out what is not pinned (an engine without it needs every position)
     free: bool = True
+    #: draws what is not pinned where its ``position`` says (an engine with it needs one for every other neuron)
+    places: bool = False
     arrange: bool = False
     boxes: bool = False
     direction: bool = False

@@ -49,13 +49,17 @@ def _compiled(text: str, file: str, folder: Path, root: Path, files: Files) -> C
     findings = Findings()
     read = pipeline.read_string(text, file, findings)
     spec = None if read is None else pipeline.shape(read, findings)
-    network = None
+    network = refusal = None
     if spec is not None:
         includes = read_includes(spec, folder, root, findings, files.read)
-        network = pipeline.build(spec, Request(folder, root, includes=includes), findings)
+        request = Request(folder, root, includes=includes)
+        network = pipeline.build(spec, request, findings)
+        if network is not None and not findings.failed:
+            refusal = pipeline.refusal(spec, request, network, None)
     pipeline.allow(findings)
     others = frozenset(place_of(name, folder) for name in findings.sources if name != file)
-    return Checked(findings.sorted(), None if findings.failed else network, others)
+    found = findings.sorted()
+    return Checked(found if refusal is None else (*found, refusal), None if findings.failed else network, others)
 
 
 def place_of(file: str, folder: Path) -> Path:

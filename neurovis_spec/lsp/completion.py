@@ -121,6 +121,8 @@ def _of_role(role: Role | None, scope: Scope, path: Path, front: str, index: Ind
             yield from _formula(role, scope, path, index, place)
         case "ends" | "references":
             yield from _neurons(scope, front, index, single=path[-2:-1] == ("positions",))
+            if path[:1] == ("outputs",):
+                yield from _states(scope, front, index)
         case "choice":
             assert role.kind is not None
             yield from _definitions(known(role.kind, index.all_items).values())
@@ -232,6 +234,25 @@ def _neurons(scope: Scope, front: str, index: Index, single: bool = False, signa
         return
     for group in groups:
         yield from (_Offer(name, "neuron", f"of {group.text}") for name in _numbered(group, index))
+
+
+def _states(scope: Scope, front: str, index: Index) -> Iterator[_Offer]:
+    """Behind the dot after a group or a neuron: the states of its model."""
+    way = _WAY.search(front)
+    if way is None:
+        return
+    *instances, owner, _ = way[0].split(".")
+    module = index.module_at(instances, scope.module)
+    if index.module_of(owner, module) is not None or (instances and module is None):
+        return
+    models = known("model", index.all_items)
+    for group in index.declared("neuron", module):
+        if group.text == owner or owner in _numbered(group, index):
+            path = (*group.item.path, "model")
+            told = index.attribute(group, "model")
+            inner = (key[-1] for key in index.home(group).keys if key[:-1] == path)
+            model = models.get(told.text if told is not None else str(next(inner, "")))
+            yield from (_Offer(name, "parameter", "state") for name in (() if model is None else model.states))
 
 
 def _instances(module: str | None, index: Index) -> Iterator[_Offer]:

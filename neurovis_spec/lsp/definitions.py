@@ -34,6 +34,7 @@ class Definition:
     signals: tuple[str, ...]
     equations: tuple[str, ...]
     description: str
+    states: tuple[str, ...] = ()
 
     @property
     def usage(self) -> str:
@@ -95,7 +96,9 @@ def _definition(section: str, name: str, texts: Mapping[tuple[str, ...], str]) -
             parameters.append(Parameter(path[1], default, texts.get((*path, "description"), "")))
     signals = tuple(text for path, text in texts.items() if path[:1] == ("signals",) and text)
     description = " ".join(texts.get(("description",), "").split())
-    return Definition(DEFINITIONS[section], name, tuple(parameters), signals, _equations(section, texts), description)
+    states = tuple(dict.fromkeys(path[1] for path in texts if path[:1] == ("state",) and len(path) > 1))
+    equations = _equations(section, texts)
+    return Definition(DEFINITIONS[section], name, tuple(parameters), signals, equations, description, states)
 
 
 def _equations(section: str, texts: Mapping[tuple[str, ...], str]) -> tuple[str, ...]:

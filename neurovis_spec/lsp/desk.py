@@ -23,7 +23,7 @@ _Found = Mapping[Path, tuple[Diagnostic, ...]]
 
 @dataclass
 class Desk:
-    """The open documents by their URIs; ``path_of`` gives the path of a URI, None where it names no file."""
+    """The open documents by their URIs; ``path_of`` gives the resolved path of a URI, None where it names no file."""
 
     path_of: Callable[[str], Path | None]
     _files: Files = field(default_factory=Files)
@@ -42,8 +42,7 @@ class Desk:
     def place(self, uri: str) -> Path | None:
         """The file of a URI."""
         if uri not in self._places:
-            path = self.path_of(uri)
-            self._places[uri] = None if path is None else path.resolve()
+            self._places[uri] = self.path_of(uri)
         return self._places[uri]
 
     def document(self, uri: str, source: str) -> Document:

@@ -112,19 +112,32 @@ def _references(item: Item, scope: Scope, text: Text, lookup: Lookup) -> Iterato
             parts.append((at, at + len(part)))
             at += len(part) + 1
     places = iter(_inside(item, text, parts))
+    stately = item.path[:1] == ("outputs",)
     low: list[tuple[str, Scope | None, Name | None]] = []  # the instances of the name before, with where they lead
     end = 0
     for match in found:
         *instances, last = match[0].split(".")
+        if item.text[: match.start()].rstrip().endswith(")."):  # the state of a rule: (K -> O).eligibility
+            for _ in (*instances, last):
+                next(places)
+            continue
         # the second end of a range may leave out what it has in common with the first: left1.K1..K3
         common = low[: len(low) - len(instances)] if item.text[end : match.start()].strip() == ".." else []
         if [part for part, _, _ in low[len(common) :]] != instances:
             common = []
         here, via = common[-1][1:] if common else (Scope(scope.module), None)
         low, end = list(common), match.end()
-        for part in instances:
+        for number, part in enumerate(instances, 1):
             span, exact = next(places)
-            if here is not None:
+            if (
+                here is not None
+                and stately
+                and number == len(instances)
+                and lookup.module_of(part, here.module) is None
+            ):
+                yield Name("neuron", part, span, here, item, False, exact, via)  # K.v is the state v of K
+                here = None
+            elif here is not None:
                 via = Name("instance", part, span, here, item, False, exact, via)
                 yield via
                 module = lookup.module_of(part, here.module)

@@ -50,12 +50,16 @@ class SpecServer(LanguageServer):
 
     def document(self, uri: str) -> Document:
         """An open document as it is now; the same object until it, or a file that it includes, changes."""
-        sources = {other: document.source for other, document in self.workspace.text_documents.items()}
         roots = [_path_of(folder.uri) for folder in self.workspace.folders.values()]
         if not roots and self.workspace.root_uri:
             roots = [_path_of(self.workspace.root_uri)]
-        self._desk.update(sources, tuple(root.resolve() for root in roots if root is not None), self._encoding)
+        self._desk.update(self._texts, tuple(root for root in roots if root is not None), self._encoding)
         return self._desk.document(uri, self.workspace.get_text_document(uri).source)
+
+    @property
+    def _texts(self) -> dict[str, str]:
+        """The open texts by their URIs as the client writes them; pygls keeps them with what is escaped resolved."""
+        return {document.uri: document.source for document in self.workspace.text_documents.values()}
 
     @property
     def _encoding(self) -> str:
@@ -137,7 +141,7 @@ class SpecServer(LanguageServer):
         if uri is None:
             return
         found = self._desk.findings(path)
-        if uri in self.workspace.text_documents:
+        if uri in self._texts:
             document = self.document(uri)
             told = wire.diagnostics(document.text, found)
             told += wire.included_faults(document, self._desk.around(uri, path))
@@ -148,8 +152,12 @@ class SpecServer(LanguageServer):
 
 
 def _path_of(uri: str) -> Path | None:
-    path = to_fs_path(uri) if uri.startswith("file:") else None
-    return None if path is None else Path(path)
+    """The path of a URI; None where it names no file, as of a text that was never saved, or that no file can have."""
+    try:
+        path = to_fs_path(uri) if uri.startswith("file:") else None
+        return Path(path).resolve() if path else None
+    except (OSError, RuntimeError, ValueError):  # NUL, a lone surrogate, a name too long, links in a circle
+        return None
 
 
 def make_server(pause: float = PAUSE) -> SpecServer:

@@ -56,6 +56,24 @@ class Stepper(Protocol):
 
 
 @runtime_checkable
+class Runner(Protocol):
+    """A Stepper that makes many steps in one call."""
+
+    @property
+    def at_once(self) -> int:
+        """How many steps are well made in one call, so that a run can be stopped between two."""
+        ...
+
+    def run(
+        self, state: State, vectors: FloatArray, activity: FloatArray, weights: FloatArray, every: int, look: bool
+    ) -> int:
+        """Make a step for each row of ``vectors``, at least one; keep those that ``every`` divides: a[t] in the first
+        rows of ``activity``, the w[t] that change in those of ``weights``. With ``look``, end behind the first step
+        after which something is not finite. Gives the number of steps made."""
+        ...
+
+
+@runtime_checkable
 class Backend(Protocol):
     """A way to execute a network."""
 
@@ -107,19 +125,30 @@ def listing() -> tuple[str, ...]:
     return tuple(lines)
 
 
-def choose_backend(network: Network) -> tuple[str, str]:
-    """The name of the backend that runs this network unless another is asked for, and why."""
+def choose_backend(network: Network, steps: int | None = None) -> tuple[str, str]:
+    """The name of the backend that runs this network unless another is asked for, and why. Without ``steps`` a run of
+    ``time.steps`` is meant."""
     size = f"{len(network.neurons)} neurons, {len(network.connections)} connections"
-    return "numpy", f"array code made for this network ({size}); needs nothing but NumPy"
+    if "c" not in names():
+        return "numpy", f"array code made for this network ({size}); needs nothing but NumPy"
+    from neurovis_spec.runtime.c_choice import pays
+
+    better, why = pays(network, network.steps if steps is None else steps)
+    return ("c", f"{why} ({size})") if better else ("numpy", f"array code made for this network ({size}); {why}")
 
 
-def prepare(network: Network, backend: str | Backend | None = None) -> Stepper:
-    """Make a network ready to run on a backend, by default on the chosen one.
+def prepare(network: Network, backend: str | Backend | None = None, steps: int | None = None) -> Stepper:
+    """Make a network ready to run on a backend, by default on the one chosen for so many steps.
 
     Raises BackendError where it is unknown, not available, or lacks something that the network asks for.
     """
     if backend is None:
-        backend = choose_backend(network)[0]
+        backend = choose_backend(network, steps)[0]
+        if backend == "c":
+            try:
+                return load(backend).prepare(network)
+            except (BackendError, plugins.PluginError):  # a compiler that cannot compile
+                backend = "numpy"
     chosen = load(backend) if isinstance(backend, str) else backend
     found = chosen.availability()
     if not found.available:

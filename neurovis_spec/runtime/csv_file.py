@@ -1,7 +1,8 @@
 """Recordings as ``.csv``: a row a step, a column a neuron and a changing weight.
 
 In: a Recording and a path, or a path. Out: a file written row by row, or a Recording. The header is ``step``, ``t``,
-the names of the neurons, then ``K1 -> O`` for each changing connection. Numbers read back exactly. What stays in a run
+the names of the neurons, then ``K1 -> O`` for each changing connection, then the states (``K1.v``, ``(K1 -> O).e``).
+Numbers read back exactly. What stays in a run
 is not in the table, so a recording read from it knows the changing connections alone, with delay 1; nor is what is true
 after the last step, for which the last row stands.
 """
@@ -21,6 +22,7 @@ from typing import BinaryIO
 import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.states import split_state
 from neurovis_spec.runtime.files import regular_size, replacing
 from neurovis_spec.runtime.recording import After, Recording, RecordingError, after_rows
 from neurovis_spec.runtime.rows import RowWriter, Steps
@@ -30,19 +32,21 @@ _CONNECTION = re.compile(r"(?P<source>\S+) -> (?P<target>\S+)(?: \((?P<rank>[0-9
 
 #: bytes that are read together
 _BLOCK = 1 << 16
+#: what a table begins with
+_FIRST = b"step,t"
 
 
 def write_csv(recording: Recording, path: Path) -> None:
     """Write a recording; what was there stays until all is written."""
     with replacing(path) as file:
         table = _Table(file, recording)
-        table.write(recording.step, recording.activity, recording.weights)
+        table.write(recording.step, recording.activity, recording.weights, recording.states)
         table.close()
 
 
 def csv_size(frame: Recording, steps: Steps) -> int:
     """About the bytes that a file takes: numbers have up to 24 characters, most of them fewer."""
-    return len(steps) * 10 * (2 + len(frame.neurons) + len(frame.plastic))
+    return len(steps) * 10 * (2 + sum(frame.widths))
 
 
 @contextmanager
@@ -50,7 +54,7 @@ def stream_csv(path: Path, frame: Recording, steps: Steps) -> Iterator[RowWriter
     """A writer for rows as they come; what was there stays until all is written. After an exception there is a part
     that holds the rows until then."""
     with part_of(path) as part:
-        rows = _CsvRows(part, frame, steps.every)
+        rows = _CsvRows(part, frame, steps)
         yield rows
         rows.close()
         part.take_place()
@@ -59,16 +63,16 @@ def stream_csv(path: Path, frame: Recording, steps: Steps) -> Iterator[RowWriter
 class _CsvRows:
     """Writes rows, and knows of which steps they are."""
 
-    def __init__(self, part: Part, frame: Recording, every: int) -> None:
+    def __init__(self, part: Part, frame: Recording, steps: Steps) -> None:
         self._buffered = io.BufferedRandom(part.file)
         self._table = _Table(self._buffered, frame)
-        self._part, self._every, self._rows = part, every, 0
+        self._part, self._steps, self._rows = part, steps, 0
 
-    def write(self, activity: FloatArray, weights: FloatArray, after: After) -> None:
-        numbers = np.arange(self._rows, self._rows + len(activity)) * self._every
-        self._table.write(numbers, activity, weights)
+    def write(self, activity: FloatArray, weights: FloatArray, states: FloatArray, after: After) -> None:
+        numbers = self._steps.at(self._rows) + np.arange(len(activity)) * self._steps.every
+        self._table.write(numbers, activity, weights, states)
         self._rows += len(activity)
-        self._part.held = (self._rows - 1) * self._every if self._rows else None
+        self._part.held = self._steps.at(self._rows - 1) if self._rows else None
 
     def close(self) -> None:
         """Leave the file to its owner."""
@@ -82,13 +86,14 @@ class _Table:
     def __init__(self, file: BinaryIO, frame: Recording) -> None:
         self._text = io.TextIOWrapper(file, encoding="utf-8", newline="")
         self._writer, self._dt = csv.writer(self._text, lineterminator="\n"), frame.dt
-        names = [frame.connection_names[index] for index in frame.plastic.tolist()]
-        self._writer.writerow(["step", "t", *frame.neurons, *names])
+        plastic = frame.plastic.tolist() if frame.weights.shape[1] else []
+        names = [frame.connection_names[index] for index in plastic]
+        self._writer.writerow(["step", "t", *frame.columns, *names, *frame.state_names])
 
-    def write(self, steps: IntArray, activity: FloatArray, weights: FloatArray) -> None:
+    def write(self, steps: IntArray, activity: FloatArray, weights: FloatArray, states: FloatArray) -> None:
         """Further rows, which are with the system afterwards."""
-        for step, active, strong in zip(steps.tolist(), activity, weights, strict=True):
-            self._writer.writerow([step, step * self._dt, *active.tolist(), *strong.tolist()])
+        for step, active, strong, held in zip(steps.tolist(), activity, weights, states, strict=True):
+            self._writer.writerow([step, step * self._dt, *active.tolist(), *strong.tolist(), *held.tolist()])
         self._text.flush()
 
     def close(self) -> None:
@@ -97,7 +102,10 @@ class _Table:
 
 
 def held_csv(file: FileIO) -> int | None:
-    """The last step that a part holds, None for none. Raises OSError."""
+    """The last step that a part holds, None for none. Raises RecordingError for a file that is no part, OSError."""
+    file.seek(0)
+    if not _FIRST.startswith(file.read(len(_FIRST))):
+        raise RecordingError("not a recording in progress")
     end = _whole(file, file.seek(0, io.SEEK_END))
     begin = _whole(file, end - 1)
     file.seek(begin)
@@ -161,11 +169,11 @@ def _table(reader: Iterator[list[str]], columns: int) -> FloatArray:
 def _recording(header: list[str], table: FloatArray) -> Recording:
     if header[:2] != ["step", "t"]:
         raise RecordingError("not a recording: its first columns are not 'step' and 't'")
-    neurons = tuple(name for name in header[2:] if " -> " not in name)
+    neurons, connections, states = _columns(header[2:])
     index = {name: number for number, name in enumerate(neurons)}
-    if header[2 : 2 + len(neurons)] != list(neurons) or len(index) != len(neurons):
-        raise RecordingError("not a recording: neurons are mixed with weights, or named twice")
-    ends = [_ends(name, index) for name in header[2 + len(neurons) :]]
+    if len(index) != len(neurons) or len(set(states)) != len(states):
+        raise RecordingError("not a recording: a neuron or a state is named twice")
+    ends = [_ends(name, index) for name in connections]
     if len(set(ends)) != len(ends):
         raise RecordingError("a connection stands there twice")
     sources, targets, ranks = (np.array([e[i] for e in ends], dtype=np.int64) for i in range(3))
@@ -173,10 +181,11 @@ def _recording(header: list[str], table: FloatArray) -> Recording:
     whole = (steps == np.floor(steps)) & (np.abs(steps) < 2.0**53)
     if not (whole.all() and (np.diff(steps, prepend=-1.0) > 0).all()):
         raise RecordingError("the steps are no ascending whole numbers")
-    weights = table[:, 2 + len(neurons) :].copy()
-    after = after_rows(steps.astype(np.int64), weights)
+    n, p = 2 + len(neurons), len(connections)
+    weights = table[:, n : n + p].copy()
+    after = after_rows(steps.astype(np.int64), weights, p)
     return Recording(
-        activity=table[:, 2 : 2 + len(neurons)].copy(),
+        activity=table[:, 2:n].copy(),
         neurons=neurons,
         weights=weights,
         weights_static=np.zeros(0),
@@ -189,7 +198,32 @@ def _recording(header: list[str], table: FloatArray) -> Recording:
         ranks=ranks,
         weights_after=after.weights,
         reached=after.reached,
+        states=table[:, n + p :].copy(),
+        state_names=tuple(states),
     )
+
+
+def _columns(names: list[str]) -> tuple[tuple[str, ...], list[str], list[str]]:
+    """The columns of neurons, of connections, of states: of a rule's (``(K1 -> O).e``), or of the model of a neuron
+    that has a column itself (``K1.v``), or behind others that are no neurons. Raises RecordingError where they
+    are mixed."""
+    kinds = {"neuron": 0, "connection": 1, "state": 2}
+    result: tuple[list[str], list[str], list[str]] = ([], [], [])
+    seen: set[str] = set()
+    last = 0
+    for name in names:
+        state = split_state(name)
+        if state is not None and (state.of_rule or state.owner in seen or last):
+            kind = kinds["state"]
+        else:
+            kind = kinds["connection"] if " -> " in name else kinds["neuron"]
+        if kind < last:
+            raise RecordingError("not a recording: neurons are mixed with weights or states")
+        last = kind
+        result[kind].append(name)
+        if kind == 0:
+            seen.add(name)
+    return tuple(result[0]), result[1], result[2]
 
 
 def _dt(table: FloatArray) -> float:

@@ -33,8 +33,8 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
             yield file
             copy_to_device(file, target)
         return
-    clear(target, "new")
-    beside, raw = open_beside(target, "new")
+    clear(target, "neurovis-new")
+    beside, raw = open_beside(target, "neurovis-new")
     try:
         buffered = io.BufferedRandom(raw)
         yield buffered

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from io import FileIO
 from pathlib import Path
 from typing import Protocol, runtime_checkable
@@ -62,7 +62,7 @@ class StreamingFormat(Format, Protocol):
         ...
 
     def held(self, file: FileIO) -> int | None:
-        """The last step that a part holds, None for none. Raises OSError."""
+        """The last step that a part holds, None for none. Raises RecordingError for a file that is no part, OSError."""
         ...
 
     def recover(self, part: Path) -> Recording:
@@ -184,9 +184,12 @@ def load(path: str | os.PathLike[str]) -> Recording:
 
 def _in_place(path: Path, part: Path, format_: StreamingFormat) -> Recording:
     """The recording in a part, which stands in for the file itself."""
-    recording = format_.recover(part)
+    try:
+        recording = format_.recover(part)
+    except RecordingError:  # a file of somebody else
+        return format_.load(path)
     if not len(recording):
-        raise RecordingError(f"{path}: No such file or directory")
+        return format_.load(path)
     fate = "is still going on" if is_written(part) else "did not come to its end"
     held = f"what was recorded, up to step {recording.step[-1]}, is read from {shown(part, path)}"
     _warn(f"{path}: its run {fate}; {held}")
@@ -198,7 +201,8 @@ def _tell(path: Path, parts: Sequence[Path], format_: StreamingFormat) -> None:
     for part in parts:
         file = seize(part)
         if file is not None:
-            with file:
+            last = None
+            with file, suppress(RecordingError):
                 last = format_.held(file)
             if last is not None:
                 held = f"what it recorded, up to step {last}, is in {shown(part, path)}"
@@ -210,7 +214,10 @@ def settle(path: Path, format_: StreamingFormat) -> None:
     say so. Where the file itself is not there a part becomes it. Raises RecordingError, OSError."""
     target = Path(os.path.realpath(path))
     for part, file in rest(target):
-        last = format_.held(file)
+        try:
+            last = format_.held(file)
+        except RecordingError:  # a file of somebody else
+            continue
         held = f"what an earlier run recorded before it broke off, up to step {last},"
         if last is None:
             part.unlink()

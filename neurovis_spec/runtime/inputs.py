@@ -73,10 +73,15 @@ class InputReader:
 
     def rows(self, first: int, stop: int) -> Iterator[FloatArray]:
         """The vectors of steps ``first`` … ``stop`` − 1, each (inputs,), read-only."""
+        for part in self.parts(first, stop):
+            yield from part
+
+    def parts(self, first: int, stop: int) -> Iterator[FloatArray]:
+        """The same, as many at a time as are made together: (steps, inputs)."""
         while first < stop:
             if not self._first <= first < self._first + len(self._rows):
                 self._make(first - first % self._steps)
-            yield from self._rows[first - self._first : stop - self._first]
+            yield self._rows[first - self._first : stop - self._first]
             first = self._first + len(self._rows)
 
     def at(self, k: int, values: Mapping[str, npt.ArrayLike] | None = None) -> FloatArray:

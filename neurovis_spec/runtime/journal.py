@@ -14,7 +14,7 @@ import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from io import FileIO
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple, TypeAlias
 from zlib import crc32
 
 import numpy as np
@@ -22,22 +22,27 @@ import numpy.typing as npt
 
 from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.runtime.recording import After, RecordingError
+from neurovis_spec.runtime.rows import Steps
 
-MAGIC: Final = b"neurovis run 1\n"
-#: bytes of the frame, every how many steps, checksum; of a chunk: a mark, rows, bytes of the text at its end, checksum
-_FRAME, _CHUNK = struct.Struct("<QQI"), struct.Struct("<4sQQI")
+MAGIC: Final = b"neurovis run 2\n"
+#: bytes of the frame, every how many steps, the first step, checksum; of a chunk: a mark, rows, bytes of
+#: the text at its end, checksum
+_FRAME, _CHUNK = struct.Struct("<QQQI"), struct.Struct("<4sQQI")
 _MARK = b"rows"
 _NUMBER, _PIECE = 8, 1 << 20
+
+What: TypeAlias = Literal["activity", "weights", "states"]
+_PARTS: Final[tuple[What, ...]] = ("activity", "weights", "states")
 
 
 class JournalWriter:
     """Writes a journal. After ``write`` a whole chunk more is with the system, so that it outlives this process."""
 
-    def __init__(self, file: FileIO, frame: bytes, every: int) -> None:
+    def __init__(self, file: FileIO, frame: bytes, steps: Steps) -> None:
         self._file = file
-        _write(file, MAGIC + _FRAME.pack(len(frame), every, crc32(frame)), frame)
+        _write(file, MAGIC + _FRAME.pack(len(frame), steps.every, steps.first, crc32(frame)), frame)
 
-    def write(self, activity: FloatArray, weights: FloatArray, after: After) -> None:
+    def write(self, activity: FloatArray, weights: FloatArray, states: FloatArray, after: After) -> None:
         """A chunk of rows. Raises OSError."""
         text = json.dumps(
             {
@@ -47,7 +52,7 @@ class JournalWriter:
                 "lesioned_connections": after.lesioned_connections.tolist(),
             }
         ).encode()
-        parts = [_bytes(activity), _bytes(weights), _bytes(after.weights), memoryview(text)]
+        parts = [_bytes(activity), _bytes(weights), _bytes(states), _bytes(after.weights), memoryview(text)]
         total = 0
         for part in parts:
             total = crc32(part, total)
@@ -74,6 +79,15 @@ class _Chunk:
     rows: int
 
 
+class Widths(NamedTuple):
+    """How many columns the rows have, and how many changing weights there are after the last step."""
+
+    activity: int
+    weights: int
+    states: int
+    after: int
+
+
 @dataclass(frozen=True)
 class Journal:
     """What can be read of a journal: the bytes of its frame, ``rows`` rows of every ``every``-th step, and what was
@@ -82,7 +96,8 @@ class Journal:
     file: FileIO
     frame: bytes
     every: int
-    columns: tuple[int, int]
+    first: int
+    columns: Widths
     chunks: tuple[_Chunk, ...]
     after: dict[str, object]
     weights: FloatArray
@@ -92,39 +107,52 @@ class Journal:
         """How many rows it holds."""
         return sum(chunk.rows for chunk in self.chunks)
 
-    def pieces(self, what: Literal["activity", "weights"]) -> Iterator[bytes]:
-        """The bytes of all activities or of all changing weights, in order, some at a time."""
-        n, p = self.columns
-        for chunk in self.chunks:
-            offset, width = (chunk.offset, n) if what == "activity" else (chunk.offset + chunk.rows * n * _NUMBER, p)
-            yield from _pieces(self.file, offset, chunk.rows * width * _NUMBER)
+    @property
+    def steps(self) -> Steps:
+        """The steps of its rows."""
+        begin = -(-self.first // self.every) * self.every
+        return Steps(self.rows * self.every, self.every, begin)
 
-    def numbers(self, what: Literal["activity", "weights"]) -> FloatArray:
+    def pieces(self, what: What) -> Iterator[bytes]:
+        """The bytes of all activities, changing weights or states, in order, some at a time."""
+        place = _PARTS.index(what)
+        before, width = sum(self.columns[:place]), self.columns[place]
+        for chunk in self.chunks:
+            yield from _pieces(self.file, chunk.offset + chunk.rows * before * _NUMBER, chunk.rows * width * _NUMBER)
+
+    def numbers(self, what: What) -> FloatArray:
         """The same as an array (rows, columns)."""
-        width = self.columns[0 if what == "activity" else 1]
+        width = self.columns[_PARTS.index(what)]
         return np.frombuffer(b"".join(self.pieces(what)), dtype="<f8").astype(np.float64).reshape(self.rows, width)
 
 
-def read_journal(file: FileIO, columns: Callable[[bytes], tuple[int, int]]) -> Journal:
-    """Read a journal as far as it is whole. ``columns`` says from a frame how many neurons and changing connections
-    there are. Raises RecordingError, OSError."""
+def is_begun(file: FileIO) -> bool:
+    """Whether a file is a journal, or was to become one."""
+    file.seek(0)
+    return MAGIC.startswith(file.read(len(MAGIC)))
+
+
+def read_journal(file: FileIO, columns: Callable[[bytes], Widths]) -> Journal:
+    """Read a journal as far as it is whole. ``columns`` says from a frame how many columns there
+    are. Raises RecordingError, OSError."""
     size = file.seek(0, io.SEEK_END)
     file.seek(0)
     head = file.read(len(MAGIC) + _FRAME.size)
     if len(head) < len(MAGIC) + _FRAME.size or not head.startswith(MAGIC):
         raise RecordingError("not a recording in progress")
-    length, every, checksum = _FRAME.unpack(head[len(MAGIC) :])
+    length, every, first, checksum = _FRAME.unpack(head[len(MAGIC) :])
     frame = b"".join(_pieces(file, len(head), length)) if length <= size else b""
-    if len(frame) != length or crc32(frame) != checksum or every < 1:
+    if len(frame) != length or crc32(frame) != checksum or every < 1 or first >= 2**62:
         raise RecordingError("not a recording in progress: its beginning is damaged")
-    n, p = columns(frame)
+    widths = columns(frame)
+    width, p = sum(widths[:3]), widths.after
     chunks: list[_Chunk] = []
     offset, text, last = len(head) + length, b"{}", b""
     while offset + _CHUNK.size <= size:
         file.seek(offset)
         mark, rows, more, checksum = _CHUNK.unpack(file.read(_CHUNK.size))
         begin = offset + _CHUNK.size
-        numbers = (rows * (n + p) + p) * _NUMBER
+        numbers = (rows * width + p) * _NUMBER
         end = begin + numbers + more
         if mark != _MARK or end > size or _sum(file, begin, end) != checksum:
             break
@@ -136,7 +164,7 @@ def read_journal(file: FileIO, columns: Callable[[bytes], tuple[int, int]]) -> J
     if not isinstance(after, dict):
         raise RecordingError("not a recording in progress")
     weights: npt.NDArray[np.float64] = np.frombuffer(last, dtype="<f8").astype(np.float64)
-    return Journal(file, frame, every, (n, p), tuple(chunks), after, weights)
+    return Journal(file, frame, every, first, widths, tuple(chunks), after, weights)
 
 
 def _sum(file: FileIO, begin: int, end: int) -> int:

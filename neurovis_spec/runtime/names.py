@@ -13,6 +13,7 @@ from itertools import count
 from typing import NamedTuple
 
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.states import StateName, split_state, split_sum
 from neurovis_spec.diagnostics import suggest
 
 _RANGE = re.compile(
@@ -38,10 +39,67 @@ class Names:
     views: Mapping[str, tuple[tuple[int, ...], bool]] = field(default_factory=dict)
     #: how many instances a name stands for: ``left`` for ``left1``, ``left2``, …
     counted: Mapping[str, int] = field(default_factory=dict)
+    #: states that are recorded (``K1.v``, ``(K1 -> O).e``), by their columns
+    states: Mapping[str, int] = field(default_factory=dict)
+    #: outputs that name states, and whether a single one is meant
+    state_views: Mapping[str, tuple[tuple[int, ...], bool]] = field(default_factory=dict)
+
+    def find_states(self, reference: str) -> Found | str | None:
+        """The columns of the states of a reference; None where it is to no state, a text where that is not there."""
+        parts = [part.strip() for _, part in split_sum(reference)]
+        result: list[int] = []
+        single = len(parts) == 1
+        for part in parts:
+            found = self._states(part)
+            if not isinstance(found, Found):
+                return found
+            single = single and found.single
+            result += found.neurons
+        return Found(tuple(result), single)
+
+    def _states(self, text: str) -> Found | str | None:
+        if text in self.state_views:
+            return Found(*self.state_views[text])
+        name = split_state(text)
+        if text in self.states and (name is None or not name.of_rule or name.owner.endswith(")")):
+            return Found((self.states[text],), True)
+        if name is None or (not name.of_rule and isinstance(self.find(text), Found)):
+            return None
+        single = False
+        if name.of_rule:
+            columns, single = self._of_rules(name)
+        else:
+            owners = self.find(name.owner)
+            if isinstance(owners, str):
+                return None
+            called = list(self.neurons)
+            columns = [self.states.get(f"{called[index]}.{name.state}") for index in owners.neurons]
+        there = tuple(column for column in columns if column is not None)
+        if not there or len(there) < len(columns):
+            return f"the state '{text}' was not recorded" + (
+                f"; {suggest(text, self.states, 'recorded are')}" if self.states else ", and no other"
+            )
+        return Found(there, single)
+
+    def _of_rules(self, name: StateName) -> tuple[list[int | None], bool]:
+        """The columns of a state between two ends, and whether it is the only one of two single neurons."""
+        left, _, right = name.owner.partition("->")
+        ends = [self.find(left.strip()), self.find(right.strip())]
+        if isinstance(ends[0], str) or isinstance(ends[1], str):
+            return [], False
+        columns: list[int | None] = []
+        for text, column in self.states.items():
+            other = split_state(text)
+            if other is None or not other.of_rule or other.state != name.state:
+                continue
+            source, _, target = other.owner.partition(" -> ")
+            if self.neurons[source] in ends[0].neurons and self.neurons[target.partition(" ")[0]] in ends[1].neurons:
+                columns.append(column)
+        return columns, len(columns) == 1 and ends[0].single and ends[1].single
 
     def find(self, reference: str) -> Found | str:
         """The neurons of a reference, in the order written; a text says what is wrong."""
-        parts = [part.strip() for part in reference.split("+")]
+        parts = [part.strip() for _, part in split_sum(reference)]
         if len(parts) == 1:
             return self._one(parts[0])
         result: list[int] = []
@@ -105,7 +163,7 @@ class Names:
 def names_of(network: Network) -> Names:
     """Who is called what in a network."""
     groups = {g.name: (tuple(g.indices), False) for g in network.neurons.groups if g.name not in network.neuron_index}
-    outputs = {o.name: (tuple(o.neurons.tolist()), o.scalar) for o in network.outputs}
+    outputs = {o.name: (tuple(o.neurons.tolist()), o.scalar) for o in network.outputs if not o.states}
     counted = {one.declared: number for one in network.instances if (number := one.number)}
     return Names(network.neuron_index, outputs | groups, counted)
 

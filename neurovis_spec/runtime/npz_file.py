@@ -29,7 +29,7 @@ from neurovis_spec.compiler.limits import DEEPEST
 from neurovis_spec.language.data_files_npy import LONGEST_HEADER, read_header
 from neurovis_spec.language.data_files_table import CellError
 from neurovis_spec.runtime.files import regular_size, replacing
-from neurovis_spec.runtime.journal import Journal, JournalWriter, read_journal
+from neurovis_spec.runtime.journal import Journal, JournalWriter, Widths, is_begun, read_journal
 from neurovis_spec.runtime.recording import After, Recording, RecordingError, after_rows, ended
 from neurovis_spec.runtime.rows import RowWriter, Steps
 from neurovis_spec.runtime.unfinished import Part, part_of
@@ -56,25 +56,32 @@ OPTIONAL: Mapping[str, tuple[str, int]] = {
     "lesioned_neurons": ("iu", 1),
     "lesioned_connections": ("iu", 1),
     "about": ("U", 0),
+    "states": ("fiu", 2),
+    "state_names": ("U", 1),
+    "recorded": ("iu", 1),
 }
 #: an archive may always grow to this many bytes, and beyond that to a hundred times its size
 ROOM = 256 * 2**20
 RATIO = 100
 _NUMBER = 8
+#: what the views of ``about`` are of
+_CALLED: Mapping[str, str] = {"views": "neurons", "state_views": "states"}
 
 
 def write_npz(recording: Recording, path: Path) -> None:
     """Write a recording; what was there stays until all is written."""
     large = {"activity": recording.activity, "weights": recording.weights, "step": recording.step}
+    if recording.state_names:
+        large["states"] = recording.states
     with replacing(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
         _put(archive, {**large, **_small(recording)})
 
 
 def npz_size(frame: Recording, steps: Steps) -> int:
     """The bytes that a streamed file takes, and the journal of which it is made."""
-    n, p = len(frame.neurons), len(frame.plastic)
+    width = sum(frame.widths)
     small = sum(array.nbytes for array in _small(frame).values())
-    return len(steps) * _NUMBER * (2 * n + 2 * p + 1) + 2 * small
+    return len(steps) * _NUMBER * (2 * width + 1) + 2 * small
 
 
 @contextmanager
@@ -82,42 +89,46 @@ def stream_npz(path: Path, frame: Recording, steps: Steps) -> Iterator[RowWriter
     """A writer for rows, of which there may be fewer in the end than steps were to be. What was there stays until all
     is written; after an exception there is a part that holds the rows until then."""
     with part_of(path) as part:
-        yield _NpzRows(part, frame, steps.every)
+        yield _NpzRows(part, frame, steps)
         _archive(part.file, path)
 
 
 class _NpzRows:
     """Writes rows into a journal, and says which steps it holds."""
 
-    def __init__(self, part: Part, frame: Recording, every: int) -> None:
-        self._journal = JournalWriter(part.file, _frame_bytes(frame), every)
-        self._part, self._every, self._rows = part, every, 0
+    def __init__(self, part: Part, frame: Recording, steps: Steps) -> None:
+        self._journal = JournalWriter(part.file, frame_bytes(frame), steps)
+        self._part, self._steps, self._rows = part, steps, 0
 
-    def write(self, activity: FloatArray, weights: FloatArray, after: After) -> None:
-        self._journal.write(activity, weights, after)
+    def write(self, activity: FloatArray, weights: FloatArray, states: FloatArray, after: After) -> None:
+        self._journal.write(activity, weights, states, after)
         self._rows += len(activity)
-        self._part.held = (self._rows - 1) * self._every if self._rows else None
+        self._part.held = self._steps.at(self._rows - 1) if self._rows else None
 
 
 def _archive(file: FileIO, path: Path) -> None:
     """Make an archive of a journal, in memory that does not grow with the rows. Raises RecordingError, OSError."""
     journal, frame = _journal(file)
-    rows, (n, p) = journal.rows, journal.columns
+    rows, widths = journal.rows, journal.columns
     with replacing(path) as out, zipfile.ZipFile(out, "w", zipfile.ZIP_STORED) as archive:
         _put(archive, _small(frame))
-        _put_pieces(archive, "activity", "<f8", (rows, n), journal.pieces("activity"))
-        _put_pieces(archive, "weights", "<f8", (rows, p), journal.pieces("weights"))
-        steps = Steps(rows * journal.every, journal.every)
-        _put_pieces(archive, "step", "<i8", (rows,), (part.astype("<i8").tobytes() for part in steps.parts()))
+        _put_pieces(archive, "activity", "<f8", (rows, widths.activity), journal.pieces("activity"))
+        _put_pieces(archive, "weights", "<f8", (rows, widths.weights), journal.pieces("weights"))
+        if widths.states:
+            _put_pieces(archive, "states", "<f8", (rows, widths.states), journal.pieces("states"))
+        steps = (part.astype("<i8").tobytes() for part in journal.steps.parts())
+        _put_pieces(archive, "step", "<i8", (rows,), steps)
 
 
 def held_npz(file: FileIO) -> int | None:
-    """The last step that a part holds, None for none. Raises OSError."""
+    """The last step that a part holds, None for none. Raises RecordingError for a file that is no part, OSError."""
+    if not is_begun(file):
+        raise RecordingError("not a recording in progress")
     try:
         journal, _ = _journal(file)
     except RecordingError:
         return None
-    return (journal.rows - 1) * journal.every if journal.rows else None
+    return journal.steps.at(journal.rows - 1) if journal.rows else None
 
 
 def finish_npz(file: FileIO, part: Path, path: Path) -> None:
@@ -130,18 +141,18 @@ def recover_npz(part: Path) -> Recording:
     """Read a part. Raises RecordingError."""
     with _suspicion(part), FileIO(part) as file:
         journal, frame = _journal(file)
-        steps = np.arange(journal.rows, dtype=np.int64) * journal.every
+        steps = np.concatenate([frame.step, *journal.steps.parts()])
         activity, weights = journal.numbers("activity"), journal.numbers("weights")
-        return replace(frame, step=steps, activity=activity, weights=weights)
+        return replace(frame, step=steps, activity=activity, weights=weights, states=journal.numbers("states"))
 
 
 def _journal(file: FileIO) -> tuple[Journal, Recording]:
     """A journal, and the recording without its rows."""
 
-    def columns(frame: bytes) -> tuple[int, int]:
-        recording = _recording(_arrays(io.BytesIO(frame), len(frame)))
+    def columns(frame: bytes) -> Widths:
+        recording = frame_of(frame)
         frames.append(recording)
-        return len(recording.neurons), len(recording.plastic)
+        return Widths(*recording.widths, len(recording.plastic))
 
     frames: list[Recording] = []
     try:
@@ -151,7 +162,7 @@ def _journal(file: FileIO) -> tuple[Journal, Recording]:
             told = {name: np.array(journal.after[name], dtype=np.int64)
                     for name in ("reached", "lesioned_neurons", "lesioned_connections")}  # fmt: skip
             arrays = {**told, "weights_after": journal.weights}
-            none = after_rows(frame.step, frame.weights)
+            none = after_rows(frame.step, frame.weights, len(frame.plastic))
             frame = ended(frame, _after(arrays, journal.after, none, len(frame.neurons), len(frame.sources)))
     except (OSError, RecordingError):
         raise
@@ -160,11 +171,19 @@ def _journal(file: FileIO) -> tuple[Journal, Recording]:
     return journal, frame
 
 
-def _frame_bytes(frame: Recording) -> bytes:
+def frame_of(frame: bytes) -> Recording:
+    """The recording without rows that ``frame_bytes`` made these bytes of. Raises RecordingError, and what zipfile,
+    NumPy and json raise for what is malformed."""
+    return _recording(_arrays(io.BytesIO(frame), len(frame)))
+
+
+def frame_bytes(frame: Recording) -> bytes:
     """All but the rows, as an archive of its own."""
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
         none = {"activity": frame.activity[:0], "weights": frame.weights[:0], "step": frame.step[:0]}
+        if frame.state_names:
+            none["states"] = frame.states[:0]
         _put(archive, {**none, **_small(frame)})
     return file.getvalue()
 
@@ -197,6 +216,14 @@ def _small(recording: Recording) -> dict[str, Array]:
         "parallel": [[int(index), int(recording.ranks[index])] for index in parallel],
         "set_parameters": dict(recording.set_parameters),
     }
+    more: dict[str, Array] = {}
+    if recording.state_names:
+        about["state_views"] = {
+            name: [list(members), single] for name, (members, single) in recording.state_views.items()
+        }
+        more["state_names"] = np.array(recording.state_names, dtype=np.str_)
+    if recording.recorded is not None:
+        more["recorded"] = recording.recorded
     return {
         "neurons": np.array(recording.neurons, dtype=np.str_),
         "weights_static": recording.weights_static,
@@ -210,6 +237,7 @@ def _small(recording: Recording) -> dict[str, Array]:
         "lesioned_neurons": recording.lesioned_neurons,
         "lesioned_connections": recording.lesioned_connections,
         "about": np.array(json.dumps(about)),
+        **more,
     }
 
 
@@ -270,10 +298,14 @@ def _array(file: IO[bytes], name: str, size: int, kinds: str, dimensions: int) -
 
 def _recording(arrays: Mapping[str, Array]) -> Recording:
     rows, n = arrays["activity"].shape
+    n = len(arrays["neurons"]) if "recorded" in arrays else n
     m, p = len(arrays["sources"]), len(arrays["plastic"])
+    recorded = _integers(arrays, "recorded", 0, n, ascending=True) if "recorded" in arrays else None
     shapes = {
+        "activity": (rows, n if recorded is None else len(recorded)),
         "neurons": (n,),
-        "weights": (rows, p),
+        "weights": (rows, p if arrays["weights"].shape[1] else 0),
+        "states": (rows, len(arrays.get("state_names", ()))),
         "weights_static": (m - p,),
         "targets": (m,),
         "delays": (m,),
@@ -283,7 +315,12 @@ def _recording(arrays: Mapping[str, Array]) -> Recording:
     for name, shape in shapes.items():
         if name in arrays and arrays[name].shape != shape:
             raise RecordingError(f"'{name}' has the shape {arrays[name].shape}, where the others ask for {shape}")
+    if "state_names" in arrays and "states" not in arrays:
+        raise RecordingError("it names states and holds none")
     neurons = tuple(str(name) for name in arrays["neurons"].tolist())
+    state_names = tuple(str(name) for name in arrays["state_names"].tolist()) if "state_names" in arrays else ()
+    if len(set(state_names)) != len(state_names):
+        raise RecordingError("'state_names' holds a name twice")
     dt = float(arrays["dt"].astype(np.float64))
     if len(set(neurons)) != n:
         raise RecordingError("'neurons' holds a name twice")
@@ -292,7 +329,7 @@ def _recording(arrays: Mapping[str, Array]) -> Recording:
     about = _about(arrays)
     step = _integers(arrays, "step", 0, 2**62, ascending=True)
     weights = arrays["weights"].astype(np.float64)
-    after = _after(arrays, about, after_rows(step, weights), n, m)
+    after = _after(arrays, about, after_rows(step, weights, p), n, m)
     return Recording(
         activity=arrays["activity"].astype(np.float64),
         neurons=neurons,
@@ -310,10 +347,14 @@ def _recording(arrays: Mapping[str, Array]) -> Recording:
         set_parameters=after.set_parameters,
         lesioned_neurons=after.lesioned_neurons,
         lesioned_connections=after.lesioned_connections,
-        views=_views(about, n),
+        views=_views(about, "views", n),
         network=str(about.get("network", "")),
         hash=str(about.get("hash", "")),
         counted=_counted(about, n),
+        states=arrays["states"].astype(np.float64) if state_names else np.zeros((rows, 0)),
+        state_names=state_names,
+        state_views=_views(about, "state_views", len(state_names)),
+        recorded=recorded,
     )
 
 
@@ -352,14 +393,14 @@ def _about(arrays: Mapping[str, Array]) -> dict[str, object]:
     return about
 
 
-def _views(about: Mapping[str, object], n: int) -> dict[str, tuple[tuple[int, ...], bool]]:
-    views = about.get("views", {})
+def _views(about: Mapping[str, object], key: str, n: int) -> dict[str, tuple[tuple[int, ...], bool]]:
+    views = about.get(key, {})
     if not isinstance(views, dict):
         raise RecordingError("'about' names no views")
     checked = {}
     for name, (members, single) in views.items():
         if not members or not all(type(index) is int and 0 <= index < n for index in members):
-            raise RecordingError(f"'about': '{name}' names neurons that are not there")
+            raise RecordingError(f"'about': '{name}' names {_CALLED[key]} that are not there")
         checked[str(name)] = (tuple(members), bool(single))
     return checked
 

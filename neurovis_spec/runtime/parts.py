@@ -21,8 +21,9 @@ from typing import Literal, TypeAlias
 if sys.platform != "win32":
     import fcntl
 
-#: ``part``: rows of a recording that can be read at any time; ``new``: a file of use to nobody before it is whole
-Kind: TypeAlias = Literal["part", "new"]
+#: ``part``: rows of a recording that can be read at any time; the other: a file of use to nobody before it is whole,
+#: of a name that nobody else gives a file
+Kind: TypeAlias = Literal["part", "neurovis-new"]
 
 _LONGEST = 200
 _PART = re.compile(r"\.(?P<name>.+?)(?:\.[0-9]+)?\.part")

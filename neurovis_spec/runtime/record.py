@@ -14,14 +14,15 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.progress import Progress
-from neurovis_spec.runtime.backend import Backend, prepare
+from neurovis_spec.runtime.backend import Backend, Runner, Stepper, prepare
+from neurovis_spec.runtime.columns import ALL, Columns, Keep, columns_of
 from neurovis_spec.runtime.conditions import Controls
 from neurovis_spec.runtime.inputs import STRETCH, InputReader
 from neurovis_spec.runtime.memory import check_room
-from neurovis_spec.runtime.recording import After, Recording, recording_of
+from neurovis_spec.runtime.recording import After, Numbers, Recording, recording_of
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.runtime.until import Until
@@ -37,23 +38,23 @@ def record(
     start: Recording | None = None,
     progress: Progress | None = None,
     until: Until | None = None,
+    keep: Keep = ALL,
 ) -> Recording:
     """Run a network for ``steps`` steps (by default ``time.steps``) and record steps 0, ``every``, 2·``every``, …;
     ``until`` may end it earlier.
 
-    ``inputs`` as in ``InputReader``; ``start`` as in ``resume``. Warns once (RuntimeWarning) when something is no
-    longer finite. Raises InputError, BackendError, RecordingError (also where there is not the memory), ValueError.
+    ``inputs`` as in ``InputReader``; ``start`` as in ``resume``; ``keep`` is what of a step is recorded. Warns once
+    (RuntimeWarning) when something is no longer finite. Raises InputError, BackendError, RecordingError (also where
+    there is not the memory), KeyError for a name that there is not, ValueError.
     """
     steps = checked_steps(network, steps, every)
-    check_room(steps, every, len(network.neurons) + len(network.changing))
+    columns = columns_of(network, keep)
+    check_room(steps, every, sum(columns.widths(network)))
     state = initial_state(network) if start is None else resumed_state(network, start)
     kept = np.arange(0, steps, every, dtype=np.int64)
-    rows = _InMemory(network, len(kept))
-    go(network, state, Course(steps, every, inputs, backend, until), rows, progress)
-    made = rows.filled
-    return recording_of(
-        network, kept[:made], rows.activity[:made], rows.weights[:made], state.weights, after(network, state)
-    )
+    rows = InMemory(columns.widths(network), len(kept))
+    go(network, state, Course(steps, every, inputs, backend, until, keep), rows, progress)
+    return recording_of(network, columns, rows.numbers(kept), state.weights, after(network, state))
 
 
 def after(network: Network, state: State) -> After:
@@ -76,8 +77,8 @@ def after(network: Network, state: State) -> After:
 class Rows(Protocol):
     """Where rows go, a stretch of the run at a time."""
 
-    def begin(self, count: int) -> tuple[FloatArray, FloatArray]:
-        """Arrays for the next ``count`` rows: activities (count, n), changing weights (count, p)."""
+    def begin(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Arrays for the next ``count`` rows: activities (count, n), changing weights (count, p), states (count, q)."""
         ...
 
     def end(self, count: int) -> None:
@@ -93,25 +94,33 @@ class Rows(Protocol):
         ...
 
 
-class _InMemory:
-    """All rows in two arrays."""
+class InMemory:
+    """All rows in arrays of these widths."""
 
-    def __init__(self, network: Network, rows: int) -> None:
-        self.activity = np.empty((rows, len(network.neurons)))
-        self.weights = np.empty((rows, len(network.changing)))
-        self.filled = 0
+    def __init__(self, widths: tuple[int, int, int], rows: int) -> None:
+        self.activity, self.weights, self.states = (np.empty((rows, width)) for width in widths)
+        self._filled = 0
 
-    def begin(self, count: int) -> tuple[FloatArray, FloatArray]:
-        first = self.filled
-        return self.activity[first : first + count], self.weights[first : first + count]
+    def numbers(self, steps: IntArray) -> Numbers:
+        """All that has come, for these steps."""
+        made = slice(self._filled)
+        return Numbers(steps[made], self.activity[made], self.weights[made], self.states[made])
+
+    def begin(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The next rows of the arrays."""
+        rows = slice(self._filled, self._filled + count)
+        return self.activity[rows], self.weights[rows], self.states[rows]
 
     def end(self, count: int) -> None:
-        self.filled += count
+        """So many are filled."""
+        self._filled += count
 
     def due(self) -> bool:
+        """Never: nobody waits for them."""
         return False
 
     def over(self) -> bool:
+        """Never."""
         return False
 
 
@@ -125,6 +134,7 @@ class Course:
     backend: str | Backend | None = None
     #: what may end it earlier
     until: Until | None = None
+    keep: Keep = ALL
 
 
 def checked_steps(network: Network, steps: int | None, every: int) -> int:
@@ -140,10 +150,14 @@ def go(network: Network, state: State, course: Course, rows: Rows, progress: Pro
     every, steps = course.every, course.steps
     if course.until is not None:
         rows = course.until.watch(rows, state, steps)
-    changing = _subscript(network.changing)
-    watch, due, step = Watch(network), rows.due, prepare(network, course.backend).step
-    look = watch.look
+    watch = Watch(network)
+    columns = columns_of(network, course.keep)
     reader = InputReader(network, course.inputs, watch.given)
+    stepper = prepare(network, course.backend, steps)
+    make: _Make = _OneByOne(columns, stepper)
+    plain = columns.neurons is None and not columns.probe.names and len(columns.weights) == len(network.changing)
+    if isinstance(stepper, Runner) and plain and course.until is None:  # which is asked after each step
+        make = _Together(stepper)
     controls, changes = Controls(network), {change.at: change for change in network.changes}
     edges = [0, *(at for at in changes if 0 < at < steps), steps]
     with np.errstate(all="ignore"):
@@ -152,30 +166,95 @@ def go(network: Network, state: State, course: Course, rows: Rows, progress: Pro
                 controls.apply(state.conditions, state.weights, state.signals, changes[begin])
             reader.use(state)
             for first, stop in _stretches(begin, end):
-                if rows.over():
+                if rows.over() or not make.steps(state, first, stop, every, rows, reader, watch):
                     return
-                wanted = (stop - 1) // every - (first - 1) // every
-                activity, weights = rows.begin(wanted)
-                row = 0
-                for k, vector in enumerate(reader.rows(first, stop), first):
-                    keep = k % every == 0
-                    if keep and changing is not None:
-                        weights[row] = state.weights[changing]
-                    step(state, vector)
-                    look(state)
-                    if keep:
-                        activity[row] = state.activity
-                        row += 1
-                    if due():
-                        rows.end(row)
-                        if rows.over():
-                            return
-                        wanted -= row
-                        activity, weights = rows.begin(wanted)
-                        row = 0
-                rows.end(row)
                 if progress is not None:
                     progress(stop, steps)
+
+
+class _Make(Protocol):
+    """A way to make the steps of a stretch."""
+
+    def steps(
+        self, state: State, first: int, stop: int, every: int, rows: Rows, reader: InputReader, watch: Watch
+    ) -> bool:
+        """Make the steps from ``first`` to ``stop``; False where the rows say that the run is over."""
+        ...
+
+
+@dataclass(frozen=True)
+class _OneByOne:
+    """Each step by a call."""
+
+    columns: Columns
+    stepper: Stepper
+
+    def steps(
+        self, state: State, first: int, stop: int, every: int, rows: Rows, reader: InputReader, watch: Watch
+    ) -> bool:
+        step, look, due, columns = self.stepper.step, watch.look, rows.due, self.columns
+        changing, chosen = _subscript(columns.weights), columns.neurons
+        probe = columns.probe if columns.probe.names else None
+        wanted = _kept(first, stop, every)
+        activity, weights, states = rows.begin(wanted)
+        row = 0
+        for k, vector in enumerate(reader.rows(first, stop), first):
+            keep = k % every == 0
+            if keep and changing is not None:
+                weights[row] = state.weights[changing]
+            step(state, vector)
+            look(state)
+            if keep:
+                activity[row] = state.activity if chosen is None else state.activity[chosen]
+                if probe is not None:
+                    probe.read(state, states[row])
+                row += 1
+            if due():
+                rows.end(row)
+                if rows.over():
+                    return False
+                wanted -= row
+                activity, weights, states = rows.begin(wanted)
+                row = 0
+        rows.end(row)
+        return True
+
+
+@dataclass(frozen=True)
+class _Together:
+    """Many steps by a call."""
+
+    runner: Runner
+
+    def steps(
+        self, state: State, first: int, stop: int, every: int, rows: Rows, reader: InputReader, watch: Watch
+    ) -> bool:
+        wanted, most = _kept(first, stop, every), self.runner.at_once
+        activity, weights, _ = rows.begin(wanted)
+        row, k = 0, first
+        for part in reader.parts(first, stop):
+            begin = k
+            while k < begin + len(part):
+                until = watch.until(k, min(k + most, begin + len(part)))
+                vectors = part[k - begin : until - begin]
+                made = self.runner.run(state, vectors, activity[row:], weights[row:], every, not watch.warned)
+                row += _kept(k, k + made, every)
+                k += made
+                watch.look(state)
+                if rows.due():
+                    rows.end(row)
+                    if rows.over():
+                        return False
+                    wanted -= row
+                    activity, weights, _ = rows.begin(wanted)
+                    row = 0
+        rows.end(row)
+        return True
+
+
+def _kept(first: int, stop: int, every: int) -> int:
+    """How many of the steps from ``first`` to ``stop`` are recorded."""
+    return (stop - 1) // every - (first - 1) // every
 
 
 def _stretches(begin: int, end: int) -> Iterator[tuple[int, int]]:

@@ -10,12 +10,18 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from neurovis_spec import arguments
 from neurovis_spec.compiler.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.runtime.names import Names, names_of, unknown_text
+from neurovis_spec.diagnostics import listed
+from neurovis_spec.runtime.names import Found, Names, names_of, unknown_text
+
+if TYPE_CHECKING:
+    from neurovis_spec.runtime.columns import Columns
 
 
 class RecordingError(ValueError):
@@ -70,7 +76,11 @@ class Recording:
     step's update; ``plastic`` (p,) are the indices of the changing connections, ``weights_static`` (m − p,) the weights
     of the others, in their order. ``weights_after`` and the four below it are what ``After`` says. All arrays are
     read-only. ``recording["O"]`` is the activity of a neuron (rows,), of a group, an output or any other reference of a
-    spec (``K3..K5``, ``K1 + O``, ``left.K``) (rows, size).
+    spec (``K3..K5``, ``K1 + O``, ``left.K``) (rows, size); ``recording["K.v"]`` is a state of models or rules that was
+    recorded: ``states`` (rows, states), after the step, whose columns ``state_names`` names.
+
+    A partial recording holds the activities of some neurons alone, those that ``recorded`` lists (None: of all), so
+    that ``activity`` has fewer columns, or no weights: then ``weights`` has no columns.
     """
 
     activity: FloatArray
@@ -96,11 +106,22 @@ class Recording:
     hash: str = ""
     #: how many instances a name stands for: ``left`` for ``left1``, ``left2``, …
     counted: Mapping[str, int] = field(default_factory=dict)
+    states: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    state_names: tuple[str, ...] = ()
+    #: outputs that name states: columns of ``states``, and whether a single one is meant
+    state_views: Mapping[str, tuple[tuple[int, ...], bool]] = field(default_factory=dict)
+    recorded: IntArray | None = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "state_names", tuple(self.state_names))
+        shape = len(self.step), len(self.state_names)
+        object.__setattr__(self, "states", np.asarray(self.states, dtype=np.float64).reshape(shape))
+        if self.recorded is not None:
+            object.__setattr__(self, "recorded", np.asarray(self.recorded, dtype=np.int64))
+            frozen(self.recorded)
         for array in (self.activity, self.weights, self.weights_static, self.plastic, self.sources, self.targets,
                       self.delays, self.step, self.ranks, self.weights_after, self.lesioned_neurons,
-                      self.lesioned_connections):  # fmt: skip
+                      self.lesioned_connections, self.states):  # fmt: skip
             frozen(array)
 
     def __len__(self) -> int:
@@ -109,17 +130,72 @@ class Recording:
     def __getitem__(self, name: str) -> FloatArray:
         """Activities by the name of a neuron, a group or an output, or by another reference. Raises KeyError with the
         nearest names."""
-        found = self._names.find(name)
-        if isinstance(found, str):
-            raise UnknownNameError(found)
-        return self.activity[:, found.neurons[0]] if found.single else self.activity[:, list(found.neurons)]
+        values, found = self._found(arguments.text("name", name))
+        return values[:, found.neurons[0]] if found.single else values[:, list(found.neurons)]
 
     def __contains__(self, name: object) -> bool:
-        return isinstance(name, str) and not isinstance(self._names.find(name), str)
+        try:
+            return isinstance(name, str) and self._found(name) is not None
+        except UnknownNameError:
+            return False
+
+    def _found(self, name: str) -> tuple[FloatArray, Found]:
+        """Where the numbers of a reference are: an array, and its columns."""
+        found = self._names.find(name)
+        if isinstance(found, str):
+            states = self._names.find_states(name)
+            if not isinstance(states, Found):
+                raise UnknownNameError(states or found)
+            return self.states, states
+        if self.recorded is None:
+            return self.activity, found
+        columns = self._columns
+        missing = [self.neurons[index] for index in found.neurons if index not in columns]
+        if missing:
+            there = listed([self.neurons[index] for index in self.recorded.tolist()])
+            raise UnknownNameError(f"{listed(missing)} was not recorded: the recording is partial and holds {there}")
+        return self.activity, Found(tuple(columns[index] for index in found.neurons), found.single)
+
+    @cached_property
+    def _columns(self) -> Mapping[int, int]:
+        """Neuron index to column of ``activity``."""
+        recorded = range(len(self.neurons)) if self.recorded is None else self.recorded.tolist()
+        return {index: column for column, index in enumerate(recorded)}
 
     @cached_property
     def _names(self) -> Names:
-        return Names({name: index for index, name in enumerate(self.neurons)}, self.views, self.counted)
+        neurons = {name: index for index, name in enumerate(self.neurons)}
+        states = {name: column for column, name in enumerate(self.state_names)}
+        return Names(neurons, self.views, self.counted, states, self.state_views)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The names of the neurons whose activities it holds, a name a column of ``activity``."""
+        if self.recorded is None:
+            return self.neurons
+        return tuple(self.neurons[index] for index in self.recorded.tolist())
+
+    @property
+    def widths(self) -> tuple[int, int, int]:
+        """How many activities, changing weights and states a row holds."""
+        return self.activity.shape[1], self.weights.shape[1], self.states.shape[1]
+
+    @property
+    def missing(self) -> str | None:
+        """What a partial recording lacks, in words; None where it is whole."""
+        lacks = []
+        if self.recorded is not None:
+            there = set(self.recorded.tolist())
+            names = [name for index, name in enumerate(self.neurons) if index not in there]
+            lacks.append(f"the activities of {listed(names)}")
+        if self.weights.shape[1] < len(self.plastic):
+            lacks.append("the changing weights")
+        return " and ".join(lacks) or None
+
+    def check_whole(self, what: str) -> None:
+        """Refuse a partial recording for something that needs all of it. Raises RecordingError."""
+        if self.missing is not None:
+            raise RecordingError(f"{what} a partial recording: it lacks {self.missing}")
 
     @cached_property
     def connection_names(self) -> tuple[str, ...]:
@@ -136,11 +212,13 @@ class Recording:
 
     def weight(self, name: str) -> FloatArray:
         """w[t] of a connection by name, (rows,), also of one that stays. Raises KeyError with the nearest names."""
-        index = self.connection_index.get(name)
+        index = self.connection_index.get(arguments.text("name", name))
         if index is None:
             raise unknown("connection", name, self.connection_names)
         column = int(np.searchsorted(self.plastic, index))
         if column < len(self.plastic) and self.plastic[column] == index:
+            if not self.weights.shape[1]:
+                raise UnknownNameError(f"the weight '{name}' was not recorded: the recording is partial")
             return self.weights[:, column]
         return np.broadcast_to(self.weights_static[index - column], (len(self),))
 
@@ -157,7 +235,8 @@ class Recording:
 
     def row(self, step: int) -> int:
         """The row that holds a step. Raises RecordingError where it was not recorded."""
-        row = int(np.searchsorted(self.step, step))
+        arguments.integer("step", step)
+        row = int(np.searchsorted(self.step, step)) if abs(step) < 1 << 63 else len(self.step)
         if row == len(self.step) or self.step[row] != step:
             span = f"steps {self.step[0]} to {self.step[-1]}" if len(self.step) else "no steps"
             raise RecordingError(f"step {step} is not in the recording, which has {span} in {len(self.step)} rows")
@@ -165,6 +244,7 @@ class Recording:
 
     def snapshot(self, step: int) -> Snapshot:
         """Activities and all weights at a step. Raises RecordingError where it was not recorded."""
+        self.check_whole("a picture cannot be drawn from")
         row = self.row(step)
         before = self.all_weights(row - 1) if row > 0 and self.step[row - 1] == step - 1 else None
         return Snapshot(step, self.activity[row], self.all_weights(row), before)
@@ -173,7 +253,7 @@ class Recording:
         """Write a file of the format that the suffix names. Raises RecordingError, OSError."""
         from neurovis_spec.runtime import formats
 
-        formats.save(self, path)
+        formats.save(self, arguments.path("path", path))
 
     def _repr_svg_(self) -> str:
         """Its traces, for a notebook."""
@@ -187,24 +267,32 @@ def unknown(what: str, name: str, known: Iterable[str]) -> UnknownNameError:
     return UnknownNameError(unknown_text(what, name, known))
 
 
-def recording_of(
-    network: Network, step: IntArray, activity: FloatArray, weights: FloatArray, all_weights: FloatArray, after: After
-) -> Recording:
+@dataclass(frozen=True, eq=False)
+class Numbers:
+    """The rows of a recording: activities, changing weights, states."""
+
+    step: IntArray
+    activity: FloatArray
+    weights: FloatArray
+    states: FloatArray
+
+
+def recording_of(network: Network, columns: Columns, rows: Numbers, all_weights: FloatArray, after: After) -> Recording:
     """A recording with the structure of a network; ``all_weights`` (m,) gives those that stay."""
     connections = network.connections
     static = np.setdiff1d(np.arange(len(connections)), network.changing, assume_unique=True)
     names = names_of(network)
     return Recording(
-        activity=activity,
+        activity=rows.activity,
         neurons=network.neurons.names,
-        weights=weights,
+        weights=rows.weights,
         weights_static=all_weights[static],
         plastic=network.changing.copy(),
         sources=connections.sources.copy(),
         targets=connections.targets.copy(),
         delays=connections.delays.copy(),
         dt=network.dt,
-        step=step,
+        step=rows.step,
         ranks=_ranks(network),
         weights_after=after.weights,
         reached=after.reached,
@@ -215,6 +303,10 @@ def recording_of(
         network=network.name,
         hash=network.hash,
         counted=names.counted,
+        states=rows.states,
+        state_names=columns.probe.names,
+        state_views=columns.outputs,
+        recorded=columns.neurons,
     )
 
 
@@ -230,11 +322,14 @@ def ended(recording: Recording, after: After) -> Recording:
     )
 
 
-def after_rows(step: IntArray, weights: FloatArray) -> After:
-    """What the rows alone say of the time after them: the weights of the last one, before its update."""
-    if not len(step):
-        return After(np.full(weights.shape[1], np.nan), 0)
-    return After(weights[-1].copy(), int(step[-1]) + 1)
+def after_rows(step: IntArray, weights: FloatArray, changing: int | None = None) -> After:
+    """What the rows alone say of the time after them: the weights of the last one, before its update; NaN where they
+    hold none of the changing ones."""
+    reached = int(step[-1]) + 1 if len(step) else 0
+    changing = weights.shape[1] if changing is None else changing
+    if not len(step) or weights.shape[1] < changing:
+        return After(np.full(changing, np.nan), reached)
+    return After(weights[-1].copy(), reached)
 
 
 def _ranks(network: Network) -> IntArray:

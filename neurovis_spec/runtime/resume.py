@@ -30,6 +30,7 @@ from neurovis_spec.runtime.state import State, initial_state
 
 def resumed_state(network: Network, recording: Recording) -> State:
     """The state in which a run goes on. Raises RecordingError where names do not agree or the recording is empty."""
+    recording.check_whole("a run cannot go on from")
     if not len(recording):
         raise RecordingError("the recording holds no step to go on from")
     order = _matching_neurons(network, recording)

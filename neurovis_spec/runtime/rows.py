@@ -17,28 +17,35 @@ from neurovis_spec.runtime.recording import After
 
 @dataclass(frozen=True, slots=True)
 class Steps:
-    """The steps that are recorded: 0, ``every``, 2·``every``, … of ``total``.
+    """The steps that are recorded: the multiples of ``every`` among the ``total`` steps from ``first`` on.
 
-    >>> len(Steps(10, 4)), [part.tolist() for part in Steps(10, 4).parts(2)]
-    (3, [[0, 4], [8]])
+    >>> len(Steps(10, 4)), [part.tolist() for part in Steps(10, 4).parts(2)], list(Steps(10, 4, 5).parts())[0].tolist()
+    (3, [[0, 4], [8]], [8, 12])
     """
 
     total: int
     every: int = 1
+    first: int = 0
 
     def __len__(self) -> int:
-        return -(-self.total // self.every)
+        return -(-(self.first + self.total) // self.every) + -self.first // self.every
+
+    def at(self, row: int) -> int:
+        """The step of a row."""
+        return (row - -self.first // self.every) * self.every
 
     def parts(self, size: int = 1 << 16) -> Iterator[IntArray]:
         """Their numbers, some at a time."""
         for first in range(0, len(self), size):
-            yield np.arange(first, min(first + size, len(self)), dtype=np.int64) * self.every
+            rows = np.arange(first, min(first + size, len(self)), dtype=np.int64)
+            yield (rows - -self.first // self.every) * self.every
 
 
 class RowWriter(Protocol):
     """Takes rows in the order of their steps."""
 
-    def write(self, activity: FloatArray, weights: FloatArray, after: After) -> None:
-        """Some rows, which are only lent: (count, n) and (count, p); and what is true after the last step made, which
-        the file holds if nothing follows. At the end there may be none (count 0)."""
+    def write(self, activity: FloatArray, weights: FloatArray, states: FloatArray, after: After) -> None:
+        """Some rows, which are only lent: (count, n), (count, p), (count, q) with as many columns as the frame has; and
+        what is true after the last step made, which the file holds if nothing follows. At the end there may be none
+        (count 0)."""
         ...

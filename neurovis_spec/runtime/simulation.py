@@ -7,20 +7,22 @@ can be kept and gone back to.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec import arguments
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.changes import Clamp
-from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.network import Network, Output
 from neurovis_spec.compiler.patch import PatchError
 from neurovis_spec.compiler.settable import ParameterFormula
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.expressions.tree import Number
 from neurovis_spec.runtime.backend import Backend, prepare
+from neurovis_spec.runtime.columns import probe_of
 from neurovis_spec.runtime.conditions import Controls
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.names import Names, names_of
@@ -57,6 +59,11 @@ class Simulation:
     def _names(self) -> Names:
         return names_of(self.network)
 
+    @cached_property
+    def _outputs(self) -> Mapping[str, Callable[[State], np.float64 | FloatArray]]:
+        """How each output is read."""
+        return {entry.name: _reader(self.network, entry) for entry in self.network.outputs}
+
     def _apply(self, state: State) -> None:
         """What events change at the step to come."""
         change = self._changes.get(state.k)
@@ -89,7 +96,7 @@ class Simulation:
 
     def weight(self, name: str) -> float:
         """w[k] of any connection by name. Raises KeyError with the nearest names."""
-        index = self.network.connection_index.get(name)
+        index = self.network.connection_index.get(arguments.text("name", name))
         if index is None:
             raise unknown("connection", name, self.network.connection_names)
         return float(self._state.weights[index])
@@ -103,6 +110,8 @@ class Simulation:
         none. Raises InputError, and then no step was made.
         """
         state = self._state
+        if values is not None and not isinstance(values, Mapping):
+            raise TypeError(f"inputs are given by name, not as {type(values).__name__}: step(target=0.3)")
         vector = self._reader.at(state.k, {**(values or {}), **inputs})
         with np.errstate(all="ignore"):
             self._stepper.step(state, vector)
@@ -110,11 +119,7 @@ class Simulation:
         if state.k in self._changes:  # those of the next step apply now, so that ``weights`` are those of the next step
             self._apply(state)
             self._reader.use(state)
-        activity = state.activity
-        return {
-            entry.name: np.float64(activity[entry.neurons[0]]) if entry.scalar else activity[entry.neurons]
-            for entry in self.network.outputs
-        }
+        return {name: read(state) for name, read in self._outputs.items()}
 
     def set(self, values: Mapping[str, float] | None = None, /, **parameters: float) -> None:
         """Give parameters other values from step k on, until an event of a later step sets them again.
@@ -122,7 +127,7 @@ class Simulation:
         Fixed weights, biases, inputs, clamps and parameters of models and rules follow; plastic weights, states,
         signals under way and ``initial`` stay. Raises ParameterError, and then nothing has changed.
         """
-        checked = self._checked({**(values or {}), **parameters})
+        checked = self._checked({**arguments.mapping("values", values), **parameters})
         state = self._state
         try:
             with np.errstate(all="ignore"):
@@ -131,8 +136,8 @@ class Simulation:
             raise ParameterError(str(error)) from None
         self._reader.use(state)
 
-    def _checked(self, values: Mapping[str, float]) -> dict[int, float]:
-        slots = self.network.settable.index
+    def _checked(self, values: Mapping[str, object]) -> dict[int, float]:
+        slots, result = self.network.settable.index, {}
         for name, value in values.items():
             if name not in self.network.parameters:
                 hint = suggest(name, self.network.parameters, "the parameters are")
@@ -143,7 +148,8 @@ class Simulation:
                 )
             if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
                 raise ParameterError(f"parameter '{name}' takes a finite number, not {value!r}")
-        return {slots[name]: float(value) for name, value in values.items()}
+            result[slots[name]] = float(value)
+        return result
 
     def clamp(self, neurons: str, value: float) -> None:
         """Hold neurons (``K1..K3``, ``K + O``, ``left.K``) at a value from step k on, whatever their model says; its
@@ -185,7 +191,7 @@ class Simulation:
         self._controls.learn(self._state.conditions, members, on)
 
     def _neurons(self, text: str) -> IntArray:
-        found = self._names.find(text)
+        found = self._names.find(arguments.text("reference", text))
         if isinstance(found, str):
             raise UnknownNameError(found)
         return np.array(found.neurons, dtype=np.int64)
@@ -193,7 +199,7 @@ class Simulation:
     def _parts(self, text: str) -> tuple[IntArray, IntArray]:
         """The neurons, or else the connections, that a reference names."""
         none = np.zeros(0, dtype=np.int64)
-        if "->" not in text:
+        if "->" not in arguments.text("reference", text):
             return self._neurons(text), none
         index = self.network.connection_index.get(text)
         if index is not None and text.endswith(")"):
@@ -218,7 +224,19 @@ class Simulation:
 
     def restore(self, state: State) -> None:
         """Go on from a state of this network, exactly as it was. Raises ValueError for one of another network."""
+        arguments.instance("state", state, State, "a state, as state() gives it")
         if state.network != self.network.hash or len(state.activity) != len(self.network.neurons):
             raise ValueError("this is a state of another network")
         self._state = state.copy()
         self._reader.use(self._state)
+
+
+def _reader(network: Network, output: Output) -> Callable[[State], np.float64 | FloatArray]:
+    """What reads an output from the state after a step."""
+    if output.states:
+        probe = probe_of(network, output.states)
+        return (lambda state: np.float64(probe.now(state)[0])) if output.scalar else probe.now
+    if output.scalar:
+        index = int(output.neurons[0])
+        return lambda state: np.float64(state.activity[index])
+    return lambda state: state.activity[output.neurons]

@@ -18,10 +18,11 @@ from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.interrupts import Asked, Ended, deferred
 from neurovis_spec.progress import Progress
+from neurovis_spec.runtime.columns import columns_of
 from neurovis_spec.runtime.formats import StreamingFormat, for_path, settle
 from neurovis_spec.runtime.inputs import STRETCH
 from neurovis_spec.runtime.memory import check_disk
-from neurovis_spec.runtime.record import Course, after, checked_steps, go, record
+from neurovis_spec.runtime.record import Course, InMemory, after, checked_steps, go, record
 from neurovis_spec.runtime.recording import After, Recording, recording_of
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.rows import RowWriter, Steps
@@ -49,20 +50,21 @@ def record_to(
     after a second signal, which ends everything at once."""
     format_ = for_path(path)
     if not isinstance(format_, StreamingFormat):
-        how = (course.steps, course.inputs, course.backend, course.every, start, progress, course.until)
+        how = (course.steps, course.inputs, course.backend, course.every, start, progress, course.until, course.keep)
         format_.save(record(network, *how), path)
         return
     steps = Steps(checked_steps(network, course.steps, course.every), course.every)
     state = initial_state(network) if start is None else resumed_state(network, start)
-    none = np.zeros((0, len(network.neurons))), np.zeros((0, len(network.changing)))
-    frame = recording_of(network, np.zeros(0, dtype=np.int64), *none, state.weights, after(network, state))
+    columns = columns_of(network, course.keep)
+    none = InMemory(columns.widths(network), 0).numbers(np.zeros(0, dtype=np.int64))
+    frame = recording_of(network, columns, none, state.weights, after(network, state))
     settle(path, format_)
     check_disk(path, steps.total, steps.every, format_.size(frame, steps))
     written = False
     try:
         with deferred() as asked:
             with format_.stream(path, frame, steps) as writer:
-                rows = _Handed(network, writer, lambda: after(network, state), asked)
+                rows = _Handed(columns.widths(network), writer, lambda: after(network, state), asked)
                 go(network, state, course, rows, progress)
                 if asked and not rows.handed:
                     raise Ended(asked.number)
@@ -78,19 +80,20 @@ def record_to(
 class _Handed:
     """Rows that are handed on when a stretch is full or some time has passed; the arrays for them are used again."""
 
-    def __init__(self, network: Network, writer: RowWriter, after: Callable[[], After], asked: Asked) -> None:
-        self._activity = np.empty((STRETCH, len(network.neurons)))
-        self._weights = np.empty((STRETCH, len(network.changing)))
+    def __init__(
+        self, widths: tuple[int, int, int], writer: RowWriter, after: Callable[[], After], asked: Asked
+    ) -> None:
+        self._activity, self._weights, self._states = (np.empty((STRETCH, width)) for width in widths)
         self._writer, self._after, self._asked = writer, after, asked
         self._due = monotonic() + OFTEN
         self.handed = 0
 
-    def begin(self, count: int) -> tuple[FloatArray, FloatArray]:
-        return self._activity[:count], self._weights[:count]
+    def begin(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        return self._activity[:count], self._weights[:count], self._states[:count]
 
     def end(self, count: int) -> None:
         if count:
-            self._writer.write(self._activity[:count], self._weights[:count], self._after())
+            self._writer.write(*self.begin(count), self._after())
             self.handed += count
         self._due = monotonic() + OFTEN
 
@@ -102,4 +105,4 @@ class _Handed:
 
     def close(self) -> None:
         """Hand on what is true after the last step, which may lie behind the last row."""
-        self._writer.write(self._activity[:0], self._weights[:0], self._after())
+        self._writer.write(*self.begin(0), self._after())

@@ -5,6 +5,7 @@ In: a Recording. Out: an SVG as text. It needs no network, so that a recording t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from html import escape
 from typing import TYPE_CHECKING
@@ -21,15 +22,17 @@ MOST, COLUMNS = 24, 300
 
 
 def traces(recording: Recording) -> str:
-    """The activities and the changing weights over the steps; every line has its own range, which is written beside
-    it."""
-    names = [recording.connection_names[index] for index in recording.plastic[:MOST].tolist()]
+    """The activities, the changing weights and the states over the steps; every line has its own range, which is
+    written beside it."""
+    plastic = recording.plastic if recording.weights.shape[1] else recording.plastic[:0]
+    names = [recording.connection_names[index] for index in plastic[:MOST].tolist()]
     rows = [
-        *_rows("activity", recording.neurons[:MOST], recording.activity, "#0072b2"),
+        *_rows("activity", recording.columns[:MOST], recording.activity, "#0072b2"),
         *_rows("weight", names, recording.weights, "#b07d00"),
+        *_rows("state", recording.state_names[:MOST], recording.states, "#009e73"),
     ]
     height = TOP + ROW * len(rows) + 8
-    hidden = max(0, len(recording.neurons) - MOST) + max(0, len(recording.plastic) - MOST)
+    hidden = sum(max(0, width - MOST) for width in recording.widths)
     span = f"steps {recording.step[0]} … {recording.step[-1]}" if len(recording) else "no steps"
     more = f" · {hidden} more" if hidden else ""
     title = escape(f"{recording.network or 'recording'} · {span}{more}")
@@ -66,6 +69,8 @@ def _points(values: npt.NDArray[np.float64], low: float, high: float, top: int) 
     if not len(values):
         return ""
     right = WIDTH - 108
+    exponent = int(np.frexp(max(abs(low), abs(high)))[1])  # of values near 1 no difference and no ratio overflows
+    values, low, high = np.ldexp(values, -exponent), math.ldexp(low, -exponent), math.ldexp(high, -exponent)
     edges = np.linspace(0, len(values), min(COLUMNS, len(values)) + 1).astype(np.int64)
     scale = (ROW - 8) / (high - low) if high > low else 0.0
     places = []

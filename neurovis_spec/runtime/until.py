@@ -58,7 +58,7 @@ class _Watched:
         self._meter = Meter(until.measure)
         self._met = False
 
-    def begin(self, count: int) -> tuple[FloatArray, FloatArray]:
+    def begin(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         return self._rows.begin(count)
 
     def end(self, count: int) -> None:

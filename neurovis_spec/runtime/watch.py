@@ -41,6 +41,11 @@ class Watch:
         if len(wrong):
             self._step, self._vector = first + int(wrong[0]), vectors[wrong[0]]
 
+    def until(self, k: int, stop: int) -> int:
+        """How far steps from k on may be made, ``stop`` at most, before one must be looked at: one behind the first
+        whose inputs are not finite."""
+        return self._step + 1 if not self.warned and k <= self._step < stop else stop
+
     def look(self, state: State) -> None:
         """Warn if something of the step just made is NaN or infinite."""
         if self.warned:

@@ -172,13 +172,12 @@ def tooltips(network: Network, activity: FloatArray, weights: FloatArray) -> tup
             of_neurons[index] = "\n".join(part for part in parts if part)
     of_connections = []
     lows, highs = weights.min(axis=0).tolist(), weights.max(axis=0).tolist()
-    rows = zip(connections.rules.tolist(), connections.delays.tolist(), connections.entry.tolist(), strict=True)
-    for index, (rule, delay, entry) in enumerate(rows):
-        learns = network.plasticity[rule].title if rule >= 0 else ""
+    rows = zip(connections.delays.tolist(), connections.entry.tolist(), strict=True)
+    for index, (delay, entry) in enumerate(rows):
         parts = [
             network.connection_names[index].replace("->", "→"),
             f"weight {_range(lows[index], highs[index])}",
-            learns,
+            connections.learns[entry] or "",
             f"delay {delay}" if delay != 1 else "",
             connections.descriptions[entry] or "",
         ]

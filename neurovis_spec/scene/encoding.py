@@ -65,6 +65,6 @@ def glow(weight: FloatArray, previous: FloatArray | None, gain: float) -> FloatA
 def glow_width(width: FloatArray, intensity: FloatArray) -> FloatArray:
     """The width of a glow around a line of ``width``: it reaches further the more the weight changes, at an intensity
     of 1 by half of ``GLOW_REACH`` on either side; 0 (none) below ``FAINTEST``."""
-    light = np.nan_to_num(intensity, nan=0.0, posinf=1e12)
+    light = np.minimum(np.nan_to_num(intensity, nan=0.0), 1e12)  # brighter cannot be told from it
     result: FloatArray = np.where(light < FAINTEST, 0.0, width + 2 * GLOW_REACH * light / (1 + light))
     return result

@@ -20,6 +20,7 @@ from neurovis_spec.diagnostics import SpecError
 from neurovis_spec.findings import printable
 from neurovis_spec.plugins import PluginError
 from neurovis_spec.runtime.backend import BackendError
+from neurovis_spec.runtime.columns import columns_of
 from neurovis_spec.runtime.inputs import STRETCH, InputError
 from neurovis_spec.runtime.measures import Measure, Meter, parsed, resolved
 from neurovis_spec.runtime.record import Course, go
@@ -118,13 +119,13 @@ class _Metered:
     """Rows that are measured and forgotten."""
 
     def __init__(self, network: Network, state: State, meters: Sequence[Meter]) -> None:
-        self._activity = np.empty((STRETCH, len(network.neurons)))
-        self._weights = np.empty((STRETCH, len(network.changing)))
+        widths = columns_of(network).widths(network)
+        self._activity, self._weights, self._states = (np.empty((STRETCH, width)) for width in widths)
         self._state, self._meters = state, meters
         self.last = [float("nan")] * len(meters)
 
-    def begin(self, count: int) -> tuple[FloatArray, FloatArray]:
-        return self._activity[:count], self._weights[:count]
+    def begin(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        return self._activity[:count], self._weights[:count], self._states[:count]
 
     def end(self, count: int) -> None:
         if count:

@@ -15,12 +15,13 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec import api
+from neurovis_spec import api, arguments
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.diagnostics import SpecError, suggest
 from neurovis_spec.interrupts import Ended
 from neurovis_spec.language.reader import LARGEST
 from neurovis_spec.language.reader_files import FileFault, read_bytes
+from neurovis_spec.plain import text_of
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.backend import BackendError, available
 from neurovis_spec.runtime.backend import load as load_backend
@@ -186,8 +187,8 @@ def _pair(text: str) -> tuple[str, str]:
 def _read(source: str | Path | Mapping[str, object]) -> Source:
     """A spec, read once, so that it is the same at every point."""
     if isinstance(source, Mapping):
-        return Source(api.text_of(source), api.MAPPING, Path())
-    path = Path(source)
+        return Source(text_of(source), "<mapping>", Path())
+    path = arguments.path("source", source)
     data = read_bytes(path, LARGEST)
     with suppress(UnicodeDecodeError):
         if not isinstance(data, FileFault):

@@ -2,20 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-from neurovis_layouts.kept import kept
-from neurovis_layouts.layered.engine import LayeredEngine as FreshLayeredEngine
-from neurovis_spec.layout.model import Layout, LayoutProblem
+from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem
 
 __all__ = ["LayeredEngine"]
 
 
-class LayeredEngine(FreshLayeredEngine):
-    """Neurons in ranks along the direction; those that an earlier layout knew stay where they were."""
+class LayeredEngine:
+    """Neurons in ranks along the direction, instances and boxes as frames; neurons that an earlier layout knew stay
+    where they were."""
 
-    capabilities = replace(FreshLayeredEngine.capabilities, memory=True)
+    name = "layered"
+    capabilities = Capabilities(
+        pins=True,
+        arrange=True,
+        boxes=True,
+        direction=True,
+        modules=True,
+        mirrors=True,
+        align=True,
+        memory=True,
+        neurons=100_000,
+        edges=1_000_000,
+    )
 
     def lay_out(self, problem: LayoutProblem) -> Layout:
-        """Place every neuron and route every connection. Raises LayoutRefusalError."""
-        return kept(problem, super().lay_out(problem))
+        """Place every neuron and route every connection. Raises LayoutRefusalError for what cannot be met, such as
+        lines that a formation cannot keep."""
+        from neurovis_layouts.kept import kept  # only here: who asks what it can do needs none of it
+        from neurovis_layouts.layered.engine import drawn
+
+        return kept(problem, drawn(problem, self.name))

@@ -14,43 +14,26 @@ from dataclasses import replace
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.layered.book import keys_of
 from neurovis_layouts.layered.compose import Composer
-from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem, Point
+from neurovis_spec.layout.model import Layout, LayoutProblem, Point
 
 
-class LayeredEngine:
-    """Neurons in ranks along the direction, instances and boxes as frames."""
-
-    name = "layered"
-    capabilities = Capabilities(
-        pins=True,
-        arrange=True,
-        boxes=True,
-        direction=True,
-        modules=True,
-        mirrors=True,
-        align=True,
-        neurons=100_000,
-        edges=1_000_000,
+def drawn(problem: LayoutProblem, engine: str) -> Layout:
+    """The layout of a problem as if there were no earlier one. Raises LayoutRefusalError for what cannot be met."""
+    if not problem.neurons:
+        return Layout(problem.network, engine, {}, {})
+    drawing = Composer(_framed(problem)).whole()
+    return Layout(
+        problem.network,
+        engine,
+        {
+            name: to_picture(place, problem.direction)
+            for name, place in zip(problem.neurons, drawing.places, strict=True)
+        },
+        {
+            edge.name: tuple(to_picture(point, problem.direction) for point in drawing.routes[key])
+            for edge, key in zip(problem.edges, keys_of(problem.edges), strict=True)
+        },
     )
-
-    def lay_out(self, problem: LayoutProblem) -> Layout:
-        """Place every neuron and route every connection. Raises LayoutRefusalError for what cannot be met, such as a
-        neuron arranged twice or lines that a formation cannot keep."""
-        if not problem.neurons:
-            return Layout(problem.network, self.name, {}, {})
-        drawing = Composer(_framed(problem)).whole()
-        return Layout(
-            problem.network,
-            self.name,
-            {
-                name: to_picture(place, problem.direction)
-                for name, place in zip(problem.neurons, drawing.places, strict=True)
-            },
-            {
-                edge.name: tuple(to_picture(point, problem.direction) for point in drawing.routes[key])
-                for edge, key in zip(problem.edges, keys_of(problem.edges), strict=True)
-            },
-        )
 
 
 def _framed(problem: LayoutProblem) -> LayoutProblem:

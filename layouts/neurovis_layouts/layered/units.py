@@ -17,7 +17,7 @@ import networkx as nx
 from neurovis_layouts.formations import offsets
 from neurovis_layouts.frame import from_picture
 from neurovis_spec.layout.geometry import snap, turn
-from neurovis_spec.layout.model import Arrangement, LayoutProblem, LayoutRefusalError, Point
+from neurovis_spec.layout.model import Arrangement, LayoutProblem, Point
 
 #: Loops of more neurons than this are unrolled along the direction instead of drawn as a ring.
 _MOST_IN_A_RING = 32
@@ -44,10 +44,7 @@ class Unit:
 def units_of(
     problem: LayoutProblem, frames: Sequence[Unit] = (), absent: AbstractSet[int] = frozenset()
 ) -> tuple[Unit, ...]:
-    """The units, ordered by their first neuron, ``frames`` among them as they are; ``absent`` neurons are in none.
-
-    Raises LayoutRefusalError where a neuron is arranged twice.
-    """
+    """The units, ordered by their first neuron, ``frames`` among them as they are; ``absent`` neurons are in none."""
     framed = {member for unit in frames for member in unit.members} | absent
     asked = [*frames, *_arranged(problem, framed)]
     found = list(asked)
@@ -71,16 +68,10 @@ def units_of(
 def _arranged(problem: LayoutProblem, framed: AbstractSet[int]) -> list[Unit]:
     spacing = max(problem.neuron_spacing, 0.65)
     found: list[Unit] = []
-    taken: set[int] = set()
     for whole, how in problem.arrange:
         members = tuple(member for member in whole if member not in framed)
         if not members:
             continue
-        twice = [m for m in members if m in taken]
-        if twice:
-            name = problem.neurons[twice[0]]
-            raise LayoutRefusalError("arranged-twice", f"'{name}' is arranged twice", "arrange it once", (name,))
-        taken.update(members)
         wide = spacing * (1.5 if _graph(problem, members).size() else 1.0)
         places = offsets(how, len(members), wide)
         found.append(Unit(members, tuple(from_picture(place, problem.direction) for place in places)))

@@ -15,6 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from neurovis_layouts.routing.nearby import Nearby
 from neurovis_layouts.routing.rounded import rounded
 from neurovis_layouts.routing.sight import MOST, Sight, lengths, runs_along
 from neurovis_layouts.routing.walls import BoolArray, FloatArray, IntArray, Walls, blocked, meet, touch
@@ -29,6 +30,8 @@ _CLEAR = ((0.1, 0.44), (0.02, 0.34))
 #: Ways that look longer than the best by this factor are not followed up: a tenth of the work; and where more detours
 #: than so many are looked for.
 _HASTE, _MORE_HASTE, _MANY = 1.1, 1.3, 60
+#: With more frames than this corners see those nearby alone; the haste then, and how many lanes there are.
+_CROWD, _MOST_HASTE, _FEW_LANES = 128, 1.5, 2
 #: What a bend costs, a lane that is taken already, and a corner that an edge between the same neurons has taken.
 _BEND, _TAKEN, _SAME = 0.2, 0.6, 1e6
 #: Outwards, from each side of a rectangle.
@@ -56,7 +59,10 @@ class _Ground:
     def clears(self, piece: Route) -> bool:
         """Whether a curve is clear of all."""
         line = np.array(sampled(piece, 0.1), dtype=np.float64)
-        return bool(self.free(line[:-1], line[1:]).all())
+        low, high = line.min(axis=0) - self.clear, line.max(axis=0) + self.clear
+        rects = self.rects[((self.rects[:, :2] < high) & (self.rects[:, 2:] > low)).all(axis=1)]
+        discs = self.discs[((self.discs > low) & (self.discs < high)).all(axis=1)]
+        return bool(_Ground(rects, discs, self.clear).free(line[:-1], line[1:]).all())
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,13 +85,19 @@ class _Taken:
 
     def beside(self, at: Point, points: FloatArray) -> FloatArray:
         """(k,) what it costs to run from here straight to points (k, 2), for the stretches shared."""
-        cost = np.zeros(len(points))
+        times = np.zeros(len(points), dtype=np.int64)
         for axis in (0, 1):
-            for low, high in self.lines.get((axis, at[axis]), ()):
-                other, here = points[:, 1 - axis], at[1 - axis]
+            stretches = self.lines.get((axis, at[axis]))
+            on = np.flatnonzero(points[:, axis] == at[axis]) if stretches else ()
+            if len(on):
+                low, high = np.array(stretches, dtype=np.float64).T
+                other, here = points[on, 1 - axis, None], at[1 - axis]
                 shared = (np.minimum(other, here) < high) & (np.maximum(other, here) > low)
-                cost += np.where(shared & (points[:, axis] == at[axis]), _TAKEN, 0.0)
-        return cost
+                times[on] += shared.sum(axis=1)
+        costs = np.full(int(times.max(initial=0)) + 1, _TAKEN)
+        costs[0] = 0.0
+        total: FloatArray = np.cumsum(costs)[times]
+        return total
 
 
 class Detours:
@@ -93,13 +105,14 @@ class Detours:
 
     def __init__(self, walls: Walls, centres: Sequence[Point], lanes: int = len(_LANES), ways: int = 1) -> None:
         """``lanes`` is how many there are around a frame, at most; ``ways`` how many detours will be looked for."""
-        self._haste = _HASTE if ways <= _MANY else _MORE_HASTE
+        many = len(walls.rects) > _CROWD
+        self._haste = _MOST_HASTE if many else _HASTE if ways <= _MANY else _MORE_HASTE
         self._walls = walls
         self._centres: FloatArray = np.array(centres, dtype=np.float64).reshape(-1, 2)
         x0, y0, x1, y1 = walls.rects.T
         corners = [
             np.stack([x + right * off, y + down * off, np.full(len(x), right), np.full(len(x), down)], axis=1)
-            for off in _LANES[:lanes]
+            for off in _LANES[: min(lanes, _FEW_LANES) if many else lanes]
             for x, right in ((x0, -1.0), (x1, 1.0))
             for y, down in ((y0, -1.0), (y1, 1.0))
         ]
@@ -108,6 +121,14 @@ class Detours:
         flat = self._corners.reshape(-1, 4)
         #: what corners see, by how far off frames lines stay
         self._sights = {off: Sight(flat, walls.rects + off * _OUT) for off, _ in _CLEAR}
+        #: of many frames, what corners see nearby
+        #: (n,) in how many frames each neuron is
+        self._depth: IntArray = walls.inside.sum(axis=1)
+        free = self._centres[self._depth == 0]
+        self._nearby = {o: Nearby(flat, walls.rects + o * _OUT, free, clear) for o, clear in _CLEAR} if many else {}
+        #: what it costs to bend at a corner, of many frames
+        self._bends: FloatArray = np.full(len(flat), _BEND)
+        self._corner = {(x, y): number for number, (x, y) in enumerate(flat[:, :2].tolist())} if many else {}
         self._taken = _Taken()
         self._between: dict[tuple[int, int], list[Point]] = {}
 
@@ -120,6 +141,9 @@ class Detours:
             return None
         self._taken.add(path)
         same += path[1:-1]
+        for point in path[1:-1]:
+            if point in self._corner:
+                self._bends[self._corner[point]] += _TAKEN
         return rounded(path, ground.clears)
 
     def folded(self, source: int, target: int, twice: float) -> Route | None:
@@ -142,7 +166,10 @@ class Detours:
         return rounded(path, ground.clears)
 
     def longer(self, source: int, target: int) -> float:
-        """By how much the way round is longer than the straight one; 0 where there is none."""
+        """By how much the way round is longer than the straight one; 0 where there is none. Among many frames all ways
+        round are much the same: there it is how long the straight one is."""
+        if self._nearby:
+            return float(lengths(self._centres[[target]] - self._centres[[source]])[0])
         path, _ = self._way(source, target, (), True)
         if path is None:
             return 0.0
@@ -153,23 +180,46 @@ class Detours:
         ends = self._centres[[source, target]]
         bends = {**self._taken.corners, **dict.fromkeys(same, _SAME)}
         foreign = self._walls.foreign(source, target)
-        loose: BoolArray = np.logical_not(self._walls.inside[:, foreign].any(axis=1))
+        # in no frame but those that hold an end
+        inside = self._walls.inside
+        loose: BoolArray = inside[:, ~foreign].sum(axis=1) == self._depth
         loose[[source, target]] = False
         frames, discs = np.flatnonzero(foreign), np.flatnonzero(loose)
-        for off, clear in _CLEAR:
-            rects = self._walls.rects[frames] + off * _OUT
-            whole = _Ground(rects, self._centres[discs], clear)
-            path = self._over(ends, whole, frames, self._sights[off], bends, alone)
-            if path is not None:
-                break
-        return path, whole
+        for search in (self._past, self._over) if self._nearby else (self._over,):
+            for off, clear in _CLEAR:
+                whole = _Ground(self._walls.rects[frames] + off * _OUT, self._centres[discs], clear)
+                path = search(ends, whole, frames, off, bends, alone)
+                if path is not None:
+                    return path, whole
+        return None, whole
+
+    def _past(
+        self,
+        ends: FloatArray,
+        whole: _Ground,
+        frames: IntArray,
+        off: float,
+        bends: Mapping[Point, float],
+        alone: bool,
+    ) -> list[Point] | None:
+        """A short line round many frames, from one to the next; None where none is found so."""
+        if alone and whole.free(ends[:1], ends[1:])[0]:
+            return [(x, y) for x, y in ends.tolist()]
+        foreign = np.zeros(len(self._walls.rects), dtype=np.bool_)
+        foreign[frames] = True
+        same = [self._corner[place] for place, cost in bends.items() if cost >= _SAME and place in self._corner]
+        extra = self._bends.copy()
+        extra[same] += _SAME
+        path = self._nearby[off].way(ends, foreign, whole.discs, extra, self._taken.beside, self._haste)
+        line = np.array(path or ends.tolist(), dtype=np.float64)
+        return path if whole.free(line[:-1], line[1:]).all() else None
 
     def _over(
         self,
         ends: FloatArray,
         whole: _Ground,
         frames: IntArray,
-        sight: Sight,
+        off: float,
         bends: Mapping[Point, float],
         alone: bool,
     ) -> list[Point] | None:
@@ -193,7 +243,7 @@ class Detours:
             among[frames[met]] = True
             number = (np.arange(corners[0])[:, None] * corners[1] + frames[met][None, :]).reshape(-1)
             free = whole.free(nodes[:, :2], nodes[:, :2])
-            known = sight if corners[1] <= MOST else None
+            known = self._sights[off] if corners[1] <= MOST else None
             graph = _Graph(ends, nodes[free], ground, number[free[: len(number)]], among, known)
             path = _shortest(graph, bends, self._taken, alone, self._haste)
         return None

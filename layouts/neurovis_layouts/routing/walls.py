@@ -67,18 +67,18 @@ class Walls:
 def meet(a: FloatArray, b: FloatArray, rects: FloatArray) -> BoolArray:
     """(k, f) whether the segments from ``a`` (k, 2) to ``b`` (k, 2) enter rectangles (f, 4), borders apart."""
     entered: BoolArray = np.zeros((len(a), len(rects)), dtype=np.bool_)
-    entered[_meetings(a, b, rects)] = True
+    entered[meetings(a, b, rects)] = True
     return entered
 
 
 def blocked(a: FloatArray, b: FloatArray, rects: FloatArray) -> BoolArray:
     """(k,) whether the segments from ``a`` (k, 2) to ``b`` (k, 2) enter any of the rectangles (f, 4)."""
     entered: BoolArray = np.zeros(len(a), dtype=np.bool_)
-    entered[_meetings(a, b, rects)[0]] = True
+    entered[meetings(a, b, rects)[0]] = True
     return entered
 
 
-def _meetings(a: FloatArray, b: FloatArray, rects: FloatArray) -> tuple[IntArray, IntArray]:
+def meetings(a: FloatArray, b: FloatArray, rects: FloatArray) -> tuple[IntArray, IntArray]:
     """Which segment enters which rectangle."""
     # apart on no axis: across, along, and that square to the segment (separating axes)
     half, middle = (rects[:, 2:] - rects[:, :2]) / 2, (rects[:, 2:] + rects[:, :2]) / 2

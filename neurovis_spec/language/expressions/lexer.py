@@ -88,7 +88,7 @@ def tokens(text: str, *, references: bool = False) -> tuple[Token, ...]:
         hint = "give its parts names, as parameters or in 'let'"
         raise ExpressionError("expression-too-long", message, MAX_LENGTH, len(text), hint)
     if date := _DATE.fullmatch(text):
-        hint = "a difference has blanks around its signs: 9 - 8 - 7"
+        hint = f"for the difference write {' - '.join(part.lstrip('0') or '0' for part in date[1].split('-'))}"
         raise ExpressionError("malformed-number", f"'{date[1]}' is a date, no number", *date.span(1), hint)
     found: list[Token] = []
     at = 0
@@ -147,7 +147,7 @@ def _number(text: str, number: re.Match[str]) -> Token:
             _number_hint(number.group(), tail.group()),
         )
     if _ZEROS.fullmatch(number.group()):
-        message = f"'{shown(number.group())}' is no number: it begins with a zero"
+        message = f"'{shown(number.group())}' is no number: a zero stands in front of it"
         raise ExpressionError("malformed-number", message, start, end, decimal_hint(number.group()))
     if math.isinf(float(number.group())):
         message = f"{shown(number.group(), 20)} is beyond the range of numbers, which ends near 1.8e308"

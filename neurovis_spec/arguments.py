@@ -1,0 +1,97 @@
+"""Arguments of the Python interface, checked where they come in.
+
+In: what an argument is called, and a value. Out: the value as the type that is wanted; else a TypeError or a ValueError
+that names the argument, rather than an error from deep within.
+"""
+
+from __future__ import annotations
+
+import operator
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import SupportsFloat, SupportsIndex, TypeVar
+
+Kind = TypeVar("Kind")
+
+
+def text(name: str, value: object) -> str:
+    """A text."""
+    return instance(name, value, str, "a text")
+
+
+def path(name: str, value: object) -> Path:
+    """A path that a file could have.
+
+    >>> path("path", 3)
+    Traceback (most recent call last):
+    TypeError: 'path' is a path, not int
+    """
+    if not isinstance(value, str | os.PathLike) or not isinstance(plain := os.fspath(value), str):
+        raise _wrong(name, "a path", value)
+    if "\0" in plain:
+        raise ValueError(f"'{name}' holds a NUL character, which no path does")
+    return Path(plain)
+
+
+def integer(name: str, value: object, least: int | None = None, most: int | None = None) -> int:
+    """An integer from ``least`` to ``most``.
+
+    >>> integer("limit", -5, least=0)
+    Traceback (most recent call last):
+    ValueError: 'limit' is at least 0, not -5
+    """
+    if isinstance(value, bool) or not isinstance(value, SupportsIndex):
+        raise _wrong(name, "an integer", value)
+    try:
+        whole = operator.index(value)
+    except TypeError:  # an array of several
+        raise _wrong(name, "an integer", value) from None
+    if least is not None and whole < least:
+        raise ValueError(f"'{name}' is at least {least}, not {_shown(whole)}")
+    if most is not None and whole > most:
+        raise ValueError(f"'{name}' is at most {most}, not {_shown(whole)}")
+    return whole
+
+
+def number(name: str, value: object) -> float:
+    """A number, which may be NaN or infinite."""
+    if isinstance(value, str | bytes | bytearray) or not isinstance(value, SupportsFloat | SupportsIndex):
+        raise _wrong(name, "a number", value)
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise _wrong(name, "a number", value) from None
+    except OverflowError:
+        raise ValueError(f"'{name}' is beyond what a double can hold") from None
+
+
+def mapping(name: str, value: object) -> Mapping[str, object]:
+    """A mapping whose keys are texts; None is an empty one."""
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping):
+        raise _wrong(name, "a mapping", value)
+    return {text(f"{name}: key", key): item for key, item in value.items()}
+
+
+def instance(name: str, value: object, kind: type[Kind], what: str) -> Kind:
+    """A value of this kind."""
+    if not isinstance(value, kind):
+        raise _wrong(name, what, value)
+    return value
+
+
+def function(name: str, value: object) -> None:
+    """Refuse what cannot be called; None is no function and fine."""
+    if value is not None and not callable(value):
+        raise _wrong(name, "a function", value)
+
+
+def _wrong(name: str, what: str, value: object) -> TypeError:
+    return TypeError(f"'{name}' is {what}, not {type(value).__name__}")
+
+
+def _shown(whole: int) -> str:
+    """An integer of any length."""
+    return str(whole) if abs(whole) < 10**15 else f"about {'-' if whole < 0 else ''}2^{whole.bit_length() - 1}"

@@ -1,0 +1,188 @@
+"""Refusals: what is asked of an engine that it cannot do, or that nobody can.
+
+In: what is asked, by a LayoutProblem or by a network's settings, and what an engine declares that it can do. Out:
+nothing, or a LayoutRefusalError. No engine runs for it, so that ``neurovis validate`` can say what ``neurovis layout``
+would refuse.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import takewhile
+
+import numpy as np
+
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.layout.geometry import distance
+from neurovis_spec.layout.model import (
+    RADIUS,
+    Capabilities,
+    Direction,
+    LayoutProblem,
+    LayoutRefusalError,
+    Point,
+)
+from neurovis_spec.layout.naming import natural_key
+
+#: Rounding in the last bit does not make two pins overlap.
+_SLACK = 1e-9
+#: So many neurons are named in a message.
+_SHOWN = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Wishes:
+    """What is asked of an engine. Neurons are meant by their place in ``neurons``; ``known`` are those whose data say
+    where they are."""
+
+    neurons: Sequence[str]
+    connections: int
+    pins: Mapping[int, Point]
+    known: frozenset[int]
+    arrange: Sequence[tuple[Sequence[int], str]]
+    align: Sequence[Sequence[int]]
+    direction: Direction
+    boxes: bool
+    mirrors: bool
+    memory: bool
+
+
+def asked_by(problem: LayoutProblem) -> Wishes:
+    """What a problem asks for."""
+    return Wishes(
+        problem.neurons,
+        len(problem.edges),
+        problem.pins,
+        frozenset(i for i, (x, y) in enumerate(problem.places) if math.isfinite(x + y)),
+        problem.arrange,
+        problem.align,
+        problem.direction,
+        bool(problem.boxes),
+        bool(problem.mirrors),
+        problem.memory is not None,
+    )
+
+
+def asked_of(network: Network, memory: bool) -> Wishes:
+    """What the settings of a network ask for, with a ``memory`` of an earlier layout or without."""
+    settings = network.layout
+    return Wishes(
+        network.neurons.names,
+        len(network.connections),
+        settings.positions,
+        frozenset(np.flatnonzero(np.isfinite(network.neurons.position).all(axis=1)).tolist()),
+        settings.arrange,
+        settings.align,
+        settings.direction,
+        bool(settings.boxes) or any(group.box is not None for group in network.neurons.groups),
+        bool(settings.mirrors),
+        memory,
+    )
+
+
+def refuse(wishes: Wishes, name: str, can: Capabilities) -> None:
+    """Raise LayoutRefusalError for the first thing that is asked for beyond what the engine of this name can do, or
+    that contradicts itself."""
+    _refuse_size(wishes, name, can)
+    _refuse_without_place(wishes, name, can)
+    asked: Mapping[str, tuple[bool, bool, str]] = {
+        "layout-pins-unsupported": (bool(wishes.pins), can.pins, "keep pinned positions (layout.positions)"),
+        "layout-arrange-unsupported": (bool(wishes.arrange), can.arrange, "arrange groups (layout.arrange)"),
+        "layout-boxes-unsupported": (wishes.boxes, can.boxes, "keep the members of a box together"),
+        "layout-mirror-unsupported": (wishes.mirrors, can.mirrors, "draw mirror images (layout.mirror)"),
+        "layout-align-unsupported": (bool(wishes.align), can.align, "put neurons on one line (layout.align)"),
+        "layout-memory-unsupported": (wishes.memory, can.memory, "remember a layout (layout.file)"),
+        "layout-direction-unsupported": (wishes.direction != "down", can.direction, "draw in another direction"),
+    }
+    for code, (wanted, possible, what) in asked.items():
+        if wanted and not possible:
+            raise LayoutRefusalError(code, f"the engine '{name}' cannot {what}", "the engine 'layered' can")
+    _refuse_contradictions(wishes)
+    _refuse_close_pins(wishes)
+
+
+def _refuse_contradictions(wishes: Wishes) -> None:
+    """Raise LayoutRefusalError where a neuron is arranged twice, or a line holds neurons that an arrangement keeps off
+    it."""
+    arranged: dict[int, tuple[int, str]] = {}
+    for number, (whole, how) in enumerate(wishes.arrange):
+        for member in _together(wishes, whole):
+            if member in arranged:
+                name = wishes.neurons[member]
+                raise LayoutRefusalError("arranged-twice", f"'{name}' is arranged twice", "arrange it once", (name,))
+            arranged[member] = number, how
+    along = "column" if wishes.direction in ("down", "up") else "row"
+    for line in wishes.align:
+        first: dict[int, int] = {}
+        for member in line:
+            number, how = arranged.get(member, (-1, ""))
+            if how == along and (mate := first.setdefault(number, member)) != member:
+                names = wishes.neurons[mate], wishes.neurons[member]
+                raise LayoutRefusalError(
+                    "align-conflict",
+                    f"'{names[0]}' and '{names[1]}' cannot stand on one line: what they belong to holds them apart",
+                    about=names,
+                )
+
+
+def _together(wishes: Wishes, members: Sequence[int]) -> Sequence[int]:
+    """Those of the members of an arrangement that it arranges: they stand in no instance that is within what all have
+    in common."""
+    paths = [wishes.neurons[member].split(".")[:-1] for member in members]
+    if not any(paths):
+        return members
+    both = zip(min(paths), max(paths), strict=False)
+    common = sum(1 for _ in takewhile(lambda steps: steps[0] == steps[1], both))
+    return [member for member, path in zip(members, paths, strict=True) if len(path) == common]
+
+
+def _refuse_size(wishes: Wishes, name: str, can: Capabilities) -> None:
+    neurons, edges = len(wishes.neurons), wishes.connections
+    if neurons > can.neurons or edges > can.edges:
+        raise LayoutRefusalError(
+            "layout-too-large",
+            f"the engine '{name}' draws at most {can.neurons} neurons and {can.edges} connections; "
+            f"this network has {neurons} and {edges}",
+        )
+
+
+def _refuse_without_place(wishes: Wishes, name: str, can: Capabilities) -> None:
+    if can.free and not can.places:
+        return
+    known = wishes.known if can.places else frozenset[int]()
+    free = [n for i, n in enumerate(wishes.neurons) if i not in wishes.pins and i not in known]
+    if not free:
+        return
+    free.sort(key=natural_key)
+    shown = ", ".join(f"'{one}'" for one in free[:_SHOWN])
+    more = f" and {len(free) - _SHOWN} more" if len(free) > _SHOWN else ""
+    has = "has" if len(free) == 1 else "have"
+    if can.places:
+        message = f"the engine '{name}' draws neurons where their 'position' says; {shown}{more} {has} none"
+        hint = "give them a position, or pin them under layout.positions"
+    else:
+        message = f"the engine '{name}' needs a position for every neuron; {shown}{more} {has} none"
+        hint = "give it one in layout.positions, or choose the layered engine, which arranges the rest around the pins"
+    raise LayoutRefusalError("position-missing", message, hint, tuple(free))
+
+
+def _refuse_close_pins(wishes: Wishes) -> None:
+    """Two pins whose discs would overlap, found through cells as wide as a disc."""
+    cells: dict[tuple[int, int], list[int]] = {}
+    for index, (x, y) in sorted(wishes.pins.items()):
+        if not (math.isfinite(x) and math.isfinite(y)):
+            name = wishes.neurons[index]
+            raise LayoutRefusalError("pin-not-finite", f"the pin of '{name}' is not finite", about=(name,))
+        column, row = math.floor(x / (2 * RADIUS)), math.floor(y / (2 * RADIUS))
+        for near in ((column + i, row + j) for i in (-1, 0, 1) for j in (-1, 0, 1)):
+            for other in cells.get(near, ()):
+                if distance(wishes.pins[other], (x, y)) < 2 * RADIUS - _SLACK:
+                    raise LayoutRefusalError(
+                        "pins-too-close",
+                        f"the pins of '{wishes.neurons[other]}' and '{wishes.neurons[index]}' are closer than "
+                        f"{2 * RADIUS:g}: their discs would overlap",
+                        about=(wishes.neurons[other], wishes.neurons[index]),
+                    )
+        cells.setdefault((column, row), []).append(index)

@@ -1,0 +1,359 @@
+"""The C backend: a network's step and whole runs, compiled for this machine.
+
+In: a Network. Out: a Stepper over the arrays of a State, which are read and written in place. What can be set, held,
+lesioned or stopped is data: none of it compiles anything. A step looks for it only where there is any: there are two
+forms of the step, a plain one and one that looks after everything.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.language.expressions.emit_c import Emitter
+from neurovis_spec.runtime import c_library
+from neurovis_spec.runtime.backend import Availability, BackendError, Capabilities
+from neurovis_spec.runtime.c_code import Code, Tables, function, words_of
+from neurovis_spec.runtime.c_step import Form, StepCode
+from neurovis_spec.runtime.conditions import Conditions, Mask, Structure
+from neurovis_spec.runtime.state import State
+
+#: neurons and connections up to which a network is written out one by one
+SMALL = 600
+#: items of a table that stands in the text; longer ones are handed over
+LONGEST = 1024
+#: neurons, connections and steps of one call together: some tens of milliseconds
+_AT_ONCE = 1 << 22
+#: forms of the step
+_PLAIN, _GENERAL, _FIRST = 0, 1, 2
+
+_HEAD: Final = """#include <math.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#ifdef _WIN32
+#define NV_PUBLIC __declspec(dllexport)
+#else
+#define NV_PUBLIC
+#endif
+
+typedef struct {
+    double *activity, *weights, *signals, *history;
+    const double *x, *s, *holding;
+    const uint8_t *held, *gone, *still;
+    const void *const *given;
+    double *const *cells;
+    double *const *traces;
+} nv_state;
+
+typedef struct {
+    int64_t k, steps, every, form, look;
+    const double *rows;
+    double *activity, *weights;
+    const int64_t *changing;
+} nv_course;
+"""
+
+_TAIL: Final = """
+NV_PUBLIC void nv_once(const nv_state *p, int64_t k, int32_t form)
+{
+    if (form == 0)
+        nv_plain(p, k, p->s);
+    else
+        nv_general(p, k, p->s, form == 2);
+}
+
+static uint64_t nv_odd(const double *values, int64_t count)
+{
+    uint64_t found = 0;
+    for (int64_t i = 0; i < count; i++) {
+        uint64_t bits;
+        memcpy(&bits, values + i, sizeof bits);
+        found |= (bits & UINT64_C(0x7ff0000000000000)) + UINT64_C(0x0010000000000000);
+    }
+    return found >> 63;
+}
+
+NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
+{
+    const double *s = c->rows;
+    double *activity = c->activity, *weights = c->weights;
+    int64_t wait = (c->every - c->k % c->every) % c->every;
+    for (int64_t i = 0; i < c->steps; i++, s += INPUTS) {
+        const int kept = wait == 0;
+        if (kept) {
+            for (int64_t j = 0; j < CHANGING; j++)
+                weights[j] = p->weights[c->changing[j]];
+            weights += CHANGING;
+            wait = c->every;
+        }
+        wait--;
+        if (c->form == 0)
+            nv_plain(p, c->k + i, s);
+        else
+            nv_general(p, c->k + i, s, c->form == 2 && i == 0);
+        if (kept) {
+            memcpy(activity, p->activity, sizeof(double)*NEURONS);
+            activity += NEURONS;
+        }
+        if (c->look && LOOK)
+            return i + 1;
+    }
+    return c->steps;
+}
+"""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Written:
+    """The text of a network, and the arrays that it is handed."""
+
+    text: str
+    given: tuple[FloatArray | IntArray, ...]
+
+
+_written: WeakKeyDictionary[Network, Written] = WeakKeyDictionary()
+
+
+def written(network: Network) -> Written:
+    """The C of a network; made once for each."""
+    found = _written.get(network)
+    if found is None:
+        found = _written[network] = _write(network)
+    return found
+
+
+def forget() -> None:
+    """Write all networks anew when they are asked for."""
+    _written.clear()
+
+
+def _write(network: Network) -> Written:
+    emitter, tables = Emitter(), Tables("double", LONGEST)
+    small = len(network.neurons) + len(network.connections) <= SMALL
+    bodies: list[str] = []
+    taken = _taken(network)
+    for name, form, more in (
+        ("nv_plain", Form(written_out=small), ""),
+        ("nv_general", Form(first=True, held=True, gone=True, still=True), ", int first"),
+    ):
+        code = Code(emitter, tables, network.dt, network.settable.variables)
+        StepCode(network, code, form).write()
+        head = f"static void {name}(const nv_state *p, int64_t k, const double *restrict s{more})"
+        bodies += [*function(code, head, taken | tables.taken()), ""]
+    counts = {"NEURONS": len(network.neurons), "INPUTS": network.vector_size, "CHANGING": len(network.changing)}
+    defined = [f"#define {name} {value}" for name, value in counts.items()]
+    defined.append(f"#define LOOK ({_look(network)})")
+    used = words_of(bodies)
+    parts = [_HEAD, "\n".join(defined), emitter.helpers(used), tables.text(used), "\n".join(bodies)]
+    return Written("\n\n".join(part for part in parts if part) + _TAIL, tuple(tables.given))
+
+
+def _taken(network: Network) -> dict[str, str]:
+    """For each array of the state, and for what is handed over, the line that gives it its name."""
+    kinds = (
+        ("double", ("activity", "weights", "signals", "history")),
+        ("const double", ("x", "holding")),
+        ("const uint8_t", ("held", "gone", "still")),
+    )
+    taken = {name: f"{kind} *restrict const {name} = p->{name};" for kind, names in kinds for name in names}
+    for kind, counts in owned(network):
+        number = 0
+        for owner, count in enumerate(counts):
+            for i in range(count):
+                taken[f"{kind}{owner}_{i}"] = f"double *restrict const {kind}{owner}_{i} = p->{kind}[{number}];"
+                number += 1
+    return taken
+
+
+def owned(network: Network) -> tuple[tuple[str, list[int]], ...]:
+    """How many states each block (``cells``) and each plasticity (``traces``) has."""
+    return (
+        ("cells", [len(block.model.state) for block in network.blocks]),
+        ("traces", [len(plasticity.rule.state) for plasticity in network.plasticity]),
+    )
+
+
+def _look(network: Network) -> str:
+    """Whether anything of a state is not finite."""
+    tests = [f"nv_odd(p->activity, {len(network.neurons)})"]
+    if network.plasticity:
+        tests.append(f"nv_odd(p->weights, {len(network.connections)})")
+    number = 0
+    for block in network.blocks:
+        for _ in block.model.state:
+            tests.append(f"nv_odd(p->cells[{number}], {len(block.members)})")
+            number += 1
+    number = 0
+    for plasticity in network.plasticity:
+        for _ in plasticity.rule.state:
+            tests.append(f"nv_odd(p->traces[{number}], {len(plasticity.members)})")
+            number += 1
+    return " || ".join(tests)
+
+
+_POINTERS: Final = (
+    *("activity", "weights", "signals", "history", "x", "s", "holding"),
+    *("held", "gone", "still", "given", "cells", "traces"),
+)
+
+
+class _State(ctypes.Structure):
+    _fields_ = [(name, ctypes.c_void_p) for name in _POINTERS]
+
+
+class _Course(ctypes.Structure):
+    _fields_ = [
+        *((name, ctypes.c_int64) for name in ("k", "steps", "every", "form", "look")),
+        *((name, ctypes.c_void_p) for name in ("rows", "activity", "weights", "changing")),
+    ]
+
+
+class CStepper:
+    """One network, compiled; what it was given last is kept ready."""
+
+    def __init__(self, network: Network) -> None:
+        self.network = network
+        made = written(network)
+        library = c_library.load(made.text)
+        self._library = library
+        self._step, self._run = library.nv_once, library.nv_run
+        self._step.argtypes, self._step.restype = (ctypes.c_void_p, ctypes.c_int64, ctypes.c_int32), None
+        self._run.argtypes, self._run.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64
+        self._given = made.given
+        self._vector = np.zeros(network.vector_size)
+        self._initial = bool((~np.isnan(network.neurons.initial)).any())
+        self._changing = np.ascontiguousarray(network.changing, dtype=np.int64)
+        self._pointers = _State()
+        self._pointers.s = self._vector.ctypes.data
+        self._here = ctypes.addressof(self._pointers)
+        self._handed = _addresses(self._given)
+        self._pointers.given = ctypes.addressof(self._handed)
+        self._of: State | None = None
+        self._activity = self._weights = self._signals = self._history = self._variables = self._vector
+        self._holds: object = None
+        self._structure: Structure | None = None
+        self._general = False
+
+    def step(self, state: State, inputs: FloatArray, /) -> None:
+        """Advance the state by a step."""
+        now = state.conditions
+        if (
+            state is not self._of
+            or now.holds is not self._holds
+            or now.structure is not self._structure
+            or now.variables is not self._variables
+            or state.activity is not self._activity
+            or state.weights is not self._weights
+            or state.signals is not self._signals
+            or state.history is not self._history
+        ):
+            self._take(state)
+        k = state.k
+        self._vector[:] = inputs
+        self._step(self._here, k, self._form(state) if k == 0 or self._general else _PLAIN)
+        state.k = k + 1
+
+    def run(
+        self, state: State, vectors: FloatArray, activity: FloatArray, weights: FloatArray, every: int, look: bool
+    ) -> int:
+        """Advance the state by a step for each row of ``vectors``; steps that ``every`` divides are kept, in the first
+        rows of ``activity`` and ``weights``. With ``look`` it ends behind the first step after which something is not
+        finite. Gives the number of steps made."""
+        self._take(state)
+        rows = np.ascontiguousarray(vectors, dtype=np.float64)
+        course = _Course(
+            state.k,
+            len(rows),
+            every,
+            self._form(state),
+            look,
+            rows.ctypes.data,
+            activity.ctypes.data,
+            weights.ctypes.data,
+            self._changing.ctypes.data,
+        )
+        made: int = self._run(self._here, ctypes.addressof(course))
+        state.k += made
+        return made
+
+    @property
+    def at_once(self) -> int:
+        """Steps that are well made in one call, so that a run can be stopped."""
+        return max(1, _AT_ONCE // (len(self.network.neurons) + len(self.network.connections) + 1))
+
+    def _form(self, state: State) -> int:
+        if state.k == 0 and not state.continued and self._initial:
+            return _FIRST
+        return _GENERAL if self._general else _PLAIN
+
+    def _take(self, state: State) -> None:
+        """Note where the arrays of a state lie, and what is held and left out."""
+        now, pointers = state.conditions, self._pointers
+        for name in ("activity", "weights", "signals", "history"):
+            array = getattr(state, name)
+            if not (array.flags.c_contiguous and array.flags.writeable and array.dtype == np.float64):
+                array = np.array(array, dtype=np.float64)
+                setattr(state, name, array)
+            setattr(pointers, name, array.ctypes.data)
+        pointers.x = now.variables.ctypes.data
+        self._cells = _addresses([array for block in state.cells for array in block])
+        self._traces = _addresses([array for rule in state.traces for array in rule])
+        pointers.cells, pointers.traces = ctypes.addressof(self._cells), ctypes.addressof(self._traces)
+        if now.holds is not self._holds or now.structure is not self._structure:
+            self._take_conditions(now)
+        self._of = state  # what is kept alive cannot be mistaken for another array at the same address
+        self._activity, self._weights, self._variables = state.activity, state.weights, now.variables
+        self._signals, self._history = state.signals, state.history
+
+    def _take_conditions(self, now: Conditions) -> None:
+        n, pointers = len(self.network.neurons), self._pointers
+        self._holds, self._structure = now.holds, now.structure
+        self._general = now.holds is not None or not now.structure.whole
+        self._held, self._holding = np.zeros(n, dtype=np.uint8), np.zeros(n)
+        for held in now.holds or ():
+            if held is not None:
+                self._held[held[0]] = 1
+                self._holding[held[0]] = held[1]
+        self._gone, self._still = (_bytes(mask) for mask in (now.structure.gone, now.structure.still))
+        pointers.held, pointers.holding = self._held.ctypes.data, self._holding.ctypes.data
+        pointers.gone, pointers.still = self._gone.ctypes.data, self._still.ctypes.data
+
+
+def _addresses(arrays: Sequence[npt.NDArray[np.generic]]) -> ctypes.Array[ctypes.c_void_p]:
+    """Where arrays lie, as an array; a room more, so that it is never empty."""
+    return (ctypes.c_void_p * (len(arrays) + 1))(*(array.ctypes.data for array in arrays), None)
+
+
+def _bytes(mask: Mask) -> npt.NDArray[np.uint8]:
+    return np.ascontiguousarray(mask, dtype=np.uint8)
+
+
+class CBackend:
+    """C made from the update program, compiled for this machine."""
+
+    name = "c"
+    capabilities = Capabilities(noise=True)
+
+    def availability(self) -> Availability:
+        """Whether there is a compiler."""
+        try:
+            return Availability(True, f"C made for each network, compiled by {c_library.compiler().name}")
+        except c_library.CompilerError as error:
+            return Availability(False, str(error))
+
+    def prepare(self, network: Network) -> CStepper:
+        """Compile a network, or take what was compiled before."""
+        try:
+            return CStepper(network)
+        except c_library.CompilerError as error:
+            raise BackendError(f"the backend 'c' is not available here: {error}") from None

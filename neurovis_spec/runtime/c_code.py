@@ -1,0 +1,205 @@
+"""C in the making: lines with identifiers of our own, and the tables of numbers that they read.
+
+In: typed trees, arrays, indices that are numbers or code. Out: the body of a function, and tables to stand before it.
+Names of the author never reach the text. A ``Place`` is an index: a number where neurons or connections are written out
+one by one, else the code of a loop's variable.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Container, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import TypeAlias
+
+import numpy as np
+
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.settable import Variable
+from neurovis_spec.language.expressions.emit_c import Drawn, Emitter, Made, Value
+from neurovis_spec.language.expressions.tree import Tree, names
+from neurovis_spec.runtime.state import constants
+
+Place: TypeAlias = int | str
+
+#: items of a table in a line of the text
+_ROW = 16
+_NONE: Mapping[str, Made] = {}
+
+
+class Tables:
+    """Constant arrays, each once. Those of more than ``longest`` items are not written into the text but handed to it:
+    ``given`` holds them in order."""
+
+    def __init__(self, real: str, longest: int | None) -> None:
+        self._real, self._longest = real, longest
+        self._names: dict[tuple[str, bytes], str] = {}
+        self._text: dict[str, str] = {}
+        self.given: list[FloatArray | IntArray] = []
+        self._taken: dict[str, str] = {}
+
+    def name(self, values: FloatArray | IntArray | np.ndarray[tuple[int], np.dtype[np.int32]]) -> str:
+        """The identifier of an array of numbers or indices."""
+        real = values.dtype.kind == "f"
+        array = np.ascontiguousarray(values, dtype=np.float64 if real else np.int32)
+        key = array.dtype.char, array.tobytes()
+        if key not in self._names:
+            name = self._names[key] = f"t{len(self._names)}"
+            kind = self._real if real else "int32_t"
+            if self._longest is not None and len(array) > self._longest:
+                self._taken[name] = f"const {kind} *const {name} = (const {kind} *)p->given[{len(self.given)}];"
+                self.given.append(array)
+            else:
+                self._text[name] = f"static const {kind} {name}[{len(array)}] = {{\n{self._items(array)}\n}};"
+        return self._names[key]
+
+    def _items(self, array: FloatArray | IntArray) -> str:
+        items = array.tolist()
+        emitter = Emitter(self._real)
+        texts = [emitter.text(item) if isinstance(item, float) else str(item) for item in items]
+        return ",\n".join("    " + ", ".join(texts[i : i + _ROW]) for i in range(0, len(texts), _ROW))
+
+    def text(self, used: Container[str]) -> str:
+        """The definitions of those that are used."""
+        return "\n\n".join(text for name, text in self._text.items() if name in used)
+
+    def taken(self) -> dict[str, str]:
+        """For each array that is handed over, the line that gives it its name."""
+        return self._taken
+
+
+class Code:
+    """Lines of a function, one level deep."""
+
+    def __init__(self, emitter: Emitter, tables: Tables, dt: float, variables: Mapping[str, Variable]) -> None:
+        self.emitter, self.tables, self._variables = emitter, tables, variables
+        self.lines: list[str] = []
+        self.indent = 1
+        self._count = 0
+        #: identifiers whose values stay
+        self._constant: set[str] = set()
+        #: what stands at the head of the function, each once
+        self.head: dict[str, str] = {}
+        self.clock: dict[str, Value] = {**constants(dt), "k": "kd", "t": "td"}
+        self._dt = dt
+
+    @property
+    def real(self) -> str:
+        """The type of numbers."""
+        return self.emitter.real
+
+    def line(self, text: str) -> None:
+        """Append a line."""
+        self.lines.append("    " * self.indent + text)
+
+    @contextmanager
+    def block(self, head: str) -> Iterator[None]:
+        """Lines within braces."""
+        self.line(f"{head} {{")
+        self.indent += 1
+        yield
+        self.indent -= 1
+        self.line("}")
+
+    def loop(self, index: str, count: int | str, first: int | str = 0) -> str:
+        """The head of a loop."""
+        return f"for (int32_t {index} = {first}; {index} < {count}; {index}++)"
+
+    def name(self, prefix: str) -> str:
+        """A new identifier."""
+        self._count += 1
+        return f"{prefix}{self._count}"
+
+    def let(self, prefix: str, value: Value) -> Value:
+        """Give code an identifier; a number stays one."""
+        if isinstance(value, float) or value in self._constant:
+            return value
+        name = self.name(prefix)
+        self._constant.add(name)
+        self.line(f"const {self.real} {name} = {value};")
+        return name
+
+    def variable(self, prefix: str, value: Value) -> str:
+        """Give a value an identifier that can be assigned to."""
+        name = self.name(prefix)
+        self.line(f"{self.real} {name} = {self.text(value)};")
+        return name
+
+    def text(self, value: Value) -> str:
+        """A value as code."""
+        return self.emitter.text(value)
+
+    def at(self, indices: IntArray, place: Place) -> Place:
+        """An element of an array of indices, worked out where they are regular."""
+        if isinstance(place, int):
+            return int(indices[place])
+        first = int(indices[0])
+        if len(indices) == 1:
+            return first
+        stride = int(indices[1]) - first
+        if np.array_equal(indices, first + stride * np.arange(len(indices))):
+            if stride == 0:
+                return first
+            step = place if stride == 1 else f"{stride}*{place}"
+            return f"{first} + {step}" if first else step
+        return f"{self.tables.name(indices)}[{place}]"
+
+    def number(self, values: FloatArray, place: Place) -> Value:
+        """An element of an array of numbers; where all are the same, that one."""
+        if isinstance(place, int):
+            return float(values[place])
+        bits = np.ascontiguousarray(values, dtype=np.float64).view(np.int64)
+        return float(values[0]) if (bits == bits[0]).all() else f"{self.tables.name(values)}[{place}]"
+
+    def settable(self, array: str, values: FloatArray, members: IntArray | None, place: Place) -> Value:
+        """An element of an array of the network, of its ``members`` or of all: where it can be set as it is by now."""
+        variable = self._variables.get(array)
+        if variable is None:
+            return self.number(values if members is None else values[members], place)
+        if variable.size == 1:
+            return f"x[{variable.start}]"
+        places = np.arange(variable.size, dtype=np.int64) if members is None else members
+        return f"x[{self.at(variable.start + places, place)}]"
+
+    def is_set(self, array: str) -> bool:
+        """Whether an array can be set in a run."""
+        return array in self._variables
+
+    def parameters(self, owner: str, arrays: Mapping[str, FloatArray], place: Place) -> dict[str, Value]:
+        """The parameters of a definition in use."""
+        return {name: self.settable(f"{owner}/{name}", values, None, place) for name, values in arrays.items()}
+
+    def value(
+        self, tree: Tree, known: Mapping[str, Value], calls: Mapping[str, Made] = _NONE, drawn: Drawn | None = None
+    ) -> Value:
+        """An expression as a number or code."""
+        read = names(tree) & {"k", "t"}
+        if read:
+            self.head["kd"] = f"const {self.real} kd = ({self.real})k;"
+        if "t" in read:
+            self.head["td"] = f"const {self.real} td = kd * {self.emitter.literal(self._dt)[0]};"
+        return self.emitter.value(tree, {**self.clock, **known}, calls, drawn)
+
+    def remainder(self, divisor: int) -> str:
+        """k mod a number."""
+        if divisor == 1:
+            return "0"
+        name = f"r{divisor}"
+        self.head[name] = f"const int32_t {name} = (int32_t)(k % {divisor});"
+        return name
+
+
+def words_of(lines: Iterable[str]) -> set[str]:
+    """All identifiers in some lines, but for members of a struct."""
+    return set(re.findall(r"(?<!->)(?<![\w.])[A-Za-z_]\w*", "\n".join(lines)))
+
+
+def function(code: Code, head: str, taken: Mapping[str, str]) -> list[str]:
+    """A function of the lines of ``code``, with what stands at their head and those of ``taken`` that are used."""
+    head_lines = dict(code.head)
+    used = words_of(code.lines)
+    for name in reversed(list(head_lines)):
+        if name in used:
+            used |= words_of([head_lines[name]])
+    heads = [f"    {line}" for name, line in head_lines.items() if name in used]
+    return [head, "{", *(f"    {line}" for name, line in taken.items() if name in used), *heads, *code.lines, "}"]

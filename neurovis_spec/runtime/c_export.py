@@ -1,0 +1,513 @@
+"""A network as C for a robot: one header and one source, without heap and without variables that change.
+
+In: a Network, the State that it begins in, the type of numbers. Out: the texts of the files. The step is that of the C
+backend; around it stand what is done in Python elsewhere: inputs, noise, events, the setting of parameters. Everything
+that changes is in a struct of the caller's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.changes import Change, Clamp
+from neurovis_spec.compiler.draws import Stream
+from neurovis_spec.compiler.network import Input, Network, Noise
+from neurovis_spec.language.expressions.emit_c import Emitter, Value
+from neurovis_spec.language.expressions.tree import Draw
+from neurovis_spec.runtime.c_backend import SMALL
+from neurovis_spec.runtime.c_code import Code, Tables, function, words_of
+from neurovis_spec.runtime.c_draws import drawing
+from neurovis_spec.runtime.c_names import LONGEST_STRING, identifiers, prefix, string, words
+from neurovis_spec.runtime.c_settable import formula, write_follow
+from neurovis_spec.runtime.c_step import Form, StepCode
+from neurovis_spec.runtime.conditions import Controls, Mask
+from neurovis_spec.runtime.signals import signal_layout
+from neurovis_spec.runtime.state import State, initial_state
+
+
+@dataclass(frozen=True)
+class Phase:
+    """What is held and left out from a step on, by events."""
+
+    at: int
+    order: tuple[int, ...]
+    lesioned: Mask
+    gone: Mask
+    still: Mask
+    clamps: Mapping[int, Clamp]
+
+
+@dataclass(frozen=True)
+class Member:
+    """A member of the struct: an array of numbers, what it begins with and what it is."""
+
+    name: str
+    begin: FloatArray
+    about: str
+
+
+class Exported:
+    """The C of one network."""
+
+    def __init__(self, network: Network, start: State | None = None, real: str = "double") -> None:
+        self.network, self.real = network, real
+        self.name = prefix(network.name)
+        self.macro = self.name.upper()
+        self.state = (initial_state(network) if start is None else start).copy()
+        self.emitter, self.tables = Emitter(real), Tables(real, None)
+        self.kinds: set[str] = set()
+        self.inputs = [one for one in network.inputs if one.expression is None and one.table is None]
+        self.input_names = identifiers(one.name for one in self.inputs)
+        self.output_names = identifiers(one.name for one in network.outputs)
+        slots = network.settable.index
+        self.settable = [name for name in network.parameters if name not in network.structural and name in slots]
+        self.settable_names = identifiers(self.settable)
+        self.phases = self._phases()
+        self.holding = any(any(order >= 0 for order in phase.order) or phase.lesioned.any() for phase in self.phases)
+        self.leaving = any(phase.gone.any() or phase.still.any() for phase in self.phases)
+        self.members = self._members()
+
+    # ---- what there is -----------------------------------------------------------------------------------------
+
+    def _phases(self) -> list[Phase]:
+        """What is held and left out after the events of each step; which that is depends on no parameter."""
+        network, controls = self.network, Controls(self.network)
+        state = self.state.copy()
+        phases = [self._phase(-1, state)]
+        with np.errstate(all="ignore"):
+            for change in network.changes:
+                if _only_sets(change):
+                    continue
+                # what is set changes nothing of this; it is done in C
+                controls.apply(state.conditions, state.weights, state.signals, change._replace(parameters=()))
+                phases.append(self._phase(change.at, state))
+        return phases
+
+    def _phase(self, at: int, state: State) -> Phase:
+        now = state.conditions
+        order = tuple(now.held.order.tolist())
+        structure = now.structure
+        return Phase(at, order, now.lesioned_neurons.copy(), structure.gone, structure.still, dict(now.held.active))
+
+    def _members(self) -> list[Member]:
+        network, state = self.network, self.state
+        settable = network.settable
+        cells = [array for block in state.cells for array in block]
+        traces = [array for rule in state.traces for array in rule]
+        none = np.zeros(0)
+        found = [
+            Member("activity", state.activity, "a[k - 1] of all neurons"),
+            Member("weights", state.weights, "w[k] of all connections"),
+            Member("signals", state.signals, "what is under way on delayed connections"),
+            Member("history", state.history.ravel(), "past activities, for rules"),
+            Member("cells", np.concatenate([none, *cells]), "states of models"),
+            Member("traces", np.concatenate([none, *traces]), "states of rules"),
+            Member("parameters", state.conditions.parameters, "parameters of the spec and of its instances"),
+            Member("variables", state.conditions.variables, "numbers that follow parameters"),
+            Member("vector", np.zeros(network.vector_size), "the inputs and the noise of a step"),
+        ]
+        if self.holding:
+            found.append(Member("holding", np.zeros(len(network.neurons)), "what neurons are held at"))
+        return [member for member in found if len(member.begin)]
+
+    @property
+    def first(self) -> bool:
+        """Whether neurons take ``initial`` at step 0."""
+        return not self.state.continued and bool((~np.isnan(self.network.neurons.initial)).any())
+
+    # ---- the header --------------------------------------------------------------------------------------------
+
+    def header(self) -> str:
+        """The text of NAME.h."""
+        network, name, macro = self.network, self.name, self.macro
+        n, m = len(network.neurons), len(network.connections)
+        slots = len(network.settable.slots)
+        lines = [
+            "/*",
+            f" * {words(network.title or network.name)}",
+            " *",
+            f" * A network of {n} neurons and {m} connections, made by neurovis export. C99 and C++17; needs libm.",
+            " */",
+            f"#ifndef {macro}_H",
+            f"#define {macro}_H",
+            "",
+            "#include <stdint.h>",
+            "",
+            "#ifdef __cplusplus",
+            'extern "C" {',
+            "#endif",
+            "",
+            f"#define {macro}_NEURONS {n}",
+            f"#define {macro}_CONNECTIONS {m}",
+            f'#define {macro}_SPEC_HASH "{network.hash}"',
+            "",
+            "/* The names of the neurons, in order. */",
+            f"extern const char *const {name}_neuron_names[{max(n, 1)}];",
+            "",
+            "/* All that changes. Copy it to keep a state, and copy it back to go on from there. */",
+            f"typedef struct {name}_state {{",
+        ]
+        width = {member.name: len(member.begin) for member in self.members}
+        for wanted in ("activity", "weights"):
+            if wanted not in width:
+                lines.append(f"    {self.real} {wanted}[1]; /* there are none */")
+        for member in self.members:
+            lines.append(f"    {self.real} {member.name}[{len(member.begin)}]; /* {member.about} */")
+        lines.append("    int64_t k; /* the step to come */")
+        if slots:
+            lines.append(f"    unsigned char chosen[{slots}]; /* parameters that were set */")
+        if len(self.phases) > 1:
+            lines.append("    int32_t phase; /* events that have happened */")
+        if self.holding:
+            lines.append(f"    unsigned char held[{n}]; /* neurons that are held */")
+        lines += [f"}} {name}_state;", "", "/* The inputs of a step that have no source of their own. */"]
+        lines.append(f"typedef struct {name}_inputs {{")
+        lines += [
+            f"    {self.real} {own}[{entry.size}];"
+            for own, entry in zip(self.input_names, self.inputs, strict=True)
+        ] or ["    char unused;"]
+        lines += [f"}} {name}_inputs;", "", "/* The outputs of a step. */", f"typedef struct {name}_outputs {{"]
+        lines += [
+            f"    {self.real} {own}[{len(entry.neurons)}];"
+            for own, entry in zip(self.output_names, network.outputs, strict=True)
+        ] or ["    char unused;"]
+        lines += [
+            f"}} {name}_outputs;",
+            "",
+            "/* Make a state ready for step 0, whatever its memory holds. */",
+            f"void {name}_init({name}_state *state);",
+            "",
+            "/* Make one step. in may be NULL: its inputs are 0. out may be NULL. */",
+            f"void {name}_step({name}_state *state, const {name}_inputs *in, {name}_outputs *out);",
+        ]
+        for parameter, own in zip(self.settable, self.settable_names, strict=True):
+            lines += [
+                "",
+                f"/* Set the parameter {words(parameter)} from the next step on, and all that follows it. Gives 1; or 0, and",
+                "   nothing has changed, where a number would not be finite or leave its bounds. */",
+                f"int {name}_set_{own}({name}_state *state, {self.real} value);",
+            ]
+        lines += ["", "#ifdef __cplusplus", "}", "#endif", "", "#endif", ""]
+        return "\n".join(lines)
+
+    # ---- the source --------------------------------------------------------------------------------------------
+
+    def source(self) -> str:
+        """The text of NAME.c. Raises ExportError."""
+        body: list[str] = []
+        if self.network.settable.slots:
+            body += [*self._follow(), ""]
+        if self.network.changes:
+            body += [*self._events(), ""]
+        if self.network.vector_size:
+            body += [*self._sense(), ""]
+        body += [*self._compute(), "", *self._init(), "", *self._step()]
+        for parameter, own in zip(self.settable, self.settable_names, strict=True):
+            body += ["", *self._set(parameter, own)]
+        if self.holding:
+            body = [*self._hold(), "", *body]
+        used = words_of(body)
+        parts = [
+            f'/* {words(self.network.title or self.network.name)}: see {self.name}.h. */\n#include "{self.name}.h"',
+            "#include <math.h>\n#include <stddef.h>\n#include <string.h>",
+            _restrict(self.macro) if f"{self.macro}_RESTRICT" in used else "",
+            self._names(),
+            self.emitter.helpers(used),
+            drawing(self.kinds),
+            self.tables.text(used),
+            "\n".join(body),
+        ]
+        return "\n\n".join(part.strip("\n") for part in parts if part) + "\n"
+
+    def _names(self) -> str:
+        """The names of the neurons; those that are too long for a literal as arrays."""
+        before, items = [], []
+        for number, name in enumerate(self.network.neurons.names):
+            data = name.encode()
+            if len(data) <= LONGEST_STRING // 4:
+                items.append(f"    {string(name)},")
+                continue
+            codes = ", ".join(f"(char){byte if byte < 128 else byte - 256}" for byte in (*data, 0))
+            before.append(f"static const char name{number}[{len(data) + 1}] = {{{codes}}};")
+            items.append(f"    name{number},")
+        count = max(len(items), 1)
+        head = f"const char *const {self.name}_neuron_names[{count}] = {{"
+        return "\n".join([*before, head, *(items or ["    0,"]), "};"])
+
+    def _code(self) -> Code:
+        return Code(self.emitter, self.tables, self.network.dt, self.network.settable.variables)
+
+    def _taken(self) -> dict[str, str]:
+        """For each array of the state, and its parts, the line that gives it its name."""
+        network, real, quick = self.network, self.real, f"{self.macro}_RESTRICT"
+        taken = {
+            name: f"{real} *{quick} const {name} = state->{name};" for name in ("activity", "weights", "signals", "history")
+        }
+        taken["x"] = f"{real} *{quick} const x = state->variables;"
+        taken["s"] = f"const {real} *{quick} const s = state->vector;"
+        taken["holding"] = f"const {real} *{quick} const holding = state->holding;"
+        taken["held"] = f"const unsigned char *{quick} const held = state->held;"
+        taken["p"] = f"const {real} *const p = state->parameters;"
+        for kind, sizes in (
+            ("cells", [(len(block.model.state), len(block.members)) for block in network.blocks]),
+            ("traces", [(len(rule.rule.state), len(rule.members)) for rule in network.plasticity]),
+        ):
+            start = 0
+            for owner, (states, count) in enumerate(sizes):
+                for i in range(states):
+                    name = f"{kind}{owner}_{i}"
+                    taken[name] = f"{real} *{quick} const {name} = state->{kind} + {start};"
+                    start += count
+        return taken
+
+    def _compute(self) -> list[str]:
+        """The step itself."""
+        network, code, taken = self.network, self._code(), self._taken()
+        small = len(network.neurons) + len(network.connections) <= SMALL
+        before: list[str] = []
+        for name, masks in (("gone", [p.gone for p in self.phases]), ("still", [p.still for p in self.phases])):
+            if any(mask.any() for mask in masks):
+                lines, which = _masks(name, masks)
+                before += lines
+                taken[name] = f"const unsigned char *const {name} = {which};"
+        form = Form(small, self.first, self.holding, "gone" in taken, "still" in taken)
+        StepCode(network, code, form).write()
+        if self.first:
+            code.head["first"] = "const int first = k == 0;"
+        return [*before, *self._function(code, "What a step computes.", "void nv_compute", taken)]
+
+    def _function(self, code: Code, about: str, own: str, taken: dict[str, str], more: str = "") -> list[str]:
+        """A function of our own over a state."""
+        head = f"static {own}({self.name}_state *state{more})"
+        lines = function(code, head, {"k": "const int64_t k = state->k;", **taken})
+        if "state" not in words_of(lines[1:]):
+            lines.insert(2, "    (void)state;")
+        return [f"/* {about} */", *lines]
+
+    def _hold(self) -> list[str]:
+        """What neurons are held at, by the parameters of now."""
+        code, n = self._code(), len(self.network.neurons)
+        code.line("memset(state->held, 0, sizeof state->held);")
+        switch = len(self.phases) > 1
+        for number, phase in enumerate(self.phases):
+            order = np.array(phase.order)
+            order[phase.lesioned] = -1
+            if (order < 0).all() and not phase.lesioned.any():
+                continue
+            with code.block(f"if (state->phase == {number})" if switch else ""):
+                for one in sorted(set(order[order >= 0].tolist())):
+                    value = code.text(formula(code, phase.clamps[one].value, 0))
+                    self._hold_at(code, np.flatnonzero(order == one), value)
+                if phase.lesioned.any():
+                    self._hold_at(code, np.flatnonzero(phase.lesioned), code.text(0.0))
+        assert n
+        return self._function(code, "What neurons are held at.", "void nv_hold", self._taken())
+
+    def _hold_at(self, code: Code, neurons: IntArray, value: str) -> None:
+        name = code.variable("n", value)
+        with code.block(code.loop("i", len(neurons))):
+            neuron = code.at(neurons, "i")
+            code.line(f"state->held[{neuron}] = 1;")
+            code.line(f"state->holding[{neuron}] = {name};")
+
+    def _follow(self) -> list[str]:
+        """What follows parameters that are set."""
+        code = self._code()
+        write_follow(code, self.network.settable)
+        taken = {name: line for name, line in self._taken().items() if name != "p"}
+        more = f", {self.real} *p, unsigned char *changed"
+        about = "What follows parameters that change: gives 0, and changes nothing, where it cannot be."
+        return self._function(code, about, "int nv_follow", taken, more)
+
+    def _begin_setting(self, code: Code) -> None:
+        count = len(self.network.settable.slots)
+        code.line(f"{self.real} p[{count}];")
+        code.line(f"unsigned char changed[{count}];")
+        code.line("memcpy(p, state->parameters, sizeof p);")
+        code.line("memset(changed, 0, sizeof changed);")
+
+    def _events(self) -> list[str]:
+        """What the events of the step to come change."""
+        code, phase = self._code(), 0
+        code.line("switch (state->k) {")
+        for change in self.network.changes:
+            after = phase if _only_sets(change) else phase + 1
+            code.line(f"case {change.at}: {{")
+            code.indent += 1
+            if change.parameters:
+                self._begin_setting(code)
+                values = [code.text(formula(code, one, 0, "state->parameters")) for _, one in change.parameters]
+                for (slot, _), value in zip(change.parameters, values, strict=True):
+                    code.line(f"p[{slot}] = {value};")
+                    code.line(f"changed[{slot}] = 1;")
+                code.line("if (nv_follow(state, p, changed)) {")
+                for slot, _ in change.parameters:
+                    code.line(f"    state->chosen[{slot}] = 1;")
+                code.line("}")
+            if after != phase:
+                self._mend(code, self.phases[phase].gone & ~self.phases[after].gone)
+                code.line(f"state->phase = {after};")
+            if self.holding:
+                code.line("nv_hold(state);")
+            code.line("break;")
+            code.indent -= 1
+            code.line("}")
+            phase = after
+        code.line("default:")
+        code.line("    break;")
+        code.line("}")
+        return self._function(code, "What events change at the step to come.", "void nv_events", {})
+
+    def _mend(self, code: Code, mended: Mask) -> None:
+        """Nothing is under way on connections that are mended."""
+        delays, offsets = self.network.connections.delays, signal_layout(self.network).offsets
+        connections = np.flatnonzero(mended & (delays > 0))
+        slots = [np.arange(offsets[c], offsets[c] + delays[c]) for c in connections.tolist()]
+        if slots:
+            places = np.concatenate(slots)
+            code.line(code.loop("i", len(places)))
+            code.line(f"    state->signals[{code.at(places, 'i')}] = {code.text(0.0)};")
+
+    def _sense(self) -> list[str]:
+        """The inputs and the noise of a step."""
+        code, network = self._code(), self.network
+        for number, entry in enumerate(network.inputs):
+            if entry.expression is not None:
+                known: dict[str, Value] = {**network.parameters, **{n: f"p[{slot}]" for n, slot in entry.slots.items()}}
+                value = code.variable("n", code.value(entry.expression, known))
+                code.line(code.loop("i", entry.size))
+                code.line(f"    v[{entry.start} + i] = {value};")
+            elif entry.table is not None:
+                self._row(code, number, entry)
+        for own, entry in zip(self.input_names, self.inputs, strict=True):
+            code.line(code.loop("i", entry.size))
+            code.line(f"    v[{entry.start} + i] = in != NULL ? in->{own}[i] : {code.text(0.0)};")
+        for noise in network.noises:
+            self._noise(code, noise)
+        if not self.inputs:
+            code.line("(void)in;")
+        taken = {**self._taken(), "v": f"{self.real} *const v = state->vector;"}
+        more = f", const {self.name}_inputs *in"
+        return self._function(code, "The inputs and the noise of a step.", "void nv_sense", taken, more)
+
+    def _row(self, code: Code, number: int, entry: Input) -> None:
+        assert entry.table is not None
+        rows, size = len(entry.table), entry.size
+        with code.block(""):
+            code.line(f"const int32_t row = k < {rows} ? (int32_t)k : {rows - 1};")
+            variable = self.network.settable.variables.get(f"table/{number}")
+            if variable is None:
+                value = f"{code.tables.name(entry.table.ravel())}[row*{size} + i]"
+            else:
+                value = f"x[{variable.start} + row*{size} + i]" if variable.size > 1 else f"x[{variable.start}]"
+            if "row" not in value:
+                code.line("(void)row;")
+            code.line(code.loop("i", size))
+            code.line(f"    v[{entry.start} + i] = {value};")
+
+    def _noise(self, code: Code, noise: Noise) -> None:
+        low, high = Stream(self.network.seed, "noise", noise.name).key
+        step = f"(uint32_t)(k + {self.state.drawn})" if self.state.drawn else "(uint32_t)k"
+
+        def drawn(node: Draw, first: Value, second: Value) -> Value:
+            self.kinds.add(node.kind)
+            number = f"nv_{node.kind}(UINT32_C({low}), UINT32_C({high}), (uint32_t)i, {step}, {node.index})"
+            number = f"(float){number}" if self.real == "float" else number
+            a, b = code.text(first), code.text(second)
+            if node.kind == "uniform":
+                return code.let("d", f"({a}) + (({b}) - ({a}))*{number}")
+            drawn = f"({a}) + ({b})*{number}"
+            return code.let("d", drawn if isinstance(second, float) and second >= 0 else f"({b}) < 0 ? NAN : {drawn}")
+
+        known: dict[str, Value] = {**noise.parameters, **{n: f"p[{slot}]" for n, slot in noise.slots.items()}}
+        known |= {"i": f"({self.real})i", "n": float(len(noise.members))}
+        with code.block(code.loop("i", len(noise.members))):
+            value = code.value(noise.expression, known, {}, drawn)
+            code.line(f"v[{noise.start} + i] = {code.text(value)};")
+
+    def _init(self) -> list[str]:
+        """All members of the state."""
+        code = self._code()
+        for member in self.members:
+            array = np.ascontiguousarray(member.begin, dtype=np.float64)
+            if not array.view(np.int64).any():
+                code.line(f"memset(state->{member.name}, 0, sizeof state->{member.name});")
+            else:
+                code.line(f"memcpy(state->{member.name}, {self.tables.name(array)}, sizeof state->{member.name});")
+        for name in ("activity", "weights"):
+            if name not in {member.name for member in self.members}:
+                code.line(f"state->{name}[0] = {code.text(0.0)};")
+        code.line("state->k = 0;")
+        if self.network.settable.slots:
+            code.line("memset(state->chosen, 0, sizeof state->chosen);")
+            for slot in np.flatnonzero(self.state.conditions.chosen).tolist():
+                code.line(f"state->chosen[{slot}] = 1;")
+        if len(self.phases) > 1:
+            code.line("state->phase = 0;")
+        if self.holding:
+            code.line("nv_hold(state);")
+        if self.network.changes:
+            code.line("nv_events(state);")
+        return function(code, f"void {self.name}_init({self.name}_state *state)", {})
+
+    def _step(self) -> list[str]:
+        """The step with all that belongs to it."""
+        code, name = self._code(), self.name
+        code.line("nv_sense(state, in);" if self.network.vector_size else "(void)in;")
+        code.line("nv_compute(state);")
+        code.line("state->k++;")
+        if self.network.changes:
+            code.line("nv_events(state);")
+        if self.network.outputs:
+            with code.block("if (out != NULL)"):
+                for own, entry in zip(self.output_names, self.network.outputs, strict=True):
+                    code.line(code.loop("i", len(entry.neurons)))
+                    code.line(f"    out->{own}[i] = state->activity[{code.at(entry.neurons, 'i')}];")
+        else:
+            code.line("(void)out;")
+        head = f"void {name}_step({name}_state *state, const {name}_inputs *in, {name}_outputs *out)"
+        return function(code, head, {})
+
+    def _set(self, parameter: str, own: str) -> list[str]:
+        """The function that sets a parameter."""
+        code, slot = self._code(), self.network.settable.index[parameter]
+        self._begin_setting(code)
+        code.line(f"p[{slot}] = value;")
+        code.line(f"changed[{slot}] = 1;")
+        code.line("if (!nv_follow(state, p, changed))")
+        code.line("    return 0;")
+        code.line(f"state->chosen[{slot}] = 1;")
+        if self.holding:
+            code.line("nv_hold(state);")
+        code.line("return 1;")
+        return function(code, f"int {self.name}_set_{own}({self.name}_state *state, {self.real} value)", {})
+
+
+def _only_sets(change: Change) -> bool:
+    arrays = (change.mended_neurons, change.mended_connections, change.lesioned_neurons, change.lesioned_connections)
+    return not (change.clamps or change.released or change.learning or any(len(array) for array in arrays))
+
+
+def _masks(name: str, masks: list[Mask]) -> tuple[list[str], str]:
+    """The bytes of a mask in each phase, each different one once, and the code of those of now."""
+    unique: dict[bytes, int] = {}
+    for mask in masks:
+        unique.setdefault(mask.tobytes(), len(unique))
+    rows = ["    {" + ", ".join(str(byte) for byte in data) + "}," for data in unique]
+    lines = [f"static const unsigned char nv_{name}[{len(rows)}][{len(masks[0])}] = {{", *rows, "};"]
+    if len(masks) == 1:
+        return lines, f"nv_{name}[0]"
+    which = ", ".join(str(unique[mask.tobytes()]) for mask in masks)
+    lines.append(f"static const int32_t nv_{name}_at[{len(masks)}] = {{{which}}};")
+    return lines, f"nv_{name}[nv_{name}_at[state->phase]]"
+
+
+def _restrict(macro: str) -> str:
+    """What says that arrays do not overlap."""
+    return (
+        f"#ifdef __cplusplus\n#define {macro}_RESTRICT __restrict\n#else\n#define {macro}_RESTRICT restrict\n#endif"
+    )

@@ -1,0 +1,201 @@
+"""Shared libraries out of C: which compiler there is, and a cache of what it has made.
+
+In: the text of one C file. Out: the library, loaded with ctypes. Compiled libraries are kept by the hash of all that
+makes them, in the user's cache folder; each is written beside its place and moved there, so that two processes may
+compile at once. Where the cache cannot be written, a temporary folder is used, and nothing is kept.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+from neurovis_spec.language.expressions.emit_c import INEXACT
+
+#: No option changes what IEEE 754 says of an operation, but for flags and traps that nobody reads.
+FLAGS = (
+    "-std=c99",
+    "-O2",
+    "-ffp-contract=off",
+    "-fno-math-errno",
+    "-fno-trapping-math",
+    "-ftree-vectorize",
+    *(f"-fno-builtin-{name}" for name in INEXACT),
+)
+#: The cache holds at most so many bytes; what was used longest ago goes first.
+MOST_BYTES = 64 << 20
+_SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+
+
+class CompilerError(ValueError):
+    """There is no C compiler, or it cannot make a library."""
+
+
+@dataclass(frozen=True, slots=True)
+class Compiler:
+    """A command that compiles C; ``name`` as one would call it, ``stamp`` changes when it is another."""
+
+    command: tuple[str, ...]
+    name: str
+    stamp: str
+
+
+def compiler() -> Compiler:
+    """The compiler that is there: ``CC``, else cc, gcc, clang, else that of the package ziglang. Raises
+    CompilerError."""
+    return _compiler(os.environ.get("CC", ""), os.environ.get("PATH", ""))
+
+
+@cache
+def _compiler(chosen: str, path: str) -> Compiler:
+    if chosen.strip():
+        try:
+            command = tuple(shlex.split(chosen))
+        except ValueError:
+            raise CompilerError(f"CC is no command: {chosen!r}") from None
+        found = shutil.which(command[0], path=path)
+        if found is None:
+            raise CompilerError(f"CC names '{command[0]}', which is not there")
+        return Compiler((found, *command[1:]), chosen, _stamp(found))
+    for name in ("cc", "gcc", "clang"):
+        found = shutil.which(name, path=path)
+        if found is not None:
+            return Compiler((found,), name, _stamp(found))
+    try:
+        zig = find_spec("ziglang")
+    except (ImportError, ValueError):
+        zig = None
+    if zig is not None and zig.origin is not None:
+        return Compiler((sys.executable, "-m", "ziglang", "cc"), "ziglang", _stamp(zig.origin))
+    raise CompilerError("there is no C compiler; pip install 'neurovis-spec[c]' brings one")
+
+
+def _stamp(path: str) -> str:
+    try:
+        real = os.path.realpath(path)
+        about = Path(real).stat()
+    except OSError:
+        return path
+    return f"{real} {about.st_size} {about.st_mtime_ns}"
+
+
+def folder() -> Path:
+    """Where compiled libraries are kept."""
+    given = os.environ.get("XDG_CACHE_HOME", "")
+    try:
+        base = Path(given) if given and Path(given).is_absolute() else Path.home() / ".cache"
+    except RuntimeError:  # there is no home
+        base = Path(tempfile.gettempdir()) / "neurovis-no-home"
+    return base / "neurovis" / "c"
+
+
+def place(text: str) -> Path:
+    """Where the library of a text is, once it is compiled. Raises CompilerError."""
+    made_by = compiler()
+    parts = (
+        text,
+        *made_by.command,
+        made_by.stamp,
+        *FLAGS,
+        platform.machine(),
+        sys.platform,
+        str(ctypes.sizeof(ctypes.c_void_p)),
+    )
+    return folder() / (hashlib.sha256("\0".join(parts).encode()).hexdigest()[:40] + _SUFFIX)
+
+
+def load(text: str) -> ctypes.CDLL:
+    """The library of a text: from the cache, else compiled now. Raises CompilerError."""
+    path = place(text)
+    try:
+        library = ctypes.CDLL(str(path))
+    except OSError:  # not there, or no library
+        return _made(text, path)
+    try:
+        os.utime(path)
+    except OSError:
+        pass
+    return library
+
+
+def _made(text: str, path: Path) -> ctypes.CDLL:
+    """Compile into the cache, or where that cannot be, beside it."""
+    try:
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".making") as beside:
+            made = _compiled(text, Path(beside))
+            os.replace(made, path)
+            library = ctypes.CDLL(str(path))
+        _trim(path.parent, path)
+        return library
+    except OSError:
+        pass
+    try:
+        with tempfile.TemporaryDirectory(prefix="neurovis", ignore_cleanup_errors=True) as beside:
+            return ctypes.CDLL(str(_compiled(text, Path(beside))))
+    except OSError as error:
+        raise CompilerError(f"what is compiled cannot be written or loaded: {error}") from None
+
+
+def _compiled(text: str, into: Path) -> Path:
+    """Compile in a folder. Raises OSError where it cannot be written to, CompilerError where the compiler fails."""
+    source, library = into / "network.c", into / f"network{_SUFFIX}"
+    source.write_text(text, encoding="ascii")
+    made_by = compiler()
+    command = [*made_by.command, *FLAGS, "-w", "-shared"]
+    if sys.platform != "win32":
+        command.append("-fPIC")
+    command += ["-o", str(library), str(source)]
+    if sys.platform != "win32":
+        command.append("-lm")
+    try:
+        done = subprocess.run(
+            command, cwd=into, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False
+        )
+    except OSError as error:
+        raise CompilerError(f"'{made_by.name}' cannot be started: {error.strerror}") from None
+    if done.returncode != 0 or not library.exists():
+        said = done.stdout.decode(errors="replace").strip().splitlines()
+        first = next((line for line in said if "error" in line), said[0] if said else f"status {done.returncode}")
+        raise CompilerError(f"'{made_by.name}' fails: {first.strip()[:300]}")
+    return library
+
+
+def _trim(cache: Path, newest: Path) -> None:
+    """Remove what was used longest ago where the cache holds too much."""
+    found: list[tuple[float, int, Path]] = []
+    for path in _entries(cache):
+        try:
+            about = path.stat()
+        except OSError:
+            continue
+        found.append((about.st_mtime, about.st_size, path))
+    total = sum(size for _, size, _ in found)
+    for _, size, path in sorted(found):
+        if total <= MOST_BYTES:
+            return
+        if path != newest:
+            try:
+                path.unlink()
+            except OSError:
+                continue
+            total -= size
+
+
+def _entries(cache: Path) -> Iterable[Path]:
+    try:
+        return [path for path in cache.iterdir() if path.suffix == _SUFFIX]
+    except OSError:
+        return ()

@@ -1,0 +1,146 @@
+"""Setting parameters in C: the same formulas as ``compiler.patch`` evaluates, over the parameters of a state.
+
+In: Settable. Out: the lines of a function that takes new values for some parameters, follows all that depends on them,
+and writes what this comes to, or nothing where something would not be finite or leave its bounds.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from neurovis_spec.compiler.settable import (
+    Assembled,
+    Binding,
+    Dependent,
+    Distance,
+    ParameterFormula,
+    Settable,
+    Subset,
+)
+from neurovis_spec.language.expressions.arrays import Value as ArrayValue
+from neurovis_spec.language.expressions.emit_c import Value
+from neurovis_spec.language.expressions.tree import Draw
+from neurovis_spec.runtime.c_code import Code, Place
+
+#: numbers of a binding that are written out one by one, where they are no regular array
+_MOST_WRITTEN_OUT = 4096
+
+
+class ExportError(ValueError):
+    """A network that C cannot be made of."""
+
+
+def formula(code: Code, dependent: Dependent, place: Place, parameters: str = "p") -> Value:
+    """The number at a place of what a formula gives. Raises ExportError."""
+    match dependent:
+        case ParameterFormula(tree=tree, places=places, known=known, draw=draw):
+            names: dict[str, Value] = {name: f"{parameters}[{slot}]" for name, slot in places.items()}
+            for name, value in known.items():
+                if isinstance(value, float | np.ndarray):
+                    names[name] = _element(code, value, place)
+                else:
+                    names[name] = formula(code, value, place, parameters)
+
+            def drawn(node: Draw, first: Value, second: Value) -> Value:
+                assert draw is not None
+                number = code.text(_element(code, draw(node, np.float64(0.0), np.float64(1.0)), place))
+                low, high = code.text(first), code.text(second)
+                if node.kind == "uniform":
+                    return f"(({low}) + (({high}) - ({low}))*{number})"
+                return f"(({high}) < 0 ? NAN : ({low}) + ({high})*{number})"
+
+            return code.emitter.value(tree, {**code.clock, **names}, {}, drawn)
+        case Assembled(base=base, parts=parts):
+            index = _number(place)
+            for part in reversed(parts):
+                inside = np.flatnonzero(part.within(base.size) == index)
+                if len(inside):
+                    return formula(code, part.formula, int(inside[-1]), parameters)
+            return float(base.ravel()[index])
+        case Subset(whole=whole, places=places):
+            return formula(code, whole, int(places[_number(place)]), parameters)
+        case Distance(positions=positions, sources=sources, targets=targets):
+            index = _number(place)
+            ends = (int(sources[index]), int(targets[index]))
+            x, y = (
+                [code.text(formula(code, positions, 2 * end + axis, parameters)) for end in ends] for axis in (0, 1)
+            )
+            return f"hypot{code.emitter.suffix}(({x[0]}) - ({x[1]}), ({y[0]}) - ({y[1]}))"
+    raise ExportError("a parameter is used in a way that cannot be set in C")
+
+
+def _element(code: Code, value: ArrayValue, place: Place) -> Value:
+    array = np.asarray(value, dtype=np.float64).ravel()
+    return float(array[0]) if len(array) == 1 else code.number(array, place)
+
+
+def _number(place: Place) -> int:
+    assert isinstance(place, int)
+    return place
+
+
+def regular(dependent: Dependent) -> bool:
+    """Whether the numbers of a formula can be gone through by a loop."""
+    return isinstance(dependent, ParameterFormula) and all(
+        isinstance(value, float | np.ndarray) or regular(value) for value in dependent.known.values()
+    )
+
+
+def write_follow(code: Code, settable: Settable) -> None:
+    """The body of ``follow(state, p, changed)``: ``p`` are parameters of which some are ``changed``. All that depends
+    on them follows; it gives 0, and nothing has changed, where a number would not be finite or leave its bounds."""
+    for slot, entry in enumerate(settable.slots):
+        code.line(f"if (changed[{slot}]) {{")
+        code.line(f"    if (!isfinite(p[{slot}]){_outside(code, f'p[{slot}]', entry.low, entry.high)})")
+        code.line("        return 0;")
+        code.line("}")
+        for place, follower in enumerate(settable.slots):
+            if follower.formula is None or max(follower.formula.slots, default=-1) != slot:
+                continue
+            read = " || ".join(f"changed[{other}]" for other in sorted(follower.formula.slots))
+            condition = f"({read})" if "||" in read else read
+            with code.block(f"if (!changed[{place}] && !state->chosen[{place}] && {condition})"):
+                code.line(f"p[{place}] = {code.text(formula(code, follower.formula, 0))};")
+                code.line(f"changed[{place}] = 1;")
+    with code.block("for (int write = 0; write < 2; write++)"):
+        for binding in settable.bindings:
+            if binding.slots:
+                _write_binding(code, binding)
+    code.line(f"memcpy(state->parameters, p, {len(settable.slots)}*sizeof(p[0]));")
+    code.line("return 1;")
+
+
+def _outside(code: Code, value: str, low: float, high: float) -> str:
+    tests = [f" || {value} < {code.text(low)}"] if np.isfinite(low) else []
+    return "".join([*tests, f" || {value} > {code.text(high)}" if np.isfinite(high) else ""])
+
+
+def _write_binding(code: Code, binding: Binding) -> None:
+    """What one formula gives, checked at first, then written."""
+    condition = " || ".join(f"changed[{slot}]" for slot in sorted(binding.slots))
+    count = len(binding.indices)
+    array = "weights" if binding.weights else "x"
+    bounds = [bound for bound in (binding.low, binding.high) if bound is not None]
+    with code.block(f"if ({condition})"):
+        if all(regular(one) for one in (binding.formula, *bounds)):
+            if count > 1 or not bounds:
+                with code.block(code.loop("i", count)):
+                    _write_number(code, binding, "i", array)
+                return
+        if count > _MOST_WRITTEN_OUT:
+            raise ExportError(f"{count} numbers follow parameters by positions or data: {_MOST_WRITTEN_OUT} are the most")
+        for place in range(count):
+            with code.block(""):
+                _write_number(code, binding, place, array)
+
+
+def _write_number(code: Code, binding: Binding, place: Place, array: str) -> None:
+    value = code.text(formula(code, binding.formula, place))
+    code.line(f"const {code.real} value = {value};")
+    low = "" if binding.low is None else f" || value < {code.text(formula(code, binding.low, place))}"
+    high = "" if binding.high is None else f" || value > {code.text(formula(code, binding.high, place))}"
+    code.line(f"if (!isfinite(value){low}{high})")
+    code.line("    return 0;")
+    code.line("if (write)")
+    code.line(f"    {array}[{code.at(binding.indices, place)}] = value;")
+

@@ -1,0 +1,200 @@
+"""Columns: what of each step is kept, which are activities, changing weights and states of models and rules.
+
+In: a Network, and what is wanted of it (Keep). Out: Columns: the indices to take, and a Probe that reads states.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.states import (
+    Refusal,
+    StateOf,
+    connections_state,
+    holders_of,
+    model_state,
+    names_of_states,
+    rule_state,
+    singles,
+    split_state,
+    split_sum,
+    wiring_of,
+)
+from neurovis_spec.runtime.names import Names, names_of
+from neurovis_spec.runtime.recording import UnknownNameError
+from neurovis_spec.runtime.state import State
+
+
+@dataclass(frozen=True)
+class Keep:
+    """What is recorded: these neurons (references; all without), the changing weights or none, these states
+    (references) besides those that the outputs of the spec name."""
+
+    neurons: tuple[str, ...] = ()
+    weights: bool = True
+    states: tuple[str, ...] = ()
+
+
+#: Everything but states that nobody asks for.
+ALL = Keep()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """State ``quantity`` of the rules of a plasticity (``learned``) or of the models of a block: of ``members``, into
+    ``columns``."""
+
+    learned: bool
+    number: int
+    quantity: int
+    members: IntArray
+    columns: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Probe:
+    """Reads states, each into its column."""
+
+    names: tuple[str, ...]
+    parts: tuple[_Part, ...]
+
+    def read(self, state: State, row: FloatArray) -> None:
+        """The states as they are now, (columns,)."""
+        for part in self.parts:
+            values = (state.traces if part.learned else state.cells)[part.number][part.quantity]
+            row[part.columns] = values[part.members]
+
+    def now(self, state: State) -> FloatArray:
+        """The same as an array of its own."""
+        row = np.empty(len(self.names))
+        self.read(state, row)
+        return row
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """What is recorded of a network. ``neurons`` are indices, None for all of them; ``weights`` those of connections;
+    ``outputs`` are the columns of states that outputs name, and whether a single one is meant."""
+
+    neurons: IntArray | None
+    weights: IntArray
+    probe: Probe
+    outputs: dict[str, tuple[tuple[int, ...], bool]]
+
+    def widths(self, network: Network) -> tuple[int, int, int]:
+        """How many numbers of a step are activities, weights, states."""
+        neurons = len(network.neurons) if self.neurons is None else len(self.neurons)
+        return neurons, len(self.weights), len(self.probe.names)
+
+
+def columns_of(network: Network, keep: Keep = ALL) -> Columns:
+    """What is kept of a network. Raises KeyError with the nearest names."""
+    names = names_of(network)
+    states: dict[tuple[str, str, int], None] = {}
+    outputs: dict[str, tuple[tuple[int, ...], bool]] = {}
+    for output in network.outputs:
+        if output.states:
+            own = list(singles(output.states))
+            states.update(dict.fromkeys(own))
+            outputs[output.name] = tuple(list(states).index(one) for one in own), output.scalar
+    for reference in keep.states:
+        states.update(dict.fromkeys(singles(find_states(network, reference, names))))
+    return Columns(
+        _neurons(keep.neurons, names, len(network.neurons)),
+        network.changing if keep.weights else network.changing[:0],
+        _probe(network, list(states)),
+        outputs,
+    )
+
+
+def _neurons(references: Sequence[str], names: Names, count: int) -> IntArray | None:
+    if not references:
+        return None
+    found = names.find(" + ".join(references))
+    if isinstance(found, str):
+        raise UnknownNameError(found)
+    chosen = np.array(sorted(found.neurons), dtype=np.int64)
+    return None if len(chosen) == count else chosen
+
+
+def find_states(network: Network, reference: str, names: Names | None = None) -> tuple[StateOf, ...]:
+    """The states of a reference (``K.v``, ``(K -> O).eligibility``, several joined with ``+``). Raises KeyError with
+    the nearest names."""
+    names = names_of(network) if names is None else names
+    return tuple(_state(network, part.strip(), names) for _, part in split_sum(reference))
+
+
+def _state(network: Network, text: str, names: Names) -> StateOf:
+    if not isinstance(names.find(text), str):
+        raise UnknownNameError(f"'{text}' is no state: its activity is recorded as that of a neuron, group or output")
+    name = split_state(text)
+    if name is None:
+        raise UnknownNameError(f"'{text}' is no state: write K.v for v of K's model, (K -> O).v for that of a rule")
+    one: StateOf | Refusal | None
+    if not name.of_rule:
+        one = model_state(name, _found(name.owner, names), holders_of(network))
+    elif name.owner.endswith(")") and name.owner in network.connection_index:
+        index = np.array([network.connection_index[name.owner]], dtype=np.int64)
+        one = connections_state(name, index, wiring_of(network))
+    else:
+        left, _, right = name.owner.partition("->")
+        one = rule_state(name, _found(left.strip(), names), _found(right.strip(), names), wiring_of(network))
+    if not isinstance(one, StateOf):
+        hint = "" if one is None or one.hint is None else f"; {one.hint}"
+        raise UnknownNameError(f"'{text}': {'there is none' if one is None else one.message}{hint}")
+    return one
+
+
+def _found(reference: str, names: Names) -> tuple[int, ...]:
+    found = names.find(reference)
+    if isinstance(found, str):
+        raise UnknownNameError(found)
+    return found.neurons
+
+
+def probe_of(network: Network, states: Iterable[StateOf]) -> Probe:
+    """A probe of these states, in their order."""
+    return _probe(network, list(singles(states)))
+
+
+def _probe(network: Network, wanted: list[tuple[str, str, int]]) -> Probe:
+    places: dict[tuple[bool, int, int], tuple[list[int], list[int]]] = {}
+    located: dict[str, tuple[IntArray, IntArray]] = {}
+    for column, (state, what, index) in enumerate(wanted):
+        learned = what == "connection"
+        if what not in located:
+            located[what] = _located(network, learned)
+        numbers, positions = located[what]
+        number = int(numbers[index])
+        kept = network.plasticity[number].rule.state if learned else network.blocks[number].model.state
+        quantity = [one.name for one in kept].index(state)
+        members, columns = places.setdefault((learned, number, quantity), ([], []))
+        members.append(int(positions[index]))
+        columns.append(column)
+    parts = tuple(
+        _Part(*key, np.array(members, dtype=np.int64), np.array(columns, dtype=np.int64))
+        for key, (members, columns) in places.items()
+    )
+    none: IntArray = np.zeros(0, dtype=np.int64)
+    names: list[str] = []
+    for state, what, index in wanted:
+        one = np.array([index], dtype=np.int64)
+        neuron = what == "neuron"
+        names += names_of_states(network, [StateOf(state, one if neuron else none, none if neuron else one)])
+    return Probe(tuple(names), parts)
+
+
+def _located(network: Network, learned: bool) -> tuple[IntArray, IntArray]:
+    """For each neuron its block, or for each connection its plasticity, and its place there; −1 without one."""
+    count = len(network.connections) if learned else len(network.neurons)
+    numbers, positions = np.full(count, -1, dtype=np.int64), np.zeros(count, dtype=np.int64)
+    members = [one.members for one in (network.plasticity if learned else network.blocks)]
+    for number, own in enumerate(members):
+        numbers[own] = number
+        positions[own] = np.arange(len(own))
+    return numbers, positions

@@ -1,0 +1,136 @@
+"""What Python hands over: each wrong argument of a public function is named, at once."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import neurovis_spec as nv
+from neurovis_spec import plain
+from neurovis_spec.runtime.recording import Recording
+
+TEXT = """neurovis: 1
+name: x
+parameters: {g: 1}
+inputs: {s: {size: 2}}
+neurons: {A: {bias: g}, B: {count: 2, input: s}}
+connections: {A -> B: {weight: 1, plasticity: hebbian}}
+"""
+NETWORK = nv.compile_text(TEXT)
+RECORDING = NETWORK.run(3)
+SPEC = {"neurovis": 1, "name": "x", "neurons": {"A": {}}}
+WRONG: dict[str, tuple[object, ...]] = {
+    "a text": (None, 5, b"x", ["x"], np.array("x")),
+    "a path": (None, 5, b"x", ["x"], ("x",)),
+    "an integer": (1.5, float("nan"), "1", None, True, [1], np.array([1, 2]), np.float64(2)),
+    "a number": ("1", b"1", None, [1.0], 1j, np.array([1, 2])),
+    "a mapping": (5, "s", [("s", 1)], np.zeros(3)),
+    "a recording": (5, "x.npz", {}, np.zeros(3)),
+    "a layout": (5, "x.yaml", {}),
+    "a function": (5, "f", {}),
+}
+#: what may be left out: None stands for the default
+OPTIONAL = {"limit", "seed", "root", "steps", "step", "fps", "engine", "theme", "backend"}
+CALLS: dict[tuple[str, str, str], Callable[..., object]] = {
+    ("compile", "source", "a path"): lambda v: nv.compile(v),
+    ("compile", "root", "a path"): lambda v: nv.compile(SPEC, root=v),
+    ("compile", "seed", "an integer"): lambda v: nv.compile(SPEC, seed=v),
+    ("compile", "limit", "an integer"): lambda v: nv.compile(SPEC, limit=v),
+    ("compile_text", "text", "a text"): lambda v: nv.compile_text(v),
+    ("compile_text", "file", "a text"): lambda v: nv.compile_text(TEXT, file=v),
+    ("compile_text", "parameters", "a mapping"): lambda v: nv.compile_text(TEXT, parameters=v),
+    ("compile_text", "g", "a number"): lambda v: nv.compile_text(TEXT, g=v),
+    ("load", "path", "a path"): lambda v: nv.load(v),
+    ("run", "steps", "an integer"): lambda v: NETWORK.run(v),
+    ("run", "every", "an integer"): lambda v: NETWORK.run(3, every=v),
+    ("run", "inputs", "a mapping"): lambda v: NETWORK.run(3, v),
+    ("run", "backend", "a text"): lambda v: NETWORK.run(3, backend=v),
+    ("run", "start", "a recording"): lambda v: NETWORK.run(3, start=v),
+    ("run", "progress", "a function"): lambda v: NETWORK.run(3, progress=v),
+    ("run_to", "path", "a path"): lambda v: NETWORK.run_to(v, 3),
+    ("simulator", "backend", "a text"): lambda v: NETWORK.simulator(v),
+    ("simulator", "start", "a recording"): lambda v: NETWORK.simulator(start=v),
+    ("layout", "engine", "a text"): lambda v: NETWORK.layout(v),
+    ("layout", "earlier", "a layout"): lambda v: NETWORK.layout(earlier=v),
+    ("render", "path", "a path"): lambda v: NETWORK.render(v, step=1),
+    ("render", "step", "an integer"): lambda v: NETWORK.render("x.svg", step=v),
+    ("render", "recording", "a recording"): lambda v: NETWORK.render("x.svg", recording=v),
+    ("render", "theme", "a text"): lambda v: NETWORK.render("x.svg", theme=v),
+    ("animate", "start", "an integer"): lambda v: NETWORK.animate("x.svg", start=v),
+    ("animate", "steps", "an integer"): lambda v: NETWORK.animate("x.svg", steps=v),
+    ("animate", "fps", "a number"): lambda v: NETWORK.animate("x.svg", fps=v),
+    ("recording", "name", "a text"): lambda v: RECORDING[v],
+    ("weight", "name", "a text"): lambda v: RECORDING.weight(v),
+    ("snapshot", "step", "an integer"): lambda v: RECORDING.snapshot(v),
+    ("save", "path", "a path"): lambda v: RECORDING.save(v),
+}
+
+
+@pytest.mark.parametrize(("call", "name", "what"), CALLS)
+def test_a_wrong_type_is_named(
+    call: str, name: str, what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for value in WRONG[what]:
+        if value is None and name in OPTIONAL:
+            continue
+        with pytest.raises(TypeError, match=f"^'{name}' is {what}, not {type(value).__name__}$"):
+            CALLS[call, name, what](value)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: nv.compile_text(TEXT, limit=-5), "'limit' is at least 0, not -5"),
+        (lambda: nv.compile_text(TEXT, seed=2**80), r"'seed' is at most 9223372036854775807, not about 2\^80"),
+        (lambda: nv.compile_text(TEXT, seed=-(2**63) - 1), "'seed' is at least -9223372036854775808"),
+        (lambda: nv.compile_text(TEXT, g=10**400), "'g' is beyond what a double can hold"),
+        (lambda: nv.compile("a\0b"), "'source' holds a NUL character"),
+        (lambda: NETWORK.run(-1), "'steps' is at least 0, not -1"),
+        (lambda: NETWORK.run(2**80), "'steps' is at most 9007199254740992"),
+        (lambda: NETWORK.run_to("x.npz", 3, every=2**80), "'every' is at most 9007199254740992"),
+        (lambda: NETWORK.run(3, every=0), "'every' is at least 1, not 0"),
+        (lambda: RECORDING.snapshot(2**80), "is not in the recording"),
+    ],
+)
+def test_a_wrong_value_is_named(call: Callable[[], object], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        call()
+
+
+def test_a_mapping_that_is_no_spec_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    loop: dict[str, object] = {"neurovis": 1}
+    loop["neurons"] = {"A": {"bias": [loop]}}
+    with pytest.raises(ValueError, match=r"holds itself, at 'neurons: A: bias'"):
+        nv.compile(loop)
+    deep: dict[str, object] = {}
+    inner = deep
+    for _ in range(100_000):
+        inner["a"] = inner = {}
+    with pytest.raises(ValueError, match="nested too deeply"):
+        nv.compile(deep)
+    with pytest.raises(ValueError, match="two keys of the mapping read as '1'"):
+        nv.compile({**SPEC, "neurons": {"1": {}, 1: {}}})
+    with pytest.raises(TypeError, match="numbers, not bytes"):
+        nv.compile({**SPEC, "title": b"x"})
+    monkeypatch.setattr(plain, "MOST_VALUES", 1000)
+    with pytest.raises(ValueError, match="too large for a spec: it has more than 1,000 values"):
+        nv.compile({**SPEC, "neurons": itertools.count()})
+    shared: object = 1
+    for _ in range(64):  # 2 to the power of 64 values, if they were written one by one
+        shared = [shared, shared]
+    with pytest.raises(ValueError, match="too large for a spec"):
+        nv.compile({**SPEC, "neurons": shared})
+
+
+def test_numbers_of_any_make_are_taken() -> None:
+    compile_text: Callable[..., nv.CompiledNetwork] = nv.compile_text
+    made = compile_text(TEXT, seed=np.int64(3), limit=np.uint8(9), parameters={"g": np.float32(2)})
+    run: Callable[..., Recording] = made.run
+    assert made.parameters["g"] == 2
+    assert len(run(np.int64(3), every=np.int32(2))) == 2

@@ -1,0 +1,87 @@
+"""What a layout costs grows with the network and hardly faster: the work is counted, in calls of functions."""
+
+from __future__ import annotations
+
+import random
+import sys
+from collections.abc import Callable
+
+import layout_conformance as suite
+import pytest
+from neurovis_layouts.routing import nearby, walls
+from neurovis_layouts.routing.detours import Detours
+from neurovis_layouts.routing.walls import FloatArray, IntArray, Walls
+
+import neurovis_spec as nv
+from neurovis_spec.layout.problem import problem_of
+
+HEAD = "neurovis: 1\nname: many\n"
+
+
+def calls(network: nv.CompiledNetwork) -> int:
+    """How many functions are called while a network is laid out."""
+    count = 0
+
+    def note(_frame: object, event: str, _given: object) -> None:
+        nonlocal count
+        count += event in ("call", "c_call")
+
+    sys.setprofile(note)
+    try:
+        network.layout()
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+def loops(count: int) -> nv.CompiledNetwork:
+    return nv.compile_text(HEAD + "neurons: {A: {bias: 1}}\nconnections:\n" + "  - A -> A: 1\n" * count)
+
+
+def parallel(count: int) -> nv.CompiledNetwork:
+    return nv.compile_text(HEAD + "neurons: {A: {bias: 1}, B: {}}\nconnections:\n" + "  - A -> B: 1\n" * count)
+
+
+def legs(count: int, engine: str = "grid") -> nv.CompiledNetwork:
+    """Instances, a quarter of them connected with another anywhere."""
+    draw = random.Random(3)
+    text = HEAD + "modules: {leg: {neurons: {S: {bias: 1}, K: {}}, connections: {S -> K: 1}}}\n"
+    text += f"instances: {{l: {{module: leg, count: {count}}}}}\nlayout: {{engine: {engine}}}\nconnections:\n"
+    ends = [(draw.randint(1, count), draw.randint(1, count)) for _ in range(count // 4)]
+    return nv.compile_text(text + "".join(f"  - l{a}.K -> l{b}.S: 1\n" for a, b in ends))
+
+
+@pytest.mark.parametrize(("make", "small"), [(loops, 20), (parallel, 20)])
+def test_twice_as_many_cost_little_more_than_twice_as_much(
+    make: Callable[[int], nv.CompiledNetwork], small: int
+) -> None:
+    calls(make(2))  # whatever is imported
+    assert calls(make(2 * small)) < 2.6 * calls(make(small))
+
+
+def test_a_way_round_many_frames_meets_few_of_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 400 frames no search compares its lines with more than some, however many ways it tries."""
+    compared: list[int] = []
+
+    def counted(a: FloatArray, b: FloatArray, rects: FloatArray) -> tuple[IntArray, IntArray]:
+        compared.append(len(a) * len(rects))
+        return meetings(a, b, rects)
+
+    meetings = walls.meetings
+    for module in (walls, nearby):
+        monkeypatch.setattr(module, "meetings", counted)
+    centres = [(4.0 * i, 4.0 * j) for i in range(20) for j in range(20)]
+    frames = [(frozenset({k}), (x - 1.5, y - 1.5, x + 1.5, y + 1.5)) for k, (x, y) in enumerate(centres)]
+    detours = Detours(Walls(frames, len(centres)), centres, ways=200)
+    draw = random.Random(1)
+    ways = [tuple(draw.sample(range(400), 2)) for _ in range(200)]
+    assert all(detours.route(a, b, True) for a, b in ways)
+    assert sum(compared) / len(ways) < 60_000
+
+
+@pytest.mark.parametrize("engine", ["grid", "circular"])
+def test_among_many_frames_no_route_enters_a_foreign_one(engine: str) -> None:
+    network = legs(150, engine)
+    layout = network.layout()
+    assert suite.through_frames(layout.value, problem_of(network.network)) == []
+    assert layout.metrics()["edges_over_neurons"] == 0

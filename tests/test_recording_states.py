@@ -1,0 +1,225 @@
+"""States of models and rules, and partial recordings: what is kept of a step, and how it is read again (§12, §14)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import neurovis_spec as nv
+from neurovis_spec.cli.commands import neurovis
+from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.state import State
+
+SPEC = """\
+neurovis: 1
+name: states
+time: {steps: 30, episode: 10}
+inputs: {reward: {expression: sin(k)}}
+modules:
+  leg:
+    neurons: {K: {count: 2, model: {adaptive: {}}, bias: 1 + i}}
+neurons:
+  A: {count: 3, model: leaky_integrator, bias: 1 + i, activation: tanh}
+  R: {input: reward}
+  O: {}
+instances: {left: {module: leg, count: 2}}
+connections:
+  - A -> O: {weight: 0.1, plasticity: {reward_modulated: {policy: R, reward: R}}}
+  - A1 -> O: {weight: 0.2, delay: 2, plasticity: {reward_modulated: {policy: R, reward: R}}}
+  - left.K -> O: 0.3
+outputs: {membrane: A.v, one: A2.v, tired: left.K.b, trace: (A -> O).eligibility, signal: O}
+"""
+WANTED = ["left1.K.v", "(A2 -> O).baseline"]
+
+
+@pytest.fixture(scope="module")
+def network() -> nv.CompiledNetwork:
+    return nv.compile_text(SPEC)
+
+
+def by_hand(network: nv.CompiledNetwork, read: object, steps: int = 30) -> np.ndarray:
+    """Something of the State after each step."""
+    assert callable(read)
+    simulation = network.simulator()
+    rows = []
+    for _ in range(steps):
+        simulation.step()
+        rows.append(read(simulation.state()))
+    return np.array(rows)
+
+
+def cells(network: nv.CompiledNetwork, neuron: str, state: str) -> object:
+    index = network.network.neuron_index[neuron]
+
+    def read(now: State) -> float:
+        for block, values in zip(network.network.blocks, now.cells, strict=True):
+            if index in block.members:
+                names = [quantity.name for quantity in block.model.state]
+                return float(values[names.index(state)][block.members.tolist().index(index)])
+        raise AssertionError
+
+    return read
+
+
+def test_a_state_is_that_after_the_step(network: nv.CompiledNetwork) -> None:
+    recording = network.run(states=WANTED)
+    assert recording["A.v"].shape == (30, 3)
+    assert recording["A2.v"].shape == (30,)
+    for neuron, state in (("A2", "v"), ("left1.K2", "v"), ("left2.K1", "b")):
+        assert np.array_equal(recording[f"{neuron}.{state}"], by_hand(network, cells(network, neuron, state)))
+    traces = by_hand(network, lambda now: now.traces[0][0][:3])
+    assert np.array_equal(recording["(A -> O).eligibility"][:, :3], traces)
+    assert traces.any()
+    assert np.array_equal(recording["membrane"], recording["A.v"])
+    assert recording["one"].shape == (30,)
+    assert np.array_equal(recording["tired"][:, 0], recording["left1.K1.b"])
+    assert np.array_equal(recording["left1.K.v"][:, 1], recording["left1.K2.v"])
+    assert recording["(A2 -> O).baseline"].shape == (30,)
+    assert recording["(A1 -> O).eligibility"].shape == (30, 2)
+    assert "(A1 -> O (2)).eligibility" in recording
+
+
+def test_the_reference_gives_the_same_states(network: nv.CompiledNetwork) -> None:
+    one, other = (network.run(states=WANTED, backend=name) for name in ("numpy", "reference"))
+    assert one.state_names == other.state_names
+    assert np.allclose(one.states, other.states, rtol=1e-12, atol=1e-12)
+
+
+def test_outputs_of_a_step_are_states(network: nv.CompiledNetwork) -> None:
+    simulation, recording = network.simulator(), network.run()
+    for k in range(12):
+        out = simulation.step()
+        for name in ("membrane", "one", "tired", "trace", "signal"):
+            assert np.array_equal(out[name], recording[name][k])
+    assert np.shape(out["one"]) == ()
+    assert np.shape(out["trace"]) == (4,)
+
+
+@pytest.mark.parametrize("suffix", ["npz", "csv"])
+@pytest.mark.parametrize("streamed", [False, True])
+def test_states_come_back_from_a_file(network: nv.CompiledNetwork, tmp_path: Path, suffix: str, streamed: bool) -> None:
+    path, made = tmp_path / f"x.{suffix}", network.run(states=WANTED)
+    if streamed:
+        network.run_to(path, states=WANTED)
+    else:
+        made.save(path)
+    again = nv.load(path)
+    assert again.state_names == made.state_names
+    assert np.array_equal(again.states, made.states)
+    for name in ("A.v" if suffix == "npz" else "A1.v", "left1.K1.b", *WANTED[1:]):
+        assert np.array_equal(again[name], made[name])
+    assert np.array_equal(again.activity, made.activity)
+    assert np.array_equal(again.weights, made.weights)
+
+
+def test_a_neuron_of_an_instance_is_no_state() -> None:
+    text = SPEC.replace("neurons: {K: {count", "neurons: {v: {bias: 1}, K: {count") + "layout: {}\n"
+    network = nv.compile_text(text.replace("signal: O", "signal: left1.v"))
+    assert network.run(2)["signal"].shape == (2,)
+    with pytest.raises(KeyError, match="no state"):
+        network.run(2, states=["left1.v"])
+
+
+@pytest.mark.parametrize(
+    ("reference", "words"),
+    [
+        ("A.w", "its states are: v"),
+        ("O.v", "has no states"),
+        ("Q.v", "no neuron, group or output 'Q'"),
+        ("A", "is no state"),
+        ("(R -> O).x", "no connection"),
+        ("(left.K -> O).x", "no rule changes"),
+        ("(A -> O).x", "eligibility, baseline"),
+        ("A..v", "is no state"),
+    ],
+)
+def test_an_unknown_state_is_refused_in_words(network: nv.CompiledNetwork, reference: str, words: str) -> None:
+    with pytest.raises(KeyError, match=words.replace("(", "\\(")):
+        network.run(2, states=[reference])
+
+
+def test_a_state_that_was_not_recorded_is_said(network: nv.CompiledNetwork) -> None:
+    recording = network.run(2)
+    with pytest.raises(KeyError, match=r"'left1.K.v' was not recorded"):
+        recording["left1.K.v"]
+    assert "left1.K.v" not in recording
+    assert "A.v" in recording
+
+
+def partial(network: nv.CompiledNetwork, tmp_path: Path, suffix: str = "npz") -> Recording:
+    path = tmp_path / f"partial.{suffix}"
+    network.run_to(path, every=10, neurons="O + A1..A2", weights="none", states=["A3.v"])
+    return nv.load(path)
+
+
+def test_a_partial_recording_knows_what_it_holds(network: nv.CompiledNetwork, tmp_path: Path) -> None:
+    whole, part = network.run(), partial(network, tmp_path)
+    with np.load(tmp_path / "partial.npz") as file:
+        assert file["recorded"].tolist() == [0, 1, 4]
+        assert file["activity"].shape == (3, 3)
+        assert file["neurons"].tolist() == list(whole.neurons)
+        assert file["weights"].shape == (3, 0)
+        assert len(file["plastic"]) == 4 == len(file["weights_after"])
+    assert part.neurons == whole.neurons
+    assert part.step.tolist() == [0, 10, 20]
+    for name in ("O", "A1..A2", "A2 + O", "A3.v", "membrane"):
+        assert np.array_equal(part[name], whole[name][::10])
+    for name in ("A", "A3", "left1.K"):
+        with pytest.raises(KeyError, match=r"was not recorded.*holds A1, A2, O"):
+            part[name]
+    with pytest.raises(KeyError, match="weight 'A1 -> O' was not recorded"):
+        part.weight("A1 -> O")
+    assert part.weight("left1.K1 -> O").shape == (3,)
+    assert "svg" in part._repr_svg_()
+
+
+def test_a_partial_recording_in_memory_is_that_of_the_file(network: nv.CompiledNetwork, tmp_path: Path) -> None:
+    part = partial(network, tmp_path)
+    made = network.run(every=10, neurons=["O", "A1..A2"], weights="none", states=["A3.v"])
+    assert np.array_equal(part.activity, made.activity)
+    assert np.array_equal(part.states, made.states)
+    assert partial(network, tmp_path, "csv")["A1"].shape == (3,)
+
+
+def test_nothing_goes_on_from_or_draws_a_partial_recording(network: nv.CompiledNetwork, tmp_path: Path) -> None:
+    part = partial(network, tmp_path)
+    with pytest.raises(RecordingError, match=r"go on from a partial recording: it lacks the activities of A3, R"):
+        network.run(start=part)
+    with pytest.raises(RecordingError, match=r"lacks the activities .* and the changing weights"):
+        network.render(tmp_path / "x.svg", recording=part)
+    with pytest.raises(RecordingError, match="lacks the changing weights"):
+        network.animate(tmp_path / "x.svg", recording=network.run(5, weights="none"))
+
+
+def test_every_neuron_named_is_a_whole_recording(network: nv.CompiledNetwork) -> None:
+    recording = network.run(2, neurons="A + R + O + left.K")
+    assert recording.missing is None
+    assert recording.recorded is None
+    assert network.run(start=recording, steps=2).step.tolist() == [0, 1]
+
+
+def test_the_command_records_and_shows_states(tmp_path: Path) -> None:
+    spec = tmp_path / "x.yaml"
+    spec.write_text(SPEC, encoding="utf-8")
+    run = [*("run", str(spec)), "--states", "left1.K.v", "--states", "(A -> O).baseline"]
+    shown = CliRunner().invoke(neurovis, run)
+    assert shown.exit_code == 0
+    assert "left1.K.v" in shown.stdout
+    assert "membrane" in shown.stdout
+    made = CliRunner().invoke(neurovis, [*run, "-o", str(tmp_path / "x.npz"), "--neurons", "O", "--weights", "none"])
+    assert made.exit_code == 0
+    assert nv.load(tmp_path / "x.npz")["left1.K.v"].shape == (30, 2)
+    wrong = CliRunner().invoke(neurovis, ["run", str(spec), "--states", "A.w"])
+    assert wrong.exit_code == 1
+    assert "its states are: v" in wrong.stderr
+    told = CliRunner().invoke(neurovis, ["inspect", str(spec)])
+    assert "A1.v" in told.stdout
+
+
+def test_the_hash_knows_which_state_an_output_names() -> None:
+    first = nv.compile_text(SPEC).hash
+    assert first != nv.compile_text(SPEC.replace("tired: left.K.b", "tired: left.K.v")).hash
+    assert first == nv.compile_text(SPEC.replace("membrane: A.v", "membrane: [A1.v, A2..A3.v]")).hash

@@ -1,0 +1,230 @@
+"""What every backend promises: each step as the reference makes it, and every event and call of a run alike.
+
+The C backend computes with the C library that Python itself calls, so that it gives the same bits.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+from networks_by_hand import TANH, Link, Unit, build, cpg_rbf, model
+from random_specs import specs
+from test_runtime_backends import networks, parts
+
+import neurovis_spec as nv
+from neurovis_spec.compiler.network import Input, Network
+from neurovis_spec.runtime import c_backend
+from neurovis_spec.runtime.backend import Backend, load
+from neurovis_spec.runtime.c_backend import CBackend
+from neurovis_spec.runtime.inputs import InputReader
+from neurovis_spec.runtime.numpy_backend import NumpyBackend
+from neurovis_spec.runtime.record import record
+from neurovis_spec.runtime.reference import ReferenceBackend
+from neurovis_spec.runtime.simulation import Simulation
+from neurovis_spec.runtime.state import State, initial_state
+
+SPECS = sorted(path for path in (Path(__file__).parent.parent / "specs").rglob("*.yaml") if "modules" not in path.parts)
+OTHERS = ["numpy", pytest.param("c", marks=pytest.mark.compiler)]
+#: a program in which something of everything happens
+EVENTS = """
+neurovis: 1
+name: events
+time: {dt: 0.1, episode: 7}
+seed: 3
+parameters: {gain: 0.4, leak: 0.2, rate: 0.02, level: 0.3, offset: 0.1}
+inputs: {wave: {expression: "level*sin(k/3)"}, teacher: {expression: "0.2*cos(k/5)"}}
+neurons:
+  S: {count: 4, input: wave, initial: 0.2, bias: offset, activation: tanh}
+  L: {count: 4, model: {leaky_integrator: {leak: leak}}, activation: tanh, noise: "normal(0, 0.05)"}
+  P: {count: 2, combine: product}
+  D: {combine: distance, activation: {gaussian: {sigma: 0.7}}}
+  O: {}
+connections:
+  S -> L: {weight: "gain*(1 + i - j)/4", pattern: all_to_all}
+  L -> S: {weight: 0.3, delay: 3, pattern: one_to_one}
+  S -> P: {weight: 1.1, pattern: all_to_all, delay: 2}
+  L -> D: {weight: gain, centre: offset}
+  L -> O: {weight: 0.1, plasticity: {delta: {rate: rate, target: teacher}}, delay: 2}
+  P -> O: {weight: 0.2, plasticity: {oja: {rate: rate}}, bounds: [-0.5, 0.5]}
+events:
+  - {at: 4, set: {gain: 0.7, leak: 0.3}}
+  - {from: 6, to: 15, clamp: {S2: level}}
+  - {at: 9, lesion: [L3, S1 -> P1]}
+  - {at: 11, learning: {L -> O: false}}
+  - {at: 14, set: {rate: 0.05, level: 0.5, offset: -0.2}}
+  - {at: 20, mend: [L3, S1 -> P1]}
+  - {at: 22, learning: {L -> O: true}}
+outputs: {out: O}
+"""
+
+
+def agree(state: State, other: State, exact: bool) -> None:
+    """Both hold the same: bit for bit, or within 1e-12."""
+    assert state.k == other.k
+    for expected, found in zip(parts(state), parts(other), strict=True):
+        if exact:
+            np.testing.assert_array_equal(found, expected)
+            assert np.array_equal(np.signbit(found), np.signbit(expected)) or np.isnan(expected).any()
+        else:
+            np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+
+
+def follow(network: Network, backend: Backend, steps: int = 24) -> None:
+    """Each step is begun in the reference's state."""
+    plain, fast, reader = ReferenceBackend().prepare(network), backend.prepare(network), InputReader(network)
+    state = initial_state(network)
+    with np.errstate(all="ignore"):
+        for k in range(steps):
+            other = state.copy()
+            plain.step(state, reader.at(k))
+            fast.step(other, reader.at(k))
+            agree(state, other, backend.name == "c")
+
+
+@pytest.fixture(params=[0, 600], ids=["loops", "written out"])
+def small(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Both ways to write a network in C."""
+    monkeypatch.setattr(c_backend, "SMALL", request.param)
+    c_backend.forget()
+    yield
+    c_backend.forget()
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("size", [0, 600], ids=["loops", "written out"])
+@settings(max_examples=25, deadline=None, phases=(Phase.explicit, Phase.generate))
+@given(network=networks())
+def test_each_step_in_c_is_the_reference_bit_for_bit(network: Network, size: int) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(c_backend, "SMALL", size)
+        follow(network, CBackend())
+
+
+@pytest.mark.parametrize("backend", OTHERS)
+@settings(max_examples=12, deadline=None, phases=(Phase.explicit, Phase.generate))
+@given(spec=specs())
+def test_each_step_of_a_random_spec_agrees(spec: dict[str, object], backend: str) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        follow(nv.compile(spec).network, load(backend), 12)
+
+
+@pytest.mark.compiler
+@pytest.mark.usefixtures("small")
+@pytest.mark.parametrize("path", SPECS, ids=lambda path: path.stem)
+def test_the_examples_run_alike_in_c(path: Path) -> None:
+    network = nv.compile(path).network
+    runs = [record(network, 60, backend=name) for name in ("reference", "c")]
+    assert runs[0].activity.tobytes() == runs[1].activity.tobytes()
+    assert runs[0].weights.tobytes() == runs[1].weights.tobytes()
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("every", [1, 4])
+def test_events_apply_alike_in_whole_runs(every: int) -> None:
+    network = nv.compile_text(EVENTS).network
+    runs = [record(network, 30, backend=name, every=every) for name in ("reference", "c")]
+    assert runs[0].activity.tobytes() == runs[1].activity.tobytes()
+    assert runs[0].weights.tobytes() == runs[1].weights.tobytes()
+
+
+@pytest.mark.parametrize("backend", OTHERS)
+def test_every_call_of_a_run_does_alike(backend: str) -> None:
+    """Setting, clamping, lesioning, stopping rules, going back: after each, both are where the other is."""
+    network = nv.compile_text(EVENTS).network
+    plain, fast = Simulation(network, "reference"), Simulation(network, backend)
+
+    def both(steps: int) -> None:
+        for _ in range(steps):
+            plain.step(wave=0.3)
+            fast.step(wave=0.3)
+            agree(plain.state(), fast.state(), backend == "c")
+
+    both(5)
+    for simulation in (plain, fast):
+        simulation.set(gain=-0.2, rate=0.5)
+    both(2)
+    kept = plain.state(), fast.state()
+    for simulation in (plain, fast):
+        simulation.clamp("L1..L2 + O", 0.25)
+    both(3)
+    for simulation in (plain, fast):
+        simulation.release("L1")
+        simulation.lesion("P2")
+        simulation.lesion("L -> D")
+        simulation.learning("P -> O", False)
+    both(6)
+    for simulation in (plain, fast):
+        simulation.mend("P2")
+        simulation.learning("P -> O", True)
+    both(9)
+    plain.restore(kept[1])
+    fast.restore(kept[0])
+    both(9)
+    for simulation in (plain, fast):
+        simulation.reset()
+    both(3)
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("delay", [0, 1, 3])
+@pytest.mark.parametrize("by_target", [False, True])
+def test_full_matrices_and_many_connections_add_up_in_order(delay: int, by_target: bool) -> None:
+    """Each way in which the sums of a large network are written."""
+    random = np.random.default_rng(1)
+    units = [Unit(f"S{i}", TANH, bias=float(b)) for i, b in enumerate(random.normal(size=20))]
+    units += [Unit(f"T{i}", TANH) for i in range(30)]
+    ends = [(s, t) for s in range(20) for t in range(20, 50)]
+    if by_target:
+        ends.sort(key=lambda pair: pair[1])
+    links = [Link(s, t, float(random.normal()), delay) for s, t in ends]
+    follow(build(units, links), CBackend(), 6)
+    follow(build(units, links[:-3]), CBackend(), 6)
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("backend", ["numpy", "c"])
+def test_what_is_not_finite_is_told_at_its_step(backend: str) -> None:
+    growing = model("f(v)", {"v": ("1", "v^2 * 10 + 1e300 * (v > 1e9)", None)})
+    network = build([Unit("A", model=growing), Unit("B", input=0)], inputs=[Input("s", 0, 1)])
+    with pytest.warns(RuntimeWarning, match=r"A is inf at step 5") as first:
+        record(network, 600, backend="reference")
+    with pytest.warns(RuntimeWarning) as second:
+        record(network, 600, backend=backend)
+    assert [str(w.message) for w in second] == [str(w.message) for w in first]
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("size", [0, 600])
+def test_setting_clamping_and_lesioning_compile_nothing(size: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(c_backend, "SMALL", size)
+    network = nv.compile_text(EVENTS).network
+    simulation = Simulation(network, "c")
+    monkeypatch.setattr(c_backend.c_library, "load", lambda text: pytest.fail("something was compiled"))
+    simulation.set(gain=0.9)
+    simulation.clamp("S1", 1)
+    simulation.lesion("L2")
+    simulation.learning("L -> O", False)
+    simulation.step()
+    assert simulation.activity[0] == 1
+
+
+@pytest.mark.compiler
+def test_one_state_goes_from_backend_to_backend() -> None:
+    network = cpg_rbf()
+    steppers = [ReferenceBackend().prepare(network), CBackend().prepare(network), NumpyBackend().prepare(network)]
+    reader, state, plain = InputReader(network), initial_state(network), initial_state(network)
+    for k in range(30):
+        steppers[k % 3].step(state, reader.at(k))
+        steppers[0].step(plain, reader.at(k))
+        state = state.copy() if k % 4 == 0 else state
+    for expected, found in zip(parts(plain), parts(state), strict=True):
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+    assert math.isfinite(float(state.activity.sum()))
