@@ -20,7 +20,7 @@ from neurovis_spec.diagnostics import SpecError
 from neurovis_spec.findings import printable
 from neurovis_spec.plugins import PluginError
 from neurovis_spec.runtime.backend import BackendError
-from neurovis_spec.runtime.columns import columns_of
+from neurovis_spec.runtime.columns import Columns, Keep, columns_of
 from neurovis_spec.runtime.inputs import STRETCH, InputError
 from neurovis_spec.runtime.measures import Measure, Meter, parsed, resolved
 from neurovis_spec.runtime.record import Course, go
@@ -110,18 +110,22 @@ def failed(job: Job, code: str, message: str) -> Result:
 def _measured(job: Job, network: Network) -> tuple[float, ...]:
     meters = tuple(Meter(measure) for measure in measures(job, network))
     state = initial_state(network)
-    rows = _Metered(network, state, meters)
-    go(network, state, Course(network.steps if job.steps is None else job.steps, 1, job.inputs, job.backend), rows)
+    keep = Keep(states=tuple(dict.fromkeys(name for meter in meters for name in meter.measure.probe.names)))
+    rows = _Metered(network, state, meters, columns_of(network, keep))
+    steps = network.steps if job.steps is None else job.steps
+    go(network, state, Course(steps, 1, job.inputs, job.backend, keep=keep), rows)
     return tuple(rows.last)
 
 
 class _Metered:
     """Rows that are measured and forgotten."""
 
-    def __init__(self, network: Network, state: State, meters: Sequence[Meter]) -> None:
-        widths = columns_of(network).widths(network)
+    def __init__(self, network: Network, state: State, meters: Sequence[Meter], columns: Columns) -> None:
+        widths = columns.widths(network)
         self._activity, self._weights, self._states = (np.empty((STRETCH, width)) for width in widths)
         self._state, self._meters = state, meters
+        names = columns.probe.names
+        self._places = [[names.index(name) for name in meter.measure.probe.names] for meter in meters]
         self.last = [float("nan")] * len(meters)
 
     def begin(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -130,7 +134,11 @@ class _Metered:
     def end(self, count: int) -> None:
         if count:
             parameters = self._state.conditions.parameters
-            self.last = [float(meter.rows(self._activity[:count], parameters)[-1]) for meter in self._meters]
+            activity, states = self._activity[:count], self._states[:count]
+            self.last = [
+                float(meter.rows(activity, parameters, states[:, places])[-1])
+                for meter, places in zip(self._meters, self._places, strict=True)
+            ]
 
     def due(self) -> bool:
         return False
