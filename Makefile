@@ -17,7 +17,7 @@ PYTEST_ARGS ?=
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
-ELSEWHERE := browser or dot or compiler
+ELSEWHERE := browser or dot or compiler or cluster
 
 .PHONY: help install demo gallery test test-all needs fuzz layouts docs format clean
 .DELETE_ON_ERROR:

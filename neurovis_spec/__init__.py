@@ -13,8 +13,9 @@ if TYPE_CHECKING:
     from neurovis_spec.api import compile, compile_text, load
     from neurovis_spec.compiled import CompiledNetwork
     from neurovis_spec.diagnostics import Diagnostic, SpecError
+    from neurovis_spec.sweeps.sweep import sweep
 
-__all__ = ["CompiledNetwork", "Diagnostic", "SpecError", "__version__", "compile", "compile_text", "load"]
+__all__ = ["CompiledNetwork", "Diagnostic", "SpecError", "__version__", "compile", "compile_text", "load", "sweep"]
 
 _HOMES = {
     "CompiledNetwork": "neurovis_spec.compiled",
@@ -23,6 +24,7 @@ _HOMES = {
     "load": "neurovis_spec.api",
     "Diagnostic": "neurovis_spec.diagnostics",
     "SpecError": "neurovis_spec.diagnostics",
+    "sweep": "neurovis_spec.sweeps.sweep",
 }
 
 

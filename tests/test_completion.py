@@ -70,6 +70,7 @@ FILES = [
         ("inspect", "wa"),
         ("layout", "wa"),
         ("run", "wa"),
+        ("sweep", "wa"),
     ),
     *(("render", "wa"), ("animate", "wa"), ("render", "walk.yaml", "-o", ""), ("run", "walk.yaml", "--output", "x")),
     *(("run", "walk.yaml", "--from", "x"), ("render", "walk.yaml", "--recording", "x")),
@@ -115,6 +116,8 @@ def test_every_code_is_offered() -> None:
 def test_parameters_and_inputs_of_the_spec_on_the_line_are_offered(folder: Path) -> None:
     assert offered("run", "walk.yaml", "--set", "ga") == [("plain", "gain="), ("plain", "gap=")]
     assert offered("render", "walk.yaml", "--set", "") == [("plain", f"{name}=") for name in ("gain", "gap", "phi")]
+    assert offered("sweep", "walk.yaml", "--over", "ga") == [("plain", "gain="), ("plain", "gap=")]
+    assert offered("sweep", "walk.yaml", "--over", "s") == [("plain", "seed=")]
     assert offered("run", "walk.yaml", "--input", "t") == [("plain", "touch=")]
     assert offered("run", "walk.yaml", "--input", "touch=data/t") == [("plain", "touch=data/touch.csv")]
     assert offered("run", "walk.yaml", "--input", "touch=") == [("plain", "touch=data/"), ("plain", "touch=walk.yaml")]

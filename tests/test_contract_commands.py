@@ -50,6 +50,7 @@ OPTIONS = {
     "new": "--from", "validate": "--format --strict --limit --root", "fmt": "--check --diff", "inspect": "--format",
     "layout": "--output --engine --update --metrics", "render": "--output --step --recording --theme",
     "run": "--steps --set --input --backend --every --from --until --output",
+    "sweep": "--over --metric --steps --set --input --backend --jobs --scheduler --output",
     "animate": "--output --steps --from --fps --recording", "export": "--to --output --float --from --set",
     "explain": "", "docs": "", "lsp": "", "schema": "",
 }  # fmt: skip

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 import pytest
+import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -123,7 +124,7 @@ def test_a_measure_of_a_recording(text: str, wanted: Callable[[Array, Recording]
     parameters = network.network.settable.parameters.copy()
     for k in range(40):
         parameters[network.network.settable.index["gain"]] = 0.5 if k < 20 else 0.75
-        value = meter.step(recording.activity[k], parameters)
+        value = meter.step(recording.activity[k], parameters, np.zeros(0))
         assert value == found[k] or (math.isnan(value) and math.isnan(found[k])) or "mean(gain" in text
 
 
@@ -174,6 +175,33 @@ def test_a_mistake_has_its_place(text: str, code: str, column: int, words: str) 
     found = caught.value.diagnostics[0]
     assert (found.code, found.span.file, found.span.line, found.span.column) == (code, "<until>", 1, column)
     assert words in f"{found.message} {found.hint}"
+
+
+STATES = """neurovis: 1
+name: cells
+time: {steps: 30}
+neurons: {V: {count: 2, model: leaky, bias: i + 1}, U: {model: leaky}}
+models: {leaky: {state: {v: {initial: 0.5, each_step: v + 0.1*(drive - v)}}, activity: tanh(v)}}
+outputs: {potential: V2.v, both: V.v}
+"""
+
+
+def test_a_state_is_a_number_as_well() -> None:
+    network = nv.compile_text(STATES)
+    recording = network.run(states=["V.v"])
+    assert recording["V2.v"][-1] > 1
+    for name in ("V2.v", "potential"):
+        found = network.measure(f"mean({name}, last=3)", recording)
+        np.testing.assert_allclose(found[2:], rolled(recording["V2.v"], 3, np.mean)[2:])
+        level = float(recording["V2.v"][20])
+        assert network.run(until=f"{name} >= {level!r}").reached == 21
+        table = nv.sweep(yaml.safe_load(STATES), {"seed": "0"}, [f"x = {name}", "V1.v", "U"])
+        assert table.rows[0][1:] == (recording["V2.v"][-1], recording["V1.v"][-1], recording["U"][-1], None)
+    with pytest.raises(ValueError, match=r"the state 'U\.v' was not recorded"):
+        network.measure("U.v", recording)
+    for text, code in (("V2.w", "unknown-name"), ("V.v", "not-one-number"), ("both", "not-one-number")):
+        with pytest.raises(nv.SpecError, match=code):
+            network.run(until=f"{text} > 0")
 
 
 def test_a_name_of_two_things_is_refused() -> None:

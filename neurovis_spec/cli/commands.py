@@ -31,6 +31,7 @@ COMMANDS: Final[Mapping[str, str]] = {
     "lsp": "Answer an editor: findings while typing, completion, hover, rename.",
     "layout": "Compute and write the layout.",
     "run": "Run a network and write a recording.",
+    "sweep": "Run a spec over a grid of parameters and seeds, into a table.",
     "render": "Draw one step as a picture.",
     "animate": "Draw a run as a moving picture.",
     "export": "Write a network as source code for a robot.",

@@ -46,6 +46,11 @@ def settings(ctx: click.Context, param: click.Parameter, incomplete: str) -> Ite
     return _items(f"{name}=" for name in _names_in(ctx, "parameters") if f"{name}=".startswith(incomplete))
 
 
+def axes(ctx: click.Context, param: click.Parameter, incomplete: str) -> Items:
+    """``name=`` for what a sweep of the spec on the line can be over."""
+    return _items(f"{name}=" for name in ("seed", *_names_in(ctx, "parameters")) if f"{name}=".startswith(incomplete))
+
+
 def input_files(ctx: click.Context, param: click.Parameter, incomplete: str) -> Items:
     """``name=`` for the inputs of the spec on the line, behind the sign the files."""
     name, sign, path = incomplete.partition("=")

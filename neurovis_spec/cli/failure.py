@@ -69,5 +69,9 @@ def _input_errors() -> tuple[type[Exception], ...]:
     from neurovis_spec.runtime.recording import RecordingError, UnknownNameError
     from neurovis_spec.runtime.simulation import ParameterError
     from neurovis_spec.scene.renderers import RendererError
+    from neurovis_spec.sweeps.grid import SweepError
 
-    return (RendererError, BackendError, InputError, ParameterError, PluginError, RecordingError, UnknownNameError)
+    return (
+        *(RendererError, BackendError, InputError, ParameterError, PluginError, RecordingError, SweepError),
+        UnknownNameError,
+    )

@@ -49,12 +49,17 @@ def compiled(spec: str, parameters: Mapping[str, float] | None = None) -> Compil
 
 def network_of(spec: str, parameters: Mapping[str, float] | None = None) -> CompiledNetwork:
     """The same, its warnings shown on standard error."""
-    from neurovis_spec.findings import show_text
-
     network = compiled(spec, parameters)
-    if network.warnings:
-        click.echo(show_text(network.warnings, network.sources), err=True)
+    show_findings(network)
     return network
+
+
+def show_findings(network: CompiledNetwork) -> None:
+    """What was noticed about a spec, on standard error."""
+    if network.warnings:
+        from neurovis_spec.findings import show_text
+
+        click.echo(show_text(network.warnings, network.sources), err=True)
 
 
 def show_warnings(layout: NetworkLayout) -> None:

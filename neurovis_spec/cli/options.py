@@ -53,6 +53,11 @@ def _settings(ctx: click.Context, param: click.Parameter, values: tuple[str, ...
     return settings
 
 
+def ranges(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, str]:
+    """Name to range."""
+    return _once(_pair(value, "name=RANGE") for value in values)
+
+
 def _files(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, str]:
     """Name to path."""
     return _once(_pair(value, "name=FILE") for value in values)

@@ -5,6 +5,7 @@ In: the text of a measure, a Network, a Recording of it. Out: the value after ea
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -25,10 +26,11 @@ def over(text: str, network: Network, recording: Recording) -> FloatArray:
     steps only."""
     meter = Meter(measure_of(text, network, LABEL))
     if recording.neurons != network.neurons.names:
-        raise RecordingError("a measure is of a recording of the network that is measured: its neurons are others")
+        raise RecordingError("a measure is of a recording of all neurons of the network, and this one has others")
     steps = len(recording)
     if not np.array_equal(recording.step, np.arange(steps)):
         raise RecordingError("a measure is of every step from step 0 on, and the recording holds some of them only")
+    states = _states(meter.measure.probe.names, recording)
     state, controls = initial_state(network), Controls(network)
     changes = {change.at: change for change in network.changes}
     parts = []
@@ -36,5 +38,13 @@ def over(text: str, network: Network, recording: Recording) -> FloatArray:
         if begin in changes:
             with np.errstate(all="ignore"):
                 controls.apply(state.conditions, state.weights, state.signals, changes[begin])
-        parts.append(meter.rows(recording.activity[begin:end], state.conditions.parameters))
+        parts.append(meter.rows(recording.activity[begin:end], state.conditions.parameters, states[begin:end]))
     return np.concatenate(parts)
+
+
+def _states(names: Sequence[str], recording: Recording) -> FloatArray:
+    """The columns of these states."""
+    for name in names:
+        if name not in recording.state_names:
+            raise RecordingError(f"the state '{name}' was not recorded")
+    return recording.states[:, [recording.state_names.index(name) for name in names]]

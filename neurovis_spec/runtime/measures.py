@@ -15,13 +15,16 @@ import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.states import StateOf, split_state
 from neurovis_spec.diagnostics import Findings, Span, shown, suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.measures import PLACE, Formula, parse_measure
 from neurovis_spec.language.expressions.parser import ExpressionError
 from neurovis_spec.language.expressions.tree import Name, Tree, names, walk
+from neurovis_spec.runtime.columns import Probe, find_states, probe_of
 from neurovis_spec.runtime.names import Names, names_of
+from neurovis_spec.runtime.recording import UnknownNameError
 from neurovis_spec.runtime.state import constants
 from neurovis_spec.runtime.windows import running
 
@@ -32,11 +35,14 @@ _OF_TIME: Final = ("k", "t", "dt", "pi", "e")
 @dataclass(frozen=True, eq=False)
 class Measure:
     """A measure of the runs of a network: ``neurons`` gives the index of each neuron that it names, ``slots`` the slot
-    of each parameter. ``label`` says in findings where the text stands."""
+    of each parameter, ``states`` the column of each state that ``probe`` reads. ``label`` says in findings where the
+    text stands."""
 
     formula: Formula
     neurons: Mapping[str, int]
     slots: Mapping[str, int]
+    states: Mapping[str, int]
+    probe: Probe
     dt: float
     label: str
 
@@ -92,12 +98,15 @@ def resolved(formula: Formula, network: Network, label: str) -> Measure:
     directory, findings = names_of(network), findings_of(formula.text, label)
     neurons: dict[str, int] = {}
     slots: dict[str, int] = {}
+    states: dict[str, StateOf] = {}
     places = {PLACE(number) for number in range(len(formula.windows))}
     for node in _named(formula):
-        if node.name not in places:
-            _resolve(node, network, directory, neurons, slots, findings, label)
+        span = _span(label, node.start, node.end)
+        if node.name not in places and not _resolve_state(node.name, span, network, directory, states, findings):
+            _resolve(node.name, span, network, directory, neurons, slots, findings)
     findings.check()
-    return Measure(formula, neurons, slots, network.dt, label)
+    columns = {name: column for column, name in enumerate(states)}
+    return Measure(formula, neurons, slots, columns, probe_of(network, states.values()), network.dt, label)
 
 
 def measure_of(text: str, network: Network, label: str, *, bounded: bool = False) -> Measure:
@@ -110,17 +119,40 @@ def _named(formula: Formula) -> Iterable[Name]:
     return (node for tree in trees for node in walk(tree) if isinstance(node, Name))
 
 
+def _resolve_state(
+    name: str, span: Span, network: Network, directory: Names, states: dict[str, StateOf], findings: Findings
+) -> bool:
+    """Whether a name is a state, or an output that is one; what it is, or what is wrong with it, is noted."""
+    output = next((one for one in network.outputs if one.name == name and one.states), None)
+    if output is None:
+        split = split_state(name)
+        if split is None or not isinstance(directory.find(name), str) or isinstance(directory.find(split.owner), str):
+            return False
+        try:
+            found = find_states(network, name, directory)
+        except UnknownNameError as error:
+            findings.error("unknown-name", span, str(error))
+            return True
+    else:
+        found = output.states
+    if sum(one.size for one in found) == 1:
+        states[name] = next(one for one in found if one.size)
+    else:
+        message = f"'{shown(name)}' is {sum(one.size for one in found)} states, and no single one"
+        findings.error("not-one-number", span, message, "name that of one neuron")
+    return True
+
+
 def _resolve(
-    node: Name,
+    name: str,
+    span: Span,
     network: Network,
     directory: Names,
     neurons: dict[str, int],
     slots: dict[str, int],
     findings: Findings,
-    label: str,
 ) -> None:
-    """What a name means."""
-    name, span = node.name, _span(label, node.start, node.end)
+    """What a name means that is no state."""
     own, found = name in _OF_TIME or name in network.parameters, directory.find(name)
     if isinstance(found, str):
         if not own:
@@ -162,14 +194,16 @@ class Meter:
         #: the value of each window after the last step
         self.values: list[float] = [math.nan] * len(self._running)
 
-    def step(self, activity: FloatArray, parameters: FloatArray) -> float:
-        """After one more step: a[t] of all neurons, the parameters of the step (one a slot). NaN before the measure has
-        a value."""
+    def step(self, activity: FloatArray, parameters: FloatArray, states: FloatArray) -> float:
+        """After one more step: a[t] of all neurons, the parameters of the step (one a slot), the states of the probe.
+        NaN before the measure has a value."""
         known = dict(self._constants)
         for name, index in self.measure.neurons.items():
             known[name] = float(activity[index])
         for name, slot in self.measure.slots.items():
             known[name] = float(parameters[slot])
+        for name, column in self.measure.states.items():
+            known[name] = float(states[column])
         known["k"] = float(self.made)
         known["t"] = self.made * self.measure.dt
         self.made += 1
@@ -178,12 +212,13 @@ class Meter:
             self.values[number] = known[PLACE(number)] = value
         return math.nan if self.made < self.measure.longest else evaluate(self.measure.formula.tree, known)
 
-    def rows(self, activity: FloatArray, parameters: FloatArray) -> FloatArray:
-        """After each of some more steps, all with the same parameters: a row of ``activity`` a step."""
+    def rows(self, activity: FloatArray, parameters: FloatArray, states: FloatArray) -> FloatArray:
+        """After each of some more steps, all with the same parameters: a row of ``activity`` and ``states`` a step."""
         count = len(activity)
         known: dict[str, float | FloatArray] = dict(self._constants)
         known |= {name: activity[:, index] for name, index in self.measure.neurons.items()}
         known |= {name: float(parameters[slot]) for name, slot in self.measure.slots.items()}
+        known |= {name: states[:, column] for name, column in self.measure.states.items()}
         k = np.arange(self.made, self.made + count).astype(np.float64)
         known |= {"k": k, "t": k * self.measure.dt}
         for number, window in enumerate(self.measure.formula.windows):

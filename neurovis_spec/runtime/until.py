@@ -66,7 +66,8 @@ class _Watched:
         self._until.ending = self._ending()
 
     def due(self) -> bool:
-        value = self._meter.step(self._state.activity, self._state.conditions.parameters)
+        state, probe = self._state, self._until.measure.probe
+        value = self._meter.step(state.activity, state.conditions.parameters, probe.now(state))
         self._met = value == value and value != 0
         return self._rows.due() or self._met
 

@@ -1,0 +1,270 @@
+"""``nv.sweep``: a table of metrics, a row for each point of a grid.
+
+In: a spec, what it is varied over, metrics. Out: a Table, and a file that grows while the sweep runs.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from contextlib import closing, suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec import api, arguments
+from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.diagnostics import SpecError, suggest
+from neurovis_spec.interrupts import Ended
+from neurovis_spec.language.reader import LARGEST
+from neurovis_spec.language.reader_files import FileFault, read_bytes
+from neurovis_spec.plain import text_of
+from neurovis_spec.progress import Progress
+from neurovis_spec.runtime.backend import BackendError, available
+from neurovis_spec.runtime.backend import load as load_backend
+from neurovis_spec.runtime.inputs import check_names
+from neurovis_spec.runtime.measures import parsed
+from neurovis_spec.sweeps.grid import SEED, Axis, Number, Point, SweepError, axes, points
+from neurovis_spec.sweeps.journal import Journal
+from neurovis_spec.sweeps.point import LABEL, Job, Result, compiled, measures
+from neurovis_spec.sweeps.table import ERROR, Row, Table
+from neurovis_spec.sweeps.workers import here, in_processes
+
+#: Runs points: their places and results, as they come.
+Runner: TypeAlias = Callable[[Job, Sequence[Point]], Generator[tuple[int, Result], None, None]]
+
+_NAMED = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*=(?!=)(.*)", re.DOTALL)
+
+
+class SweepStoppedError(Ended):
+    """A signal has ended a sweep; the rows until then are in the file."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """A spec as a text, called ``file``; its own files lie in ``folder``."""
+
+    text: str
+    file: str
+    folder: Path
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A sweep that has been checked, as far as the ends of its grid show what is wrong; ``network`` is that of one of
+    its points."""
+
+    job: Job
+    columns: tuple[str, ...]
+    points: tuple[Point, ...]
+    network: CompiledNetwork
+
+
+def sweep(
+    source: str | Path | Mapping[str, object],
+    over: Mapping[str, str | Iterable[Number]],
+    metrics: str | Iterable[str] | Mapping[str, str],
+    *,
+    steps: int | None = None,
+    inputs: Mapping[str, npt.ArrayLike] | None = None,
+    parameters: Mapping[str, float] | None = None,
+    backend: str | None = None,
+    jobs: int = 1,
+    scheduler: str | None = None,
+    path: str | Path | None = None,
+    root: str | Path | None = None,
+    limit: int | None = None,
+    progress: Progress | None = None,
+) -> Table:
+    """Run a spec at every point of a grid, and measure each run.
+
+    ``over`` gives names their values, numbers or a range (``"0.001:0.1:log20"``, ``"0..9"``): ``seed`` is the seed, the
+    others are parameters. ``metrics`` are measures (``"rms(T - O, last=514)"``), by themselves, as ``"name=…"`` or by
+    name; what they are after the last step is a column. ``parameters`` are the same at every point. Points run in
+    ``jobs`` processes (in a script, call this under ``if __name__ == "__main__":``), or on the cluster of a
+    ``scheduler``. With ``path`` rows are in that file as soon as they are there, and those that are in it already are
+    not run again. Raises SweepError, InputError, BackendError, OSError, and SpecError where the spec or a metric is
+    invalid at both ends of the grid and without it; what is wrong with a single point is in its row.
+    """
+    plan = planned(source, over, metrics, steps=steps, parameters=parameters, backend=backend, root=root, limit=limit)
+    return carried_out(plan, inputs, jobs=jobs, scheduler=scheduler, path=path, progress=progress)
+
+
+def planned(
+    source: str | Path | Mapping[str, object] | Source,
+    over: Mapping[str, str | Iterable[Number]],
+    metrics: str | Iterable[str] | Mapping[str, str],
+    *,
+    steps: int | None = None,
+    parameters: Mapping[str, float] | None = None,
+    backend: str | None = None,
+    root: str | Path | None = None,
+    limit: int | None = None,
+) -> Plan:
+    """A sweep before anything is run. Raises what ``sweep`` raises."""
+    grid = axes(over)
+    spec = source if isinstance(source, Source) else _read(source)
+    named = named_metrics(metrics)
+    for one in named.values():
+        parsed(one, LABEL)
+    columns = (*(one.name for one in grid), *named, ERROR)
+    _check_columns(columns)
+    job = Job(
+        spec.text,
+        spec.file,
+        str(spec.folder.resolve()),
+        tuple(one.name for one in grid),
+        tuple(named.values()),
+        {name: float(value) for name, value in (parameters or {}).items()},
+        steps,
+        {},
+        backend,
+        None if root is None else str(Path(root).resolve()),
+        limit,
+    )
+    every = tuple(points(grid))
+    return Plan(job, columns, every, _checked(job, grid, every))
+
+
+def carried_out(
+    plan: Plan,
+    inputs: Mapping[str, npt.ArrayLike] | None = None,
+    *,
+    jobs: int = 1,
+    scheduler: str | None = None,
+    path: str | Path | None = None,
+    progress: Progress | None = None,
+) -> Table:
+    """The table of a sweep. Raises what ``sweep`` raises."""
+    check_names(plan.network.network, inputs or {})
+    arrays = {name: np.asarray(value, dtype=np.float64) for name, value in (inputs or {}).items()}
+    job, width = replace(plan.job, inputs=arrays), len(plan.job.names)
+    run = _runner(jobs, scheduler)
+    if path is None:
+        rows: dict[Row, Row] = {}
+        _run(job, plan.points, run, rows, lambda row: rows.__setitem__(row[:width], row), progress)
+        return Table(plan.columns, tuple(rows[point] for point in plan.points))
+    journal = Journal(Path(path), plan.columns, width)
+    rows = journal.rows
+    try:
+        _run(job, plan.points, run, rows, journal.add, progress)
+    except KeyboardInterrupt as error:
+        journal.finish(plan.points)
+        number = error.number if isinstance(error, Ended) else Ended().number
+        held = sum(point in rows for point in plan.points)
+        raise SweepStoppedError(number, f"stopped; {path} holds {held} of {len(plan.points)} rows") from None
+    except BaseException:
+        journal.finish(plan.points)
+        raise
+    journal.finish(plan.points)
+    return Table(plan.columns, tuple(rows[point] for point in plan.points))
+
+
+def named_metrics(metrics: str | Iterable[str] | Mapping[str, str]) -> dict[str, str]:
+    """Metrics by name; one that has none is called as it is written. Raises SweepError."""
+    if isinstance(metrics, Mapping):
+        pairs = list(metrics.items())
+    else:
+        pairs = [_pair(text) for text in ([metrics] if isinstance(metrics, str) else metrics)]
+    if not pairs:
+        raise SweepError("a sweep has one metric at least", 'as in "rms(O - T, last=100)"')
+    result: dict[str, str] = {}
+    for name, text in pairs:
+        if name in result:
+            raise SweepError(f"there are two metrics '{name}'", "give one of them a name, as in error=rms(O, last=100)")
+        result[name] = text
+    return result
+
+
+def _pair(text: str) -> tuple[str, str]:
+    match = _NAMED.fullmatch(text)
+    return (match[1], match[2].strip()) if match else (" ".join(text.split()), text)
+
+
+def _read(source: str | Path | Mapping[str, object]) -> Source:
+    """A spec, read once, so that it is the same at every point."""
+    if isinstance(source, Mapping):
+        return Source(text_of(source), "<mapping>", Path())
+    path = arguments.path("source", source)
+    data = read_bytes(path, LARGEST)
+    with suppress(UnicodeDecodeError):
+        if not isinstance(data, FileFault):
+            return Source(data.decode("utf-8-sig"), str(source), path.parent)
+    api.compile(source)
+    raise SweepError(f"{source} cannot be read")  # and whoever compiled it said more
+
+
+def _check_columns(columns: Sequence[str]) -> None:
+    for place, name in enumerate(columns):
+        if name in columns[:place]:
+            raise SweepError(f"two columns of the table would be called '{name}'", "give the metric another name")
+
+
+def _checked(job: Job, grid: Sequence[Axis], every: Sequence[Point]) -> CompiledNetwork:
+    """Refuse what is wrong with all points, as far as the ends of the grid show it; the network of one of these."""
+    networks: list[CompiledNetwork] = []
+    errors: list[SpecError] = []
+    for point in dict.fromkeys((every[0], every[-1], None)):
+        if point is None and networks:
+            break
+        try:
+            networks.append(compiled(job, point))
+        except SpecError as error:
+            errors.append(error)
+    if not networks:
+        raise errors[-1]
+    known = networks[0].parameters
+    for one in grid:
+        if one.name != SEED and one.name not in known:
+            hint = suggest(one.name, (*known, SEED), "there are")
+            raise SweepError(f"there is no parameter '{one.name}'", hint)
+    if job.backend is not None:
+        load_backend(job.backend)
+        found = available(job.backend)
+        if not found.available:
+            raise BackendError(f"the backend '{job.backend}' is not available here: {found.note}")
+    wrong: list[SpecError] = []
+    for network in networks:
+        try:
+            measures(job, network.network)
+        except SpecError as error:
+            wrong.append(error)
+    if len(wrong) == len(networks):
+        raise wrong[0]
+    return networks[0]
+
+
+def _runner(jobs: int, scheduler: str | None) -> Runner:
+    if scheduler is not None:
+        from neurovis_spec.sweeps.cluster import on_cluster
+
+        return lambda job, some: on_cluster(job, some, scheduler)
+    if jobs < 1:
+        raise SweepError(f"a sweep runs in one process at least, not in {jobs}")
+    return here if jobs == 1 else lambda job, some: in_processes(job, some, jobs)
+
+
+def _run(
+    job: Job,
+    every: Sequence[Point],
+    run: Runner,
+    rows: Mapping[Row, Row],
+    add: Callable[[Row], None],
+    progress: Progress | None,
+) -> None:
+    """Run the points that have no row yet."""
+    missing = [point for point in every if point not in rows]
+    done = len(every) - len(missing)
+    if progress is not None:
+        progress(done, len(every))
+    if not missing:
+        return
+    with closing(run(job, missing)) as results:
+        for place, result in results:
+            add((*missing[place], *result.values, result.error))
+            done += 1
+            if progress is not None:
+                progress(done, len(every))

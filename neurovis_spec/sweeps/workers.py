@@ -1,0 +1,151 @@
+"""Points in processes of this machine.
+
+In: a Job and its points. Out: results as they come, each with the place of its point. Processes are spawned, so that
+none shares a state with this one; each is given a point at a time, so that it is known what a process did that has been
+ended from outside: the point is tried once more, and then it is a failed one.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from multiprocessing import get_context, parent_process, resource_tracker
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnProcess
+from typing import TypeAlias
+
+from neurovis_spec.interrupts import ENDING
+from neurovis_spec.sweeps.grid import Point, SweepError
+from neurovis_spec.sweeps.point import Job, Result, failed, run_point
+
+#: What runs a point.
+Run: TypeAlias = Callable[[Job, Point], Result]
+#: how often a point is tried whose process is ended
+_TRIES = 2
+#: how many processes in a row may end before they ask for a point
+_STILLBORN = 3
+
+
+def here(job: Job, points: Sequence[Point]) -> Generator[tuple[int, Result], None, None]:
+    """One point after the other, in this process."""
+    for place, point in enumerate(points):
+        yield place, run_point(job, point)
+
+
+def in_processes(
+    job: Job, points: Sequence[Point], count: int, run: Run = run_point
+) -> Generator[tuple[int, Result], None, None]:
+    """Points in so many processes, which end with the iteration. Raises SweepError where none starts."""
+    waiting = deque(range(len(points)))
+    tried = [0] * len(points)
+    workers = [_Worker(job, run) for _ in range(min(count, len(points)))]
+    left, stillborn = len(points), 0
+    try:
+        while left:
+            ready = wait([worker.connection for worker in workers])
+            for worker in [worker for worker in workers if worker.connection in ready]:
+                place, result = worker.place, worker.receive()
+                if result is None:
+                    workers.remove(worker)
+                    stillborn = 0 if worker.began else stillborn + 1
+                    if stillborn == _STILLBORN:
+                        raise SweepError("the processes of the sweep do not start", _GUARD)
+                    if place is not None and tried[place] < _TRIES:
+                        waiting.appendleft(place)
+                    elif place is not None:
+                        result = failed(job, "worker-died", worker.end())
+                    if waiting:
+                        workers.append(_Worker(job, run))
+                else:
+                    stillborn = 0
+                    if waiting:
+                        tried[waiting[0]] += 1
+                        worker.send(waiting[0], points[waiting.popleft()])
+                if place is not None and result is not None:
+                    left -= 1
+                    yield place, result
+    finally:
+        for worker in workers:
+            worker.stop()
+
+
+_GUARD = 'in a script, call it under: if __name__ == "__main__": (or with jobs=1)'
+
+
+class _Worker:
+    """A process; ``place`` is the point that it runs, ``began`` whether it has got as far as asking for one."""
+
+    def __init__(self, job: Job, run: Run) -> None:
+        context = get_context("spawn")
+        self.connection, other = context.Pipe()
+        self._process: SpawnProcess = context.Process(target=_serve, args=(other, job, run), daemon=True)
+        with _unmoved():
+            self._process.start()
+        other.close()
+        self.place: int | None = None
+        self.began = False
+
+    def send(self, place: int, point: Point) -> None:
+        self.place = place
+        with suppress(OSError):  # it has been ended: reading says so
+            self.connection.send(point)
+
+    def receive(self) -> Result | None:
+        """What it says: a result, or that it is there (an empty one); None where the process has ended."""
+        try:
+            found = self.connection.recv()
+        except (EOFError, OSError):
+            return None
+        self.began, self.place = True, None
+        return found if isinstance(found, Result) else None
+
+    def end(self) -> str:
+        """How the process has ended."""
+        self._process.join()
+        code = self._process.exitcode or 0
+        how = f"signal {-code} ended" if code < 0 else "something ended"
+        return f"{how} the process of this point; perhaps there was not enough memory"
+
+    def stop(self) -> None:
+        self._process.terminate()
+        self._process.join()
+        self.connection.close()
+
+
+def _serve(connection: Connection[object, object], job: Job, run: Run) -> None:
+    """What a process does: points, until it is ended."""
+    threading.Thread(target=_follow, daemon=True).start()
+    with suppress(EOFError, OSError):
+        connection.send(Result(()))
+        while True:
+            point = connection.recv()
+            assert isinstance(point, tuple)
+            connection.send(run(job, point))
+
+
+@contextmanager
+def _unmoved() -> Iterator[None]:
+    """A block in which signals wait; for a process that is started in it they wait for ever. Ctrl-C, which a terminal
+    sends to all, is for the process that started the others."""
+    if sys.platform == "win32":
+        yield
+        return
+    resource_tracker.ensure_running()  # else starting the first process starts it, and lets signals through
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, set(ENDING) - {signal.SIGTERM})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _follow() -> None:
+    """End with the process that started this one, however that ends."""
+    parent = parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)

@@ -1,0 +1,111 @@
+"""A sweep on a cluster: a real scheduler of dask.distributed and two workers, of which one is killed."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from distributed import Client
+
+import neurovis_spec as nv
+from neurovis_spec.cli.commands import neurovis
+from neurovis_spec.sweeps.grid import SweepError
+
+pytestmark = pytest.mark.cluster
+
+SPEC = """\
+neurovis: 1
+name: noisy
+time: {steps: 5000}
+parameters: {gain: {value: 0.5, min: 0, max: 1}}
+neurons: {A: {noise: "normal(0, 0.1)"}, K: {bias: gain, activation: tanh}}
+connections: {A -> K: 0.5}
+"""
+OVER = {"gain": "0.2:1.1:10", "seed": "0..1"}
+METRICS = ["rms(K, last=1000)", "top=max(A)"]
+
+
+class Cluster:
+    """A scheduler and its workers, each a process of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self._file = folder / "scheduler.json"
+        self._processes = [self._started("dask_scheduler", "--port", "0", "--dashboard-address", ":0")]
+        wait_for(self._file.exists)
+        self.workers = [self._started("dask_worker", "--no-nanny", "--no-dashboard", "--nthreads", "1") for _ in "12"]
+        with Client(scheduler_file=str(self._file), set_as_default=False) as client:
+            client.wait_for_workers(2, timeout=60)
+            self.address = str(client.scheduler.address)
+
+    def _started(self, module: str, *options: str) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", f"distributed.cli.{module}", "--scheduler-file", str(self._file), *options]
+        return subprocess.Popen(command, stderr=subprocess.DEVNULL, cwd=self._file.parent)
+
+    def kill(self) -> None:
+        """End the scheduler."""
+        self._processes[0].kill()
+
+    def close(self) -> None:
+        for process in (*self.workers, *self._processes):
+            process.kill()
+            process.wait()
+
+
+def wait_for(true: object) -> None:
+    assert callable(true)
+    for _ in range(1500):
+        if true():
+            return
+        time.sleep(0.04)
+    raise AssertionError("nothing happened")
+
+
+@pytest.fixture
+def cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Cluster]:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "noisy.yaml").write_text(SPEC)
+    made = Cluster(tmp_path)
+    yield made
+    made.close()
+
+
+def test_a_sweep_loses_nothing_with_a_worker(cluster: Cluster) -> None:
+    serial = nv.sweep("noisy.yaml", OVER, METRICS)
+    killed = []
+
+    def kill(done: int, total: int) -> None:
+        if done == 3:
+            cluster.workers[0].kill()
+            killed.append(done)
+
+    table = nv.sweep("noisy.yaml", OVER, METRICS, scheduler=cluster.address, path="x.csv", progress=kill)
+    assert killed
+    assert cluster.workers[0].wait() == -9
+    assert table == serial
+    assert Path("x.csv").read_text() == str(serial)
+    assert [str(error)[:12] for error in table["error"][-2:]] == ["out-of-range"] * 2
+
+
+def test_the_command_runs_on_a_cluster_and_goes_on(cluster: Cluster) -> None:
+    arguments = ["sweep", "noisy.yaml", "--metric", "mean(K)", "--scheduler", cluster.address, "-o", "x.csv"]
+    for seeds in ("0..2", "0..5"):
+        result = CliRunner().invoke(neurovis, [*arguments, "--over", f"seed={seeds}"])
+        assert (result.exit_code, result.stderr) == (0, "")
+    assert Path("x.csv").read_text() == str(nv.sweep("noisy.yaml", {"seed": "0..5"}, "mean(K)"))
+
+
+def test_a_scheduler_that_is_lost_ends_the_sweep_and_no_row_is(cluster: Cluster) -> None:
+    def kill(done: int, total: int) -> None:
+        if done == 3:
+            cluster.kill()
+
+    with pytest.raises(SweepError, match="the cluster gave up"):
+        nv.sweep("noisy.yaml", OVER, METRICS, scheduler=cluster.address, path="x.csv", progress=kill)
+    rows = Path("x.csv").read_text().splitlines()
+    assert set(rows[1:]) <= set(str(nv.sweep("noisy.yaml", OVER, METRICS)).splitlines())
+    assert len(rows) > 3
