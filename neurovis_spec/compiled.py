@@ -113,20 +113,23 @@ class CompiledNetwork:
         states: str | Sequence[str] = (),
         neurons: str | Sequence[str] = (),
         weights: Literal["plastic", "none"] = "plastic",
+        checkpoint: str | Path | None = None,
     ) -> Recording:
         """Run ``steps`` steps (default ``time.steps``) and record every ``every``-th.
 
         ``inputs`` replace the sources of inputs: arrays of (steps,) or (steps, size). ``states`` are recorded as well
         (``K.v``, ``(K -> O).eligibility``), and so are those that outputs name; ``neurons`` (``O + K``) are the only
-        ones that are recorded, ``weights="none"`` leaves the weights out.
-        The run ends at the first step after which ``until`` is true (``"rms(O - T, last=129) < 0.01"``). Raises
+        ones that are recorded, ``weights="none"`` leaves the weights out. The run ends at the first step after which
+        ``until`` is true (``"rms(O - T, last=129) < 0.01"``). ``checkpoint`` is a file from which the run goes on
+        exactly, if it is there, and which holds its state at the end; ``steps`` are those to be made now. Raises
         InputError, BackendError, RecordingError, KeyError for a name that there is not, SpecError where ``until`` is
         invalid.
         """
         _check(backend=backend, start=start, progress=progress)
         keep = _keep(states, neurons, weights)
         course = self._course(steps, inputs, backend, every, until, keep)
-        return pipeline.simulate(self.network, course, start, progress)
+        kept = None if checkpoint is None else arguments.path("checkpoint", checkpoint)
+        return pipeline.simulate(self.network, course, start, progress, kept)
 
     def until(self, text: str) -> Until:
         """A measure that ends runs, ``rms(O - T, last=129) < 0.01``: its ``ending`` says how the last one ended. Raises
@@ -154,6 +157,7 @@ class CompiledNetwork:
         states: str | Sequence[str] = (),
         neurons: str | Sequence[str] = (),
         weights: Literal["plastic", "none"] = "plastic",
+        checkpoint: str | Path | None = None,
     ) -> None:
         """Run as ``run`` does and write the recording to a file while it is made, in memory that does not grow with the
         steps. What was there stays until the end. Raises what ``run`` and ``Recording.save`` raise, RecordingError
@@ -161,7 +165,8 @@ class CompiledNetwork:
         After any other exception a part beside the file holds them, which is read where the file is not there."""
         _check(backend=backend, start=start, progress=progress)
         course = self._course(steps, inputs, backend, every, until, _keep(states, neurons, weights))
-        pipeline.simulate_to(self.network, arguments.path("path", path), course, start, progress)
+        kept = None if checkpoint is None else arguments.path("checkpoint", checkpoint)
+        pipeline.simulate_to(self.network, arguments.path("path", path), course, start, progress, kept)
 
     def _course(
         self,

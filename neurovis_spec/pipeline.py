@@ -74,13 +74,17 @@ def allow(findings: Findings) -> None:
 
 
 def simulate(
-    network: Network, course: Course, start: Recording | None = None, progress: Progress | None = None
+    network: Network,
+    course: Course,
+    start: Recording | None = None,
+    progress: Progress | None = None,
+    checkpoint: Path | None = None,
 ) -> Recording:
     """Run the update program, record activities and weights."""
     from neurovis_spec.runtime.record import record
 
     how = (course.steps, course.inputs, course.backend, course.every, start, progress, course.until, course.keep)
-    return record(network, *how)
+    return record(network, *how, checkpoint)
 
 
 def simulate_to(
@@ -89,11 +93,12 @@ def simulate_to(
     course: Course,
     start: Recording | None = None,
     progress: Progress | None = None,
+    checkpoint: Path | None = None,
 ) -> None:
     """The same, written to a file while it runs."""
     from neurovis_spec.runtime.stream import record_to
 
-    record_to(network, path, course, start, progress)
+    record_to(network, path, course, start, progress, checkpoint)
 
 
 def gauge(network: Network, text: str, recording: Recording) -> FloatArray:

@@ -24,7 +24,7 @@ _MOST_SHOWN = 20
 
 
 class Chosen(TypedDict):
-    """How the network runs, and what of a step is recorded."""
+    """How the network runs, what of a step is recorded, and where a run goes on."""
 
     backend: str | None
     every: int
@@ -33,6 +33,7 @@ class Chosen(TypedDict):
     states: tuple[str, ...]
     neurons: tuple[str, ...]
     weights: Literal["plastic", "none"]
+    checkpoint: Path | None
 
 
 @click.command(
@@ -83,6 +84,13 @@ class Chosen(TypedDict):
     help="End at the first step after which this is true: an expression of neurons, outputs, parameters, k and t, with "
     "rms, mean, min and max over the last N steps. Steps are the most there are.",
 )
+@click.option(
+    "--checkpoint",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    shell_complete=paths,
+    help="Go on exactly from FILE, if it is there; write the run's state to it at the end, also after Ctrl-C.",
+)
 @output_option("Write the recording here (.npz or .csv); without it a summary is printed.")
 @compile_options
 def command(
@@ -97,6 +105,7 @@ def command(
     states: tuple[str, ...],
     neurons: tuple[str, ...],
     weights: Literal["plastic", "none"],
+    checkpoint: Path | None,
     output: Path | None,
 ) -> None:
     """Run a network and write a recording.
@@ -106,6 +115,9 @@ def command(
     nothing is written, and the last step's values are printed. Ctrl-C ends a run, as do SIGTERM, SIGHUP and SIGQUIT;
     its recording holds the steps until then. If a run is killed, a part beside the file holds them (.x.npz.part), which
     is read where the file is not there.
+
+    With --checkpoint a run is made in parts: each goes on exactly where the last one ended, --steps counts the steps to
+    be made now, and the parts together are bit for bit the run in one go.
     """
     if backend == "list":
         _list_backends()
@@ -114,9 +126,12 @@ def command(
         raise click.UsageError("Missing argument 'SPEC'.")
     read = [(f"the file of the input '{name}'", path) for name, path in inputs.items()]
     check_target(output, [("the spec itself", spec), ("the recording that the run goes on from", start), *read])
+    others = [("the spec itself", spec), ("the recording that the run goes on from", start), *read]
+    check_target(checkpoint, [*others, ("the recording", None if output is None else str(output))], "--checkpoint")
     _check_format(output)
     network = network_of(spec, settings)
     check_files(output, network)
+    check_files(checkpoint, network, "--checkpoint")
     arrays, before = tables(inputs, network.network), recording_of(start)
     ends = None if until is None else network.until(until)
     chosen: Chosen = {
@@ -127,6 +142,7 @@ def command(
         "states": states,
         "neurons": neurons,
         "weights": weights,
+        "checkpoint": checkpoint,
     }
     begun = perf_counter()
     if output is not None:

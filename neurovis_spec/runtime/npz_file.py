@@ -74,7 +74,7 @@ def write_npz(recording: Recording, path: Path) -> None:
     if recording.state_names:
         large["states"] = recording.states
     with replacing(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
-        _put(archive, {**large, **_small(recording)})
+        put_arrays(archive, {**large, **_small(recording)})
 
 
 def npz_size(frame: Recording, steps: Steps) -> int:
@@ -111,7 +111,7 @@ def _archive(file: FileIO, path: Path) -> None:
     journal, frame = _journal(file)
     rows, widths = journal.rows, journal.columns
     with replacing(path) as out, zipfile.ZipFile(out, "w", zipfile.ZIP_STORED) as archive:
-        _put(archive, _small(frame))
+        put_arrays(archive, _small(frame))
         _put_pieces(archive, "activity", "<f8", (rows, widths.activity), journal.pieces("activity"))
         _put_pieces(archive, "weights", "<f8", (rows, widths.weights), journal.pieces("weights"))
         if widths.states:
@@ -139,7 +139,7 @@ def finish_npz(file: FileIO, part: Path, path: Path) -> None:
 
 def recover_npz(part: Path) -> Recording:
     """Read a part. Raises RecordingError."""
-    with _suspicion(part), FileIO(part) as file:
+    with suspicion(part), FileIO(part) as file:
         journal, frame = _journal(file)
         steps = np.concatenate([frame.step, *journal.steps.parts()])
         activity, weights = journal.numbers("activity"), journal.numbers("weights")
@@ -166,7 +166,7 @@ def _journal(file: FileIO) -> tuple[Journal, Recording]:
             frame = ended(frame, _after(arrays, journal.after, none, len(frame.neurons), len(frame.sources)))
     except (OSError, RecordingError):
         raise
-    except Exception as error:  # as in _suspicion
+    except Exception as error:  # as in suspicion
         raise RecordingError(f"not a recording in progress ({type(error).__name__}: {str(error)[:200]})") from None
     return journal, frame
 
@@ -184,7 +184,7 @@ def frame_bytes(frame: Recording) -> bytes:
         none = {"activity": frame.activity[:0], "weights": frame.weights[:0], "step": frame.step[:0]}
         if frame.state_names:
             none["states"] = frame.states[:0]
-        _put(archive, {**none, **_small(frame)})
+        put_arrays(archive, {**none, **_small(frame)})
     return file.getvalue()
 
 
@@ -198,7 +198,7 @@ def _put_pieces(
             member.write(piece)
 
 
-def _put(archive: zipfile.ZipFile, arrays: Mapping[str, Array]) -> None:
+def put_arrays(archive: zipfile.ZipFile, arrays: Mapping[str, Array]) -> None:
     """Whole arrays, as ``numpy.savez`` puts them into an archive."""
     for name, array in arrays.items():
         with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
@@ -243,14 +243,14 @@ def _small(recording: Recording) -> dict[str, Array]:
 
 def read_npz(path: Path) -> Recording:
     """Read a recording. Raises RecordingError."""
-    with _suspicion(path):
+    with suspicion(path):
         size = regular_size(path)
         with path.open("rb") as file:
             return _recording(_arrays(file, size))
 
 
 @contextmanager
-def _suspicion(path: Path) -> Iterator[None]:
+def suspicion(path: Path, what: str = "a recording") -> Iterator[None]:
     """A block that reads a file; whatever is wrong with it is a RecordingError."""
     try:
         yield
@@ -260,7 +260,7 @@ def _suspicion(path: Path) -> Iterator[None]:
         raise RecordingError(f"{path}: {error.strerror or error}") from None
     except Exception as error:
         # zipfile, zlib, NumPy's header parser and json have errors of their own for every way to be malformed
-        raise RecordingError(f"{path}: not a recording ({type(error).__name__}: {str(error)[:200]})") from None
+        raise RecordingError(f"{path}: not {what} ({type(error).__name__}: {str(error)[:200]})") from None
 
 
 def _arrays(archived: IO[bytes], size: int) -> dict[str, Array]:
@@ -278,11 +278,11 @@ def _arrays(archived: IO[bytes], size: int) -> dict[str, Array]:
             if room < 0:
                 raise RecordingError("not a recording: it grows out of all proportion")
             with archive.open(member) as file:
-                arrays[name] = _array(file, name, member.file_size, kinds, dimensions)
+                arrays[name] = read_array(file, name, member.file_size, kinds, dimensions)
     return arrays
 
 
-def _array(file: IO[bytes], name: str, size: int, kinds: str, dimensions: int) -> Array:
+def read_array(file: IO[bytes], name: str, size: int, kinds: str, dimensions: int) -> Array:
     """One array, its header checked before its data is read."""
     try:
         header = read_header(file.read(LONGEST_HEADER), size, kinds, (dimensions,), most=sys.maxsize)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -18,14 +19,17 @@ from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.changes import Change
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.patch import PatchError
+from neurovis_spec.interrupts import Asked, deferred
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.backend import Backend, Runner, Stepper, prepare
+from neurovis_spec.runtime.checkpoint import load_state, save_state
 from neurovis_spec.runtime.columns import ALL, Columns, Keep, columns_of
 from neurovis_spec.runtime.conditions import Controls
 from neurovis_spec.runtime.inputs import STRETCH, InputReader
 from neurovis_spec.runtime.memory import check_room
 from neurovis_spec.runtime.recording import After, Numbers, Recording, RecordingError, recording_of
 from neurovis_spec.runtime.resume import resumed_state
+from neurovis_spec.runtime.rows import Steps
 from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.runtime.until import Until
 from neurovis_spec.runtime.watch import Watch
@@ -41,22 +45,42 @@ def record(
     progress: Progress | None = None,
     until: Until | None = None,
     keep: Keep = ALL,
+    checkpoint: Path | None = None,
 ) -> Recording:
     """Run a network for ``steps`` steps (by default ``time.steps``) and record steps 0, ``every``, 2·``every``, …;
     ``until`` may end it earlier.
 
-    ``inputs`` as in ``InputReader``; ``start`` as in ``resume``; ``keep`` is what of a step is recorded. Warns once
+    ``inputs`` as in ``InputReader``; ``start`` as in ``resume``; ``keep`` is what of a step is recorded;
+    ``checkpoint`` a file from which the run goes on exactly, if it is there, and which holds its state at the end, also
+    after a signal (then KeyboardInterrupt is raised). Warns once
     (RuntimeWarning) when something is no longer finite. Raises InputError, BackendError, RecordingError (also where
     there is not the memory), KeyError for a name that there is not, ValueError.
     """
     steps = checked_steps(network, steps, every)
     columns = columns_of(network, keep)
     check_room(steps, every, sum(columns.widths(network)))
-    state = initial_state(network) if start is None else resumed_state(network, start)
-    kept = np.arange(0, steps, every, dtype=np.int64)
-    rows = InMemory(columns.widths(network), len(kept))
-    go(network, state, Course(steps, every, inputs, backend, until, keep), rows, progress)
+    state = first_state(network, start, checkpoint)
+    kept = np.concatenate([np.zeros(0, dtype=np.int64), *Steps(steps, every, state.k).parts()])
+    course = Course(steps, every, inputs, backend, until, keep)
+    if checkpoint is None:
+        rows = InMemory(columns.widths(network), len(kept))
+        go(network, state, course, rows, progress)
+    else:
+        with deferred() as asked:
+            rows = InMemory(columns.widths(network), len(kept), asked)
+            go(network, state, course, rows, progress)
+            save_state(state, checkpoint)
     return recording_of(network, columns, rows.numbers(kept), state.weights, after(network, state))
+
+
+def first_state(network: Network, start: Recording | None, checkpoint: Path | None) -> State:
+    """The state that a run begins in: that of a checkpoint, if there is one, after a recording, or the first. Raises
+    RecordingError."""
+    if checkpoint is not None and checkpoint.exists():
+        if start is not None:
+            raise RecordingError(f"{checkpoint} is there: go on from a checkpoint or from a recording, not from both")
+        return load_state(network, checkpoint)
+    return initial_state(network) if start is None else resumed_state(network, start)
 
 
 def after(network: Network, state: State) -> After:
@@ -99,9 +123,9 @@ class Rows(Protocol):
 class InMemory:
     """All rows in arrays of these widths."""
 
-    def __init__(self, widths: tuple[int, int, int], rows: int) -> None:
+    def __init__(self, widths: tuple[int, int, int], rows: int, asked: Asked | None = None) -> None:
         self.activity, self.weights, self.states = (np.empty((rows, width)) for width in widths)
-        self._filled = 0
+        self._filled, self._asked = 0, asked
 
     def numbers(self, steps: IntArray) -> Numbers:
         """All that has come, for these steps."""
@@ -118,12 +142,12 @@ class InMemory:
         self._filled += count
 
     def due(self) -> bool:
-        """Never: nobody waits for them."""
-        return False
+        """Only where the run is to end: nobody waits for them."""
+        return self.over()
 
     def over(self) -> bool:
-        """Never."""
-        return False
+        """After a signal, where somebody listens."""
+        return bool(self._asked)
 
 
 @dataclass(frozen=True)
@@ -161,18 +185,20 @@ def go(network: Network, state: State, course: Course, rows: Rows, progress: Pro
     if isinstance(stepper, Runner) and plain and course.until is None:  # which is asked after each step
         make = _Together(stepper)
     controls, changes = Controls(network), {change.at: change for change in network.changes}
-    _check_events(controls, state, [change for change in network.changes if change.at < steps])
-    edges = [0, *(at for at in changes if 0 < at < steps), steps]
+    origin, last = state.k, state.k + steps
+    _check_events(controls, state, [change for change in network.changes if origin <= change.at < last])
+    edges = [origin, *(at for at in changes if origin < at < last), last]
     with np.errstate(all="ignore"):
         for begin, end in pairwise(edges):
-            if begin in changes:
+            if begin in changes and state.begun != begin:
+                state.begun = begin
                 controls.apply(state.conditions, state.weights, state.signals, changes[begin])
             reader.use(state)
             for first, stop in _stretches(begin, end):
                 if rows.over() or not make.steps(state, first, stop, every, rows, reader, watch):
                     return
                 if progress is not None:
-                    progress(stop, steps)
+                    progress(stop - origin, steps)
 
 
 class _Make(Protocol):

@@ -7,9 +7,11 @@ can be kept and gone back to.
 
 from __future__ import annotations
 
+import os
 import reprlib
 from collections.abc import Callable, Mapping
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -68,7 +70,8 @@ class Simulation:
     def _apply(self, state: State) -> None:
         """What events change at the step to come."""
         change = self._changes.get(state.k)
-        if change is not None:
+        if change is not None and state.begun != state.k:
+            state.begun = state.k
             try:
                 with np.errstate(all="ignore"):
                     self._controls.apply(state.conditions, state.weights, state.signals, change)
@@ -229,12 +232,25 @@ class Simulation:
         """A copy of all that the run carries from step to step, what was set, clamped and lesioned included."""
         return self._state.copy()
 
-    def restore(self, state: State) -> None:
-        """Go on from a state of this network, exactly as it was. Raises ValueError for one of another network."""
-        arguments.instance("state", state, State, "a state, as state() gives it")
+    def save_state(self, path: str | os.PathLike[str]) -> None:
+        """Write the state to a file, a checkpoint, from which ``restore`` and ``run --checkpoint`` go on exactly.
+        Raises OSError."""
+        from neurovis_spec.runtime.checkpoint import save_state
+
+        save_state(self._state, Path(path))
+
+    def restore(self, state: State | str | os.PathLike[str]) -> None:
+        """Go on from a state of this network, or from a checkpoint, exactly as it was. Raises ValueError for one of
+        another network, RecordingError (a ValueError) for a file that is no checkpoint."""
+        if isinstance(state, str | os.PathLike):
+            from neurovis_spec.runtime.checkpoint import load_state
+
+            state = load_state(self.network, Path(state))
+        arguments.instance("state", state, State, "a state, as state() gives it, or a checkpoint")
         if state.network != self._begin.network:
             raise ValueError("this is a state of another network")
         self._state = state.copy()
+        self._apply(self._state)
         self._reader.use(self._state)
 
 

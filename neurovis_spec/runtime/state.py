@@ -43,6 +43,8 @@ class State:
     conditions: Conditions
     continued: bool = False
     drawn: int = 0
+    #: the step whose events have had their effect, −1 before any
+    begun: int = -1
     #: the mark of the network
     network: str = ""
 

@@ -18,15 +18,15 @@ from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.interrupts import Asked, Ended, deferred
 from neurovis_spec.progress import Progress
+from neurovis_spec.runtime.checkpoint import save_state
 from neurovis_spec.runtime.columns import columns_of
 from neurovis_spec.runtime.formats import StreamingFormat, for_path, settle
 from neurovis_spec.runtime.inputs import STRETCH
 from neurovis_spec.runtime.memory import check_disk
-from neurovis_spec.runtime.record import Course, InMemory, after, checked_steps, go, record
+from neurovis_spec.runtime.record import Course, InMemory, after, checked_steps, first_state, go, record
 from neurovis_spec.runtime.recording import After, Recording, recording_of
-from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.rows import RowWriter, Steps
-from neurovis_spec.runtime.state import initial_state
+from neurovis_spec.runtime.state import State
 
 #: seconds after which rows are handed on, so that so much of a run can be lost and a step
 OFTEN = 0.1
@@ -35,15 +35,21 @@ OFTEN = 0.1
 class StoppedError(Ended):
     """A signal has ended a run; what was recorded by then is in the file. ``rows`` says how many steps these are."""
 
-    def __init__(self, number: int, path: Path, step: int, rows: int, every: int) -> None:
-        last = (rows - 1) * every
-        held = "step 0" if rows == 1 else f"steps 0 to {last}{'' if every == 1 else f', one in {every}'}"
+    def __init__(self, number: int, path: Path, step: int, rows: int, steps: Steps) -> None:
+        first, every = steps.at(0), steps.every
+        held = f"steps {first} to {steps.at(rows - 1)}{'' if every == 1 else f', one in {every}'}"
+        held = f"step {first}" if rows == 1 else held
         super().__init__(number, f"stopped at step {step}; {path} holds {held}")
         self.rows = rows
 
 
 def record_to(
-    network: Network, path: Path, course: Course, start: Recording | None = None, progress: Progress | None = None
+    network: Network,
+    path: Path,
+    course: Course,
+    start: Recording | None = None,
+    progress: Progress | None = None,
+    checkpoint: Path | None = None,
 ) -> None:
     """Run a network and write what ``record`` returns to a file. Raises what ``record`` and ``formats.save`` raise, and
     StoppedError after a signal, when the steps until then are in the file; KeyboardInterrupt where there are none, and
@@ -51,10 +57,10 @@ def record_to(
     format_ = for_path(path)
     if not isinstance(format_, StreamingFormat):
         how = (course.steps, course.inputs, course.backend, course.every, start, progress, course.until, course.keep)
-        format_.save(record(network, *how), path)
+        format_.save(record(network, *how, checkpoint), path)
         return
-    steps = Steps(checked_steps(network, course.steps, course.every), course.every)
-    state = initial_state(network) if start is None else resumed_state(network, start)
+    state = first_state(network, start, checkpoint)
+    steps = Steps(checked_steps(network, course.steps, course.every), course.every, state.k)
     columns = columns_of(network, course.keep)
     none = InMemory(columns.widths(network), 0).numbers(np.zeros(0, dtype=np.int64))
     frame = recording_of(network, columns, none, state.weights, after(network, state))
@@ -67,14 +73,21 @@ def record_to(
                 rows = _Handed(columns.widths(network), writer, lambda: after(network, state), asked)
                 go(network, state, course, rows, progress)
                 if asked and not rows.handed:
+                    _keep(state, checkpoint)
                     raise Ended(asked.number)
                 rows.close()
             written = True
+            _keep(state, checkpoint)
     except KeyboardInterrupt:
         if not written:
             raise
     if asked:
-        raise StoppedError(asked.number, path, state.k, rows.handed, steps.every)
+        raise StoppedError(asked.number, path, state.k, rows.handed, steps)
+
+
+def _keep(state: State, checkpoint: Path | None) -> None:
+    if checkpoint is not None:
+        save_state(state, checkpoint)
 
 
 class _Handed:

@@ -1,0 +1,191 @@
+"""Checkpoints: the whole State of a run in a file, from which it goes on exactly.
+
+In: a State and a path, or a Network and a path. Out: a file, or a State. The file is an archive of arrays as NumPy
+writes them, without pickles; it is believed in nothing: whatever is not of the size that this network asks for is
+refused before it is read, and so is a checkpoint of another network (hash).
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.changes import Clamp
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.settable import ParameterFormula
+from neurovis_spec.language.expressions.tree import Number
+from neurovis_spec.runtime.conditions import Controls
+from neurovis_spec.runtime.files import regular_size, replacing
+from neurovis_spec.runtime.npz_file import Array, put_arrays, read_array, suspicion
+from neurovis_spec.runtime.recording import RecordingError
+from neurovis_spec.runtime.state import State, initial_state
+
+#: bytes of the text, of the headers of all arrays, and of the archive's own
+_TEXT, _ROOM = 4096, 1 << 20
+_MOST = 2**53
+#: bytes for the clamps of a neuron, of which several may hold: events may cover each other
+_CLAMPS = 1 << 12
+
+
+def save_state(state: State, path: Path) -> None:
+    """Write a state; what was there stays until all is written. Raises OSError."""
+    now = state.conditions
+    about = {
+        "neurovis_state": 1,
+        "network": state.network,
+        "k": state.k,
+        "drawn": state.drawn,
+        "continued": state.continued,
+        "begun": state.begun,
+    }
+    clamps = list(now.held.active.values())
+    arrays: dict[str, Array] = {
+        "about": np.array(json.dumps(about)),
+        **_arrays(state),
+        "clamps": np.array([[c.order, c.event, len(c.neurons)] for c in clamps], dtype=np.int64).reshape(-1, 3),
+        "clamped": _joined([clamp.neurons for clamp in clamps]).astype(np.int64),
+        "clamp_values": np.array([_number(clamp) for clamp in clamps], dtype=np.float64),
+    }
+    with replacing(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
+        put_arrays(archive, arrays)
+
+
+def load_state(network: Network, path: Path) -> State:
+    """The state in a file. Raises RecordingError for a file that is none, or one of another network."""
+    with suspicion(path, "a checkpoint"):
+        state = initial_state(network)
+        wanted = _arrays(state)
+        size, most = regular_size(path), sum(array.nbytes for array in wanted.values())
+        if size > most + len(network.neurons) * _CLAMPS + _ROOM:
+            raise RecordingError("not a checkpoint of this network: it is larger than its state")
+        with path.open("rb") as file, zipfile.ZipFile(file) as archive:
+            about = _about(archive)
+            if about.get("network") != state.network:
+                raise RecordingError(
+                    "a checkpoint of another network, or of other parameters: it goes on with the spec and the "
+                    "settings that it was made with"
+                )
+            found = {name: _member(archive, name, array) for name, array in wanted.items()}
+            _fill(state, found)
+            state.k, state.drawn = _whole(about, "k"), _whole(about, "drawn")
+            state.begun, state.continued = _whole(about, "begun", -1), about.get("continued") is True
+            _clamp_again(network, state, archive, size)
+    controls = Controls(network)
+    controls.restructure(state.conditions)
+    return state
+
+
+def _arrays(state: State) -> dict[str, Array]:
+    """The arrays whose sizes follow from the network."""
+    now = state.conditions
+    return {
+        "activity": state.activity,
+        "weights": state.weights,
+        "signals": state.signals,
+        "history": state.history,
+        "cells": _joined([array for block in state.cells for array in block]),
+        "traces": _joined([array for rule in state.traces for array in rule]),
+        "parameters": now.parameters,
+        "chosen": now.chosen.astype(np.uint8),
+        "variables": now.variables,
+        "held_order": now.held.order,
+        "held_value": now.held.value,
+        "lesioned_neurons": now.lesioned_neurons.astype(np.uint8),
+        "lesioned_connections": now.lesioned_connections.astype(np.uint8),
+        "paused": now.paused.astype(np.uint8),
+    }
+
+
+def _fill(state: State, found: Mapping[str, Array]) -> None:
+    now = state.conditions
+    state.activity, state.weights = _floats(found["activity"]), _floats(found["weights"])
+    state.signals, state.history = _floats(found["signals"]), _floats(found["history"])
+    state.cells = _parted(_floats(found["cells"]), state.cells)
+    state.traces = _parted(_floats(found["traces"]), state.traces)
+    now.parameters, now.variables = _floats(found["parameters"]), _floats(found["variables"])
+    now.chosen = found["chosen"].astype(np.bool_)
+    now.held.order, now.held.value = found["held_order"].astype(np.int64), _floats(found["held_value"])
+    now.lesioned_neurons = found["lesioned_neurons"].astype(np.bool_)
+    now.lesioned_connections = found["lesioned_connections"].astype(np.bool_)
+    now.paused = found["paused"].astype(np.bool_)
+
+
+def _clamp_again(network: Network, state: State, archive: zipfile.ZipFile, size: int) -> None:
+    """The clamps that hold: those of events by their order, those by hand with their numbers."""
+    rows = _member(archive, "clamps", np.zeros((0, 3), dtype=np.int64), size).astype(np.int64)
+    neurons = _member(archive, "clamped", np.zeros(0, dtype=np.int64), size).astype(np.int64)
+    values = _floats(_member(archive, "clamp_values", np.zeros(0), size))
+    counts = rows[:, 2]
+    if len(values) != len(rows) or (counts < 0).any() or counts.sum() != len(neurons):
+        raise RecordingError("its clamps do not agree")
+    if len(neurons) and (neurons.min() < 0 or neurons.max() >= len(network.neurons)):
+        raise RecordingError("it clamps neurons that are not there")
+    known = {clamp.order: clamp for change in network.changes for clamp in change.clamps}
+    held = state.conditions.held
+    ends = np.cumsum(counts)
+    for (order, event, count), end, value in zip(rows.tolist(), ends.tolist(), values.tolist(), strict=True):
+        own = neurons[end - count : end]
+        if event < 0:
+            held.active[order] = Clamp(order, event, own, ParameterFormula(Number(value), {}))
+        elif order in known and known[order].event == event:
+            held.active[order] = known[order]._replace(neurons=own)
+        else:
+            raise RecordingError("it holds a clamp that no event of this network begins")
+    if not np.isin(held.order, [-1, *held.active]).all():
+        raise RecordingError("its clamps do not agree")
+
+
+def _about(archive: zipfile.ZipFile) -> dict[str, object]:
+    member = archive.getinfo("about.npy")
+    if member.file_size > _TEXT:
+        raise RecordingError("not a checkpoint")
+    with archive.open(member) as file:
+        about = json.loads(str(read_array(file, "about", member.file_size, "U", 0)))
+    if not isinstance(about, dict) or about.get("neurovis_state") != 1:
+        raise RecordingError("not a checkpoint")
+    return about
+
+
+def _member(archive: zipfile.ZipFile, name: str, like: Array, room: int | None = None) -> Array:
+    """An array of the type and, unless there is ``room`` for others, of the shape of another one."""
+    member = archive.getinfo(f"{name}.npy")
+    if member.file_size > (like.nbytes if room is None else room) + _TEXT:
+        raise RecordingError(f"'{name}' is larger than this network's")
+    with archive.open(member) as file:
+        kinds = "f" if like.dtype.kind == "f" else "iu"
+        array = read_array(file, name, member.file_size, kinds, like.ndim)
+    if array.shape[1:] != like.shape[1:] or (room is None and array.shape != like.shape):
+        raise RecordingError(f"'{name}' has the shape {array.shape}, where this network asks for {like.shape}")
+    return array
+
+
+def _whole(about: Mapping[str, object], name: str, least: int = 0) -> int:
+    value = about.get(name)
+    if type(value) is not int or not least <= value < _MOST:
+        raise RecordingError(f"its '{name}' is no number of steps")
+    return value
+
+
+def _joined(arrays: list[npt.NDArray[np.float64]] | list[IntArray]) -> Array:
+    return np.concatenate(arrays) if arrays else np.zeros(0)
+
+
+def _parted(values: FloatArray, like: tuple[tuple[FloatArray, ...], ...]) -> tuple[tuple[FloatArray, ...], ...]:
+    """Values one behind the other, cut into pieces as long as those of another state."""
+    pieces = iter(np.split(values, np.cumsum([len(array) for group in like for array in group])))
+    return tuple(tuple(next(pieces).copy() for _ in group) for group in like)
+
+
+def _floats(array: Array) -> FloatArray:
+    return np.array(array, dtype=np.float64)
+
+
+def _number(clamp: Clamp) -> float:
+    """What a clamp by hand holds at; events know it themselves."""
+    return clamp.value.tree.value if isinstance(clamp.value.tree, Number) else float("nan")
