@@ -21,6 +21,9 @@ from neurovis_spec.diagnostics import listed
 from neurovis_spec.runtime.names import Found, Names, names_of, unknown_text
 
 if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
     from neurovis_spec.runtime.columns import Columns
 
 
@@ -254,6 +257,20 @@ class Recording:
         from neurovis_spec.runtime import formats
 
         formats.save(self, arguments.path("path", path))
+
+    def to_xarray(self) -> xr.Dataset:
+        """A Dataset with the coordinates ``step``, ``seconds``, ``neuron``, ``connection``, ``state_name`` (see
+        ``frames``). Raises ImportError without the extra ``xarray``."""
+        from neurovis_spec.runtime.frames import to_xarray
+
+        return to_xarray(self)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A DataFrame, a row a step, indexed by ``step`` and ``seconds``, with columns by ``quantity`` (activity,
+        weight, state) and ``name``. Raises ImportError without the extra ``pandas``."""
+        from neurovis_spec.runtime.frames import to_pandas
+
+        return to_pandas(self)
 
     def _repr_svg_(self) -> str:
         """Its traces, for a notebook."""
