@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-import threading
 import zipfile
 from collections.abc import Callable
 from itertools import pairwise
@@ -189,10 +188,13 @@ def test_a_checkpoint_cut_off_anywhere_is_refused(network: nv.CompiledNetwork, t
 
 def test_a_signal_leaves_a_checkpoint(tmp_path: Path) -> None:
     network = nv.compile_text(SPEC.replace("steps: 60", "steps: 10000000"))
-    timer = threading.Timer(0.4, signal.raise_signal, [signal.SIGINT])
-    timer.start()
+
+    def stop(done: int, total: int) -> None:
+        if done < 2000:
+            signal.raise_signal(signal.SIGINT)
+
     with pytest.raises(KeyboardInterrupt):
-        network.run_to(tmp_path / "x.npz", checkpoint=tmp_path / "x.state")
+        network.run_to(tmp_path / "x.npz", checkpoint=tmp_path / "x.state", progress=stop)
     first = nv.load(tmp_path / "x.npz")
     second = network.run(50, checkpoint=tmp_path / "x.state")
     assert second.step[0] == len(first)
