@@ -28,7 +28,11 @@ def main(path: str, steps: int, plastic: bool) -> None:
         if plastic:
             links.run_regularly("w += 0.01*a_post*(a_pre - a_post*w)", when="end")
         links.run_regularly("sent = w*a_pre", when="end", order=-1)
-        b.run(steps * b.ms)
+        kept = [b.StateMonitor(cells, "a", record=True)]
+        if plastic:
+            kept.append(b.StateMonitor(links, "w", record=True))
+        net = b.Network(cells, links, *kept)
+        net.run(steps * b.ms)
         b.device.build(directory=folder, compile=True, run=True, with_output=False)
         print(b.device._last_run_time)
 

@@ -45,21 +45,28 @@ _HEAD = "#include <math.h>\n#include <stdint.h>\n#include <string.h>\n"
 #: tanh(Σ w·a + bias), connections of delay 1, Oja's rule where they learn
 TANH_BY_HAND = """
 void run(int64_t steps, int64_t n, int64_t learns, const int32_t *first, const int32_t *source, double *restrict w,
-         const double *bias, double *restrict a, double *restrict next, double *restrict rows, double *restrict kept)
+         double *restrict sent, const double *bias, double *restrict a, double *restrict next, double *restrict rows,
+         double *restrict kept)
 {
     for (int64_t k = 0; k < steps; k++) {
         if (learns)
             memcpy(kept + k*first[n], w, first[n]*sizeof(double));
         for (int64_t i = 0; i < n; i++) {
             double u = 0.0;
-            for (int32_t e = first[i]; e < first[i + 1]; e++)
-                u += w[e]*a[source[e]];
+            if (learns)
+                for (int32_t e = first[i]; e < first[i + 1]; e++)
+                    u += sent[e];
+            else
+                for (int32_t e = first[i]; e < first[i + 1]; e++)
+                    u += w[e]*a[source[e]];
             next[i] = tanh(u + bias[i]);
         }
         if (learns)
             for (int64_t i = 0; i < n; i++)
-                for (int32_t e = first[i]; e < first[i + 1]; e++)
+                for (int32_t e = first[i]; e < first[i + 1]; e++) {
+                    sent[e] = w[e]*next[source[e]];
                     w[e] += 0.01*next[i]*(a[source[e]] - next[i]*w[e]);
+                }
         memcpy(a, next, n*sizeof(double));
         memcpy(rows + k*n, a, n*sizeof(double));
     }
@@ -113,9 +120,9 @@ void run(int64_t steps, const double *matrix, const double *centres, const doubl
 HEXAPOD_BY_HAND = """
 void run(int64_t steps, int64_t n, int64_t m, const int32_t *group, const int32_t *neuron, const int32_t *first,
          const int32_t *edge, const int32_t *source, const int32_t *delay, const int32_t *start,
-         const int32_t *fed, const double *bias, const double *initial, const double *one, const double *two, double *restrict w,
-         double *restrict ring, double *restrict v, double *restrict a, const double *inputs, const int32_t *learned,
-         const int32_t *reflex, double *restrict last, double *restrict rows, double *restrict kept)
+         const int32_t *fed, const double *bias, const double *initial, const double *one, const double *two,
+         double *restrict w, double *restrict ring, double *restrict v, double *restrict a, const double *inputs,
+         const int32_t *learned, const int32_t *reflex, double *restrict last, double *restrict rows, double *restrict kept)
 {
     for (int64_t k = 0; k < steps; k++, inputs += 9) {
         for (int i = 0; i < 4; i++)
@@ -196,7 +203,7 @@ def tanh_in_c(network: Network) -> Run:
         learns = bool(network.plasticity)
         rows, kept = ROOM[: steps * n], ROOM[steps * n :]
         numbers = (ctypes.c_int64(steps), ctypes.c_int64(n), ctypes.c_int64(learns))
-        arrays = (first, source, w, network.neurons.bias, a, following, rows, kept)
+        arrays = (first, source, w, np.zeros(m), network.neurons.bias, a, following, rows, kept)
         assert len(ROOM) >= steps * (n + m * learns)
         run(*numbers, *map(at, arrays))
 

@@ -57,7 +57,7 @@ typedef struct {
 } nv_state;
 
 typedef struct {
-    int64_t k, steps, every, form, look;
+    int64_t k, steps, every, form, look, beside;
     const double *rows;
     double *activity, *weights;
     const int64_t *changing;
@@ -92,8 +92,11 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
     for (int64_t i = 0; i < c->steps; i++, s += INPUTS) {
         const int kept = wait == 0;
         if (kept) {
-            for (int64_t j = 0; j < CHANGING; j++)
-                weights[j] = p->weights[c->changing[j]];
+            if (c->beside)
+                memcpy(weights, p->weights + c->changing[0], sizeof(double)*CHANGING);
+            else
+                for (int64_t j = 0; j < CHANGING; j++)
+                    weights[j] = p->weights[c->changing[j]];
             weights += CHANGING;
             wait = c->every;
         }
@@ -214,7 +217,7 @@ class _State(ctypes.Structure):
 
 class _Course(ctypes.Structure):
     _fields_ = [
-        *((name, ctypes.c_int64) for name in ("k", "steps", "every", "form", "look")),
+        *((name, ctypes.c_int64) for name in ("k", "steps", "every", "form", "look", "beside")),
         *((name, ctypes.c_void_p) for name in ("rows", "activity", "weights", "changing")),
     ]
 
@@ -234,6 +237,9 @@ class CStepper:
         self._vector = np.zeros(network.vector_size)
         self._initial = bool((~np.isnan(network.neurons.initial)).any())
         self._changing = np.ascontiguousarray(network.changing, dtype=np.int64)
+        # whether the weights that are recorded lie beside each other
+        count = len(self._changing)
+        self._beside = count > 0 and bool((np.diff(self._changing) == 1).all())
         self._pointers = _State()
         self._pointers.s = self._vector.ctypes.data
         self._here = ctypes.addressof(self._pointers)
@@ -281,6 +287,7 @@ class CStepper:
             every,
             self._form(state),
             look,
+            self._beside,
             rows.ctypes.data,
             activity.ctypes.data,
             weights.ctypes.data,

@@ -1,0 +1,88 @@
+"""The cache of compiled libraries: shared, bounded, and not needed."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from neurovis_spec.runtime import c_library
+from neurovis_spec.runtime.backend import available, listing, prepare
+from neurovis_spec.runtime.c_library import CompilerError, folder, load, place
+from neurovis_spec.runtime.numpy_backend import NumpyStepper
+
+pytestmark = pytest.mark.compiler
+
+TEXT = "int answer(void);\nint answer(void) { return %d; }\n"
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return folder()
+
+
+def test_what_was_compiled_is_not_compiled_again(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert load(TEXT % 42).answer() == 42
+    assert [path.name for path in cache.iterdir()] == [place(TEXT % 42).name]
+    monkeypatch.setattr(subprocess, "run", lambda *_, **__: pytest.fail("it was compiled again"))
+    assert load(TEXT % 42).answer() == 42
+
+
+def test_where_the_cache_cannot_be_written_a_temporary_folder_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    assert load(TEXT % 43).answer() == 43
+
+
+def test_a_broken_library_is_made_anew(cache: Path) -> None:
+    cache.mkdir(parents=True)
+    place(TEXT % 44).write_bytes(b"half")
+    assert load(TEXT % 44).answer() == 44
+
+
+def test_the_cache_is_bounded_and_the_oldest_goes(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    load(TEXT % 1)
+    monkeypatch.setattr(c_library, "MOST_BYTES", 2 * place(TEXT % 1).stat().st_size)
+    for number in (2, 3, 4):
+        load(TEXT % number)
+    assert {path.name for path in cache.iterdir()} == {place(TEXT % number).name for number in (3, 4)}
+
+
+def test_several_may_compile_the_same_at_once(cache: Path) -> None:
+    found: list[int] = []
+    threads = [threading.Thread(target=lambda: found.append(load(TEXT % 45).answer())) for _ in range(4)]
+    program = f"from neurovis_spec.runtime.c_library import load; print(load({TEXT % 45!r}).answer())"
+    other = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert found == [45] * 4
+    assert other.communicate()[0].strip() == "45"
+    assert len(list(cache.iterdir())) == 1
+
+
+def test_without_a_compiler_the_listing_says_why(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr(c_library, "find_spec", lambda name: None)
+    c_library._compiler.cache_clear()
+    assert not available("c").available
+    assert "pip install 'neurovis-spec[c]'" in next(line for line in listing() if line.startswith("c unavailable: "))
+    monkeypatch.setenv("CC", "no-such-compiler -m64")
+    assert "no-such-compiler" in available("c").note
+
+
+def test_a_compiler_that_fails_says_so_and_auto_does_without(monkeypatch: pytest.MonkeyPatch, cache: Path) -> None:
+    from networks_by_hand import cpg_rbf
+
+    monkeypatch.setenv("CC", "false")
+    with pytest.raises(CompilerError, match="'false' fails"):
+        load(TEXT % 46)
+    assert isinstance(prepare(cpg_rbf(), None, 10**9), NumpyStepper)
