@@ -182,8 +182,8 @@ def loaded(text: str) -> Callable[..., None]:
     return run
 
 
-def at(array: npt.NDArray[np.generic]) -> ctypes.c_void_p:
-    return ctypes.c_void_p(array.ctypes.data)
+def at(array: object) -> ctypes.c_void_p:
+    return ctypes.c_void_p(np.asarray(array).ctypes.data)
 
 
 def rows_of(network: Network) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32], npt.NDArray[np.int64]]:

@@ -54,10 +54,11 @@ typedef struct {
     const void *const *given;
     double *const *cells;
     double *const *traces;
+    double *before, *packed;
 } nv_state;
 
 typedef struct {
-    int64_t k, steps, every, form, look, beside;
+    int64_t k, steps, every, form, then, look, beside;
     const double *rows;
     double *activity, *weights;
     const int64_t *changing;
@@ -88,6 +89,10 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
 {
     const double *s = c->rows;
     double *activity = c->activity, *weights = c->weights;
+    const int fused = FUSED && c->then == 0 && c->steps > 3;
+    int64_t made = 0;
+    if (fused)
+        nv_pack(p);
     int64_t wait = (c->every - c->k % c->every) % c->every;
     for (int64_t i = 0; i < c->steps; i++, s += INPUTS) {
         const int kept = wait == 0;
@@ -101,18 +106,26 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
             wait = c->every;
         }
         wait--;
-        if (c->form == 0)
-            nv_plain(p, c->k + i, s);
+        const int64_t form = i ? c->then : c->form;
+        if (form)
+            nv_general(p, c->k + i, s, form == 2);
+        else if (fused && i)
+            nv_fused(p, c->k + i, s);
         else
-            nv_general(p, c->k + i, s, c->form == 2 && i == 0);
+            nv_plain(p, c->k + i, s);
+        if (fused)
+            memcpy(p->before, p->activity, sizeof(double)*NEURONS);
         if (kept) {
             memcpy(activity, p->activity, sizeof(double)*NEURONS);
             activity += NEURONS;
         }
+        made = i + 1;
         if (c->look && LOOK)
-            return i + 1;
+            break;
     }
-    return c->steps;
+    if (fused)
+        nv_leave(p);
+    return made;
 }
 """
 
@@ -123,6 +136,8 @@ class Written:
 
     text: str
     given: tuple[Table, ...]
+    #: how many weights are packed in whole runs
+    packed: int
 
 
 _written: WeakKeyDictionary[Network, Written] = WeakKeyDictionary()
@@ -154,19 +169,30 @@ def _write(network: Network) -> Written:
         StepCode(network, code, form).write()
         head = f"static void {name}(const nv_state *p, int64_t k, const double *restrict s{more})"
         bodies += [*function(code, head, taken | tables.taken()), ""]
+    # a network that is written out is in registers, and nothing is gained
+    fused = 0 if small else StepCode(network, Code(emitter, tables, network.dt, {}), Form()).count
+    for name, write, more in (
+        ("nv_fused", StepCode.write, ", int64_t k, const double *restrict s"),
+        ("nv_pack", StepCode.pack, ""),
+        ("nv_leave", lambda step: step.leave(step.fuses), ""),
+    ):
+        code = Code(emitter, tables, network.dt, network.settable.variables)
+        if fused:
+            write(StepCode(network, code, Form(fused=True)))
+        bodies += [*function(code, f"static void {name}(const nv_state *p{more})", taken | tables.taken()), ""]
     counts = {"NEURONS": len(network.neurons), "INPUTS": network.vector_size, "CHANGING": len(network.changing)}
     defined = [f"#define {name} {value}" for name, value in counts.items()]
-    defined.append(f"#define LOOK ({_look(network)})")
+    defined += [f"#define LOOK ({_look(network)})", f"#define FUSED {int(fused > 0)}"]
     used = words_of(bodies)
     parts = [_HEAD, "\n".join(defined), emitter.helpers(used), tables.text(used), "\n".join(bodies)]
-    return Written("\n\n".join(part for part in parts if part) + _TAIL, tuple(tables.given))
+    return Written("\n\n".join(part for part in parts if part) + _TAIL, tuple(tables.given), fused)
 
 
 def _taken(network: Network) -> dict[str, str]:
     """For each array of the state, and for what is handed over, the line that gives it its name."""
     kinds = (
-        ("double", ("activity", "weights", "signals", "history")),
-        ("const double", ("x", "holding")),
+        ("double", ("activity", "weights", "signals", "history", "packed")),
+        ("const double", ("x", "holding", "before")),
         ("const uint8_t", ("held", "gone", "still")),
     )
     taken = {name: f"{kind} *restrict const {name} = p->{name};" for kind, names in kinds for name in names}
@@ -207,7 +233,7 @@ def _look(network: Network) -> str:
 
 _POINTERS: Final = (
     *("activity", "weights", "signals", "history", "x", "s", "holding"),
-    *("held", "gone", "still", "given", "cells", "traces"),
+    *("held", "gone", "still", "given", "cells", "traces", "before", "packed"),
 )
 
 
@@ -217,7 +243,7 @@ class _State(ctypes.Structure):
 
 class _Course(ctypes.Structure):
     _fields_ = [
-        *((name, ctypes.c_int64) for name in ("k", "steps", "every", "form", "look", "beside")),
+        *((name, ctypes.c_int64) for name in ("k", "steps", "every", "form", "then", "look", "beside")),
         *((name, ctypes.c_void_p) for name in ("rows", "activity", "weights", "changing")),
     ]
 
@@ -246,6 +272,8 @@ class CStepper:
         #: arguments that need not be converted anew
         self._there, self._number = ctypes.c_void_p(self._here), ctypes.c_int64(0)
         self._handed = _addresses(self._given)
+        self._before, self._packed = np.zeros(len(network.neurons)), np.zeros(made.packed)
+        self._pointers.before, self._pointers.packed = self._before.ctypes.data, self._packed.ctypes.data
         self._pointers.given = ctypes.addressof(self._handed)
         self._of: State | None = None
         self._activity = self._weights = self._signals = self._history = self._variables = self._vector
@@ -286,6 +314,7 @@ class CStepper:
             len(rows),
             every,
             self._form(state),
+            _GENERAL if self._general else _PLAIN,
             look,
             self._beside,
             rows.ctypes.data,

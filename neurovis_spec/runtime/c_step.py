@@ -19,6 +19,7 @@ from neurovis_spec.compiler.program import Block, Gather, Learn, Plasticity, Rea
 from neurovis_spec.language.expressions.emit_c import Value
 from neurovis_spec.language.expressions.tree import Tree, names
 from neurovis_spec.runtime.c_code import Code, Place
+from neurovis_spec.runtime.conditions import Mask
 from neurovis_spec.runtime.signals import SignalLayout, signal_layout
 from neurovis_spec.runtime.state import history_depth, rule_names
 
@@ -32,13 +33,16 @@ _BESIDE = 4096
 class Form:
     """What a step looks after. ``written_out``: neuron by neuron, without loops. ``first``: neurons with ``initial``
     take it at step 0 (``first`` is not 0). ``held``: neurons whose byte of ``held`` is set have the activity
-    ``holding``. ``gone`` and ``still``: connections whose byte is set are left out, do not learn."""
+    ``holding``. ``gone`` and ``still``: connections whose byte is set are left out, do not learn. ``fused``: what
+    arrives after one step along weights that stay is formed where it arrives, from the activities ``before`` and the
+    weights ``packed`` in that order; it is not sent."""
 
     written_out: bool = False
     first: bool = False
     held: bool = False
     gone: bool = False
     still: bool = False
+    fused: bool = False
 
 
 class StepCode:
@@ -48,6 +52,25 @@ class StepCode:
         self.network, self.code, self.form = network, code, form
         self.layout: SignalLayout = signal_layout(network)
         self.depth = history_depth(network)
+        #: where the weights of each fused block begin among those packed
+        self.packed: dict[int, int] = {}
+        #: connections that are fused, (m,)
+        self.fuses = np.zeros(len(network.connections), dtype=np.bool_)
+        self.count = 0
+        for number, block in enumerate(network.blocks):
+            delays, rules = network.connections.delays[block.incoming], network.connections.rules[block.incoming]
+            if len(delays) and (delays == 1).all() and (rules < 0).all():
+                self.packed[number] = self.count
+                self.fuses[block.incoming] = True
+                self.count += len(block.incoming)
+
+    def pack(self) -> None:
+        """The weights of fused blocks in the order in which they are read."""
+        code = self.code
+        for number, begin in self.packed.items():
+            arrivals = _Arrivals(self, number)
+            code.line(code.loop("e", len(arrivals.connections)))
+            code.line(f"    packed[{begin} + e] = weights[{code.at(arrivals.connections, 'e')}];")
 
     def write(self) -> None:
         """All operations in order. What a block gathers is computed neuron by neuron, together with its update."""
@@ -67,7 +90,7 @@ class StepCode:
     def block(self, number: int) -> None:
         """The neurons of a block."""
         block, code = self.network.blocks[number], self.code
-        arrivals = _Arrivals(self, block)
+        arrivals = _Arrivals(self, number)
         if self.form.written_out:
             for place in range(len(block.members)):
                 with code.block(""):
@@ -195,10 +218,22 @@ class StepCode:
 
     def send(self) -> None:
         """w[t]·a[t] of every delayed connection leaves; a[t] is remembered for ``pre``."""
+        code = self.code
+        self.leave(~self.fuses if self.form.fused else np.ones(len(self.fuses), dtype=np.bool_))
+        if self.depth:
+            n = len(self.network.neurons)
+            row = f"(size_t)(k % {self.depth})*{n}"
+            code.line(f"memcpy(history + {row}, activity, {n}*sizeof(activity[0]));")
+
+    def leave(self, which: Mask) -> None:
+        """The signals of some connections (m,) leave."""
         code, connections = self.code, self.network.connections
         for kind in self.layout.classes:
-            members, sources = kind.connections, connections.sources[kind.connections]
-            slots = kind.start + kind.delay * np.arange(len(members))
+            sent = which[kind.connections]
+            if not sent.any():
+                continue
+            members = kind.connections[sent]
+            sources, slots = connections.sources[members], kind.start + kind.delay * np.flatnonzero(sent)
             shift = "" if kind.delay == 1 else f" + {code.remainder(kind.delay)}"
             places: list[Place] = list(range(len(members))) if self.form.written_out else ["p"]
             if not self.form.written_out:
@@ -207,10 +242,6 @@ class StepCode:
                 weight, source = code.at(members, place), code.at(sources, place)
                 indent = "" if self.form.written_out else "    "
                 code.line(f"{indent}signals[{code.at(slots, place)}{shift}] = weights[{weight}]*activity[{source}];")
-        if self.depth:
-            n = len(self.network.neurons)
-            row = f"(size_t)(k % {self.depth})*{n}"
-            code.line(f"memcpy(history + {row}, activity, {n}*sizeof(activity[0]));")
 
     # ---- connections -------------------------------------------------------------------------------------------
 
@@ -325,8 +356,11 @@ def read_through(let: tuple[tuple[str, Tree], ...], readers: list[Tree | None]) 
 class _Arrivals:
     """What arrives at the neurons of a block: their connections, neuron by neuron, in order."""
 
-    def __init__(self, step: StepCode, block: Block) -> None:
+    def __init__(self, step: StepCode, number: int) -> None:
+        block = step.network.blocks[number]
         self.step, self.block, self.code = step, block, step.code
+        #: where the weights begin among those packed, None where signals are read
+        self.packed = step.packed.get(number) if step.form.fused else None
         order = np.argsort(block.slots, kind="stable")
         connections = step.network.connections
         self.connections = block.incoming[order]
@@ -362,11 +396,12 @@ class _Arrivals:
         delay = int(self.delays[0])
         first, offset = int(self.connections[0]), int(self.offsets[0])
         with code.block(code.loop("q", self.degree)):
-            if delay == 0:
+            direct = delay == 0 or self.packed is not None
+            if direct:
                 source = code.at(self.sources[: self.degree], "q")
-                code.line(f"const {code.real} a = activity[{source}];")
+                code.line(f"const {code.real} a = {'activity' if delay == 0 else 'before'}[{source}];")
             code.line(code.loop("p", count))
-            if delay == 0:
+            if direct:
                 code.line(f"    {name}[p] += weights[{first} + {count}*q + p]*a;")
             elif delay == 1:
                 code.line(f"    {name}[p] += signals[{offset} + {count}*q + p];")
@@ -439,8 +474,13 @@ class _Arrivals:
         code = self.code
         delays = self.delays[column] if not isinstance(edge, int) else self.delays[column][edge : edge + 1]
         kinds = sorted(set(delays.tolist()))
-        weight, source = code.at(self.connections[column], edge), code.at(self.sources[column], edge)
-        now = f"weights[{weight}]*activity[{source}]"
+        if self.packed is not None:
+            places = self.packed + np.arange(len(self.connections))[column]
+            return f"packed[{code.at(places, edge)}]*before[{code.at(self.sources[column], edge)}]"
+        now = ""
+        if kinds[0] == 0:
+            weight, source = code.at(self.connections[column], edge), code.at(self.sources[column], edge)
+            now = f"weights[{weight}]*activity[{source}]"
         if kinds == [0]:
             return now
         offset = code.at(self.offsets[column], edge)
