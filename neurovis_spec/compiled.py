@@ -93,6 +93,13 @@ class CompiledNetwork:
             f"{int((network.connections.rules >= 0).sum())} plastic>"
         )
 
+    def text(self) -> str:
+        """The spec as one text, with what it includes and the data that it reads inside, and with what was set: it
+        compiles to the same network anywhere. Raises SpecError where a file that it names is gone."""
+        from neurovis_spec.whole import whole_text
+
+        return whole_text(self.spec, self.request, self.sources)
+
     def simulator(self, backend: str | None = None, *, start: Recording | None = None) -> Simulation:
         """Step by step, for a control loop; ``start`` is a recording to go on from."""
         from neurovis_spec.runtime.simulation import Simulation
@@ -164,9 +171,13 @@ class CompiledNetwork:
         where the disk has not the room, and after Ctrl-C a KeyboardInterrupt; the file holds the steps until then.
         After any other exception a part beside the file holds them, which is read where the file is not there."""
         _check(backend=backend, start=start, progress=progress)
-        course = self._course(steps, inputs, backend, every, until, _keep(states, neurons, weights))
+        keep = _keep(states, neurons, weights)
+        target = arguments.path("path", path)
+        if target.suffix.lower() == ".mcap":
+            keep = replace(keep, spec=self.text())
+        course = self._course(steps, inputs, backend, every, until, keep)
         kept = None if checkpoint is None else arguments.path("checkpoint", checkpoint)
-        pipeline.simulate_to(self.network, arguments.path("path", path), course, start, progress, kept)
+        pipeline.simulate_to(self.network, target, course, start, progress, kept)
 
     def _course(
         self,

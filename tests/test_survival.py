@@ -90,7 +90,7 @@ def test_a_signal_ends_a_run_with_what_was_recorded(folder: Path, number: signal
         np.testing.assert_array_equal(recording.weights_after, longer.weights[-1])
 
 
-@pytest.mark.parametrize("suffix", ["npz", "csv"])
+@pytest.mark.parametrize("suffix", ["npz", "csv", "mcap"])
 def test_what_is_killed_can_be_read_and_is_taken_over(folder: Path, suffix: str) -> None:
     """Twice, at other moments: the part is read, and the next run makes the file of it before it begins."""
     path, part = folder / f"x.{suffix}", folder / f".x.{suffix}.part"
@@ -113,7 +113,7 @@ def test_what_is_killed_can_be_read_and_is_taken_over(folder: Path, suffix: str)
         path.unlink()
 
 
-@pytest.mark.parametrize("suffix", ["npz", "csv"])
+@pytest.mark.parametrize("suffix", ["npz", "csv", "mcap"])
 def test_an_earlier_file_is_never_harmed(folder: Path, suffix: str) -> None:
     """A part of a later run beside it is told by whoever reads the file, and cleared by the next run."""
     path, part = folder / f"x.{suffix}", folder / f".x.{suffix}.part"
@@ -188,7 +188,7 @@ def test_rows_are_written_at_least_every_quarter_of_a_second(tmp_path: Path, mon
     assert len(nv.load(tmp_path / "x.npz")) == 300
 
 
-@pytest.mark.parametrize("suffix", ["npz", "csv"])
+@pytest.mark.parametrize("suffix", ["npz", "csv", "mcap"])
 def test_a_part_is_read_up_to_its_last_whole_chunk_wherever_it_breaks_off(tmp_path: Path, suffix: str) -> None:
     network = compiled(
         "neurons: {A: {count: 3, bias: 0.1*i, activation: tanh}}\n"

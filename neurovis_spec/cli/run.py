@@ -91,7 +91,7 @@ class Chosen(TypedDict):
     shell_complete=paths,
     help="Go on exactly from FILE, if it is there; write the run's state to it at the end, also after Ctrl-C.",
 )
-@output_option("Write the recording here (.npz or .csv); without it a summary is printed.")
+@output_option("Write the recording here (.npz, .csv, .mcap); without it a summary is printed.")
 @compile_options
 def command(
     spec: str | None,

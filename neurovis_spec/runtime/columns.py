@@ -33,11 +33,13 @@ from neurovis_spec.runtime.state import State
 @dataclass(frozen=True)
 class Keep:
     """What is recorded: these neurons (references; all without), the changing weights or none, these states
-    (references) besides those that the outputs of the spec name."""
+    (references) besides those that the outputs of the spec name; and the spec itself, as one text, where a format holds
+    it."""
 
     neurons: tuple[str, ...] = ()
     weights: bool = True
     states: tuple[str, ...] = ()
+    spec: str = ""
 
 
 #: Everything but states that nobody asks for.
@@ -85,6 +87,7 @@ class Columns:
     weights: IntArray
     probe: Probe
     outputs: dict[str, tuple[tuple[int, ...], bool]]
+    spec: str = ""
 
     def widths(self, network: Network) -> tuple[int, int, int]:
         """How many numbers of a step are activities, weights, states."""
@@ -109,6 +112,7 @@ def columns_of(network: Network, keep: Keep = ALL) -> Columns:
         network.changing if keep.weights else network.changing[:0],
         _probe(network, list(states)),
         outputs,
+        keep.spec,
     )
 
 

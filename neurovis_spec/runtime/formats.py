@@ -1,4 +1,4 @@
-"""Formats of recordings: ``.npz``, which keeps everything, and ``.csv``, for tables and other programs.
+"""Formats of recordings: ``.npz``, which keeps everything, ``.csv`` for tables, ``.mcap`` for the tools of robots.
 
 In: a Recording and a path, or a path alone. Out: a file, or a Recording. Formats are found through the entry point
 group ``neurovis.formats`` by the suffix of the path.
@@ -16,6 +16,15 @@ from typing import Protocol, runtime_checkable
 
 from neurovis_spec import plugins
 from neurovis_spec.runtime.csv_file import csv_size, finish_csv, held_csv, read_csv, recover_csv, stream_csv, write_csv
+from neurovis_spec.runtime.mcap_file import (
+    finish_mcap,
+    held_mcap,
+    mcap_size,
+    read_mcap,
+    recover_mcap,
+    stream_mcap,
+    write_mcap,
+)
 from neurovis_spec.runtime.npz_file import (
     finish_npz,
     held_npz,
@@ -142,6 +151,41 @@ class CsvFormat:
     def load(self, path: Path) -> Recording:
         """Read the table: what stays is not in it, so the recording knows the changing connections alone."""
         return read_csv(path)
+
+
+class McapFormat:
+    """Messages as a node of ROS 2 would send them, for the tools of robots."""
+
+    name = "mcap"
+    suffixes = frozenset({".mcap"})
+
+    def save(self, recording: Recording, path: Path) -> None:
+        """Write messages, index and footer."""
+        write_mcap(recording, path)
+
+    def stream(self, path: Path, frame: Recording, steps: Steps) -> AbstractContextManager[RowWriter]:
+        """Write the same while the network runs."""
+        return stream_mcap(path, frame, steps)
+
+    def size(self, frame: Recording, steps: Steps) -> int:
+        """About the bytes of the disk."""
+        return mcap_size(frame, steps)
+
+    def held(self, file: FileIO) -> int | None:
+        """The last step that a part holds."""
+        return held_mcap(file)
+
+    def recover(self, part: Path) -> Recording:
+        """Read a part."""
+        return recover_mcap(part)
+
+    def finish(self, file: FileIO, part: Path, path: Path) -> None:
+        """Make a recording of a part."""
+        finish_mcap(file, part, path)
+
+    def load(self, path: Path) -> Recording:
+        """Read the messages, of a file that breaks off as far as it is whole."""
+        return read_mcap(path)
 
 
 def for_path(path: str | os.PathLike[str]) -> Format:

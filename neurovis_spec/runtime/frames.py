@@ -36,8 +36,8 @@ def _changing(recording: Recording) -> list[str]:
 
 def to_xarray(recording: Recording) -> xr.Dataset:
     """``activity`` (step, neuron), ``weight`` (step, connection), ``state`` (step, state_name), with the coordinates
-    ``step``, ``seconds``, ``neuron``, ``connection`` (and its ``source``, ``target``, ``delay``) and ``state_name``. Weights that
-    stay are in ``weight_static`` (static). Raises ImportError without xarray."""
+    ``step``, ``seconds``, ``neuron``, ``connection`` (and its ``source``, ``target``, ``delay``) and ``state_name``.
+    Weights that stay are in ``weight_static`` (static). Raises ImportError without xarray."""
     xarray = _extra("xarray")
     names, neurons = _changing(recording), recording.neurons
     plastic = recording.plastic[: len(names)]

@@ -114,6 +114,9 @@ class Recording:
     #: outputs that name states: columns of ``states``, and whether a single one is meant
     state_views: Mapping[str, tuple[tuple[int, ...], bool]] = field(default_factory=dict)
     recorded: IntArray | None = None
+    #: the spec as one text and the namespace of its topics, for formats that hold them
+    spec: str = ""
+    namespace: str = "/neurovis"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "state_names", tuple(self.state_names))
@@ -324,6 +327,8 @@ def recording_of(network: Network, columns: Columns, rows: Numbers, all_weights:
         state_names=columns.probe.names,
         state_views=columns.outputs,
         recorded=columns.neurons,
+        spec=columns.spec,
+        namespace=network.ros.namespace,
     )
 
 

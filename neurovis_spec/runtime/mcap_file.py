@@ -1,0 +1,296 @@
+"""Recordings as ``.mcap``, as tools of robots read them: a message a topic and step, as a node would have sent it.
+
+In: a Recording and a path, or a path. Out: a file that can be read at any moment while it is written, or a Recording.
+Topics are ``NAMESPACE/NETWORK/activity``, ``/weights`` (of the changing connections), ``/states`` and ``/spec``. What
+does not grow with the steps is an attachment, as an archive like a ``.npz``.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from io import FileIO
+from pathlib import Path
+from time import monotonic
+from typing import BinaryIO
+
+import numpy as np
+
+from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.runtime import mcap_records as records
+from neurovis_spec.runtime.files import regular_size
+from neurovis_spec.runtime.mcap_records import Channel, DamagedError, Found, Message, Schema, Topic
+from neurovis_spec.runtime.npz_file import frame_bytes, frame_of, suspicion
+from neurovis_spec.runtime.recording import After, Recording, RecordingError, after_rows, ended
+from neurovis_spec.runtime.ros_messages import (
+    ARRAY,
+    STRING,
+    array_message,
+    array_of,
+    array_prefix,
+    label_of,
+    text_message,
+)
+from neurovis_spec.runtime.rows import RowWriter, Steps
+from neurovis_spec.runtime.unfinished import Part, move, part_of
+from neurovis_spec.version import __version__
+
+_FRAME, _ABOUT, _AFTER = "neurovis/frame.npz", "neurovis", "neurovis/after"
+#: topics of arrays, by what they hold
+_ARRAYS = ("activity", "weights", "states")
+_LAST_TIME = (1 << 64) - 1
+#: bytes that the frame may take
+_MOST_FRAME = 1 << 30
+#: the chunks of a file may always grow to this many bytes, and beyond that to so many times its size
+_ROOM, _RATIO = 32 << 20, 20
+
+
+def write_mcap(recording: Recording, path: Path) -> None:
+    """Write a recording; what was there stays until all is written."""
+    with part_of(path) as part:
+        rows = _McapRows(part.file, recording)
+        after = After(
+            recording.weights_after,
+            recording.reached,
+            recording.set_parameters,
+            recording.lesioned_neurons,
+            recording.lesioned_connections,
+        )
+        rows.put(recording.step.tolist(), (recording.activity, recording.weights, recording.states), after)
+        rows.close()
+        part.take_place()
+
+
+@contextmanager
+def stream_mcap(path: Path, frame: Recording, steps: Steps) -> Iterator[RowWriter]:
+    """A writer for rows as they come. After an exception there is a part that holds the rows until then."""
+    with part_of(path) as part:
+        rows = _McapRows(part.file, frame, part, steps)
+        yield rows
+        rows.close()
+        part.take_place()
+
+
+def mcap_size(frame: Recording, steps: Steps) -> int:
+    """About the bytes that a file takes."""
+    each = [8 * width + 200 for width in frame.widths if width]
+    return len(steps) * sum(each) + len(frame_bytes(frame)) + len(frame.spec)
+
+
+class _McapRows:
+    """Writes rows as messages; a chunk is with the system when a write returns."""
+
+    def __init__(self, file: FileIO, frame: Recording, part: Part | None = None, steps: Steps | None = None) -> None:
+        if frame.recorded is not None:
+            raise RecordingError("a .mcap holds the activities of all neurons: record a part as .npz or .csv")
+        self._file, self._dt, self._part, self._steps = file, frame.dt, part, steps
+        self._rows, self._synced, self._after = 0, monotonic(), ""
+        base = f"{frame.namespace.rstrip('/')}/{frame.network or 'network'}"
+        held = [name for name, width in zip(_ARRAYS, frame.widths, strict=True) if width or name == "activity"]
+        channels = [Channel(2, f"{base}/spec"), *(Channel(1, f"{base}/{name}") for name in held)]
+        sizes = dict(zip(_ARRAYS, frame.widths, strict=True))
+        label = label_of(frame.hash)
+        self._channels = [(_ARRAYS.index(name), n, array_prefix(label, sizes[name])) for n, name in enumerate(held, 2)]
+        about = {"network": frame.network, "hash": frame.hash, "dt": repr(frame.dt), "version": __version__}
+        start = records.head("ros2", f"neurovis {__version__}") + records.metadata(_ABOUT, about)
+        start += records.attachment(_FRAME, frame_bytes(frame))
+        start += records.schemas_and_channels([Schema(*ARRAY), Schema(*STRING)], channels)
+        if frame.spec:
+            start += records.chunk([Message(1, 0, 0, 0, text_message(frame.spec))])
+        records.put(file, start)
+
+    def write(self, activity: FloatArray, weights: FloatArray, states: FloatArray, after: After) -> None:
+        assert self._steps is not None
+        steps = [self._steps.at(self._rows + row) for row in range(len(activity))]
+        self.put(steps, (activity, weights, states), after)
+        self._rows += len(activity)
+        if self._part is not None:
+            self._part.held = self._steps.at(self._rows - 1) if self._rows else None
+
+    def put(self, steps: list[int], rows: tuple[FloatArray, ...], after: After) -> None:
+        """Rows of these steps, in chunks."""
+        for chunk in records.chunks(self._messages(steps, rows)):
+            records.put(self._file, chunk)
+        told = {
+            "reached": after.reached,
+            "set_parameters": dict(after.set_parameters),
+            "lesioned_neurons": after.lesioned_neurons.tolist(),
+            "lesioned_connections": after.lesioned_connections.tolist(),
+        }
+        self._after, self._weights = json.dumps(told), after.weights.copy()
+        if monotonic() - self._synced >= 1:
+            os.fdatasync(self._file.fileno()) if hasattr(os, "fdatasync") else os.fsync(self._file.fileno())
+            self._synced = monotonic()
+
+    def _messages(self, steps: list[int], rows: tuple[FloatArray, ...]) -> Iterator[Message]:
+        for row, step in enumerate(steps):
+            seconds = step * self._dt
+            time = min(round(seconds * 1e9), _LAST_TIME)
+            for kind, channel, prefix in self._channels:
+                data = array_message(prefix, step, seconds, rows[kind][row])
+                yield Message(channel, step % (1 << 32), time, time, data)
+
+    def close(self) -> None:
+        """What is true after the last step, then index and footer."""
+        if self._after:
+            weights = json.dumps(self._weights.tolist())
+            records.put(self._file, records.metadata(_AFTER, {"after": self._after, "weights": weights}))
+        records.finish(self._file)
+
+
+def held_mcap(file: FileIO) -> int | None:
+    """The last step that a part holds, None for none. Raises OSError."""
+    try:
+        return next((step for found in reversed(_chunks(file)) for step in reversed(_steps(file, found))), None)
+    except (RecordingError, UnicodeDecodeError):
+        return None
+
+
+def _chunks(file: FileIO) -> list[Found]:
+    return [found for found in records.scan(file) if found.opcode == records.CHUNK]
+
+
+def _steps(file: FileIO, found: Found) -> list[int]:
+    """The steps of a chunk's arrays."""
+    found_messages = records.messages_of(records.content_of(file, found))
+    return [one.sequence for one in found_messages if isinstance(one, Message) and one.channel > 1]
+
+
+def finish_mcap(file: FileIO, part: Path, path: Path) -> None:
+    """Make of a part what its run did not come to make. Raises RecordingError, OSError."""
+    records.finish(file)
+    move(file, part, path)
+
+
+def recover_mcap(part: Path) -> Recording:
+    """Read a part up to its last whole chunk. Raises RecordingError."""
+    return _read(part)[0]
+
+
+def read_mcap(path: Path) -> Recording:
+    """Read a recording; of one that breaks off what is whole, with a warning. Raises RecordingError."""
+    recording, whole = _read(path)
+    if not whole:
+        last = f"up to step {recording.step[-1]}" if len(recording) else "no step"
+        warnings.warn(f"{path} breaks off: it is read to its last whole chunk, {last}", stacklevel=4)
+    return recording
+
+
+def _read(path: Path) -> tuple[Recording, bool]:
+    with suspicion(path):
+        regular_size(path)
+        with path.open("rb", buffering=1 << 16) as file:
+            return _Reading(file).recording()
+
+
+class _Reading:
+    """Reads the records of a file one after the other."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+        self._frame: Recording | None = None
+        self._after: dict[str, str] = {}
+        self._channels: dict[int, int] = {}
+        self._known: set[int] = set()
+        self._room = max(_ROOM, _RATIO * file.seek(0, io.SEEK_END))
+        self._steps: tuple[list[int], ...] = ([], [], [])
+        self._rows: tuple[list[FloatArray], ...] = ([], [], [])
+
+    def recording(self) -> tuple[Recording, bool]:
+        """What the file holds, and whether it has come to its end."""
+        whole = False
+        for found in records.scan(self._file):
+            if found.opcode in (records.DATA_END, records.FOOTER):
+                whole = True
+                break
+            try:
+                self._take(found)
+            except DamagedError:
+                break
+        if self._frame is None:
+            raise RecordingError("not a recording: it does not say of which network it is")
+        return self._made(self._frame), whole
+
+    def _take(self, found: Found) -> None:
+        if found.opcode == records.ATTACHMENT and found.length <= _MOST_FRAME and self._frame is None:
+            reader = records.content_of(self._file, found)
+            reader.take(16)
+            name = reader.text()
+            reader.text()
+            if name == _FRAME:
+                self._frame = frame_of(reader.take(reader.number(8)))
+        elif found.opcode == records.METADATA:
+            reader = records.content_of(self._file, found)
+            if reader.text() == _AFTER:
+                self._after = reader.mapping()
+        elif found.opcode == records.CHANNEL:
+            self._channel(records.topic_of(records.content_of(self._file, found)))
+        elif found.opcode == records.CHUNK:
+            content = records.content_of(self._file, found)
+            self._room -= records.expanded_size(content)
+            if self._room < 0:
+                raise RecordingError("not a recording: it grows out of all proportion")
+            for message in records.messages_of(content):
+                if isinstance(message, Message):
+                    self._message(message)
+                else:
+                    self._channel(message)
+
+    def _channel(self, topic: Topic) -> None:
+        self._known.add(topic.channel)
+        kind = topic.topic.rpartition("/")[2]
+        if kind in _ARRAYS:
+            self._channels[topic.channel] = _ARRAYS.index(kind)
+
+    def _message(self, message: Message) -> None:
+        kind = self._channels.get(message.channel)
+        if kind is None:
+            if message.channel not in self._known:
+                raise RecordingError("a message is of a channel that there is not")
+            return
+        if self._frame is None:
+            raise RecordingError("not a recording: messages come before the network that they are of")
+        step, numbers = array_of(message.data, label_of(self._frame.hash), self._frame.widths[kind])
+        steps = self._steps[kind]
+        if steps and step <= steps[-1]:
+            raise RecordingError("the steps of its messages do not ascend")
+        steps.append(step)
+        self._rows[kind].append(numbers)
+
+    def _made(self, frame: Recording) -> Recording:
+        used = [kind for kind, width in enumerate(frame.widths) if width or kind == 0]
+        count = min(len(self._steps[kind]) for kind in used)
+        steps = self._steps[0][:count]
+        if any(self._steps[kind][:count] != steps for kind in used):
+            raise RecordingError("its topics do not hold the same steps")
+        step = np.array(steps, dtype=np.int64)
+        activity, weights, states = (
+            np.array(self._rows[kind][:count]).reshape(count, width) for kind, width in enumerate(frame.widths)
+        )
+        recording = replace(frame, step=step, activity=activity, weights=weights, states=states)
+        return ended(recording, self._ended(recording))
+
+    def _ended(self, recording: Recording) -> After:
+        changing = len(recording.plastic)
+        rows = after_rows(recording.step, recording.weights, changing)
+        if not self._after:
+            return replace(rows, set_parameters=recording.set_parameters)
+        told, weights = json.loads(self._after["after"]), json.loads(self._after["weights"])
+        n, m = len(recording.neurons), len(recording.sources)
+        lost = [
+            np.array(told[name], dtype=np.int64).reshape(-1) for name in ("lesioned_neurons", "lesioned_connections")
+        ]
+        reached = told["reached"]
+        values = np.array(weights, dtype=np.float64).reshape(changing)
+        for indices, high in zip(lost, (n, m), strict=True):
+            if len(indices) and (indices.min() < 0 or indices.max() >= high):
+                raise RecordingError("it says that parts are lesioned that are not there")
+        if type(reached) is not int or not 0 <= reached < 2**62:
+            raise RecordingError(f"'reached' is {reached}")
+        given = {str(name): float(value) for name, value in dict(told["set_parameters"]).items()}
+        return After(values, reached, given, *lost)

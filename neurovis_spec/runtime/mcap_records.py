@@ -1,0 +1,399 @@
+"""Records of MCAP files: written so that a file can be read at any moment, read with suspicion.
+
+In: messages; or a file. Out: bytes of records; or the records of a file as far as it is whole. A chunk goes to the
+system by one write. The index at a file's end is made of the records that the file holds, so that nothing grows while
+it is written, and a file that breaks off gets one in the same way.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from io import FileIO
+from typing import BinaryIO, Final, NamedTuple
+from zlib import crc32
+
+from neurovis_spec.runtime.recording import RecordingError
+
+MAGIC: Final = b"\x89MCAP0\r\n"
+HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = range(1, 9)
+ATTACHMENT, ATTACHMENT_INDEX, STATISTICS, METADATA, METADATA_INDEX, SUMMARY_OFFSET, DATA_END = range(9, 16)
+_HEAD, _MESSAGE, _CHUNK = struct.Struct("<BQ"), struct.Struct("<HIQQ"), struct.Struct("<QQQI")
+_LAST: Final = (1 << 64) - 1
+#: bytes of the messages of a chunk, unless a single one has more
+LARGEST_CHUNK: Final = 64 << 10
+#: the records of the end of a file, in their order
+_GROUPS: Final = (SCHEMA, CHANNEL, STATISTICS, CHUNK_INDEX, ATTACHMENT_INDEX, METADATA_INDEX)
+
+
+class DamagedError(RecordingError):
+    """A chunk whose checksum does not agree: what comes before it is as it was written."""
+
+
+class Schema(NamedTuple):
+    """What messages of a type look like."""
+
+    name: str
+    text: str
+
+
+class Channel(NamedTuple):
+    """A topic, and the number of its schema, from 1."""
+
+    schema: int
+    topic: str
+
+
+class Message(NamedTuple):
+    """A message of a channel (from 1); times in nanoseconds."""
+
+    channel: int
+    sequence: int
+    log_time: int
+    publish_time: int
+    data: bytes
+
+
+def record(opcode: int, *parts: bytes) -> bytes:
+    """A record of these parts."""
+    content = b"".join(parts)
+    return _HEAD.pack(opcode, len(content)) + content
+
+
+def text(value: str) -> bytes:
+    """A string, with its length."""
+    data = value.encode()
+    return struct.pack("<I", len(data)) + data
+
+
+def mapping(values: Mapping[str, str]) -> bytes:
+    """A map of strings, with its length."""
+    data = b"".join(text(key) + text(value) for key, value in values.items())
+    return struct.pack("<I", len(data)) + data
+
+
+def head(profile: str, library: str) -> bytes:
+    """The beginning of a file."""
+    return MAGIC + record(HEADER, text(profile), text(library))
+
+
+def schemas_and_channels(schemas: Iterable[Schema], channels: Iterable[Channel]) -> bytes:
+    """The records that name topics and types, numbered from 1."""
+    parts = []
+    for number, schema in enumerate(schemas, 1):
+        data = schema.text.encode()
+        parts.append(
+            record(
+                SCHEMA,
+                struct.pack("<H", number),
+                text(schema.name),
+                text("ros2msg"),
+                struct.pack("<I", len(data)),
+                data,
+            )
+        )
+    for number, channel in enumerate(channels, 1):
+        ends = struct.pack("<HH", number, channel.schema)
+        parts.append(record(CHANNEL, ends, text(channel.topic), text("cdr"), mapping({})))
+    return b"".join(parts)
+
+
+def attachment(name: str, data: bytes) -> bytes:
+    """A file within the file."""
+    size = struct.pack("<Q", len(data))
+    content = bytes(16) + text(name) + text("application/octet-stream") + size + data
+    return record(ATTACHMENT, content, struct.pack("<I", crc32(content)))
+
+
+def metadata(name: str, values: Mapping[str, str]) -> bytes:
+    """Strings by name."""
+    return record(METADATA, text(name), mapping(values))
+
+
+def chunk(messages: Iterable[Message]) -> bytes:
+    """A chunk of messages, uncompressed, and the indices that follow it."""
+    parts: list[bytes] = []
+    indices: dict[int, list[tuple[int, int]]] = {}
+    first, last, offset = _LAST, 0, 0
+    for message in messages:
+        made = record(MESSAGE, _MESSAGE.pack(*message[:2], *message[2:4]), message.data)
+        indices.setdefault(message.channel, []).append((message.log_time, offset))
+        first, last, offset = min(first, message.log_time), max(last, message.log_time), offset + len(made)
+        parts.append(made)
+    data = b"".join(parts)
+    start = _CHUNK.pack(0 if first == _LAST else first, last, len(data), crc32(data))
+    result = [record(CHUNK, start, text(""), struct.pack("<Q", len(data)), data)]
+    for channel, entries in indices.items():
+        packed = b"".join(struct.pack("<QQ", *entry) for entry in entries)
+        result.append(record(MESSAGE_INDEX, struct.pack("<HI", channel, len(packed)), packed))
+    return b"".join(result)
+
+
+def chunks(messages: Iterable[Message]) -> Iterator[bytes]:
+    """Messages in chunks of at most 64 KiB."""
+    some: list[Message] = []
+    size = 0
+    for message in messages:
+        if some and size + len(message.data) + 32 > LARGEST_CHUNK:
+            yield chunk(some)
+            some, size = [], 0
+        some.append(message)
+        size += len(message.data) + 32
+    if some:
+        yield chunk(some)
+
+
+class Found(NamedTuple):
+    """A whole record of a file: where it begins, and where and how long its content is."""
+
+    opcode: int
+    start: int
+    content: int
+    length: int
+
+    @property
+    def end(self) -> int:
+        """Where the next one begins."""
+        return self.content + self.length
+
+
+def scan(file: FileIO | BinaryIO) -> Iterator[Found]:
+    """The whole records of a file, in order, without their contents. Raises RecordingError where it is no MCAP."""
+    size = file.seek(0, io.SEEK_END)
+    file.seek(0)
+    if file.read(len(MAGIC)) != MAGIC:
+        raise RecordingError("not an MCAP file")
+    offset = len(MAGIC)
+    while offset + _HEAD.size <= size:
+        file.seek(offset)
+        opcode, length = _HEAD.unpack(file.read(_HEAD.size))
+        found = Found(opcode, offset, offset + _HEAD.size, length)
+        if found.end > size or opcode == 0:
+            return
+        yield found
+        offset = found.end
+
+
+def content_of(file: FileIO | BinaryIO, found: Found, most: int | None = None) -> Reader:
+    """The content of a record, or its first bytes."""
+    file.seek(found.content)
+    wanted = found.length if most is None else min(found.length, most)
+    pieces: list[bytes] = []
+    while wanted:
+        piece = file.read(wanted)
+        if not piece:
+            raise RecordingError("a record breaks off")
+        pieces.append(piece)
+        wanted -= len(piece)
+    return Reader(b"".join(pieces))
+
+
+@dataclass
+class Reader:
+    """Reads values from bytes, and never behind their end. Raises RecordingError."""
+
+    data: bytes
+    at: int = 0
+
+    def take(self, count: int) -> bytes:
+        """The next bytes."""
+        if count > len(self.data) - self.at:
+            raise RecordingError("a record is shorter than it says")
+        self.at += count
+        return self.data[self.at - count : self.at]
+
+    def number(self, size: int) -> int:
+        """The next number of so many bytes."""
+        return int.from_bytes(self.take(size), "little")
+
+    def text(self) -> str:
+        """The next string."""
+        return self.take(self.number(4)).decode()
+
+    def mapping(self) -> dict[str, str]:
+        """The next map of strings."""
+        inner = Reader(self.take(self.number(4)))
+        result = {}
+        while inner.at < len(inner.data):
+            key = inner.text()
+            result[key] = inner.text()
+        return result
+
+
+def expanded_size(content: Reader) -> int:
+    """How many bytes a chunk says that its messages are."""
+    return int.from_bytes(content.data[16:24], "little")
+
+
+class Topic(NamedTuple):
+    """The number of a channel, and its topic."""
+
+    channel: int
+    topic: str
+
+
+def topic_of(reader: Reader) -> Topic:
+    """What the record of a channel says."""
+    number = reader.number(2)
+    reader.take(2)
+    return Topic(number, reader.text())
+
+
+def messages_of(content: Reader) -> Iterator[Message | Topic]:
+    """The messages of a chunk, whose checksum must agree, and the channels that stand in it. Raises RecordingError."""
+    content.take(16)
+    size, checksum, compression = content.number(8), content.number(4), content.text()
+    data = content.take(content.number(8))
+    if compression:
+        data = _expanded(data, compression, size)
+    if len(data) != size or (checksum and crc32(data) != checksum):
+        raise DamagedError("a chunk is damaged")
+    reader, named = Reader(data), 0
+    while reader.at < len(data):
+        opcode, length = reader.number(1), reader.number(8)
+        inner = reader.take(length)
+        if opcode != MESSAGE:
+            named += 1
+            if opcode not in (SCHEMA, CHANNEL) or named > _MOST_NAMED:
+                raise RecordingError("a chunk holds what is no message")
+        if opcode == CHANNEL:
+            yield topic_of(Reader(inner))
+        elif opcode == MESSAGE:
+            if length < _MESSAGE.size:
+                raise RecordingError("a message is shorter than it says")
+            channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(inner)
+            yield Message(channel, sequence, log_time, publish_time, inner[_MESSAGE.size :])
+
+
+#: the most bytes that a compressed chunk may grow to
+_MOST_EXPANDED = 32 << 20
+#: records of a chunk besides messages: a channel's number has two bytes
+_MOST_NAMED = 1 << 16
+
+
+def _expanded(data: bytes, compression: str, size: int) -> bytes:
+    """What a compressed chunk of another program holds; the extra ``bags`` brings what it takes."""
+    if size > _MOST_EXPANDED or compression not in ("zstd", "lz4"):
+        raise RecordingError(f"a chunk is compressed in a way that is not read ('{compression[:20]}')")
+    try:
+        if compression == "zstd":
+            import zstandard
+
+            return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
+        from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
+
+        found: bytes = LZ4FrameDecompressor().decompress(data, max_length=size)
+        return found
+    except ImportError:
+        raise RecordingError(
+            f"its chunks are compressed ({compression}), which needs: pip install 'neurovis-spec[bags]'"
+        ) from None
+
+
+@dataclass
+class _Summary:
+    """What the end of a file says of its records."""
+
+    groups: dict[int, list[bytes]] = field(default_factory=lambda: {number: [] for number in _GROUPS})
+    counts: dict[int, int] = field(default_factory=dict)
+    first: int = _LAST
+    last: int = 0
+    #: the chunk that message indices follow
+    chunk: Found | None = None
+    about: bytes = b""
+    places: dict[int, int] = field(default_factory=dict)
+    indexed: int = 0
+
+    def take(self, file: FileIO, found: Found) -> None:
+        """Note a record."""
+        if found.opcode != MESSAGE_INDEX:
+            self.end_chunk()
+        if found.opcode in (SCHEMA, CHANNEL):
+            self.groups[found.opcode].append(record(found.opcode, content_of(file, found).data))
+        elif found.opcode == CHUNK:
+            reader = content_of(file, found, 64)
+            first, last, size = reader.number(8), reader.number(8), reader.number(8)
+            reader.take(4)
+            compression = reader.text()
+            self.first, self.last = min(self.first, first), max(self.last, last)
+            self.chunk, self.places, self.indexed = found, {}, 0
+            tail = text(compression) + struct.pack("<QQ", reader.number(8), size)
+            start = struct.pack("<QQQQ", first, last, found.start, found.end - found.start)
+            self.about = start + b"|" + tail
+        elif found.opcode == MESSAGE_INDEX:
+            reader = content_of(file, found, 6)
+            channel, size = reader.number(2), reader.number(4)
+            self.counts[channel] = self.counts.get(channel, 0) + size // 16
+            self.places[channel] = found.start
+            self.indexed += found.end - found.start
+        elif found.opcode == ATTACHMENT:
+            reader = content_of(file, found, 4096)
+            times, name, media = reader.take(16), reader.text(), reader.text()
+            size = reader.number(8)
+            where = struct.pack("<QQ", found.start, found.end - found.start)
+            made = record(ATTACHMENT_INDEX, where, times, struct.pack("<Q", size), text(name), text(media))
+            self.groups[ATTACHMENT_INDEX].append(made)
+        elif found.opcode == METADATA:
+            name = content_of(file, found, 4096).text()
+            where = struct.pack("<QQ", found.start, found.end - found.start)
+            self.groups[METADATA_INDEX].append(record(METADATA_INDEX, where, text(name)))
+
+    def end_chunk(self) -> None:
+        """The indices of a chunk are all there."""
+        if self.chunk is not None:
+            start, tail = self.about[:32], self.about[33:]
+            places = b"".join(struct.pack("<HQ", *item) for item in self.places.items())
+            offsets = struct.pack("<I", len(places)) + places + struct.pack("<Q", self.indexed)
+            self.groups[CHUNK_INDEX].append(record(CHUNK_INDEX, start, offsets, tail))
+            self.chunk = None
+
+    def statistics(self) -> bytes:
+        """How much there is of everything."""
+        sizes = {opcode: len(made) for opcode, made in self.groups.items()}
+        counts = b"".join(struct.pack("<HQ", *item) for item in self.counts.items())
+        numbers = struct.pack(
+            "<QHIIIIQQ",
+            sum(self.counts.values()),
+            *(sizes[opcode] for opcode in (SCHEMA, CHANNEL, ATTACHMENT_INDEX, METADATA_INDEX, CHUNK_INDEX)),
+            0 if self.first == _LAST else self.first,
+            self.last,
+        )
+        return record(STATISTICS, numbers, struct.pack("<I", len(counts)), counts)
+
+
+def finish(file: FileIO) -> None:
+    """End a file, of which all behind the last whole record is cut off: index, statistics, footer. Raises
+    RecordingError, OSError."""
+    summary, end = _Summary(), len(MAGIC)
+    for found in scan(file):
+        if found.opcode == DATA_END:
+            break
+        summary.take(file, found)
+        end = found.end
+    summary.end_chunk()
+    summary.groups[STATISTICS] = [summary.statistics()]
+    file.truncate(end)
+    file.seek(end)
+    data_end = record(DATA_END, bytes(4))
+    start = end + len(data_end)
+    parts, offsets, at = [], [], start
+    for opcode, made in summary.groups.items():
+        if made:
+            joined = b"".join(made)
+            parts.append(joined)
+            offsets.append(record(SUMMARY_OFFSET, struct.pack("<BQQ", opcode, at, len(joined))))
+            at += len(joined)
+    whole = b"".join([*parts, *offsets])
+    places = struct.pack("<QQ", start, at)
+    checksum = crc32(whole + _HEAD.pack(FOOTER, 20) + places)
+    footer = record(FOOTER, places, struct.pack("<I", checksum))
+    put(file, data_end + whole + footer + MAGIC)
+
+
+def put(file: FileIO, data: bytes) -> None:
+    """Write all of it: a full disk takes some, and refuses the rest. Raises OSError."""
+    left = memoryview(data)
+    while left:
+        left = left[file.write(left) or 0 :]

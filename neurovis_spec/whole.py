@@ -1,0 +1,120 @@
+"""The spec as one text: what it includes and the data that it reads are inside.
+
+In: a Spec, how it was compiled. Out: a YAML text that compiles to the same network (of the same hash) anywhere. A spec
+that names no files, and of which nothing was set from outside, stays as it was written.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TypeAlias
+
+from neurovis_spec.compiler.compile import Request
+from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.data_files import read_edges, read_table
+from neurovis_spec.language.data_files_edges import EdgeTable
+from neurovis_spec.language.located import Located
+from neurovis_spec.language.source import Mapping as SourceMapping
+from neurovis_spec.language.source import Node, Packed, Scalar, Sequence
+from neurovis_spec.language.spec import Spec
+
+Plain: TypeAlias = "bool | int | float | str | list[Plain] | dict[str, Plain] | None"
+#: sections that an included file brings in
+_BROUGHT = ("modules", "activations", "models", "rules")
+
+
+def whole_text(spec: Spec, request: Request, sources: Mapping[str, str]) -> str:
+    """The spec as one text. Raises SpecError where a file that it names is gone meanwhile."""
+    findings = Findings()
+    reader = _Reader(request.root, findings)
+    root = reader.mapping(spec.source, request.base, ())
+    included = () if request.includes is None else request.includes.files
+    own = sources.get(spec.source.span.file)
+    if own is not None and not (reader.inlined or included or request.parameters or request.seed is not None):
+        return own
+    root.pop("include", None)
+    for file in included:
+        brought = reader.mapping(file.model.source, file.folder, ())
+        for section in _BROUGHT:
+            there, more = root.setdefault(section, {}), brought.get(section)
+            if isinstance(there, dict) and isinstance(more, dict):
+                there.update(more)
+            if not there:
+                del root[section]
+    _set(root, request)
+    findings.check()
+    return json.dumps(root, ensure_ascii=False, indent=1)
+
+
+def _set(root: dict[str, Plain], request: Request) -> None:
+    parameters = root.get("parameters")
+    for name, value in request.parameters.items():
+        if isinstance(parameters, dict) and name in parameters:
+            written = parameters[name]
+            parameters[name] = {**written, "value": value} if isinstance(written, dict) else value
+    if request.seed is not None:
+        root["seed"] = request.seed
+
+
+class _Reader:
+    """Makes plain values of nodes, with the data of files in their places."""
+
+    def __init__(self, root: Path, findings: Findings) -> None:
+        self._root, self._findings = root, findings
+        self.inlined = False
+
+    def mapping(self, node: SourceMapping, folder: Path, path: tuple[str, ...]) -> dict[str, Plain]:
+        """A mapping, in its order."""
+        if path[-2:-1] == ("inputs",) and node.get("file") is not None:
+            rest = {e.name: self.value(e.value, folder, path) for e in node.entries if e.name not in ("file", "key")}
+            return {**rest, "values": self._table(node, folder)}
+        result: dict[str, Plain] = {}
+        for entry in node.entries:
+            if path == ("layout",) and entry.name == "file":
+                self.inlined = True
+                continue
+            result[entry.name] = self.value(entry.value, folder, (*path, entry.name))
+        return result
+
+    def value(self, node: Node, folder: Path, path: tuple[str, ...]) -> Plain:
+        """Any node."""
+        if isinstance(node, SourceMapping):
+            if path and path[-1] in ("matrix", "centre", "position") and node.get("file") is not None:
+                return self._table(node, folder)
+            if path and path[-1] == "edges" and node.get("file") is not None:
+                return self._edges(node, folder)
+            return self.mapping(node, folder, path)
+        if isinstance(node, (Sequence, Packed)):
+            return [self.value(item, folder, path) for item in node.items]
+        return node.value
+
+    def _named(self, node: SourceMapping) -> tuple[Scalar, Located[str] | None]:
+        self.inlined = True
+        file, key = node.get("file"), node.get("key")
+        assert isinstance(file, Scalar)
+        return file, Located(str(key.value), key) if isinstance(key, Scalar) else None
+
+    def _table(self, node: SourceMapping, folder: Path) -> Plain:
+        file, key = self._named(node)
+        table = read_table(str(file.value), self._root, folder, file.span, self._findings, key)
+        if table is None:
+            return None
+        return [
+            [value if there else None for value, there in zip(row, present, strict=True)]
+            for row, present in zip(table.values.tolist(), table.present.tolist(), strict=True)
+        ]
+
+    def _edges(self, node: SourceMapping, folder: Path) -> Plain:
+        file, key = self._named(node)
+        edges = read_edges(str(file.value), self._root, folder, file.span, self._findings, key)
+        return None if edges is None else list(_rows(edges))
+
+
+def _rows(edges: EdgeTable) -> Iterable[Plain]:
+    """Edges as a spec writes them."""
+    weights, delays = edges.weights.tolist(), edges.delays.tolist()
+    for source, target, weight, delay in zip(edges.sources, edges.targets, weights, delays, strict=True):
+        row: list[Plain] = [source, target, weight]
+        yield row if delay < 0 else [*row, delay]
