@@ -285,13 +285,15 @@ class EntryBuilder:
                 return None
         if tree is not None and "distance" in names(tree):
             position = self.place.population.neurons.position
-            apart = position[self.sources[shape.i]] - position[self.targets[shape.j]]
-            if self._misplaced() or not np.isfinite(apart).all():
+            ends = position[self.sources[shape.i]], position[self.targets[shape.j]]
+            if self._misplaced() or not all(np.isfinite(end).all() for end in ends):
                 if not self._misplaced():
                     message = "'distance' needs a position of every neuron of both ends"
                     self.constants.findings.error("no-position", formula.span, message, "give the groups a 'position'")
                 return None
-            extra["distance"] = np.hypot(apart[:, 0], apart[:, 1])
+            with np.errstate(over="ignore"):  # what is then infinite is found where it matters
+                apart = ends[0] - ends[1]
+                extra["distance"] = np.hypot(apart[:, 0], apart[:, 1])
         randomness = Randomness(self._stream(purpose), shape.i, shape.j)
         with self.constants.following() as parts:
             value = self.constants.value(formula, extra, randomness)
