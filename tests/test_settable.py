@@ -113,6 +113,11 @@ def test_a_parameter_that_was_set_follows_no_other_any_more() -> None:
     [
         ("neurons: {A: {bias: p}}", {"r": 5}, "'r' is 5; its bounds are 0 to 4"),
         ("neurons: {A: {bias: 1/p}}", {"p": 0}, "a bias would be infinite"),
+        (
+            "neurons: {A: {count: 2, activation: {clip: {low: [p, 0], high: [1, p]}}}}",
+            {"p": 2},
+            "the parameter 'high' of an activation would be below its bound of 2",
+        ),
         ("neurons: {A: {count: 2, bias: 'log(p - i/4)'}}", {"p": 0.2}, "a bias would be not finite"),
         ("neurons: {A: {bias: 1}, B: {}}\nconnections: {A -> B: log(p)}", {"p": -1}, "a weight would be undefined"),
         (

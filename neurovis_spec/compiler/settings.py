@@ -221,8 +221,8 @@ def parameters(
             None if bound is None or not _bounded(default, values) else _assembled(bound, values, following)
             for bound in (default.low, default.high)
         )
-        if not parts and any(bound is not None and bound.slots for bound in (low, high)):
-            parts = [Part(ParameterFormula(Name(default.name), {}, {default.name: value}))]
+        if any(bound is not None and bound.slots for bound in (low, high)):
+            parts = _all_of(default.name, value, parts)  # what stays must lie within bounds that do not
         if parts:
             following[default.name] = parts
             constants.follow(_between(part, low, high)._replace(name=default.name) for part in parts)
@@ -243,6 +243,19 @@ def _default(default: Default, n: int | None, values: Mapping[str, Value]) -> Fl
     if not names(default.value) <= values.keys():
         return None
     return np.broadcast_to(np.asarray(evaluate_array(default.value, values), dtype=np.float64), (n or 1,)).copy()
+
+
+def _all_of(name: str, value: FloatArray, parts: list[Part]) -> list[Part]:
+    """Parts that cover all numbers of a parameter: those that follow no parameter of the run are as they are."""
+    if any(part.places is None for part in parts):
+        return parts
+    rest = np.ones(len(value), dtype=np.bool_)
+    for part in parts:
+        rest[part.places] = False
+    if not parts:
+        return [Part(ParameterFormula(Name(name), {}, {name: value}))]
+    places = np.flatnonzero(rest)
+    return [*parts, Part(ParameterFormula(Name(name), {}, {name: value[places]}), places)] if len(places) else parts
 
 
 def _between(part: Part, low: Dependent | None, high: Dependent | None) -> Part:
