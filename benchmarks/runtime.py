@@ -335,7 +335,7 @@ def learning(network: Network) -> Network:
     oja = rule("weight + 0.01 * post * (pre - post * weight)")
     members = np.arange(len(network.connections))
     links = replace(network.connections, rules=np.zeros(len(members), dtype=np.int64))
-    plasticity = Plasticity(oja, members, {}, {}, "oja")
+    plasticity = Plasticity(oja, members, {}, {})
     program = (*network.program, Learn(0))
     return replace(network, connections=links, plasticity=(plasticity,), program=program)
 
