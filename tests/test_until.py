@@ -82,6 +82,26 @@ def test_the_parameters_are_those_of_the_step() -> None:
     assert nv.compile_text(SPEC).run(until="slope > 0.015").reached == 301
 
 
+def test_a_run_that_goes_on_from_a_checkpoint_counts_on(folder: Path) -> None:
+    """``k`` and the parameters are those of the whole run; the windows begin with the part."""
+    network = nv.compile("ramp.yaml")
+    whole = network.run()
+    for begin in (100, 350):
+        network.run(begin, checkpoint="x.state")
+        until = network.until(f"k >= {begin + 20} and slope == {0.01 if begin == 100 else 0.02}")
+        part = network.run(200, until=until, checkpoint="x.state")
+        assert part.step.tolist() == list(range(begin, begin + 21))
+        assert until.ending is not None
+        assert (until.ending.step, until.ending.made, until.ending.met) == (begin + 20, 21, True)
+        found = network.measure("mean(A, last=3) + slope + t", part)
+        np.testing.assert_allclose(found[2:], network.measure("mean(A, last=3) + slope + t", whole)[begin + 2 :][:19])
+        (folder / "x.state").unlink()
+    result = call("run", "ramp.yaml", "--steps", 100, "--checkpoint", "x.state")
+    result = call("run", "ramp.yaml", "--checkpoint", "x.state", "--until", "k >= 120")
+    assert result.stderr == "until k >= 120: ended at step 120\n"
+    assert result.stdout.startswith("ramp: 21 steps in ")
+
+
 def test_a_run_can_be_used_again() -> None:
     network = nv.compile_text(SPEC)
     until = network.until(MEAN)

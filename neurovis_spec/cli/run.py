@@ -168,7 +168,7 @@ def _summary(
 ) -> str:
     steps = network.network.steps if steps is None else steps
     if until is not None and until.ending is not None:
-        steps = until.ending.step + 1
+        steps = until.ending.made
     return f"{count(steps, 'step')} in {seconds:.2f} s, backend {backend or network.choose_backend()[0]}"
 
 

@@ -5,6 +5,7 @@ In: the text of a measure, a Network, a Recording of it. Out: the value after ea
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -21,24 +22,27 @@ LABEL = "<measure>"
 
 
 def over(text: str, network: Network, recording: Recording) -> FloatArray:
-    """What a measure is after each step of a recording, (steps,); NaN while it has no value. Parameters are those that
+    """What a measure is after each step of a recording, (rows,); NaN while it has no value. Parameters are those that
     the network and its events give. Raises SpecError, and RecordingError for a recording of another network or of some
     steps only."""
-    meter = Meter(measure_of(text, network, LABEL))
+    first = int(recording.step[0]) if len(recording) else 0
+    meter = Meter(measure_of(text, network, LABEL), first)
     if recording.neurons != network.neurons.names:
         raise RecordingError("a measure is of a recording of all neurons of the network, and this one has others")
-    steps = len(recording)
-    if not np.array_equal(recording.step, np.arange(steps)):
-        raise RecordingError("a measure is of every step from step 0 on, and the recording holds some of them only")
+    stop = first + len(recording)
+    if not np.array_equal(recording.step, np.arange(first, stop)):
+        raise RecordingError("a measure is of every step, and the recording holds some of them only")
     states = _states(meter.measure.probe.names, recording)
     state, controls = initial_state(network), Controls(network)
-    changes = {change.at: change for change in network.changes}
-    parts = []
-    for begin, end in pairwise([0, *(at for at in changes if 0 < at < steps), steps]):
-        if begin in changes:
+    edges = sorted({first, stop, *(change.at for change in network.changes if first < change.at < stop)})
+    changes = deque(sorted(network.changes, key=lambda change: change.at))
+    parts = [np.zeros(0)]
+    for begin, end in pairwise(edges):
+        while changes and changes[0].at <= begin:
             with np.errstate(all="ignore"):
-                controls.apply(state.conditions, state.weights, state.signals, changes[begin])
-        parts.append(meter.rows(recording.activity[begin:end], state.conditions.parameters, states[begin:end]))
+                controls.apply(state.conditions, state.weights, state.signals, changes.popleft())
+        rows = slice(begin - first, end - first)
+        parts.append(meter.rows(recording.activity[rows], state.conditions.parameters, states[rows]))
     return np.concatenate(parts)
 
 

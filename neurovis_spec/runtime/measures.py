@@ -184,10 +184,12 @@ def _span(label: str, start: int, end: int) -> Span:
 
 
 class Meter:
-    """The value of a measure after each step of a run, from its first step on; ``made`` is how many there were."""
+    """The value of a measure after each step of a run, whose first is step ``first``; ``made`` is how many there
+    were."""
 
-    def __init__(self, measure: Measure) -> None:
+    def __init__(self, measure: Measure, first: int = 0) -> None:
         self.measure = measure
+        self.first = first
         self.made = 0
         self._running = [running(window.summary, window.last) for window in measure.formula.windows]
         self._constants = constants(measure.dt)
@@ -204,8 +206,9 @@ class Meter:
             known[name] = float(parameters[slot])
         for name, column in self.measure.states.items():
             known[name] = float(states[column])
-        known["k"] = float(self.made)
-        known["t"] = self.made * self.measure.dt
+        k = self.first + self.made
+        known["k"] = float(k)
+        known["t"] = k * self.measure.dt
         self.made += 1
         for number, window in enumerate(self.measure.formula.windows):
             value = self._running[number].push(evaluate(window.tree, known))
@@ -219,7 +222,8 @@ class Meter:
         known |= {name: activity[:, index] for name, index in self.measure.neurons.items()}
         known |= {name: float(parameters[slot]) for name, slot in self.measure.slots.items()}
         known |= {name: states[:, column] for name, column in self.measure.states.items()}
-        k = np.arange(self.made, self.made + count).astype(np.float64)
+        begin = self.first + self.made
+        k = np.arange(begin, begin + count).astype(np.float64)
         known |= {"k": k, "t": k * self.measure.dt}
         for number, window in enumerate(self.measure.formula.windows):
             values = self._running[number].extend(_broadcast(window.tree, known, count))

@@ -22,10 +22,11 @@ LABEL = "<until>"
 
 @dataclass(frozen=True)
 class Ending:
-    """How a run ended: after ``step``; whether the measure was true then (``met``), and the values of its windows by
-    their text."""
+    """How a run ended: after ``step``, when ``made`` steps were made; whether the measure was true then (``met``), and
+    the values of its windows by their text."""
 
     step: int
+    made: int
     met: bool
     values: Mapping[str, float] = field(default_factory=dict)
 
@@ -55,7 +56,7 @@ class _Watched:
 
     def __init__(self, until: Until, rows: Rows, state: State) -> None:
         self._until, self._rows, self._state = until, rows, state
-        self._meter = Meter(until.measure)
+        self._meter = Meter(until.measure, state.k)
         self._met = False
 
     def begin(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -79,4 +80,4 @@ class _Watched:
         if not made:
             return None
         texts = [formula.text[window.start : window.end] for window in formula.windows]
-        return Ending(made - 1, self._met, dict(zip(texts, self._meter.values, strict=True)))
+        return Ending(self._meter.first + made - 1, made, self._met, dict(zip(texts, self._meter.values, strict=True)))
