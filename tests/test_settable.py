@@ -327,3 +327,17 @@ def test_a_cell_of_no_connection_follows_nothing() -> None:
         "connections: {A -> B: {matrix: [[p], [null]], centre: [[1], [p]]}}\nevents: [{at: 1, set: {p: 2}}]\n"
     )
     assert nv.compile_text(text).run(4)["B"].tolist() == [1.0, 0.5, 1.0, 1.0]
+
+
+def test_bounds_of_parameters_follow_other_parameters() -> None:
+    text = HEAD.replace("p: 0.5", "p: 0.5, s: {value: 1, min: p, max: 2*p}") + "neurons: {A: {bias: s}}\n"
+    simulation = nv.compile_text(text).simulator()
+    for _ in range(2):
+        with pytest.raises(ParameterError, match="'s' is 1; its bounds are 2 to 4"):
+            simulation.set(p=2)
+        with pytest.raises(ParameterError, match=r"'s' is 3; its bounds are 0\.5 to 1"):
+            simulation.set(s=3)
+    simulation.set(p=2, s=3)
+    assert simulation.parameters["s"] == 3
+    with pytest.raises(nv.SpecError, match="from step 1 on 's' is 1; its bounds are 3 to 6"):
+        nv.compile_text(text + "events: [{at: 1, set: {p: 3}}]")

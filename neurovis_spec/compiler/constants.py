@@ -170,7 +170,13 @@ class Constants:
     _parts: list[Part] | None = None
 
     def declare(
-        self, name: str, tree: Tree | None, value: float, low: float | None, high: float | None, given: bool
+        self,
+        name: str,
+        tree: Tree | None,
+        value: float,
+        low: float | Dependent | None,
+        high: float | Dependent | None,
+        given: bool,
     ) -> None:
         """Give a parameter a slot, if it can be set or follows one that can. ``tree`` is its formula, which it follows
         unless its value is ``given`` from outside or it is given another one (``settings``)."""

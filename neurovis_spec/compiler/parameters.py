@@ -47,8 +47,10 @@ def _parameter(
     tree = constants.tree(parameter.value, what="parameters before this one, and constants", later=later)
     constants.uses[name] = frozenset() if tree is None or name in given else names(tree)
     value = None if tree is None else constants.scalar(parameter.value)
-    low = None if parameter.minimum is None else constants.scalar(parameter.minimum)
-    high = None if parameter.maximum is None else constants.scalar(parameter.maximum)
+    with constants.following() as lower:
+        low = None if parameter.minimum is None else constants.scalar(parameter.minimum)
+    with constants.following() as upper:
+        high = None if parameter.maximum is None else constants.scalar(parameter.maximum)
     if name in given:
         value = float(given[name])
         if not math.isfinite(value):
@@ -58,7 +60,8 @@ def _parameter(
         constants.broken.add(name)
         return
     constants.parameters[name] = value
-    constants.declare(name, tree, value, low, high, name in given)
+    least, most = lower[0].formula if lower else low, upper[0].formula if upper else high
+    constants.declare(name, tree, value, least, most, name in given)
     if low is not None and high is not None and low > high and parameter.minimum is not None:
         message = f"the least value of '{name}', {low:g}, is above the greatest, {high:g}"
         findings.error("out-of-range", parameter.minimum.span, message, "swap min and max")

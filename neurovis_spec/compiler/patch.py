@@ -61,6 +61,8 @@ class _Plan:
     following: tuple[int, ...]
     bindings: tuple[Binding, ...]
     changed: frozenset[int]
+    #: slots whose bounds follow parameters that change, or that change themselves
+    bounded: tuple[int, ...]
     #: that as one function, where it was asked for before
     function: Callable[[FloatArray], tuple[Value, ...]] | None = None
     asked: bool = False
@@ -90,13 +92,16 @@ class Patcher:
             plan.function = self._compiled(plan)
         plan.asked = True
         made = self._evaluated(plan, found) if plan.function is None else plan.function(found)
+        for slot in plan.bounded:
+            self._check_bounds(slot, found)
         return Patch(found, plan.bindings, made, plan.changed)
 
     def _plan(self, own: Sequence[int], chosen: npt.NDArray[np.bool_]) -> _Plan:
         following = self.settable.reached(own, chosen.tolist())
         changed = [*own, *following]
         bindings = tuple(self.settable.bindings[place] for place in self.settable.bound_to(changed))
-        return _Plan(tuple(following), bindings, frozenset(changed))
+        bounded = (slot for slot, read in self.settable.bounded if slot in changed or not read.isdisjoint(changed))
+        return _Plan(tuple(following), bindings, frozenset(changed), tuple(bounded))
 
     def _evaluated(self, plan: _Plan, parameters: FloatArray) -> tuple[Value, ...]:
         """The plan carried out formula by formula."""
@@ -144,14 +149,28 @@ class Patcher:
         return made
 
     def _check_slot(self, slot: int, value: float) -> None:
-        """Raise PatchError where a parameter is out of its bounds."""
+        """Raise PatchError where a parameter is not finite, or out of bounds that are numbers."""
         entry = self.settable.slots[slot]
         if not math.isfinite(value):
             what = "undefined" if math.isnan(value) else "infinite"
             raise PatchError(f"'{entry.name}' would be {what}", frozenset((slot,)))
-        if not entry.low <= value <= entry.high:
-            bounds = f"{entry.low:g} to {entry.high:g}".replace("-inf", "-∞").replace("inf", "∞")
-            raise PatchError(f"'{entry.name}' is {value:g}; its bounds are {bounds}", frozenset((slot,)))
+        if isinstance(entry.low, float) and isinstance(entry.high, float):
+            self._compare(slot, value, entry.low, entry.high)
+
+    def _check_bounds(self, slot: int, parameters: FloatArray) -> None:
+        """Raise PatchError where a parameter is out of bounds that follow others."""
+        entry = self.settable.slots[slot]
+        low, high = (
+            bound if isinstance(bound, float) else float(bound.values(parameters)) for bound in (entry.low, entry.high)
+        )
+        self._compare(slot, float(parameters[slot]), low, high)
+
+    def _compare(self, slot: int, value: float, low: float, high: float) -> None:
+        entry = self.settable.slots[slot]
+        if not low <= value <= high:
+            bounds = f"{low:g} to {high:g}".replace("-inf", "-∞").replace("inf", "∞")
+            message = f"'{entry.name}' is {value:g}; its bounds are {bounds}"
+            raise PatchError(message, entry.bounds_read.union((slot,)))
 
     def _check(self, binding: Binding, value: Value, parameters: FloatArray) -> None:
         """Raise PatchError where a number is not finite, or out of its bounds."""

@@ -152,16 +152,21 @@ class Distance:
 @dataclass(frozen=True, slots=True, eq=False)
 class Slot:
     """A parameter: of the spec, or with a dotted name of an instance where it depends on one of the spec. ``formula``
-    is what it follows until it is set itself; ``low`` and ``high`` are its bounds. ``given``: its value does not come
-    from the spec, which says ``own``."""
+    is what it follows until it is set itself; ``low`` and ``high`` are its bounds, which may follow others. ``given``:
+    its value does not come from the spec, which says ``own``."""
 
     name: str
     value: float
     formula: ParameterFormula | None = None
-    low: float = -np.inf
-    high: float = np.inf
+    low: float | Dependent = -np.inf
+    high: float | Dependent = np.inf
     given: bool = False
     own: ParameterFormula | None = None
+
+    @property
+    def bounds_read(self) -> frozenset[int]:
+        """The parameters that its bounds read."""
+        return frozenset().union(*(bound.slots for bound in (self.low, self.high) if not isinstance(bound, float)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -223,6 +228,11 @@ class Settable:
             for read in () if slot.formula is None else slot.formula.slots:
                 result[read].append(place)
         return tuple(tuple(places) for places in result)
+
+    @cached_property
+    def bounded(self) -> tuple[tuple[int, frozenset[int]], ...]:
+        """The slots whose bounds follow parameters, and which they read."""
+        return tuple((place, slot.bounds_read) for place, slot in enumerate(self.slots) if slot.bounds_read)
 
     @cached_property
     def readers(self) -> tuple[tuple[int, ...], ...]:
