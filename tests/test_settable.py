@@ -137,6 +137,12 @@ def test_a_parameter_that_was_set_follows_no_other_any_more() -> None:
             {"p": 0.75},
             "the parameter 'b' of a model would be below its bound of 3",
         ),
+        ("neurons: {A: {noise: 'normal(0, p)'}}", {"p": -1}, "the spread of noise would be below its bound of 0"),
+        (
+            "neurons: {A: {count: 2, noise: 'uniform(i, q)'}}",
+            {"p": 0.25},
+            "the spread of noise would be below its bound of 0",
+        ),
         (
             "neurons: {A: {count: 2}}\nconnections: {A -> A: {weight: p*j, pattern: all_to_all, scale: {norm: 1}}}",
             {"p": 0},

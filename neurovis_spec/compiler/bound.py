@@ -11,11 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray, IntArray, frozen
+from neurovis_spec.compiler.changes import NO_INDICES
 from neurovis_spec.compiler.entries import Bundle
-from neurovis_spec.compiler.network import Connections, Input
+from neurovis_spec.compiler.network import Connections, Input, Noise
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.program import Block, Plasticity
 from neurovis_spec.compiler.settable import Binding, Dependent, ParameterFormula, Part, Settable, Slot, Variable
+from neurovis_spec.language.expressions.tree import Number
 
 
 class _Found(NamedTuple):
@@ -34,6 +36,7 @@ def make_settable(
     inputs: tuple[Input, ...],
     blocks: tuple[Block, ...],
     plasticity: tuple[Plasticity, ...],
+    noises: tuple[Noise, ...],
 ) -> Settable:
     """The bindings of a network, those of the same formula as one, and the arrays that they write to."""
     arrays: dict[str, FloatArray] = {
@@ -82,6 +85,9 @@ def make_settable(
         bindings.append(
             Binding(part.formula, one.array == "weights", indices, one.array, one.places, part.low, part.high)
         )
+    least = ParameterFormula(Number(0.0), {})
+    for noise in noises:
+        bindings += (Binding(width, False, NO_INDICES, "noise", NO_INDICES, least) for width in noise.widths)
     begin = np.concatenate([*initial, np.zeros(0)])
     frozen(begin)
     return Settable(slots, tuple(bindings), variables, begin)

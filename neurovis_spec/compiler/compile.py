@@ -153,7 +153,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         noises=noises,
         instances=_instances(units, population),
         numbering=own_weights(slots, bundles, connections.weights),
-        settable=make_settable(slots, population, bundles, connections, inputs, blocks, plasticity),
+        settable=make_settable(slots, population, bundles, connections, inputs, blocks, plasticity, noises),
         ros=ros,
     )
     eventful = _eventful(spec, network, directory, constants, made)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 #: Where a node of an expression stood, and what is only shown, is no content.
 _SHOWN = frozenset(
-    # ``slots`` and ``parts`` are how something follows parameters
+    # ``slots``, ``parts`` and ``widths`` are how something follows parameters
     (
         "start",
         "end",
@@ -36,6 +36,7 @@ _SHOWN = frozenset(
         "slots",
         "parts",
         "states",
+        "widths",
     )
 )
 

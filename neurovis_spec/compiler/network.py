@@ -19,7 +19,7 @@ from neurovis_spec.compiler.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.changes import Change
 from neurovis_spec.compiler.program import Block, Combine, Operation, Plasticity
 from neurovis_spec.compiler.ros_settings import RosSettings
-from neurovis_spec.compiler.settable import Binding, Part, Settable
+from neurovis_spec.compiler.settable import Binding, ParameterFormula, Part, Settable
 from neurovis_spec.compiler.states import StateOf
 from neurovis_spec.compiler.wishes import LayoutSettings, RenderSettings
 from neurovis_spec.language.expressions.tree import Tree
@@ -156,6 +156,8 @@ class Noise:
     parameters: Mapping[str, float]
     #: the slots of those parameters that can be set
     slots: Mapping[str, int] = field(default_factory=dict)
+    #: deviations, and widths of ``uniform``, that follow parameters: none may become negative
+    widths: tuple[ParameterFormula, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

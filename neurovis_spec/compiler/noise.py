@@ -13,11 +13,11 @@ from neurovis_spec.compiler.arrays import frozen
 from neurovis_spec.compiler.constants import Constants, Value, width_of
 from neurovis_spec.compiler.network import Noise
 from neurovis_spec.compiler.populate import Population
-from neurovis_spec.compiler.settable import places_of
+from neurovis_spec.compiler.settable import ParameterFormula, places_of
 from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
-from neurovis_spec.language.expressions.tree import Conditional, Draw, Tree, children, draws, names
+from neurovis_spec.language.expressions.tree import Binary, Conditional, Draw, Tree, children, draws, names
 from neurovis_spec.language.located import Formula
 
 
@@ -32,11 +32,11 @@ def make_noises(units: tuple[Unit, ...], population: Population, inputs: int) ->
         tree = _tree(formula, constants)
         if tree is None:
             continue
-        _check_deviations(tree, formula, group.count, constants)
+        widths = _check_deviations(tree, formula, group.count, constants)
         members = np.arange(group.start, group.start + group.count, dtype=np.int64)
         frozen(members)
         slots = places_of(tree, constants.settable)
-        result.append(Noise(group.name, members, start, tree, dict(constants.parameters), slots))
+        result.append(Noise(group.name, members, start, tree, dict(constants.parameters), slots, widths))
         start += group.count
     for model, owner in population.lost:
         if model.noise is not None:
@@ -54,10 +54,11 @@ def _tree(formula: Formula, constants: Constants) -> Tree | None:
     return None
 
 
-def _check_deviations(tree: Tree, formula: Formula, count: int, constants: Constants) -> None:
+def _check_deviations(tree: Tree, formula: Formula, count: int, constants: Constants) -> tuple[ParameterFormula, ...]:
     """A finding where a deviation, or what ``uniform`` draws from, is known before the run and negative for any neuron.
     A deviation that depends on the step, or a draw in a branch, which may not be taken, gives NaN in the run, and its
-    warning."""
+    warning. Gives those of them that follow parameters of the run."""
+    following = []
     known: dict[str, Value] = {**constants.parameters, **CONSTANTS, "dt": constants.dt}
     known |= {"i": np.arange(count, dtype=np.float64), "n": float(count)}
     for draw in _always_drawn(tree):
@@ -66,6 +67,11 @@ def _check_deviations(tree: Tree, formula: Formula, count: int, constants: Const
             width = width_of(draw, *(evaluate_array(part, known) for part in (parts[0], draw.second)))
             if np.less(width, 0).any():
                 constants.refuse_draw(formula, draw, float(np.min(width)))
+            tree = draw.second if draw.kind == "normal" else Binary("-", draw.second, draw.first)
+            bound = constants.bound(tree, {name: known[name] for name in ("i", "n")})
+            if bound.slots:
+                following.append(bound)
+    return tuple(following)
 
 
 def _always_drawn(tree: Tree) -> Iterator[Draw]:

@@ -26,7 +26,12 @@ _CALLED: Mapping[str, str] = {
     "low": "a lower bound of weights",
     "high": "an upper bound of weights",
     "table": "a value of an input",
+    "noise": "the spread of noise",
 }
+
+
+#: Plans that are kept.
+_MOST_PLANS = 256
 
 
 class PatchError(ValueError):
@@ -51,6 +56,8 @@ class Patch:
     def write(self, weights: FloatArray, variables: FloatArray) -> None:
         """Put the values where they belong."""
         for binding, value in zip(self.bindings, self.values, strict=True):
+            if not len(binding.indices):  # it is there to be checked alone
+                continue
             (weights if binding.weights else variables)[binding.indices] = value
 
 
@@ -83,6 +90,8 @@ class Patcher:
         key = own, chosen.tobytes()
         plan = self._plans.get(key)
         if plan is None:
+            if len(self._plans) >= _MOST_PLANS:
+                self._plans.clear()
             plan = self._plans[key] = self._plan(own, chosen)
         found = parameters.copy()
         for slot, value in values.items():

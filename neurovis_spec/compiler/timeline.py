@@ -198,6 +198,8 @@ class _Trial:
         effect = False
         for place, (binding, value) in enumerate(zip(patch.bindings, patch.values, strict=True)):
             now = (self._weights if binding.weights else self._variables)[binding.indices]
+            if not len(binding.indices):
+                continue
             effect = effect or bool((now != value).any())
             arrays[binding.array].append(place)
         marks = [patch.parameters[self._root].tobytes()]

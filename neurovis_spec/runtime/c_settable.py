@@ -90,7 +90,9 @@ def write_follow(code: Code, settable: Settable) -> None:
     """The body of ``follow(state, p, changed)``: ``p`` are parameters of which some are ``changed``. All that depends
     on them follows; it gives 0, and nothing has changed, where a number would not be finite or leave its bounds."""
     for slot, entry in enumerate(settable.slots):
-        code.line(f"if (changed[{slot}]) {{")
+        reads = {slot}.union(*(bound.slots for bound in (entry.low, entry.high) if not isinstance(bound, float)))
+        condition = " || ".join(f"changed[{other}]" for other in sorted(reads))
+        code.line(f"if ({condition}) {{")
         code.line(f"    if (!isfinite(p[{slot}]){_outside(code, f'p[{slot}]', entry.low, entry.high)})")
         code.line("        return 0;")
         code.line("}")
@@ -105,20 +107,25 @@ def write_follow(code: Code, settable: Settable) -> None:
     with code.block("for (int write = 0; write < 2; write++)"):
         for binding in settable.bindings:
             if binding.slots:
-                _write_binding(code, binding)
+                _write_binding(code, binding, settable)
     code.line(f"memcpy(state->parameters, p, {len(settable.slots)}*sizeof(p[0]));")
     code.line("return 1;")
 
 
-def _outside(code: Code, value: str, low: float, high: float) -> str:
-    tests = [f" || {value} < {code.text(low)}"] if np.isfinite(low) else []
-    return "".join([*tests, f" || {value} > {code.text(high)}" if np.isfinite(high) else ""])
+def _outside(code: Code, value: str, low: float | Dependent, high: float | Dependent) -> str:
+    tests = ""
+    for bound, beyond in ((low, "<"), (high, ">")):
+        if not isinstance(bound, float):
+            tests += f" || {value} {beyond} {code.text(formula(code, bound, 0))}"
+        elif np.isfinite(bound):
+            tests += f" || {value} {beyond} {code.text(bound)}"
+    return tests
 
 
-def _write_binding(code: Code, binding: Binding) -> None:
-    """What one formula gives, checked at first, then written."""
+def _write_binding(code: Code, binding: Binding, settable: Settable) -> None:
+    """What one formula gives, checked at first, then written; what stands nowhere is checked alone."""
     condition = " || ".join(f"changed[{slot}]" for slot in sorted(binding.slots))
-    count = len(binding.indices)
+    count = len(binding.indices) or int(np.size(binding.formula.values(settable.parameters)))
     array = "weights" if binding.weights else "x"
     bounds = [bound for bound in (binding.low, binding.high) if bound is not None]
     with code.block(f"if ({condition})"):
@@ -142,5 +149,7 @@ def _write_number(code: Code, binding: Binding, place: Place, array: str) -> Non
     high = "" if binding.high is None else f" || value > {code.text(formula(code, binding.high, place))}"
     code.line(f"if (!isfinite(value){low}{high})")
     code.line("    return 0;")
+    if not len(binding.indices):
+        return
     code.line("if (write)")
     code.line(f"    {array}[{code.at(binding.indices, place)}] = value;")
