@@ -46,7 +46,6 @@ _COMPARISONS: Mapping[str, int] = {
     "==": _EQUAL,
     "!=": _EQUAL,
 }
-_LITERAL = re.compile(r"[0-9.e+-]+f?")
 _NONE: Mapping[str, Made] = MappingProxyType({})
 
 #: Functions of C's library whose results a compiler must not work out itself: it rounds better than the library.
@@ -260,10 +259,10 @@ class _Writer:
                 return f"{self.tight(tree, _ADD)} != {self.number(0.0)}", _EQUAL
 
     def power(self, base: Tree, exponent: Tree) -> _Code:
-        code = self.loose(exponent)
-        if _LITERAL.fullmatch(code):
-            return f"nv_power({self.loose(base)}, {code})", _ATOM
-        return f"pow{self.emitter.suffix}({self.loose(base)}, {code})", _ATOM
+        known = known_in(exponent, self.names)
+        if isinstance(known, Number):
+            return f"nv_power({self.loose(base)}, {self.number(known.value)})", _ATOM
+        return f"pow{self.emitter.suffix}({self.loose(base)}, {self.loose(exponent)})", _ATOM
 
     def call(self, function: str, arguments: tuple[Tree, ...]) -> _Code:
         codes = [self.loose(argument) for argument in arguments]
