@@ -126,8 +126,8 @@ def listing() -> tuple[str, ...]:
 
 
 def choose_backend(network: Network, steps: int | None = None) -> tuple[str, str]:
-    """The name of the backend that runs this network unless another is asked for, and why. It goes by the length of the
-    network's default run, or of a longer one (``steps``): shorter runs, and steps by hand, give the same bits."""
+    """The name of the backend that runs this network unless another is asked for, and why. A run that is shorter than
+    ``time.steps``, and one step by step, count as one of these: a run and its parts give the same bits."""
     size = f"{len(network.neurons)} neurons, {len(network.connections)} connections"
     if "c" not in names():
         return "numpy", f"array code made for this network ({size}); needs nothing but NumPy"
