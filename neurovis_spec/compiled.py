@@ -353,7 +353,27 @@ class CompiledNetwork:
     def _snapshot(self, step: int | None, recording: Recording | None, progress: Progress | None) -> Snapshot:
         from neurovis_spec.snapshots import snapshot_at
 
-        return snapshot_at(self.network, step, recording, partial(self.run, progress=progress))
+        if recording is None and (step is None or step >= 0):
+            # one run serves the step and the gains
+            wanted = self.network.steps if step is None else step + 1
+            recording = self.run(self.steps_to_draw(step), progress=progress)
+            if self._gain_steps:
+                self.__dict__["gains"] = pipeline.measure(self.network, made=recording)
+            step = wanted - 1
+        return snapshot_at(self.network, step, recording, self.run)
+
+    @property
+    def _gain_steps(self) -> int:
+        """The steps to run for the gains: 0 where these are known."""
+        from neurovis_spec.scene.probe import probe_steps
+
+        return 0 if "gains" in self.__dict__ else probe_steps(self.network)
+
+    def steps_to_draw(self, step: int | None = None, recording: Recording | None = None) -> int:
+        """How many steps ``render`` will run: those up to the step, without a recording, and those that the gains take
+        which the spec does not state, in one run."""
+        wanted = self.network.steps if step is None else step + 1
+        return max(wanted if recording is None else 0, self._gain_steps)
 
     def _repr_svg_(self) -> str:
         """The network at the last step of its default run, for a notebook."""

@@ -174,11 +174,11 @@ def locate(
     return where(refusal, spec, request, network, engine)
 
 
-def measure(network: Network, progress: Progress | None = None) -> Gains:
-    """The gains of Eqs. 2–5: the author's, else such that the range of a default run shows."""
+def measure(network: Network, progress: Progress | None = None, made: Recording | None = None) -> Gains:
+    """The gains of Eqs. 2–5: the author's, else such that the range of a default run shows, which may be ``made``."""
     from neurovis_spec.scene.probe import probe
 
-    return probe(network, progress)
+    return probe(network, progress, made)
 
 
 def picture(network: Network, layout: Layout, snapshot: Snapshot, gains: Gains, settings: RenderSettings) -> Scene:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from neurovis_spec.cli.files import network_of, recording_of, show_warnings, writing
+from neurovis_spec.cli.files import count, network_of, recording_of, show_warnings, writing
 from neurovis_spec.cli.options import (
     engine_option,
     examples,
@@ -18,6 +19,16 @@ from neurovis_spec.cli.options import (
 )
 from neurovis_spec.cli.progress import progress
 from neurovis_spec.cli.targets import check_files, check_target
+
+if TYPE_CHECKING:
+    from neurovis_spec.compiled import CompiledNetwork
+    from neurovis_spec.runtime.recording import Recording
+
+
+def _why(network: CompiledNetwork, step: int | None, recording: Recording | None, steps: int) -> str:
+    """What a run is for, where it is not for the step that is drawn."""
+    wanted = 0 if recording is not None else network.network.steps if step is None else step + 1
+    return "" if steps <= wanted else ", which show the range of its values (render: {gain: …} in the spec states it)"
 
 
 @click.command(
@@ -52,6 +63,9 @@ def command(
     network = network_of(spec, settings)
     check_files(output, network)
     record = recording_of(recording)
+    steps = network.steps_to_draw(step, record)
+    if steps:
+        click.echo(f"running {count(steps, 'step')}{_why(network, step, record, steps)}", err=True)
     with progress("drawing") as bar, writing(output):
         network.render(output, step=step, recording=record, theme=theme, engine=engine, progress=bar)
     show_warnings(network.drawn(engine))

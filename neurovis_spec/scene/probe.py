@@ -7,6 +7,7 @@ somebody's recording, so that a picture of a step is the same wherever the step 
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,17 +24,30 @@ BUDGET = 4_000_000
 _CHUNK = 256
 
 
-def probe(network: Network, progress: Progress | None = None) -> Gains:
-    """The gains of a network: what its spec states, else from the peaks of its default run."""
+def probe_steps(network: Network) -> int:
+    """How many steps the gains of a network take: none where its spec states all of them."""
     settings = network.render
     if None not in (settings.activity, settings.signal, settings.thickness, settings.change):
+        return 0
+    width = len(network.neurons) + len(network.changing) + 1
+    return max(1, min(network.steps, BUDGET // width))
+
+
+def probe(network: Network, progress: Progress | None = None, made: Recording | None = None) -> Gains:
+    """The gains of a network: what its spec states, else from the peaks of its default run. Where this is ``made``, as
+    far as they need it or further, it is not run again."""
+    settings, steps = network.render, probe_steps(network)
+    if not steps:
         none = np.zeros(len(network.connections))
         return choose_gains(network, settings, np.zeros(len(network.neurons)), none, none, none)
-    width = len(network.neurons) + len(network.changing) + 1
-    steps = max(1, min(network.steps, BUDGET // width))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # the run that the author asks for warns
-        recording = record(network, steps, progress=progress)
+    if made is None:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # the run that the author asks for warns
+            made = record(network, steps, progress=progress)
+    rows = slice(steps)
+    recording = replace(
+        made, step=made.step[rows], activity=made.activity[rows], weights=made.weights[rows], states=made.states[rows]
+    )
     with np.errstate(over="ignore", invalid="ignore"):  # what is no finite number counts for nothing
         return choose_gains(network, settings, *peaks(network, recording))
 
