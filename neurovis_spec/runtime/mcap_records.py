@@ -294,73 +294,77 @@ def _expanded(data: bytes, compression: str, size: int) -> bytes:
 
 @dataclass
 class _Summary:
-    """What the end of a file says of its records."""
+    """What the end of a file says of its records, but for the chunks, of which there are many."""
 
     groups: dict[int, list[bytes]] = field(default_factory=lambda: {number: [] for number in _GROUPS})
     counts: dict[int, int] = field(default_factory=dict)
+    chunks: int = 0
     first: int = _LAST
     last: int = 0
-    #: the chunk that message indices follow
-    chunk: Found | None = None
-    about: bytes = b""
-    places: dict[int, int] = field(default_factory=dict)
-    indexed: int = 0
 
     def take(self, file: FileIO, found: Found) -> None:
         """Note a record."""
-        if found.opcode != MESSAGE_INDEX:
-            self.end_chunk()
+        place = struct.pack("<QQ", found.start, found.end - found.start)
         if found.opcode in (SCHEMA, CHANNEL):
             self.groups[found.opcode].append(record(found.opcode, content_of(file, found).data))
         elif found.opcode == CHUNK:
-            reader = content_of(file, found, 64)
-            first, last, size = reader.number(8), reader.number(8), reader.number(8)
-            reader.take(4)
-            compression = reader.text()
-            self.first, self.last = min(self.first, first), max(self.last, last)
-            self.chunk, self.places, self.indexed = found, {}, 0
-            tail = text(compression) + struct.pack("<QQ", reader.number(8), size)
-            start = struct.pack("<QQQQ", first, last, found.start, found.end - found.start)
-            self.about = start + b"|" + tail
+            reader = content_of(file, found, 16)
+            self.first, self.last = min(self.first, reader.number(8)), max(self.last, reader.number(8))
+            self.chunks += 1
         elif found.opcode == MESSAGE_INDEX:
             reader = content_of(file, found, 6)
             channel, size = reader.number(2), reader.number(4)
             self.counts[channel] = self.counts.get(channel, 0) + size // 16
-            self.places[channel] = found.start
-            self.indexed += found.end - found.start
         elif found.opcode == ATTACHMENT:
             reader = content_of(file, found, 4096)
-            times, name, media = reader.take(16), reader.text(), reader.text()
-            size = reader.number(8)
-            where = struct.pack("<QQ", found.start, found.end - found.start)
-            made = record(ATTACHMENT_INDEX, where, times, struct.pack("<Q", size), text(name), text(media))
+            times, name, media, length = reader.take(16), reader.text(), reader.text(), reader.take(8)
+            made = record(ATTACHMENT_INDEX, place, times, length, text(name), text(media))
             self.groups[ATTACHMENT_INDEX].append(made)
         elif found.opcode == METADATA:
             name = content_of(file, found, 4096).text()
-            where = struct.pack("<QQ", found.start, found.end - found.start)
-            self.groups[METADATA_INDEX].append(record(METADATA_INDEX, where, text(name)))
-
-    def end_chunk(self) -> None:
-        """The indices of a chunk are all there."""
-        if self.chunk is not None:
-            start, tail = self.about[:32], self.about[33:]
-            places = b"".join(struct.pack("<HQ", *item) for item in self.places.items())
-            offsets = struct.pack("<I", len(places)) + places + struct.pack("<Q", self.indexed)
-            self.groups[CHUNK_INDEX].append(record(CHUNK_INDEX, start, offsets, tail))
-            self.chunk = None
+            self.groups[METADATA_INDEX].append(record(METADATA_INDEX, place, text(name)))
 
     def statistics(self) -> bytes:
         """How much there is of everything."""
-        sizes = {opcode: len(made) for opcode, made in self.groups.items()}
         counts = b"".join(struct.pack("<HQ", *item) for item in self.counts.items())
         numbers = struct.pack(
             "<QHIIIIQQ",
             sum(self.counts.values()),
-            *(sizes[opcode] for opcode in (SCHEMA, CHANNEL, ATTACHMENT_INDEX, METADATA_INDEX, CHUNK_INDEX)),
+            *(len(self.groups[opcode]) for opcode in (SCHEMA, CHANNEL, ATTACHMENT_INDEX, METADATA_INDEX)),
+            self.chunks,
             0 if self.first == _LAST else self.first,
             self.last,
         )
         return record(STATISTICS, numbers, struct.pack("<I", len(counts)), counts)
+
+
+def _chunk_indices(file: FileIO, end: int) -> Iterator[bytes]:
+    """A record for each chunk before a place, with where the message indices behind it are."""
+    chunk: Found | None = None
+    places: list[tuple[int, int]] = []
+
+    def made() -> Iterator[bytes]:
+        if chunk is not None:
+            reader = content_of(file, chunk, 64)
+            times, size = reader.take(16), reader.take(8)
+            reader.take(4)
+            compression, compressed = reader.text(), reader.take(8)
+            where = struct.pack("<QQ", chunk.start, chunk.end - chunk.start)
+            packed = b"".join(struct.pack("<HQ", *place) for place in places)
+            behind = struct.pack("<I", len(packed)) + packed + struct.pack("<Q", last - chunk.end)
+            yield record(CHUNK_INDEX, times, where, behind, text(compression), compressed, size)
+
+    last = 0
+    for found in scan(file):
+        if found.start >= end:
+            break
+        if found.opcode == MESSAGE_INDEX:
+            places.append((content_of(file, found, 2).number(2), found.start))
+            last = found.end
+        else:
+            yield from made()
+            chunk, places, last = (found if found.opcode == CHUNK else None), [], found.end
+    yield from made()
 
 
 def finish(file: FileIO) -> None:
@@ -372,24 +376,24 @@ def finish(file: FileIO) -> None:
             break
         summary.take(file, found)
         end = found.end
-    summary.end_chunk()
     summary.groups[STATISTICS] = [summary.statistics()]
     file.truncate(end)
     file.seek(end)
-    data_end = record(DATA_END, bytes(4))
-    start = end + len(data_end)
-    parts, offsets, at = [], [], start
-    for opcode, made in summary.groups.items():
-        if made:
-            joined = b"".join(made)
-            parts.append(joined)
-            offsets.append(record(SUMMARY_OFFSET, struct.pack("<BQQ", opcode, at, len(joined))))
-            at += len(joined)
-    whole = b"".join([*parts, *offsets])
+    put(file, record(DATA_END, bytes(4)))
+    start = at = file.tell()
+    checksum, offsets = 0, b""
+    for opcode, few in summary.groups.items():
+        begin = at
+        for made in _chunk_indices(file, end) if opcode == CHUNK_INDEX else few:
+            file.seek(at)
+            put(file, made)
+            checksum, at = crc32(made, checksum), at + len(made)
+        if at > begin:
+            offsets += record(SUMMARY_OFFSET, struct.pack("<BQQ", opcode, begin, at - begin))
     places = struct.pack("<QQ", start, at)
-    checksum = crc32(whole + _HEAD.pack(FOOTER, 20) + places)
-    footer = record(FOOTER, places, struct.pack("<I", checksum))
-    put(file, data_end + whole + footer + MAGIC)
+    checksum = crc32(offsets + _HEAD.pack(FOOTER, 20) + places, checksum)
+    file.seek(at)
+    put(file, offsets + record(FOOTER, places, struct.pack("<I", checksum)) + MAGIC)
 
 
 def put(file: FileIO, data: bytes) -> None:
