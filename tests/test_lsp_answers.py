@@ -374,3 +374,13 @@ def test_deep_and_long_texts_are_looked_at_once(text: str) -> None:
     assert hover(document, place) is None
     assert definition(document, place) is None
     assert len(symbols(document)) <= 1
+
+
+def test_a_group_is_renamed_in_the_states_of_its_model_too() -> None:
+    text = (
+        "neurons:\n  K¦: {count: 2, model: adaptive}\n  O: {}\noutputs: {m: K.v, k: [left.K.b, K1.b], e: (K -> O).z}\n"
+    )
+    wanted = (
+        "neurons:\n  L: {count: 2, model: adaptive}\n  O: {}\noutputs: {m: L.v, k: [left.K.b, L1.b], e: (L -> O).z}\n"
+    )
+    assert renamed(text, "L") == wanted

@@ -97,7 +97,7 @@ class Columns:
 
 def columns_of(network: Network, keep: Keep = ALL) -> Columns:
     """What is kept of a network. Raises KeyError with the nearest names."""
-    names = names_of(network)
+    names = names_of(network) if keep.neurons or keep.states else None
     states: dict[tuple[str, str, int], None] = {}
     outputs: dict[str, tuple[tuple[int, ...], bool]] = {}
     for output in network.outputs:
@@ -116,8 +116,8 @@ def columns_of(network: Network, keep: Keep = ALL) -> Columns:
     )
 
 
-def _neurons(references: Sequence[str], names: Names, count: int) -> IntArray | None:
-    if not references:
+def _neurons(references: Sequence[str], names: Names | None, count: int) -> IntArray | None:
+    if not references or names is None:
         return None
     found = names.find(" + ".join(references))
     if isinstance(found, str):
