@@ -37,7 +37,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def start(*arguments: object) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "neurovis_spec", *map(str, arguments)]
+    slow = ("--backend", "numpy") if arguments[0] == "run" and "--backend" not in arguments else ()
+    command = [sys.executable, "-m", "neurovis_spec", *map(str, arguments), *slow]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 
 
@@ -63,14 +64,14 @@ def files(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def assert_begins_like_it(recording: Recording) -> None:
-    """The rows are those of a run that nobody has ended, one in 20: looked at are those of the first few stretches."""
+def assert_begins_like_it(recording: Recording, backend: str = "numpy", every: int = 20) -> None:
+    """The rows are those of a run that nobody has ended, one in ``every``: checked are those of the first few stretches."""
     rows = min(len(recording), 100)
-    whole = nv.compile("long.yaml").run(rows * 20, every=20)
+    whole = nv.compile("long.yaml").run(rows * every, every=every, backend=backend)
     assert rows > 0
     np.testing.assert_array_equal(recording.activity[:rows], whole.activity)
     np.testing.assert_array_equal(recording.weights[:rows], whole.weights)
-    assert recording.step.tolist() == list(range(0, len(recording) * 20, 20))
+    assert recording.step.tolist() == list(range(0, len(recording) * every, every))
 
 
 @pytest.mark.parametrize("suffix", ["npz", "csv"])
@@ -86,7 +87,7 @@ def test_a_signal_ends_a_run_with_what_was_recorded(folder: Path, number: signal
     assert_begins_like_it(recording)
     if suffix == "npz":
         assert 1 <= recording.reached - recording.step[-1] <= 20
-        longer = nv.compile("long.yaml").run(recording.reached + 1)
+        longer = nv.compile("long.yaml").run(recording.reached + 1, backend="numpy")
         np.testing.assert_array_equal(recording.weights_after, longer.weights[-1])
 
 
@@ -163,6 +164,18 @@ def test_two_writers_do_not_destroy_each_other(folder: Path, suffix: str) -> Non
         ended(process, signal.SIGTERM)
         assert_begins_like_it(nv.load(path))
     assert files(folder) == ["long.yaml", path.name]
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("number", SIGNALS)
+def test_many_steps_in_one_call_of_c_end_at_a_signal(folder: Path, number: signal.Signals) -> None:
+    much = ("--backend", "c", "--steps", 10**9, "--every", 1000)
+    process = start("run", "long.yaml", *much, "-o", "x.npz")
+    until_it_records(folder / ".x.npz.part")
+    assert "stopped at step" in ended(process, number)
+    assert process.returncode == 128 + number
+    assert_begins_like_it(nv.load("x.npz"), "c", 1000)
+    assert files(folder) == ["long.yaml", "x.npz"]
 
 
 def test_rows_are_written_at_least_every_quarter_of_a_second(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
