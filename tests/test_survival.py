@@ -65,7 +65,7 @@ def files(folder: Path) -> list[str]:
 
 
 def assert_begins_like_it(recording: Recording, backend: str = "numpy", every: int = 20) -> None:
-    """The rows are those of a run that nobody has ended, one in ``every``: checked are those of the first few stretches."""
+    """The rows are those of a run that nobody has ended, one in ``every``; the first stretches are checked."""
     rows = min(len(recording), 100)
     whole = nv.compile("long.yaml").run(rows * every, every=every, backend=backend)
     assert rows > 0

@@ -15,6 +15,8 @@ from neurovis_spec.runtime.c_backend import SMALL
 _OPERATION, _ITEM = 6e-6, 5e-9
 #: seconds to compile: at least, for each neuron and connection that is written out, and for each in a table
 _COMPILE, _WRITTEN_OUT, _TABLE = 0.12, 1.2e-3, 5e-7
+#: and for each block and each plasticity, which are loops
+_LOOP = 0.02
 
 
 def seconds_saved(network: Network, steps: int) -> float:
@@ -26,7 +28,8 @@ def seconds_saved(network: Network, steps: int) -> float:
 def seconds_to_compile(network: Network) -> float:
     """What it costs to compile a network."""
     items = len(network.neurons) + len(network.connections)
-    return _COMPILE + (_WRITTEN_OUT * items if items <= SMALL else _TABLE * items + 0.05 * len(network.blocks))
+    loops = len(network.blocks) + len(network.plasticity)
+    return _COMPILE + (_WRITTEN_OUT * items if items <= SMALL else _TABLE * items + _LOOP * loops)
 
 
 def pays(network: Network, steps: int) -> tuple[bool, str]:
