@@ -122,8 +122,8 @@ void run(int64_t steps, int64_t n, int64_t m, const int32_t *group, const int32_
          const int32_t *edge, const int32_t *source, const int32_t *delay, const int32_t *start,
          const int32_t *fed, const double *bias, const double *initial, const double *one, const double *two,
          double *restrict w, double *restrict ring, double *restrict v, double *restrict a, const double *inputs,
-         const int32_t *learned, const int32_t *reflex, const double *rate, double *restrict last, double *restrict rows,
-         double *restrict kept)
+         const int32_t *learned, const int32_t *reflex, const double *rate, double *restrict last,
+         double *restrict rows, double *restrict kept)
 {
     for (int64_t k = 0; k < steps; k++, inputs += 9) {
         for (int i = 0; i < 4; i++)

@@ -141,7 +141,7 @@ def test_a_csv_is_enough_to_go_on_from_but_for_the_last_update(tmp_path: Path) -
 
 
 def test_unknown_suffixes_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match=r"suffix '\.nzp'; known: \.csv, \.npz"):
+    with pytest.raises(RecordingError, match=r"suffix '\.nzp'; known: \.csv, \.mcap, \.npz"):
         parallel().save(tmp_path / "x.nzp")
 
 
