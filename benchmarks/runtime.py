@@ -125,6 +125,7 @@ void run(int64_t steps, int64_t n, int64_t m, const int32_t *group, const int32_
          const int32_t *learned, const int32_t *reflex, const double *rate, double *restrict last,
          double *restrict rows, double *restrict kept)
 {
+    double sent[4] = {0};
     for (int64_t k = 0; k < steps; k++, inputs += 9) {
         for (int i = 0; i < 4; i++)
             kept[4*k + i] = w[learned[i]];
@@ -168,7 +169,8 @@ void run(int64_t steps, int64_t n, int64_t m, const int32_t *group, const int32_
         for (int i = 0; i < 4; i++) {
             const int32_t c = learned[i];
             const double change = k ? a[reflex[i]] - last[i] : 0.0;
-            w[c] += rate[i]*a[source[c]]*change;
+            w[c] += rate[i]*sent[i]*change;
+            sent[i] = a[source[c]];
             last[i] = a[reflex[i]];
         }
         memcpy(rows + k*n, a, n*sizeof(double));
