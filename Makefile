@@ -3,7 +3,7 @@
 #   make demo       makes .venv, installs, and runs the main job into demo/
 #   make test       every check that needs Python alone
 #   make gallery    draws the examples into docs/pictures and writes docs/gallery.md; needs graphviz' dot
-#   make test-all   the tests that need Chromium, graphviz' dot or a C compiler; fails without them
+#   make test-all   the tests that need Chromium, graphviz' dot, gcc and g++, or start a cluster; fails without them
 #   make fuzz       20,000 broken specs and 5,000 expressions (FUZZ_ARGS=... for more), two or three minutes
 #   make layouts    layouts beside dot's, sfdp's and networkx' (LAYOUTS_ARGS="--all --graphs FOLDER" for more)
 #   make docs       writes the generated parts of docs/ anew
@@ -69,7 +69,8 @@ needs:
 	for browser in chromium chromium-browser google-chrome; do command -v $$browser >/dev/null && break; done \
 	  || missing="$$missing Chromium (apt-get install chromium);"; \
 	command -v dot >/dev/null || missing="$$missing dot (apt-get install graphviz);"; \
-	command -v cc >/dev/null || command -v gcc >/dev/null || missing="$$missing a C compiler (apt-get install gcc libc6-dev);"; \
+	command -v gcc >/dev/null || missing="$$missing a C compiler (apt-get install gcc libc6-dev);"; \
+	command -v g++ >/dev/null || missing="$$missing a C++ compiler (apt-get install g++);"; \
 	test -z "$$missing" || { echo "make test-all needs what is not here:$$missing" >&2; exit 1; }
 
 fuzz: $(VENV)/tested
