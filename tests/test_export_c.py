@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import subprocess
+import tempfile
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from exported import LANGUAGES, STRICT, compiled
+from hypothesis import Phase, given, settings
+from random_specs import specs
 from test_runtime_conformance import EVENTS, SPECS
 
 import neurovis_spec as nv
@@ -163,3 +167,56 @@ def test_the_size_in_the_readme_is_that_of_the_struct(tmp_path: Path) -> None:
     for text in (EVENTS, "neurovis: 1\nname: x\nneurons: {A: {}, B: {}, C: {}}\n"):
         controller = compiled(nv.compile_text(text).network, tmp_path / str(len(text)))
         assert size_of_state(controller.made) == len(controller.memory)
+
+
+SETTING = """
+neurovis: 1
+name: setting
+seed: 4
+parameters: {g: 0.5, h: {value: 0.4, min: 0, max: 1}, d: 2*g, x: 0.3}
+modules:
+  leg:
+    parameters: {own: 1, other: own*2}
+    neurons: {S: {count: 3, bias: own*i, activation: tanh}, K: {activation: tanh}}
+    connections: {S -> K: "other*uniform(0.1, 0.3)"}
+instances: {left: {module: leg, count: 2, set: {own: g*i}}}
+inputs: {w: {values: [[g], [h], [0.2]]}, e: {expression: sin(k*d)}}
+neurons:
+  A: {count: 4, bias: "g*(i-1) + x", activation: tanh, input: w}
+  B: {count: 3, model: {leaky_integrator: {leak: h}}, activation: {gaussian: {sigma: d}}}
+  E: {input: e, noise: "uniform(0, x)"}
+connections:
+  A -> B: {weight: "normal(g, 0.1)*(i+1)", pattern: all_to_all, delay: 2}
+  B -> left1.S: {weight: h, pattern: one_to_one}
+  left.K -> A: {weight: "0.1*g", pattern: all_to_all}
+  A -> E: {weight: 0.2, plasticity: {hebbian: {rate: 0.1*h}}, bounds: [-d, d]}
+events:
+  - {at: 6, set: {g: g + 0.1}}
+  - {from: 8, to: 12, clamp: {A1: x}}
+"""
+
+
+def test_everything_that_follows_a_parameter_follows_it_in_c(tmp_path: Path) -> None:
+    """Draws, instances, tables, bounds, parameters of parameters, clamps, and what events set in between."""
+    network = nv.compile_text(SETTING).network
+    controller, simulation = compiled(network, tmp_path), Simulation(network, "reference")
+    for k in range(30):
+        for at, name, value in ((3, "g", 0.9), (5, "h", 0.7), (9, "x", 0.1), (15, "d", 0.15), (17, "g", 0.2)):
+            if k == at:
+                assert controller.set(name, value)
+                simulation.set({name: value})
+        controller.step()
+        simulation.step()
+        np.testing.assert_array_equal(controller.activity, simulation.activity, f"a[{k}]")
+    assert not controller.set("h", 2.0)
+    controller.step()
+    simulation.step()
+    np.testing.assert_array_equal(controller.activity, simulation.activity)
+
+
+@settings(max_examples=8, deadline=None, phases=(Phase.explicit, Phase.generate))
+@given(spec=specs())
+def test_random_networks_run_alike_when_exported(spec: dict[str, object]) -> None:
+    with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
+        warnings.simplefilter("ignore")
+        runs_alike(nv.compile(spec).network, Path(folder), steps=12)

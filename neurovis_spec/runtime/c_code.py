@@ -97,7 +97,7 @@ class Code:
     @contextmanager
     def block(self, head: str) -> Iterator[None]:
         """Lines within braces."""
-        self.line(f"{head} {{")
+        self.line(f"{head} {{".lstrip())
         self.indent += 1
         yield
         self.indent -= 1

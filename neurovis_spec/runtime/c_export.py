@@ -111,7 +111,7 @@ class Exported:
         ]
         if self.holding:
             found.append(Member("holding", np.zeros(len(network.neurons)), "what neurons are held at"))
-        return [member for member in found if len(member.begin)]
+        return [member for member in found if len(member.begin) or member.name in ("activity", "weights")]
 
     @property
     def first(self) -> bool:
@@ -150,12 +150,11 @@ class Exported:
             "/* All that changes. Copy it to keep a state, and copy it back to go on from there. */",
             f"typedef struct {name}_state {{",
         ]
-        width = {member.name: len(member.begin) for member in self.members}
-        for wanted in ("activity", "weights"):
-            if wanted not in width:
-                lines.append(f"    {self.real} {wanted}[1]; /* there are none */")
         for member in self.members:
-            lines.append(f"    {self.real} {member.name}[{len(member.begin)}]; /* {member.about} */")
+            if len(member.begin):
+                lines.append(f"    {self.real} {member.name}[{len(member.begin)}]; /* {member.about} */")
+            else:
+                lines.append(f"    {self.real} {member.name}[1]; /* there are none */")
         lines.append("    int64_t k; /* the step to come */")
         if slots:
             lines.append(f"    unsigned char chosen[{slots}]; /* parameters that were set */")
@@ -434,13 +433,10 @@ class Exported:
         code = self._code()
         for member in self.members:
             array = np.ascontiguousarray(member.begin, dtype=np.float64)
-            if not array.view(np.int64).any():
+            if not array.view(np.int64).any():  # nothing but zeros
                 code.line(f"memset(state->{member.name}, 0, sizeof state->{member.name});")
             else:
                 code.line(f"memcpy(state->{member.name}, {self.tables.name(array)}, sizeof state->{member.name});")
-        for name in ("activity", "weights"):
-            if name not in {member.name for member in self.members}:
-                code.line(f"state->{name}[0] = {code.text(0.0)};")
         code.line("state->k = 0;")
         if self.network.settable.slots:
             code.line("memset(state->chosen, 0, sizeof state->chosen);")

@@ -63,8 +63,7 @@ def size_of_state(made: Exported) -> int:
     """The bytes of the struct on common machines."""
     network = made.network
     number = 4 if made.real == "float" else 8
-    numbers = sum(len(member.begin) for member in made.members)
-    numbers += sum(not any(member.name == name for member in made.members) for name in ("activity", "weights"))
+    numbers = sum(max(len(member.begin), 1) for member in made.members)
     size = -(-numbers * number // 8) * 8 + 8 + len(network.settable.slots)
     if len(made.phases) > 1:
         size = -(-size // 4) * 4 + 4

@@ -51,7 +51,7 @@ def formula(code: Code, dependent: Dependent, place: Place, parameters: str = "p
 
             return code.emitter.value(tree, {**code.clock, **names}, {}, drawn)
         case Assembled(base=base, parts=parts):
-            index = _number(place)
+            index = _number(place) if base.size > 1 else 0  # one number for all
             for part in reversed(parts):
                 inside = np.flatnonzero(part.within(base.size) == index)
                 if len(inside):
