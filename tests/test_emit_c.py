@@ -65,6 +65,20 @@ def test_every_function_and_operator_at_the_edges() -> None:
     agree([*calls, *several, *operators], [[a, b, 0.5] for a in EDGES for b in EDGES])
 
 
+def test_zero_minus_a_choice_of_zero_is_zero() -> None:
+    """gcc makes -0 of it where it stands in one expression."""
+    texts = (
+        "0 - (a > 0)",
+        "0 - (1 if a > 0 else 0)",
+        "0^2 - (a or 0)",
+        "0 - (2 if a else 0)",
+        "b - (a > 0)",
+        "-0 - (a > 0)",
+        "-0 - b",
+    )
+    agree([parse(text) for text in texts], [[a, 0.0, 0.0] for a in (-1.0, 0.0, 1.0, math.nan)])
+
+
 def test_what_is_known_is_worked_out_and_a_power_stays_one() -> None:
     """An exponent that comes to 2 is no square, whether written as a sum or known of a name."""
     emitter = Emitter()

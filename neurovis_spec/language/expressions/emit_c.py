@@ -86,6 +86,11 @@ HELPERS: Mapping[str, str] = MappingProxyType(
 {{
     return a >= b || a != a ? a : b;
 }}""",
+        # gcc makes -0 of the difference of 0 and a choice that comes to 0
+        "nv_from_zero": """static {real} nv_from_zero({real} x)
+{{
+    return 0.0{s} - x;
+}}""",
         "nv_square": """static {real} nv_square({real} x)
 {{
     return x * x;
@@ -227,6 +232,8 @@ class _Writer:
                 return f"-{self.tight(operand, _ATOM)}", _SIGN
             case Unary(operator="+", operand=operand):
                 return self.value(operand)
+            case Binary(operator="-", left=Number(value=0.0 as zero), right=right) if math.copysign(1.0, zero) > 0:
+                return f"nv_from_zero({self.loose(right)})", _ATOM
             case Binary(operator=operator, left=left, right=right) if operator in _ARITHMETIC:
                 level = _ARITHMETIC[operator]
                 joined = f" {operator} " if level == _ADD else operator
