@@ -68,7 +68,8 @@ def test_a_field_serves_every_narrower_width() -> None:
 
 @given(st.floats(2, 40), st.floats(60, 140), st.floats(60, 100))
 def test_the_area_of_a_disc_and_of_its_ring(radius: float, x: float, y: float) -> None:
-    assert coverage.disc((x, y), radius, SIZE).share.sum() == pytest.approx(math.pi * radius**2, rel=0.01, abs=0.7)
+    # pixels at the edge count by the distance of their centres: 0.844 at most, where the disc sits on the grid
+    assert coverage.disc((x, y), radius, SIZE).share.sum() == pytest.approx(math.pi * radius**2, rel=0.01, abs=0.9)
     around = coverage.ring((x, y), radius, 2.0, SIZE).share.sum()
     assert around == pytest.approx(math.tau * radius * 2, rel=0.04)
 

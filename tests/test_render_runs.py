@@ -49,10 +49,13 @@ def render_of(text: str, folder: Path) -> bytes:
     return (folder / "fresh.svg").read_bytes()
 
 
-def test_the_command_says_when_it_runs(tmp_path: Path) -> None:
+def test_the_command_says_on_a_terminal_when_it_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     spec = tmp_path / "x.yaml"
     spec.write_text("neurovis: 1\nname: x\ntime: {steps: 300}\nneurons: {A: {bias: 1}}\n", encoding="utf-8")
-    done = CliRunner().invoke(neurovis, ["render", str(spec), "--step", "20", "-o", str(tmp_path / "x.svg")])
+    words = ["render", str(spec), "--step", "20", "-o", str(tmp_path / "x.svg")]
+    assert CliRunner().invoke(neurovis, words).stderr == ""
+    monkeypatch.setattr("neurovis_spec.cli.render.on_terminal", lambda: True)
+    done = CliRunner().invoke(neurovis, words)
     assert done.exit_code == 0
     assert "running 300 steps, which show the range of its values" in done.stderr
     assert done.stdout == f"{tmp_path / 'x.svg'}\n"

@@ -67,11 +67,16 @@ class Bar:
             self._bar[0].update(self._bar[1], completed=done, total=total)
 
 
+def on_terminal() -> bool:
+    """Whether somebody reads standard error: what is piped stays clean."""
+    return sys.stderr is not None and sys.stderr.isatty()
+
+
 @contextmanager
 def progress(label: str) -> Iterator[Bar]:
     """A bar for the time of a block."""
     bar = Bar(label)
-    shown = sys.stderr is not None and sys.stderr.isatty()
+    shown = on_terminal()
     if shown:
         bar.start()
     try:

@@ -17,7 +17,7 @@ from neurovis_spec.cli.options import (
     spec_argument,
     theme_option,
 )
-from neurovis_spec.cli.progress import progress
+from neurovis_spec.cli.progress import on_terminal, progress
 from neurovis_spec.cli.targets import check_files, check_target
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def command(
     check_files(output, network)
     record = recording_of(recording)
     steps = network.steps_to_draw(step, record)
-    if steps:
+    if steps and on_terminal():
         click.echo(f"running {count(steps, 'step')}{_why(network, step, record, steps)}", err=True)
     with progress("drawing") as bar, writing(output):
         network.render(output, step=step, recording=record, theme=theme, engine=engine, progress=bar)
