@@ -107,7 +107,9 @@ def test_what_may_take_longer_than_a_second_shows_a_bar_on_a_terminal(
 
     monkeypatch.setattr(progress, "Bar", Watched)
     monkeypatch.setattr(progress, "sys", SimpleNamespace(stderr=SimpleNamespace(isatty=lambda: True)))
-    good(f"{name} small.yaml {READS[name]}")
+    result = call(f"{name} small.yaml {READS[name]}")
+    said = [line for line in result.stderr.splitlines() if not line.startswith("running 10 steps")]
+    assert (result.exit_code, said) == (0, [])
     assert progress.PATIENCE == 1
     work = {"layout": "laying out", "run": "running", "fmt": "formatting", "render": "drawing", "animate": "drawing"}
     assert f"{work.get(name, 'compiling')} begins" in told
