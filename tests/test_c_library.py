@@ -86,3 +86,18 @@ def test_a_compiler_that_fails_says_so_and_auto_does_without(monkeypatch: pytest
     with pytest.raises(CompilerError, match="'false' fails"):
         load(TEXT % 46)
     assert isinstance(prepare(cpg_rbf(), None, 10**9), NumpyStepper)
+
+
+def test_a_library_that_somebody_else_may_have_put_there_is_not_loaded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where others may write to the cache, it is passed over: what it holds would run as this user."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    text = "int answer(void) { return 42; }\n"
+    kept = c_library.place(text)
+    assert c_library.load(text).answer() == 42
+    assert kept.exists()
+    before = kept.stat().st_mtime_ns
+    kept.parent.chmod(0o777)
+    assert c_library.load(text).answer() == 42
+    assert kept.stat().st_mtime_ns == before

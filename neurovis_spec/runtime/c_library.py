@@ -121,6 +121,8 @@ def load(text: str) -> ctypes.CDLL:
     """The library of a text: from the cache, else compiled now. Raises CompilerError."""
     path = place(text)
     try:
+        if not _is_ours(path.parent):
+            raise OSError("not a folder that this user alone writes to")
         library = ctypes.CDLL(str(path))
     except OSError:  # not there, or no library
         return _made(text, path)
@@ -129,10 +131,20 @@ def load(text: str) -> ctypes.CDLL:
     return library
 
 
+def _is_ours(cache: Path) -> bool:
+    """Whether nobody else can have put a library there, which would run as this user."""
+    if sys.platform == "win32":
+        return True
+    about = cache.stat()
+    return about.st_uid == os.getuid() and not about.st_mode & 0o022
+
+
 def _made(text: str, path: Path) -> ctypes.CDLL:
     """Compile into the cache, or where that cannot be, beside it."""
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if not _is_ours(path.parent):
+            raise OSError("not a folder that this user alone writes to")
         with tempfile.TemporaryDirectory(dir=path.parent, prefix=".making") as beside:
             made = _compiled(text, Path(beside))
             made.replace(path)
