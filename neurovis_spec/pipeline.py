@@ -81,10 +81,9 @@ def simulate(
     checkpoint: Path | None = None,
 ) -> Recording:
     """Run the update program, record activities and weights."""
-    from neurovis_spec.runtime.record import record
+    from neurovis_spec.runtime.record import record_course
 
-    how = (course.steps, course.inputs, course.backend, course.every, start, progress, course.until, course.keep)
-    return record(network, *how, checkpoint)
+    return record_course(network, course, start, progress, checkpoint)
 
 
 def simulate_to(

@@ -17,6 +17,7 @@ import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.changes import Change
+from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.program import Block, Combine, Operation, Plasticity
 from neurovis_spec.compiler.ros_settings import RosSettings
 from neurovis_spec.compiler.settable import Binding, ParameterFormula, Part, Settable
@@ -240,6 +241,14 @@ class Network:
             result[noise.members] = np.arange(noise.start, noise.start + len(noise.members))
         frozen(result)
         return result
+
+    @cached_property
+    def mark(self) -> str:
+        """What networks have in common that can take on each other's states: the content hash, and which of their
+        numbers follow parameters, which that hash does not see."""
+        names = [slot.name for slot in self.settable.slots]
+        follow = [(binding.array, binding.places, sorted(binding.slots)) for binding in self.settable.bindings]
+        return digest(self.hash, names, follow)
 
     @cached_property
     def set_by_events(self) -> tuple[Binding, ...]:

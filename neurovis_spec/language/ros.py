@@ -103,10 +103,8 @@ class QosModel(Model):
     depth: FormulaField | None = Field(None, description="How many messages wait to be sent (default 10).")
 
 
-class SubscribeModel(Model):
-    """Where an input comes from."""
-
-    PLACE: ClassVar[str] = "'ros: subscribe'"
+class TopicModel(Model):
+    """A topic, and where in its messages the numbers are."""
 
     topic: TopicField = Field(description="The topic.")
     type: TypeField | None = Field(
@@ -117,6 +115,13 @@ class SubscribeModel(Model):
     field: PathField | None = Field(
         None, description="A dotted path to the number or the array of numbers in the message (default data)."
     )
+
+
+class SubscribeModel(TopicModel):
+    """Where an input comes from."""
+
+    PLACE: ClassVar[str] = "'ros: subscribe'"
+
     names: TextsField | None = Field(
         None, description="The joints whose numbers are taken, in the order of the input; they are found by name."
     )
@@ -128,20 +133,11 @@ class SubscribeModel(Model):
     )
 
 
-class PublishModel(Model):
+class PublishModel(TopicModel):
     """Where an output goes to."""
 
     PLACE: ClassVar[str] = "'ros: publish'"
 
-    topic: TopicField = Field(description="The topic.")
-    type: TypeField | None = Field(
-        None,
-        description="Its type, package/Name or package/msg/Name; without it std_msgs/Float64, for several numbers "
-        "std_msgs/Float64MultiArray.",
-    )
-    field: PathField | None = Field(
-        None, description="A dotted path to the number or the array of numbers in the message (default data)."
-    )
     safe: FormulaField | None = Field(None, description="What is sent when the run ends or stops.")
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +18,10 @@ from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.changes import Change, Held
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.patch import Patcher
+from neurovis_spec.runtime.signals import signal_layout
+
+if TYPE_CHECKING:
+    from neurovis_spec.runtime.state import State
 
 Mask = npt.NDArray[np.bool_]
 
@@ -99,6 +104,17 @@ class Controls:
 
     def __post_init__(self) -> None:
         self._patcher = Patcher(self.network.settable)
+        self._changes = {change.at: change for change in self.network.changes}
+
+    def begin(self, state: State) -> bool:
+        """What events change at the step to come, once; whether they do. Raises PatchError."""
+        change = self._changes.get(state.k)
+        if change is None or state.begun == state.k:
+            return False
+        state.begun = state.k
+        with np.errstate(all="ignore"):
+            self.apply(state.conditions, state.weights, state.signals, change)
+        return True
 
     def set(self, now: Conditions, weights: FloatArray, values: Mapping[int, float]) -> None:
         """Set slots; all or nothing. Raises PatchError."""
@@ -149,8 +165,6 @@ class Controls:
         self._clear(signals, np.flatnonzero(before & ~now.structure.gone))
 
     def _clear(self, signals: FloatArray, connections: IntArray) -> None:
-        from neurovis_spec.runtime.signals import signal_layout
-
         offsets, delays = signal_layout(self.network).offsets, self.network.connections.delays
         for connection in connections.tolist():
             if delays[connection]:

@@ -47,21 +47,31 @@ def record(
     keep: Keep = ALL,
     checkpoint: Path | None = None,
 ) -> Recording:
-    """Run a network for ``steps`` steps (by default ``time.steps``) and record steps 0, ``every``, 2·``every``, …;
-    ``until`` may end it earlier.
+    """Run a network for ``steps`` steps (by default ``time.steps``) as ``record_course`` does."""
+    steps = checked_steps(network, steps, every)
+    return record_course(network, Course(steps, every, inputs, backend, until, keep), start, progress, checkpoint)
+
+
+def record_course(
+    network: Network,
+    course: Course,
+    start: Recording | None = None,
+    progress: Progress | None = None,
+    checkpoint: Path | None = None,
+) -> Recording:
+    """Run a network and record steps 0, ``every``, 2·``every``, …; ``until`` may end it earlier.
 
     ``inputs`` as in ``InputReader``; ``start`` as in ``resume``; ``keep`` is what of a step is recorded;
     ``checkpoint`` a file from which the run goes on exactly, if it is there, and which holds its state at the end, also
-    after a signal (then KeyboardInterrupt is raised). Warns once
-    (RuntimeWarning) when something is no longer finite. Raises InputError, BackendError, RecordingError (also where
-    there is not the memory), KeyError for a name that there is not, ValueError.
+    after a signal (then KeyboardInterrupt is raised). Warns once (RuntimeWarning) when something is no longer finite.
+    Raises InputError, BackendError, RecordingError (also where there is not the memory), KeyError for a name that
+    there is not, ValueError.
     """
-    steps = checked_steps(network, steps, every)
-    columns = columns_of(network, keep)
-    check_room(steps, every, sum(columns.widths(network)))
+    steps = checked_steps(network, course.steps, course.every)
+    columns = columns_of(network, course.keep)
+    check_room(steps, course.every, sum(columns.widths(network)))
     state = first_state(network, start, checkpoint)
-    kept = np.concatenate([np.zeros(0, dtype=np.int64), *Steps(steps, every, state.k).parts()])
-    course = Course(steps, every, inputs, backend, until, keep)
+    kept = np.concatenate([np.zeros(0, dtype=np.int64), *Steps(steps, course.every, state.k).parts()])
     if checkpoint is None:
         rows = InMemory(columns.widths(network), len(kept))
         go(network, state, course, rows, progress)
@@ -184,15 +194,13 @@ def go(network: Network, state: State, course: Course, rows: Rows, progress: Pro
     plain = columns.neurons is None and not columns.probe.names and len(columns.weights) == len(network.changing)
     if isinstance(stepper, Runner) and plain and course.until is None:  # which is asked after each step
         make = _Together(stepper)
-    controls, changes = Controls(network), {change.at: change for change in network.changes}
-    origin, last = state.k, state.k + steps
-    _check_events(controls, state, [change for change in network.changes if origin <= change.at < last])
-    edges = [origin, *(at for at in changes if origin < at < last), last]
+    controls, origin, last = Controls(network), state.k, state.k + steps
+    changes = [change for change in network.changes if origin <= change.at < last]
+    _check_events(controls, state, changes)
+    edges = [origin, *(change.at for change in changes if change.at > origin), last]
     with np.errstate(all="ignore"):
         for begin, end in pairwise(edges):
-            if begin in changes and state.begun != begin:
-                state.begun = begin
-                controls.apply(state.conditions, state.weights, state.signals, changes[begin])
+            controls.begin(state)
             reader.use(state)
             for first, stop in _stretches(begin, end):
                 if rows.over() or not make.steps(state, first, stop, every, rows, reader, watch):

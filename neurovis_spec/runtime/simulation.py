@@ -53,7 +53,6 @@ class Simulation:
         self._stepper = prepare(network, backend)
         self._reader = InputReader(network, made=lambda first, rows: self._watch.given(first, rows))
         self._controls = Controls(network)
-        self._changes = {change.at: change for change in network.changes}
         self._begin = initial_state(network) if start is None else resumed_state(network, start)
         self._apply(self._begin)
         self.reset()
@@ -67,16 +66,12 @@ class Simulation:
         """How each output is read."""
         return {entry.name: _reader(self.network, entry) for entry in self.network.outputs}
 
-    def _apply(self, state: State) -> None:
-        """What events change at the step to come."""
-        change = self._changes.get(state.k)
-        if change is not None and state.begun != state.k:
-            state.begun = state.k
-            try:
-                with np.errstate(all="ignore"):
-                    self._controls.apply(state.conditions, state.weights, state.signals, change)
-            except PatchError as error:
-                raise ParameterError(f"the events at step {state.k}: {error}") from None
+    def _apply(self, state: State) -> bool:
+        """What events change at the step to come; whether they do."""
+        try:
+            return self._controls.begin(state)
+        except PatchError as error:
+            raise ParameterError(f"the events at step {state.k}: {error}") from None
 
     @property
     def k(self) -> int:
@@ -124,8 +119,7 @@ class Simulation:
         with np.errstate(all="ignore"):
             self._stepper.step(state, vector)
             self._watch.look(state)
-        if state.k in self._changes:  # those of the next step apply now, so that ``weights`` are those of the next step
-            self._apply(state)
+        if self._apply(state):  # events of the next step apply now, so that ``weights`` are those of the next step
             self._reader.use(state)
         return {name: read(state) for name, read in self._outputs.items()}
 

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray
-from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Plasticity, Quantity, Rule
 from neurovis_spec.language.expressions.arrays import evaluate_array
@@ -80,17 +79,8 @@ def initial_state(network: Network) -> State:
             for entry in network.plasticity
         ),
         conditions=first_conditions(network),
-        network=mark(network),
+        network=network.mark,
     )
-
-
-def mark(network: Network) -> str:
-    """What networks have in common that can take on each other's states: the content hash, and which of their numbers
-    follow parameters, which that hash does not see."""
-    settable = network.settable
-    names = [slot.name for slot in settable.slots]
-    follow = [(binding.array, binding.places, binding.slots) for binding in settable.bindings]
-    return digest(network.hash, names, [(array, places, sorted(slots)) for array, places, slots in follow])
 
 
 def history_depth(network: Network) -> int:

@@ -23,7 +23,7 @@ from neurovis_spec.runtime.columns import columns_of
 from neurovis_spec.runtime.formats import StreamingFormat, for_path, settle
 from neurovis_spec.runtime.inputs import STRETCH
 from neurovis_spec.runtime.memory import check_disk
-from neurovis_spec.runtime.record import Course, InMemory, after, checked_steps, first_state, go, record
+from neurovis_spec.runtime.record import Course, InMemory, after, checked_steps, first_state, go, record_course
 from neurovis_spec.runtime.recording import After, Recording, recording_of
 from neurovis_spec.runtime.rows import RowWriter, Steps
 from neurovis_spec.runtime.state import State
@@ -51,13 +51,12 @@ def record_to(
     progress: Progress | None = None,
     checkpoint: Path | None = None,
 ) -> None:
-    """Run a network and write what ``record`` returns to a file. Raises what ``record`` and ``formats.save`` raise, and
+    """Run a network and write what ``record_course`` returns to a file. Raises what it and ``formats.save`` raise, and
     StoppedError after a signal, when the steps until then are in the file; KeyboardInterrupt where there are none, and
     after a second signal, which ends everything at once."""
     format_ = for_path(path)
     if not isinstance(format_, StreamingFormat):
-        how = (course.steps, course.inputs, course.backend, course.every, start, progress, course.until, course.keep)
-        format_.save(record(network, *how, checkpoint), path)
+        format_.save(record_course(network, course, start, progress, checkpoint), path)
         return
     state = first_state(network, start, checkpoint)
     steps = Steps(checked_steps(network, course.steps, course.every), course.every, state.k)
