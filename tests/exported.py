@@ -27,8 +27,13 @@ def compiled(
     made = Exported(network, start, real)
     folder.mkdir(exist_ok=True)
     (folder / f"{made.name}.h").write_text(made.header(), encoding="ascii")
-    source = made.source()
-    (folder / f"{made.name}.c").write_text(source, encoding="ascii")
+    (folder / f"{made.name}.c").write_text(made.source(), encoding="ascii")
+    return built(made, folder, language)
+
+
+def built(made: Exported, folder: Path, language: str = "C99") -> Controller:
+    """The code that lies in a folder, compiled strictly, and loaded."""
+    source = (folder / f"{made.name}.c").read_text(encoding="ascii")
     size = f"""
 #ifdef __cplusplus
 extern "C"

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from exported import LANGUAGES, STRICT, compiled
+from exported import LANGUAGES, STRICT, built, compiled
 from hypothesis import Phase, given, settings
 from random_specs import specs
 from test_runtime_conformance import EVENTS, SPECS
@@ -18,6 +18,7 @@ from test_runtime_conformance import EVENTS, SPECS
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.runtime.c_export import Exported
 from neurovis_spec.runtime.c_package import files, size_of_state
 from neurovis_spec.runtime.record import record
 from neurovis_spec.runtime.resume import resumed_state
@@ -73,6 +74,29 @@ def test_a_controller_begins_with_what_was_learned(tmp_path: Path) -> None:
         controller.step()
         np.testing.assert_array_equal(controller.activity, expected.activity[k])
     assert expected.weights[0].any()
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".mcap"])
+def test_the_command_goes_on_from_a_recording(suffix: str, tmp_path: Path) -> None:
+    """`run -o FILE`, `export --from FILE`, a compiler: what a robot gets goes on as `run --from FILE` does."""
+    spec, recording = tmp_path / "spec.yaml", tmp_path / f"learned{suffix}"
+    spec.write_text(EVENTS, encoding="utf-8")
+    invoke("run", str(spec), "--steps", "17", "--set", "gain=0.55", "-o", str(recording))
+    invoke("export", str(spec), "--to", "c", "--from", str(recording), "-o", str(tmp_path / "controller"))
+    network = nv.compile(spec)
+    expected = network.run(25, backend="reference", start=nv.load(recording))
+    controller = built(Exported(network.network), tmp_path / "controller")
+    for k in range(24):
+        np.testing.assert_array_equal(controller.weights[network.network.changing], expected.weights[k], f"w[{k}]")
+        controller.step()
+        np.testing.assert_array_equal(controller.activity, expected.activity[k], f"a[{k}]")
+    assert not np.array_equal(expected.weights[0], network.run(1).weights[0])
+
+
+def invoke(*arguments: str) -> None:
+    """A command that ends well."""
+    result = CliRunner().invoke(neurovis, arguments)
+    assert result.exit_code == 0, result.output
 
 
 HOSTILE = """

@@ -132,7 +132,8 @@ class EventReader:
             span = source.span if entry is None else entry.key.span
             self.findings.error("bad-event", span, message, hint)
 
-        actions = [name for name in _ACTIONS if source.entry(name) is not None]
+        written = {entry.name for entry in source.entries}
+        actions = [name for name in _ACTIONS if name in written]
         if not actions and not model.lost:
             first = source.entries[0].key.span if source.entries else source.span
             self.findings.error(
@@ -140,7 +141,7 @@ class EventReader:
             )
         if not actions:
             return
-        timed = {name for name in ("at", "from", "to") if source.entry(name) is not None}
+        timed = written & {"at", "from", "to"}
         perhaps = model.lost_keys - timed  # an unknown key may be meant for these
         if "clamp" in actions:
             if "at" in timed:
@@ -156,9 +157,10 @@ class EventReader:
 
     def _check_set(self, model: EventModel, name: str) -> None:
         span = key_of(model.source, "set", name).span
-        known = (*self.constants.parameters, *self.constants.broken)
-        if name not in known and not self.constants.incomplete:
+        constants = self.constants
+        if name not in constants.parameters and name not in constants.broken and not constants.incomplete:
             message = f"there is no parameter '{shown(name)}' to be set"
+            known = (*constants.parameters, *constants.broken)
             self.findings.error("unknown-parameter", span, message, other_parameter(name, known))
         elif name in self.constants.structural:
             message = f"'{name}' cannot be set in a run: the structure of the network depends on it"

@@ -11,6 +11,8 @@ import hashlib
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate, pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,8 +32,11 @@ from neurovis_spec.language.located import Formula
 def with_changes(network: Network, events: tuple[Event, ...], constants: Constants) -> Network:
     """The network with what its events change. An expression that is set sees the values that the parameters have by
     then, not those of the other parameters that are set at the same step."""
+    settable = constants.settable.keys()
     events = tuple(  # a parameter whose own value is invalid has no slot, and that is reported
-        replace(event, set={name: value for name, value in event.set.items() if name in constants.settable})
+        event
+        if event.set.keys() <= settable
+        else replace(event, set={name: value for name, value in event.set.items() if name in settable})
         for event in events
     )
     begun, over = defaultdict[int, list[int]](list), defaultdict[int, list[int]](list)
@@ -39,14 +44,15 @@ def with_changes(network: Network, events: tuple[Event, ...], constants: Constan
         begun[event.at].append(number)
         if event.clamp and event.to is not None:
             over[event.to].append(number)
-    trial = _Trial(network, events, constants)
-    changes, course = [], hashlib.sha256()
-    for step in sorted({*begun, *over}):
-        change = _change(step, [(number, events[number]) for number in begun[step]], over[step], constants)
-        changes.append(change)
-        course.update(trial.go_on(change, [events[number] for number in begun[step]]))
+    changes = tuple(
+        _change(step, [(number, events[number]) for number in begun[step]], over[step], constants)
+        for step in sorted({*begun, *over})
+    )
+    trial, course = _Trial(network, events, changes, constants), hashlib.sha256()
+    for change in changes:
+        course.update(trial.go_on(change, [events[number] for number in begun[change.at]]))
     own = digest(network.hash, course.hexdigest())
-    return replace(network, changes=tuple(changes), hash=own)
+    return replace(network, changes=changes, hash=own)
 
 
 def _change(step: int, new: list[tuple[int, Event]], over: list[int], constants: Constants) -> Change:
@@ -93,12 +99,34 @@ def _formula(formula: Formula, constants: Constants) -> ParameterFormula:
     return constants.bound(tree or Number(0.0))
 
 
+class _Written(NamedTuple):
+    """An array that a patch writes to: which of its bindings write, and where each of these has its numbers among all.
+
+    ``order`` is that of their places; ``mark`` says what the array is called and what the places are.
+    """
+
+    weights: bool
+    parts: tuple[tuple[int, slice], ...]
+    order: IntArray
+    mark: bytes
+
+
+def _written(called: str, numbers: list[int], bindings: tuple[Binding, ...]) -> _Written:
+    places = np.concatenate([bindings[number].places for number in numbers])
+    ends = [0, *accumulate(len(bindings[number].places) for number in numbers)]
+    parts = tuple((number, slice(first, end)) for number, (first, end) in zip(numbers, pairwise(ends), strict=True))
+    order = np.argsort(places, kind="stable")
+    mark = called.encode() + hashlib.sha256(places[order].tobytes()).digest()
+    return _Written(bindings[numbers[0]].weights, parts, order, mark)
+
+
 @dataclass
 class _Trial:
     """A run without steps: what the parameters are by an event, and all that follows them."""
 
     network: Network
     events: tuple[Event, ...]
+    changes: tuple[Change, ...]
     constants: Constants
 
     def __post_init__(self) -> None:
@@ -109,7 +137,7 @@ class _Trial:
         self._weights = self.network.connections.weights.copy()
         self._variables = settable.initial.copy()
         self._held = Held.none(len(self.network.neurons))
-        self._places: dict[tuple[Binding, ...], bytes] = {}
+        self._arrays: dict[tuple[Binding, ...], tuple[_Written, ...]] = {}
         self._read = self._slots_of_formulas()
         by_name = sorted((slot.name, place) for place, slot in enumerate(settable.slots) if "." not in slot.name)
         self._root = np.array([place for _, place in by_name], dtype=np.int64)
@@ -121,14 +149,16 @@ class _Trial:
 
     def _slots_of_formulas(self) -> frozenset[int]:
         """The slots that inputs, noise and the events themselves read, and those that these follow."""
-        formulas = [formula for event in self.events for formula in (*event.set.values(), *(f for _, f in event.clamp))]
-        found = {slot for formula in formulas for slot in _formula(formula, self.constants).slots}
+        found: set[int] = set()
+        for change in self.changes:
+            for formula in (*(one for _, one in change.parameters), *(clamp.value for clamp in change.clamps)):
+                found |= formula.slots
         for slots in (*(i.slots for i in self.network.inputs), *(noise.slots for noise in self.network.noises)):
             found.update(slots.values())
         waiting = list(found)
         while waiting:
-            formula = self.network.settable.slots[waiting.pop()].formula
-            new = frozenset() if formula is None else formula.slots - found
+            followed = self.network.settable.slots[waiting.pop()].formula
+            new = frozenset() if followed is None else followed.slots - found
             found |= new
             waiting += new
         return frozenset(found)
@@ -194,27 +224,28 @@ class _Trial:
 
     def _effect(self, patch: Patch) -> tuple[bytes, bool]:
         """What a patch comes to, however the formulas are written, and whether it changes anything."""
-        arrays: dict[str, list[int]] = defaultdict(list)
-        effect = False
-        for place, (binding, value) in enumerate(zip(patch.bindings, patch.values, strict=True)):
-            now = (self._weights if binding.weights else self._variables)[binding.indices]
-            if not len(binding.indices):
-                continue
-            effect = effect or bool((now != value).any())
-            arrays[binding.array].append(place)
         marks = [patch.parameters[self._root].tobytes()]
-        for called, name in sorted((self._called(name), name) for name in arrays):
-            bindings = tuple(patch.bindings[place] for place in arrays[name])
-            places = np.concatenate([binding.places for binding in bindings])
-            values = np.concatenate(
-                [np.broadcast_to(patch.values[place], patch.bindings[place].places.shape) for place in arrays[name]]
-            )
+        effect = False
+        for array in self._written(patch.bindings):
+            now = self._weights if array.weights else self._variables
+            values = np.empty(len(array.order))
+            for number, where in array.parts:
+                values[where] = patch.values[number]
+                effect = effect or bool((now[patch.bindings[number].indices] != patch.values[number]).any())
             same = bool((values == values[0]).all())
-            order = slice(1) if same else np.argsort(places, kind="stable")
-            if bindings not in self._places:
-                self._places[bindings] = hashlib.sha256(np.sort(places).tobytes()).digest()
-            marks.append(called.encode() + self._places[bindings] + values[order].tobytes())
+            marks.append(array.mark + values[slice(1) if same else array.order].tobytes())
         return b"/".join(marks), effect
+
+    def _written(self, bindings: tuple[Binding, ...]) -> tuple[_Written, ...]:
+        """What some bindings write to."""
+        if bindings not in self._arrays:
+            arrays: dict[str, list[int]] = defaultdict(list)
+            for number, binding in enumerate(bindings):
+                if len(binding.indices):
+                    arrays[binding.array].append(number)
+            named = sorted((self._called(name), name) for name in arrays)
+            self._arrays[bindings] = tuple(_written(called, arrays[name], bindings) for called, name in named)
+        return self._arrays[bindings]
 
     def _called(self, array: str) -> str:
         """An array by a name in which no order of the spec shows."""

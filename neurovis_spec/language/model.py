@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Annotated, ClassVar, TypeAlias, TypeVar
 
 from pydantic import (
@@ -79,8 +79,15 @@ class Model(BaseModel):
         give_up()
 
     @classmethod
+    @cache
     def _fields(cls) -> dict[str, FieldInfo]:
         return {field.alias or name: field for name, field in cls.model_fields.items() if name != "source"}
+
+    @classmethod
+    @cache
+    def _written(cls) -> dict[str, str]:
+        """How each field is called in a spec."""
+        return {name: field.alias or name for name, field in cls.model_fields.items()}
 
     @classmethod
     def _keys(cls, data: Mapping, perhaps: Collection[str], findings: Findings) -> dict[str, object]:
@@ -126,10 +133,10 @@ class Model(BaseModel):
     @cached_property
     def lost(self) -> frozenset[str]:
         """The keys of the source that are not in the model: unknown ones, and those whose value is at fault."""
-        taken = {
-            field.alias or name for name, field in type(self).model_fields.items() if name in self.model_fields_set
-        }
-        return frozenset(entry.name for entry in self.source.entries) - taken
+        written = self._written()
+        return frozenset(entry.name for entry in self.source.entries).difference(
+            written[name] for name in self.model_fields_set
+        )
 
     @cached_property
     def lost_keys(self) -> frozenset[str]:
