@@ -1,9 +1,9 @@
-"""What a hostile spec or data file costs: seconds, memory, and which files were opened.
+"""What a hostile spec, data file, recording or checkpoint costs: seconds, memory, and which files were opened.
 
-Each case is compiled in a process of its own, forked from one that has compiled a small spec. Seconds are of the
-processor, so that a busy machine tells the same; memory is the growth of the largest resident memory over that before
-the case. Run with ``python benchmarks/robustness.py [NAME]…``. Status 1 where something else than findings came out, a
-file was opened that nobody may open, or a budget was missed clearly (seconds by 10 times, memory by 3 times).
+Each case is compiled, or loaded, in a process of its own, forked from one that has compiled a small spec. Seconds are
+of the processor, so that a busy machine tells the same; memory is the growth of the largest resident memory over that
+before the case. Run with ``python benchmarks/robustness.py [NAME]…``. Status 1 where something else than findings came
+out, a file was opened that nobody may open, or a budget was missed clearly (seconds by 10 times, memory by 3 times).
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
+from robustness_runs import RUNS, SUFFIXES, Attempt, network
 
 import neurovis_spec as nv
 from neurovis_spec.findings import show_text
@@ -50,6 +51,9 @@ class Case:
     mib: float = 20
     closed: bool = False
     drawn: bool = False
+    #: what is done instead of compiling, with a file of this suffix
+    loaded: Callable[[Path], list[str]] | None = None
+    suffix: str = ".yaml"
 
 
 @dataclass(frozen=True, slots=True)
@@ -343,7 +347,31 @@ LAYOUTS: dict[str, Case] = {
     "200 instances in circles": Case(_linked(200, 400, "circular"), seconds=10, mib=100, drawn=True),
     "1,000 instances in a grid": Case(_linked(1000, 1000, "grid"), seconds=20, mib=300, drawn=True),
 }
-GROUPS = {"bombs": BOMBS, "large texts": LARGE, "data files": FILES, "paths": PATHS, "layouts": LAYOUTS}
+
+
+def _attempts(title: str, attempts: dict[str, Attempt]) -> dict[str, Case]:
+    suffix = SUFFIXES[title]
+    return {
+        name: Case(
+            "",
+            lambda folder, data=one.data: (folder / f"spec{suffix}").write_bytes(data()),  # type: ignore[misc]
+            one.seconds,
+            one.mib,
+            loaded=one.load,
+            suffix=suffix,
+        )
+        for name, one in attempts.items()
+    }
+
+
+GROUPS = {
+    "bombs": BOMBS,
+    "large texts": LARGE,
+    "data files": FILES,
+    "paths": PATHS,
+    "layouts": LAYOUTS,
+    **{title: _attempts(title, attempts) for title, attempts in RUNS.items()},
+}
 
 
 def _peak() -> float:
@@ -375,14 +403,14 @@ def attempt(path: Path, drawn: bool = False) -> list[str]:
     return []
 
 
-def measure(path: Path, drawn: bool, answer: Connection) -> None:
-    """Compile a spec, perhaps lay it out; to be called once in a process."""
+def measure(path: Path, case: Case, answer: Connection) -> None:
+    """Compile a spec, perhaps lay it out, or load a file; to be called once in a process."""
     opened: list[str] = []
     sys.addaudithook(lambda event, given: opened.append(str(given[0])) if event == "open" else None)
     _forget()
     before, begun = _peak(), time.process_time()
     try:
-        codes = attempt(path, drawn)
+        codes = attempt(path, case.drawn) if case.loaded is None else case.loaded(path)
     except BaseException as error:
         answer.send(f"{type(error).__name__}: {error}"[:100])
         return
@@ -396,12 +424,12 @@ def measured_apart(case: Case) -> Result | str:
     own = multiprocessing.get_context("fork")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        path = folder / "spec.yaml"
+        path = folder / f"spec{case.suffix}"
         path.write_text(case.text, encoding="utf-8", newline="")
         if case.files is not None:
             case.files(folder)
         ours, theirs = own.Pipe(duplex=False)
-        process = own.Process(target=measure, args=(path, case.drawn, theirs))
+        process = own.Process(target=measure, args=(path, case, theirs))
         process.start()
         theirs.close()
         try:
@@ -429,11 +457,12 @@ def main() -> int:
         warm = Path(folder) / "warm.yaml"
         warm.write_text(SMALL, encoding="utf-8")
         attempt(warm)
+    network().run(1)
     for title, cases in GROUPS.items():
-        print(f"\n{title:42}{'time':>10}{'memory':>12}{'budget':>18}  {'kept':12}findings")
-        for name, case in cases.items():
-            if wanted and name not in wanted and title not in wanted:
-                continue
+        chosen = {name: case for name, case in cases.items() if not wanted or name in wanted or title in wanted}
+        if chosen:
+            print(f"\n{title:42}{'time':>10}{'memory':>12}{'budget':>18}  {'kept':12}findings")
+        for name, case in chosen.items():
             result = measured_apart(case)
             if isinstance(result, str):
                 failures += 1

@@ -146,6 +146,9 @@ HOSTILE: dict[str, Callable[[dict[str, np.ndarray]], None]] = {
     "clamps": lambda a: a.update(clamps=np.array([[5, 7, 1]]), clamped=np.array([0]), clamp_values=np.array([0.0])),
     "neurons": lambda a: a.update(clamps=np.array([[5, -1, 1]]), clamped=np.array([99]), clamp_values=np.array([0.0])),
     "counts": lambda a: a.update(clamps=np.array([[5, -1, -1]]), clamped=np.zeros(0, int), clamp_values=np.zeros(1)),
+    "sum of counts": lambda a: a.update(
+        clamps=np.array([[5, -1, 1 << 62]] * 4), clamped=np.zeros(0, int), clamp_values=np.zeros(4)
+    ),
     "held": lambda a: a.update(held_order=a["held_order"] + 9),
     "text": lambda a: a.update(about=np.array("[" * 900)),
     "steps": lambda a: a.update(about=np.array(str(a["about"]).replace('"k": 5', '"k": -5'))),

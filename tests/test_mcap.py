@@ -221,6 +221,15 @@ def test_lengths_that_lie_take_no_memory(path: Path) -> None:
         nv.load(path)
 
 
+def test_there_are_no_more_channels_than_numbers_for_them(path: Path) -> None:
+    with path.open("rb") as file:
+        first = next(found.start for found in records.scan(file) if found.opcode == records.CHUNK)
+    channel = records.schemas_and_channels([], [records.Channel(1, "/x")])
+    path.write_bytes(path.read_bytes()[:first] + channel * 70_000)
+    with pytest.raises(RecordingError, match="more channels than"):
+        nv.load(path)
+
+
 def test_a_file_of_another_program_is_no_recording(tmp_path: Path) -> None:
     path = tmp_path / "x.mcap"
     with path.open("wb") as file:

@@ -122,7 +122,8 @@ def _clamp_again(network: Network, state: State, archive: zipfile.ZipFile, size:
     neurons = _member(archive, "clamped", np.zeros(0, dtype=np.int64), size).astype(np.int64)
     values = _floats(_member(archive, "clamp_values", np.zeros(0), size))
     counts = rows[:, 2]
-    if len(values) != len(rows) or (counts < 0).any() or counts.sum() != len(neurons):
+    within = (counts >= 0) & (counts <= len(neurons))  # so that their sum is one that fits
+    if len(values) != len(rows) or not within.all() or counts.sum() != len(neurons):
         raise RecordingError("its clamps do not agree")
     if len(neurons) and (neurons.min() < 0 or neurons.max() >= len(network.neurons)):
         raise RecordingError("it clamps neurons that are not there")

@@ -197,6 +197,7 @@ class _Reading:
         self._after: dict[str, str] = {}
         self._channels: dict[int, int] = {}
         self._known: set[int] = set()
+        self._named = 0
         self._room = max(_ROOM, _RATIO * file.seek(0, io.SEEK_END))
         self._steps: tuple[list[int], ...] = ([], [], [])
         self._rows: tuple[list[FloatArray], ...] = ([], [], [])
@@ -229,6 +230,9 @@ class _Reading:
             if reader.text() == _AFTER:
                 self._after = reader.mapping()
         elif found.opcode == records.CHANNEL:
+            self._named += 1
+            if self._named > records.MOST_NAMED:
+                raise RecordingError("it holds more channels than there are numbers for")
             self._channel(records.topic_of(records.content_of(self._file, found)))
         elif found.opcode == records.CHUNK:
             content = records.content_of(self._file, found)

@@ -256,7 +256,7 @@ def messages_of(content: Reader) -> Iterator[Message | Topic]:
         inner = reader.take(length)
         if opcode != MESSAGE:
             named += 1
-            if opcode not in (SCHEMA, CHANNEL) or named > _MOST_NAMED:
+            if opcode not in (SCHEMA, CHANNEL) or named > MOST_NAMED:
                 raise RecordingError("a chunk holds what is no message")
         if opcode == CHANNEL:
             yield topic_of(Reader(inner))
@@ -269,8 +269,8 @@ def messages_of(content: Reader) -> Iterator[Message | Topic]:
 
 #: the most bytes that a compressed chunk may grow to
 _MOST_EXPANDED = 32 << 20
-#: records of a chunk besides messages: a channel's number has two bytes
-_MOST_NAMED = 1 << 16
+#: channels of a file, and records of a chunk besides messages: a channel's number has two bytes
+MOST_NAMED: Final = 1 << 16
 
 
 def _expanded(data: bytes, compression: str, size: int) -> bytes:
