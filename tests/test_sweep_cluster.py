@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 from distributed import Client
@@ -97,6 +99,48 @@ def test_the_command_runs_on_a_cluster_and_goes_on(cluster: Cluster) -> None:
         result = CliRunner().invoke(neurovis, [*arguments, "--over", f"seed={seeds}"])
         assert (result.exit_code, result.stderr) == (0, "")
     assert Path("x.csv").read_text() == str(nv.sweep("noisy.yaml", {"seed": "0..5"}, "mean(K)"))
+
+
+READING = """\
+neurovis: 1
+name: reading
+include: [parts/cell.yaml]
+time: {steps: 30}
+seed: 4
+parameters: {gain: 0.5, size: {value: 2, min: 1}}
+inputs: {drive: {file: data/drive.csv}}
+instances: {c: {module: cell, set: {bias: gain}}}
+neurons: {A: {count: size, input: drive, activation: tanh}, B: {count: 2, noise: "normal(0, 0.1)"}}
+connections: {A -> B: {matrix: {file: data/link.npy}}, B -> c.K: 1}
+"""
+CELL = """\
+neurovis: 1
+modules:
+  cell:
+    parameters: {bias: 0}
+    neurons: {K: {bias: bias}, L: {count: 2}}
+    connections: {K -> L: {edges: {file: edges.csv}}}
+"""
+
+
+def test_the_workers_need_none_of_the_files_that_a_spec_reads(cluster: Cluster, tmp_path: Path) -> None:
+    """They run elsewhere, and all that the sweep has read is gone before the first of them begins."""
+    folder = tmp_path / "specs"
+    for name in ("parts", "data"):
+        (folder / name).mkdir(parents=True)
+    (folder / "spec.yaml").write_text(READING)
+    (folder / "parts" / "cell.yaml").write_text(CELL)
+    (folder / "parts" / "edges.csv").write_text("from,to,weight\nK,L1,0.5\nK,L2,-0.25\n")
+    (folder / "data" / "drive.csv").write_text("drive\n0.1\n0.7\n-0.3\n")
+    np.save(folder / "data" / "link.npy", np.array([[0.1, 1 / 3], [0.3, 1e-17]]))
+    over, metrics = {"gain": [0.1, 0.7], "size": [2, 3], "seed": [1, 2]}, ["rms(B1, last=20)", "mean(c.L2)"]
+    serial = nv.sweep(folder / "spec.yaml", over, metrics)
+    assert [error is None for error in serial["error"]] == [True, True, False, False] * 2
+
+    def remove(done: int, total: int) -> None:
+        shutil.rmtree(folder, ignore_errors=True)
+
+    assert nv.sweep(folder / "spec.yaml", over, metrics, scheduler=cluster.address, progress=remove) == serial
 
 
 def test_a_scheduler_that_is_lost_ends_the_sweep_and_no_row_is(cluster: Cluster) -> None:

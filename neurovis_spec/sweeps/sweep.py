@@ -32,6 +32,7 @@ from neurovis_spec.sweeps.journal import Journal
 from neurovis_spec.sweeps.point import LABEL, Job, Result, compiled, measures
 from neurovis_spec.sweeps.table import ERROR, Row, Table
 from neurovis_spec.sweeps.workers import here, in_processes
+from neurovis_spec.whole import whole_text
 
 #: Runs points: their places and results, as they come.
 Runner: TypeAlias = Callable[[Job, Sequence[Point]], Generator[tuple[int, Result], None, None]]
@@ -141,8 +142,8 @@ def carried_out(
     """The table of a sweep. Raises what ``sweep`` raises."""
     check_names(plan.network.network, inputs or {})
     arrays = {name: np.asarray(value, dtype=np.float64) for name, value in (inputs or {}).items()}
-    job, width = replace(plan.job, inputs=arrays), len(plan.job.names)
-    run = _runner(jobs, scheduler)
+    job = replace(plan.job if scheduler is None else _by_itself(plan), inputs=arrays)
+    width, run = len(plan.job.names), _runner(jobs, scheduler)
     if path is None:
         rows: dict[Row, Row] = {}
         _run(job, plan.points, run, rows, lambda row: rows.__setitem__(row[:width], row), progress)
@@ -161,6 +162,19 @@ def carried_out(
         raise
     journal.finish(plan.points)
     return Table(plan.columns, tuple(rows[point] for point in plan.points))
+
+
+def _by_itself(plan: Plan) -> Job:
+    """The job with all that the spec includes and reads in its text: other machines need not have these files. Raises
+    SweepError, SpecError where one of them is gone meanwhile."""
+    made = plan.network
+    text = whole_text(made.spec, replace(made.request, parameters={}, seed=None), made.sources)
+    if text == plan.job.text:
+        return plan.job
+    if len(text.encode()) > LARGEST:
+        size = f"{len(text) >> 20} MiB, of {LARGEST >> 20} at most"
+        raise SweepError(f"with the data that it reads the spec is too large to be sent to a cluster: {size}")
+    return replace(plan.job, text=text, folder=".", root=None)
 
 
 def named_metrics(metrics: str | Iterable[str] | Mapping[str, str]) -> dict[str, str]:
