@@ -133,7 +133,8 @@ def test_the_workers_need_none_of_the_files_that_a_spec_reads(cluster: Cluster, 
     (folder / "parts" / "edges.csv").write_text("from,to,weight\nK,L1,0.5\nK,L2,-0.25\n")
     (folder / "data" / "drive.csv").write_text("drive\n0.1\n0.7\n-0.3\n")
     np.save(folder / "data" / "link.npy", np.array([[0.1, 1 / 3], [0.3, 1e-17]]))
-    over, metrics = {"gain": [0.1, 0.7], "size": [2, 3], "seed": [1, 2]}, ["rms(B1, last=20)", "mean(c.L2)"]
+    over: dict[str, list[float]] = {"gain": [0.1, 0.7], "size": [2, 3], "seed": [1, 2]}
+    metrics = ["rms(B1, last=20)", "mean(c.L2)"]
     serial = nv.sweep(folder / "spec.yaml", over, metrics)
     assert [error is None for error in serial["error"]] == [True, True, False, False] * 2
 
