@@ -107,12 +107,13 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
         }
         wait--;
         const int64_t form = i ? c->then : c->form;
+        double odd = 0.0;
         if (form)
             nv_general(p, c->k + i, s, form == 2);
         else if (fused && i)
-            nv_fused(p, c->k + i, s);
+            odd = nv_fused(p, c->k + i, s);
         else
-            nv_plain(p, c->k + i, s);
+            odd = nv_plain(p, c->k + i, s);
         if (fused)
             memcpy(p->before, p->activity, sizeof(double)*NEURONS);
         if (kept) {
@@ -120,7 +121,8 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
             activity += NEURONS;
         }
         made = i + 1;
-        if (c->look && LOOK)
+        // what no step looked at is looked at here; what no step changes, once
+        if (c->look && (odd != 0.0 || LOOK_NEURONS || ((!WATCHED || form || !i) && LOOK_CONNECTIONS)))
             break;
     }
     if (fused)
@@ -161,28 +163,33 @@ def _write(network: Network) -> Written:
     small = len(network.neurons) + len(network.connections) <= SMALL
     bodies: list[str] = []
     taken = _taken(network)
-    for name, form, more in (
-        ("nv_plain", Form(written_out=small), ""),
-        ("nv_general", Form(first=True, held=True, gone=True, still=True), ", int first"),
-    ):
-        code = Code(emitter, tables, network.dt, network.settable.variables)
-        StepCode(network, code, form).write()
-        head = f"static void {name}(const nv_state *p, int64_t k, const double *restrict s{more})"
-        bodies += [*function(code, head, taken | tables.taken()), ""]
+    watched = bool(network.plasticity) and not small
     # a network that is written out is in registers, and nothing is gained
     fused = 0 if small else StepCode(network, Code(emitter, tables, network.dt, {}), Form()).count
-    for name, write, more in (
-        ("nv_fused", StepCode.write, ", int64_t k, const double *restrict s"),
-        ("nv_pack", StepCode.pack, ""),
-        ("nv_leave", lambda step: step.leave(step.fuses), ""),
+    of_step = ", int64_t k, const double *restrict s"
+    for name, form, write, more in (
+        ("double nv_plain", Form(written_out=small, watched=watched), StepCode.write, of_step),
+        (
+            "void nv_general",
+            Form(first=True, held=True, gone=True, still=True),
+            StepCode.write,
+            f"{of_step}, int first",
+        ),
+        ("double nv_fused", Form(fused=True, watched=watched), StepCode.write, of_step),
+        ("void nv_pack", Form(fused=True), StepCode.pack, ""),
+        ("void nv_leave", Form(fused=True), lambda step: step.leave(step.fuses), ""),
     ):
         code = Code(emitter, tables, network.dt, network.settable.variables)
-        if fused:
-            write(StepCode(network, code, Form(fused=True)))
-        bodies += [*function(code, f"static void {name}(const nv_state *p{more})", taken | tables.taken()), ""]
+        if fused or name in ("double nv_plain", "void nv_general"):
+            write(StepCode(network, code, form))
+        if name.startswith("double"):
+            code.line("return odd;" if form.watched and code.lines else "return 0.0;")
+        bodies += [*function(code, f"static {name}(const nv_state *p{more})", taken | tables.taken()), ""]
     counts = {"NEURONS": len(network.neurons), "INPUTS": network.vector_size, "CHANGING": len(network.changing)}
     defined = [f"#define {name} {value}" for name, value in counts.items()]
-    defined += [f"#define LOOK ({_look(network)})", f"#define FUSED {int(fused > 0)}"]
+    neurons, connections = _look(network)
+    defined += [f"#define LOOK_NEURONS ({neurons})", f"#define LOOK_CONNECTIONS ({connections})"]
+    defined += [f"#define WATCHED {int(watched)}", f"#define FUSED {int(fused > 0)}"]
     used = words_of(bodies)
     parts = [_HEAD, "\n".join(defined), emitter.helpers(used), tables.text(used), "\n".join(bodies)]
     return Written("\n\n".join(part for part in parts if part) + _TAIL, tuple(tables.given), fused)
@@ -213,22 +220,19 @@ def owned(network: Network) -> tuple[tuple[str, list[int]], ...]:
     )
 
 
-def _look(network: Network) -> str:
-    """Whether anything of a state is not finite."""
-    tests = [f"nv_odd(p->activity, {len(network.neurons)})"]
-    if network.plasticity:
-        tests.append(f"nv_odd(p->weights, {len(network.connections)})")
-    number = 0
-    for block in network.blocks:
-        for _ in block.model.state:
-            tests.append(f"nv_odd(p->cells[{number}], {len(block.members)})")
-            number += 1
-    number = 0
-    for plasticity in network.plasticity:
-        for _ in plasticity.rule.state:
-            tests.append(f"nv_odd(p->traces[{number}], {len(plasticity.members)})")
-            number += 1
-    return " || ".join(tests)
+def _look(network: Network) -> tuple[str, str]:
+    """Whether anything that neurons, and that connections carry is not finite."""
+    neurons = [f"nv_odd(p->activity, {len(network.neurons)})"]
+    neurons += _odd("cells", [(len(block.model.state), len(block.members)) for block in network.blocks])
+    connections = [f"nv_odd(p->weights, {len(network.connections)})"] if network.plasticity else []
+    connections += _odd("traces", [(len(one.rule.state), len(one.members)) for one in network.plasticity])
+    return " || ".join(neurons), " || ".join(connections) or "0"
+
+
+def _odd(name: str, sizes: list[tuple[int, int]]) -> list[str]:
+    """The tests of states: of each owner how many there are, and their length."""
+    lengths = [length for count, length in sizes for _ in range(count)]
+    return [f"nv_odd(p->{name}[{number}], {length})" for number, length in enumerate(lengths)]
 
 
 _POINTERS: Final = (

@@ -22,7 +22,7 @@ from neurovis_spec.language.expressions.tree import Tree, names
 from neurovis_spec.runtime.state import constants
 
 Place: TypeAlias = int | str
-Table: TypeAlias = npt.NDArray[np.float64] | npt.NDArray[np.int32]
+Table: TypeAlias = npt.NDArray[np.float64] | npt.NDArray[np.int32] | npt.NDArray[np.uint16]
 
 #: items of a table in a line of the text
 _ROW = 16
@@ -42,18 +42,24 @@ class Tables:
 
     def name(self, values: FloatArray | IntArray) -> str:
         """The identifier of an array of numbers or indices."""
-        real = values.dtype.kind == "f"
-        array: Table = np.ascontiguousarray(values, np.float64) if real else np.ascontiguousarray(values, np.int32)
+        array, kind = self._array(values)
         key = array.dtype.char, array.tobytes()
         if key not in self._names:
             name = self._names[key] = f"t{len(self._names)}"
-            kind = self._real if real else "int32_t"
             if self._longest is not None and len(array) > self._longest:
                 self._taken[name] = f"const {kind} *const {name} = (const {kind} *)p->given[{len(self.given)}];"
                 self.given.append(array)
             else:
                 self._text[name] = f"static const {kind} {name}[{len(array)}] = {{\n{self._items(array)}\n}};"
         return self._names[key]
+
+    def _array(self, values: FloatArray | IntArray) -> tuple[Table, str]:
+        """The array as it is kept, indices as narrow as they can be, and the type of its items."""
+        if values.dtype.kind == "f":
+            return np.ascontiguousarray(values, np.float64), self._real
+        if values.min(initial=0) >= 0 and values.max(initial=0) < 1 << 16:
+            return np.ascontiguousarray(values, np.uint16), "uint16_t"
+        return np.ascontiguousarray(values, np.int32), "int32_t"
 
     def _items(self, array: Table) -> str:
         items = array.tolist()
@@ -103,9 +109,10 @@ class Code:
         self.indent -= 1
         self.line("}")
 
-    def loop(self, index: str, count: int | str, first: int | str = 0) -> str:
+    def loop(self, index: str, count: int | str, first: int | str = 0, step: int = 1) -> str:
         """The head of a loop."""
-        return f"for (int32_t {index} = {first}; {index} < {count}; {index}++)"
+        further = f"{index}++" if step == 1 else f"{index} += {step}"
+        return f"for (int32_t {index} = {first}; {index} < {count}; {further})"
 
     def name(self, prefix: str) -> str:
         """A new identifier."""

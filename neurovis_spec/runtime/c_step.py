@@ -8,7 +8,8 @@ of a larger one, each block is a loop.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +28,10 @@ from neurovis_spec.runtime.state import history_depth, rule_names
 _FEW = 16
 #: neurons of a dense block whose sums are kept beside each other
 _BESIDE = 4096
+#: neurons of any other block whose sums go on beside each other: an addition need not wait for the one before
+_LANES = 8
+#: connections that learn beside each other: a compiler makes vectors of them
+_RULES = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +40,8 @@ class Form:
     take it at step 0 (``first`` is not 0). ``held``: neurons whose byte of ``held`` is set have the activity
     ``holding``. ``gone`` and ``still``: connections whose byte is set are left out, do not learn. ``fused``: what
     arrives after one step along weights that stay is formed where it arrives, from the activities ``before`` and the
-    weights ``packed`` in that order; it is not sent."""
+    weights ``packed`` in that order; it is not sent. ``watched``: what loops over connections store is looked at:
+    the number ``odd`` is NaN after the step where some of it is not finite, else 0."""
 
     written_out: bool = False
     first: bool = False
@@ -43,6 +49,7 @@ class Form:
     gone: bool = False
     still: bool = False
     fused: bool = False
+    watched: bool = False
 
 
 class StepCode:
@@ -57,6 +64,12 @@ class StepCode:
         #: connections that are fused, (m,)
         self.fuses = np.zeros(len(network.connections), dtype=np.bool_)
         self.count = 0
+        #: plasticities whose connections send while they learn, in one pass over their weights: those of one delay
+        self.sent_with = frozenset(
+            number
+            for number, plasticity in enumerate(network.plasticity)
+            if not form.written_out and _alike(network.connections.delays[plasticity.members]) > 0
+        )
         for number, block in enumerate(network.blocks):
             delays, rules = network.connections.delays[block.incoming], network.connections.rules[block.incoming]
             if len(delays) and (delays == 1).all() and (rules < 0).all():
@@ -74,6 +87,8 @@ class StepCode:
 
     def write(self) -> None:
         """All operations in order. What a block gathers is computed neuron by neuron, together with its update."""
+        if self.form.watched:
+            self.code.line(f"{self.code.real} odd = {self.code.text(0.0)};")
         for operation in self.network.program:
             match operation:
                 case ReadInputs() | Gather():
@@ -97,9 +112,12 @@ class StepCode:
                     self.neuron(number, place, arrivals)
         elif arrivals.dense and self.reads_drive(block):
             with code.block(""):
-                sums = arrivals.beside()
+                sums = arrivals.matrix()
                 with code.block(code.loop("p", len(block.members))):
                     self.neuron(number, "p", arrivals, f"{sums}[p]")
+        elif arrivals.lanes is not None and self.reads_drive(block):
+            with arrivals.beside(arrivals.lanes) as total:
+                self.neuron(number, "p", arrivals, total)
         else:
             with code.block(code.loop("p", len(block.members))):
                 self.neuron(number, "p", arrivals)
@@ -219,7 +237,10 @@ class StepCode:
     def send(self) -> None:
         """w[t]·a[t] of every delayed connection leaves; a[t] is remembered for ``pre``."""
         code = self.code
-        self.leave(~self.fuses if self.form.fused else np.ones(len(self.fuses), dtype=np.bool_))
+        which = ~self.fuses if self.form.fused else np.ones(len(self.fuses), dtype=np.bool_)
+        for number in self.sent_with:
+            which[self.network.plasticity[number].members] = False
+        self.leave(which)
         if self.depth:
             n = len(self.network.neurons)
             row = f"(size_t)(k % {self.depth})*{n}"
@@ -227,40 +248,71 @@ class StepCode:
 
     def leave(self, which: Mask) -> None:
         """The signals of some connections (m,) leave."""
-        code, connections = self.code, self.network.connections
+        code = self.code
         for kind in self.layout.classes:
             sent = which[kind.connections]
             if not sent.any():
                 continue
             members = kind.connections[sent]
-            sources, slots = connections.sources[members], kind.start + kind.delay * np.flatnonzero(sent)
-            shift = "" if kind.delay == 1 else f" + {code.remainder(kind.delay)}"
-            places: list[Place] = list(range(len(members))) if self.form.written_out else ["p"]
-            if not self.form.written_out:
-                code.line(code.loop("p", len(members)))
-            for place in places:
-                weight, source = code.at(members, place), code.at(sources, place)
-                indent = "" if self.form.written_out else "    "
-                code.line(f"{indent}signals[{code.at(slots, place)}{shift}] = weights[{weight}]*activity[{source}];")
+            if self.form.written_out:
+                for place in range(len(members)):
+                    self.signal_leaves(members, place)
+            else:
+                with code.block(code.loop("p", len(members))):
+                    self.signal_leaves(members, "p")
+
+    def signal_leaves(self, members: IntArray, place: Place) -> None:
+        """The signal of one of some connections, all of one delay, leaves."""
+        code, connections = self.code, self.network.connections
+        delay = int(connections.delays[members[0]])
+        slot, source = code.at(self.layout.offsets[members], place), code.at(connections.sources[members], place)
+        shift = "" if delay == 1 else f" + {code.remainder(delay)}"
+        code.line(f"signals[{slot}{shift}] = weights[{code.at(members, place)}]*activity[{source}];")
 
     # ---- connections -------------------------------------------------------------------------------------------
 
     def learn(self, number: int) -> None:
         """The rule of a plasticity."""
-        code, plasticity = self.code, self.network.plasticity[number]
-        count = len(plasticity.members)
+        code, count = self.code, len(self.network.plasticity[number].members)
         if self.form.written_out:
             for place in range(count):
                 with code.block(""):
-                    self.connection(number, place)
-        else:
-            with code.block(code.loop("q", count)):
-                self.connection(number, "q")
+                    self.connections(number, [place])
+            return
+        lanes = 1 if self.form.still else _RULES
+        beside = count - count % lanes
+        if lanes > 1 and beside:
+            sums = [code.variable("o", 0.0) for _ in range(lanes)] if self.form.watched else []
+            with code.block(code.loop("q", beside, step=lanes)):
+                self.connections(number, ["q", *(f"(q + {lane})" for lane in range(1, lanes))], sums)
+            if sums:
+                code.line(f"odd += {' + '.join(sums)};")
+        if beside < count or lanes == 1:
+            with code.block(code.loop("q", count, 0 if lanes == 1 else beside)):
+                self.connections(number, ["q"], ["odd"] if self.form.watched else [])
 
-    def connection(self, number: int, place: Place) -> None:
-        """The weight and the states of one connection, at a step and, where it has one, at an episode's end."""
+    def connections(self, number: int, places: Sequence[Place], sums: Sequence[str] = ()) -> None:
+        """The rule at some connections: all is read before anything is stored. To each of ``sums``, one a connection,
+        what is stored adds 0, or NaN where it is not finite."""
+        stores = [self.connection(number, place) for place in places]
+        for name, made in zip(sums, stores, strict=False):
+            for _, value in made:
+                if not isinstance(value, float):
+                    self.code.line(f"{name} += {value} - {value};")
+        for made in stores:
+            for cell, value in made:
+                self.code.line(f"{cell} = {self.code.text(value)};")
+        if self.form.still and isinstance(places[0], int):
+            self.code.indent -= 1
+            self.code.line("}")
+
+    def connection(self, number: int, place: Place) -> list[tuple[str, Value]]:
+        """The weight and the states of one connection, at a step and, where it has one, at an episode's end: where
+        each is stored, and what."""
         code, plasticity = self.code, self.network.plasticity[number]
         rule, connection = plasticity.rule, code.at(plasticity.members, place)
+        if number in self.sent_with:
+            self.signal_leaves(plasticity.members, place)
         if self.form.still:
             if isinstance(place, int):
                 code.line(f"if (!still[{connection}]) {{")
@@ -286,11 +338,7 @@ class StepCode:
                 if rule.each_episode is not None:
                     code.line(f"{new['weight']} = {code.text(self.bounded(plasticity, place, new['weight']))};")
             new = {name: value for name, value in new.items() if name in changed}
-        for name, value in new.items():
-            code.line(f"{stored[name]} = {code.text(value)};")
-        if self.form.still and isinstance(place, int):
-            code.indent -= 1
-            code.line("}")
+        return [(stored[name], value) for name, value in new.items()]
 
     def bounded(self, plasticity: Plasticity, place: Place, weight: Value) -> Value:
         """A new weight within its bounds."""
@@ -344,6 +392,11 @@ class StepCode:
         return f"({index} < {n} ? activity[{index}] : s[{index} - {n}])"
 
 
+def _alike(delays: IntArray) -> int:
+    """The delay of all of some connections, 0 where they differ."""
+    return int(delays[0]) if len(delays) and (delays == delays[0]).all() else 0
+
+
 def read_through(let: tuple[tuple[str, Tree], ...], readers: list[Tree | None]) -> set[str]:
     """The names that expressions read, by themselves or through intermediate values."""
     wanted: set[str] = set().union(*(names(tree) for tree in readers if tree is not None))
@@ -353,8 +406,43 @@ def read_through(let: tuple[tuple[str, Tree], ...], readers: list[Tree | None]) 
     return wanted
 
 
+@dataclass(frozen=True, slots=True)
+class _Lanes:
+    """How the sums of some neurons go on beside each other. ``neurons``: places in the block, those of like many
+    connections beside each other, eight to a group. First come the connections that all of a group have (those of
+    group g from ``begins[g]`` on, the first of each neuron, then the second of each, …), then the others, neuron by
+    neuron (those of the i-th from ``rests[i]`` on)."""
+
+    neurons: IntArray
+    begins: IntArray
+    rests: IntArray
+
+
+def _in_lanes(ends: IntArray) -> tuple[_Lanes, IntArray]:
+    """Neurons whose connections lie neuron by neuron, those of the i-th up to ``ends[i + 1]``; and the order in which
+    the connections are read then."""
+    degrees = np.diff(ends)
+    neurons = np.argsort(degrees, kind="stable").astype(np.int64)
+    count = len(neurons) - len(neurons) % _LANES
+    # neurons have ever more connections: of a group the first has the fewest
+    shared = np.zeros(len(neurons), dtype=np.int64)
+    shared[:count] = np.repeat(degrees[neurons[:count:_LANES]], _LANES)
+    begins = np.zeros(-(-len(neurons) // _LANES) + 1, dtype=np.int64)
+    begins[1:] = np.cumsum(np.add.reduceat(shared, np.arange(0, len(neurons), _LANES)))
+    rests = begins[-1] + np.concatenate(([0], np.cumsum(degrees[neurons] - shared)))
+    lane = np.arange(len(neurons))
+    owner = np.repeat(lane, degrees[neurons])
+    nth = np.arange(len(owner)) - np.repeat(np.cumsum(degrees[neurons]) - degrees[neurons], degrees[neurons])
+    beside = begins[owner // _LANES] + nth * _LANES + owner % _LANES
+    places = np.where(nth < shared[owner], beside, rests[owner] + nth - shared[owner])
+    order = np.empty(len(owner), dtype=np.int64)
+    order[places] = ends[neurons[owner]] + nth
+    return _Lanes(neurons, begins, rests.astype(np.int64)), order
+
+
 class _Arrivals:
-    """What arrives at the neurons of a block: their connections, neuron by neuron, in order."""
+    """What arrives at the neurons of a block: their connections, in the order in which they are read: neuron by neuron,
+    or as ``lanes`` says. What arrives at one neuron is put together in the order of its connections."""
 
     def __init__(self, step: StepCode, number: int) -> None:
         block = step.network.blocks[number]
@@ -362,18 +450,25 @@ class _Arrivals:
         #: where the weights begin among those packed, None where signals are read
         self.packed = step.packed.get(number) if step.form.fused else None
         order = np.argsort(block.slots, kind="stable")
-        connections = step.network.connections
-        self.connections = block.incoming[order]
-        self.sources = connections.sources[self.connections]
-        self.delays = connections.delays[self.connections]
-        self.offsets = step.layout.offsets[self.connections]
+        self._take(block.incoming[order])
         self.ends = np.searchsorted(block.slots[order], np.arange(len(block.members) + 1)).astype(np.int64)
         degrees = np.diff(self.ends)
         #: the number of connections of each neuron, −1 where they differ
         self.degree = int(degrees[0]) if (degrees == degrees[0]).all() else -1
+        self.dense = self._is_dense()
+        self.lanes: _Lanes | None = None
+        if not (step.form.written_out or self.dense or 0 <= self.degree <= _FEW):
+            self.lanes, order = _in_lanes(self.ends)
+            self._take(self.connections[order])
 
-    @property
-    def dense(self) -> bool:
+    def _take(self, connections: IntArray) -> None:
+        """Read connections in this order."""
+        self.connections = connections
+        self.sources = self.step.network.connections.sources[connections]
+        self.delays = self.step.network.connections.delays[connections]
+        self.offsets = self.step.layout.offsets[connections]
+
+    def _is_dense(self) -> bool:
         """Whether the connections are a full matrix, row by row: then the sums of all neurons go on beside each other,
         each in its own order."""
         count = len(self.block.members)
@@ -386,7 +481,28 @@ class _Arrivals:
         regular = rows[0, 0] + np.arange(self.degree) * count + np.arange(count).reshape(-1, 1)
         return bool((rows == regular).all() and (sources == sources[0]).all())
 
-    def beside(self) -> str:
+    @contextmanager
+    def beside(self, lanes: _Lanes) -> Iterator[str]:
+        """The body of a loop over all neurons ``p`` of the block: what arrives at it."""
+        code, count = self.code, len(lanes.neurons)
+        start: Value = 1.0 if self.block.combine == "product" else 0.0
+        begins, rests = code.tables.name(lanes.begins), code.tables.name(lanes.rests)
+        with code.block(code.loop("g", len(lanes.begins) - 1)):
+            totals = [code.variable("u", start) for _ in range(_LANES)]
+            with code.block(code.loop("e", f"{begins}[g + 1]", f"{begins}[g]", _LANES)):
+                for lane, total in enumerate(totals):
+                    self._add(total, f"(e + {lane})" if lane else "e", slice(None))
+            sums = code.name("u")
+            code.line(f"const {code.real} {sums}[{_LANES}] = {{{', '.join(totals)}}};")
+            code.line(f"const int32_t last = {_LANES}*g + {_LANES} < {count} ? {_LANES}*g + {_LANES} : {count};")
+            with code.block(code.loop("i", "last", f"{_LANES}*g")):
+                code.line(f"const int32_t p = {code.at(lanes.neurons, 'i')};")
+                total = code.variable("u", f"{sums}[i - {_LANES}*g]")
+                with code.block(code.loop("e", f"{rests}[i + 1]", f"{rests}[i]")):
+                    self._add(total, "e", slice(None))
+                yield code.text(self._finished(total))
+
+    def matrix(self) -> str:
         """The sums of a full matrix; the name of their array."""
         code, count = self.code, len(self.block.members)
         name = code.name("u")
@@ -412,25 +528,16 @@ class _Arrivals:
 
     def combined(self, place: Place) -> Value:
         """All that arrives at one neuron as one number."""
-        code, combine = self.code, self.block.combine
+        combine = self.block.combine
         start: Value = 1.0 if combine == "product" else 0.0
         if not len(self.connections):
             return start
         if isinstance(place, int):
             edges: list[Place] = list(range(int(self.ends[place]), int(self.ends[place + 1])))
             return self._written(start, edges, [slice(None)] * len(edges)) if edges else start
-        if 0 <= self.degree <= _FEW:
-            columns = [slice(column, None, self.degree) for column in range(self.degree)]
-            return self._written(start, [place] * self.degree, columns)
-        total = code.variable("u", start)
-        if self.degree >= 0:
-            first, last = f"{self.degree}*{place}", f"{self.degree}*({place} + 1)"
-        else:
-            ends = code.tables.name(self.ends)
-            first, last = f"{ends}[{place}]", f"{ends}[{place} + 1]"
-        with code.block(code.loop("e", last, first)):
-            self._add(total, "e", slice(None))
-        return self._finished(total)
+        assert 0 <= self.degree <= _FEW, "others go on in lanes"
+        columns = [slice(column, None, self.degree) for column in range(self.degree)]
+        return self._written(start, [place] * self.degree, columns)
 
     def _written(self, start: Value, edges: list[Place], columns: list[slice]) -> Value:
         """One term after the other."""
