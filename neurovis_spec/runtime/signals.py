@@ -50,7 +50,8 @@ def signal_layout(network: Network) -> SignalLayout:
     offsets = np.full(len(connections), -1, dtype=np.int64)
     classes: list[DelayClass] = []
     size = 0
-    for delay in sorted(set(connections.delays.tolist()) - {0}):
+    # no longer than the slots of the longest delay
+    for delay in (np.flatnonzero(np.bincount(connections.delays)[1:]) + 1).tolist():
         members = np.flatnonzero(connections.delays == delay)
         members = members[np.argsort(blocks[members], kind="stable")]
         offsets[members] = size + delay * np.arange(len(members))
