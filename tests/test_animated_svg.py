@@ -69,7 +69,7 @@ def test_each_frame_has_the_colours_of_its_step_within_half_a_level() -> None:
             continue
         place = CASE.network.neuron_index[g.attrib["data-neuron"]]
         for frame, token in enumerate(tokens_at(g, FILM.frames)):
-            (wanted,) = colours(theme, FILM.disc_values[frame, place : place + 1])
+            (wanted,) = colours(theme, FILM.fill_values[frame, place : place + 1])
             off = np.abs(np.subtract(channels(rule(token, "color")), channels(wanted)))
             assert off.max() <= 150 / (LEVELS - 1) + 1
 

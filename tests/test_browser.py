@@ -27,7 +27,7 @@ from neurovis_renderers.svg import SvgRenderer
 from PIL import Image
 
 from neurovis_spec.compiler.wishes import RenderSettings
-from neurovis_spec.scene import Film, Scene, channels, colours, still
+from neurovis_spec.scene import THEMES, Disc, Film, Group, Scene, channels, colours, still
 from neurovis_spec.scene.encode import encode
 from neurovis_spec.scene.film import film
 from neurovis_spec.scene.gains import choose_gains
@@ -201,7 +201,7 @@ def test_each_frame_of_a_film_shows_its_step(browser: Browser) -> None:
     neuron = CASE.network.neuron_index["K5"]
     carries, learns = (CASE.network.connection_index[name] for name in ("C1 -> K5", "K5 -> O"))
     for frame, (fill, stroke, width, glow, _, caption) in enumerate(read):
-        for shown, value in ((fill, made.disc_values[frame, neuron]), (stroke, made.line_values[frame, carries])):
+        for shown, value in ((fill, made.fill_values[frame, neuron]), (stroke, made.line_values[frame, carries])):
             (wanted,) = colours(made.scene.theme, [float(value)])
             assert np.abs(np.subtract(rgb(shown), channels(wanted))).max() <= 150 / (LEVELS - 1) + 1
         assert width == pytest.approx(made.line_widths[frame, learns], abs=0.04)
@@ -234,9 +234,34 @@ def test_with_reduced_motion_a_film_stands_still_at_its_first_frame(browser: Bro
     read = measured(browser, svg, SEEK, "--force-prefers-reduced-motion")
     assert isinstance(read, list)
     assert len({json.dumps(row) for row in read}) == 1
-    (first,) = colours(made.scene.theme, made.disc_values[0, [CASE.network.neuron_index["K5"]]])
+    (first,) = colours(made.scene.theme, made.fill_values[0, [CASE.network.neuron_index["K5"]]])
     assert rgb(read[0][0]) == channels(first)
     assert read[0][5] == made.captions[0]
+
+
+WHERE = """
+svg.pauseAnimations();
+const dot = svg.querySelector('[data-part="dot"]>circle');
+return [0, 1, 2].map(frame => { svg.setCurrentTime((frame + 0.02) / 10);
+  const box = dot.getBoundingClientRect(); return [box.x + box.width / 2, box.y + box.height / 2]; });
+"""
+
+
+def test_what_is_shifted_moves_and_stands_still_with_reduced_motion(browser: Browser) -> None:
+    theme = THEMES["default"]
+    dot = Group((Disc((20, 30), 5, "#101010", "#101010", 1),), "dot", {"part": "dot"})
+    empty = np.zeros((3, 0))
+    made = Film(
+        Scene(200, 100, theme, "a dot", (dot,)), 10.0, (), (), empty, empty, empty, empty, "caption", ("",) * 3,
+        shifts=("dot",), shift_values=np.array([[[0, 0]], [[50, 0]], [[100.5, -4]]], float),
+    )  # fmt: skip
+    svg = AnimatedSvgRenderer().animate(made, ".svg")
+    moving = measured(browser, svg, WHERE)
+    still = measured(browser, svg, WHERE, "--force-prefers-reduced-motion")
+    assert isinstance(moving, list)
+    assert isinstance(still, list)
+    assert np.diff(np.array(moving), axis=0) == pytest.approx(np.array([[50, 0], [50.5, -4]]))
+    assert still[0] == still[1] == still[2] == moving[0]
 
 
 def test_a_film_moves_inside_img_and_there_shows_its_frames(browser: Browser, tmp_path: Path) -> None:

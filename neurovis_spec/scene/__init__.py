@@ -4,7 +4,7 @@ Renderers use what stands here; ``encode``, ``film`` and ``choose_gains`` are in
 """
 
 from neurovis_spec.progress import Progress
-from neurovis_spec.scene.film import still
+from neurovis_spec.scene.film import filled_shape, still
 from neurovis_spec.scene.model import (
     HALO,
     HEAD_MORE,
@@ -14,6 +14,7 @@ from neurovis_spec.scene.model import (
     Disc,
     Film,
     Group,
+    Image,
     Point,
     Ramp,
     Rectangle,
@@ -25,6 +26,7 @@ from neurovis_spec.scene.model import (
     Text,
     Theme,
     head_half_width,
+    shifted,
 )
 from neurovis_spec.scene.texts import FAMILIES, SUBSCRIPT_DROP, SUBSCRIPT_SIZE
 from neurovis_spec.scene.themes import THEMES, blend, channels, colours, readable
@@ -42,6 +44,7 @@ __all__ = [
     "Disc",
     "Film",
     "Group",
+    "Image",
     "Point",
     "Progress",
     "Ramp",
@@ -56,7 +59,9 @@ __all__ = [
     "blend",
     "channels",
     "colours",
+    "filled_shape",
     "head_half_width",
     "readable",
+    "shifted",
     "still",
 ]

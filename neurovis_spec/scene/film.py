@@ -20,7 +20,20 @@ from neurovis_spec.scene.caption import caption
 from neurovis_spec.scene.encode import CAPTION, Looks, lesions_by_id, looks, paint, tooltips
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.lesions import FAINT
-from neurovis_spec.scene.model import Arrowhead, Disc, Film, Group, Scene, Shape, Spline, Text, head_half_width
+from neurovis_spec.scene.model import (
+    Arrowhead,
+    Disc,
+    Film,
+    Group,
+    Point,
+    Rectangle,
+    Scene,
+    Shape,
+    Spline,
+    Text,
+    head_half_width,
+    shifted,
+)
 from neurovis_spec.scene.plan import plan
 from neurovis_spec.scene.themes import colours, readable
 
@@ -41,12 +54,12 @@ def film(
     frames, neurons, connections = len(snapshots), len(network.neurons), len(network.connections)
     if not frames:
         raise ValueError("a film has at least one frame")
-    disc_values, line_values = np.empty((frames, neurons)), np.empty((frames, connections))
+    fill_values, line_values = np.empty((frames, neurons)), np.empty((frames, connections))
     widths, glows = np.empty((2, frames, connections))
     captions, steps, low, high = list[str](), list[int](), None, None
     for frame, snapshot in enumerate(snapshots):
         seen = looks(network, snapshot, gains, planned.frame.widest)
-        disc_values[frame], line_values[frame] = seen.discs, seen.lines
+        fill_values[frame], line_values[frame] = seen.discs, seen.lines
         widths[frame], glows[frame] = seen.widths, seen.glows
         steps.append(snapshot.step)
         words = caption(network, snapshot.step, snapshot.activity)
@@ -58,14 +71,14 @@ def film(
     assert low is not None
     assert high is not None
     glowing: npt.NDArray[np.bool_] = glows.max(axis=0) > 0
-    first = Looks(disc_values[0], line_values[0], widths[0], glows[0])
+    first = Looks(fill_values[0], line_values[0], widths[0], glows[0])
     titles = tooltips(network, np.stack([low[0], high[0]]), np.stack([low[1], high[1]]))
     return Film(
         scene=paint(planned, first, glowing, captions[0], titles, steps[0]),
         fps=fps,
-        discs=tuple(f"n{index}" for index in range(len(network.neurons))),
+        fills=tuple(f"n{index}" for index in range(len(network.neurons))),
         lines=tuple(f"c{index}" for index in range(len(network.connections))),
-        disc_values=disc_values,
+        fill_values=fill_values,
         line_values=line_values,
         line_widths=widths,
         glow_widths=glows,
@@ -80,10 +93,19 @@ def film(
     )
 
 
+def filled_shape(group: Group) -> int | None:
+    """Which shape of a group has the colour of a film's ``fills``."""
+    places = (place for place, shape in enumerate(group.shapes) if isinstance(shape, Disc | Rectangle))
+    return next(places, None)
+
+
 def still(film: Film, frame: int) -> Scene:
     """One frame as a scene; a connection that does not glow in it has no glow. Raises IndexError beyond the end."""
     theme = film.scene.theme
-    discs = dict(zip(film.discs, colours(theme, film.disc_values[frame]), strict=True))
+    fills = dict(zip(film.fills, colours(theme, film.fill_values[frame]), strict=True))
+    shifts: dict[str, Point] = {}
+    if film.shifts:
+        shifts = {name: (x, y) for name, (x, y) in zip(film.shifts, film.shift_values[frame].tolist(), strict=True)}
     lines = {
         name: (colour, width, glow)
         for name, colour, width, glow in zip(
@@ -97,12 +119,15 @@ def still(film: Film, frame: int) -> Scene:
 
     def repaint(group: Group) -> Group:
         shapes: list[Shape] = []
-        for shape in group.shapes:
+        filled = filled_shape(group) if group.id in fills else None
+        for place, shape in enumerate(group.shapes):
             match shape:
-                case Disc() if group.id in discs:
-                    shapes.append(replace(shape, fill=discs[group.id]))
-                case Text() if shape.on_disc and group.id in discs:
-                    shapes.append(replace(shape, fill=readable(theme, discs[group.id])))
+                case Disc() | Rectangle() if place == filled:
+                    shapes.append(replace(shape, fill=fills[group.id]))
+                case Text() if shape.on_disc and group.id in fills:
+                    shapes.append(replace(shape, fill=readable(theme, fills[group.id])))
+                case _ if group.id in shifts:
+                    shapes.append(shifted(shape, shifts[group.id]))
                 case Text() if group.id == film.caption:
                     shapes.append(replace(shape, text=film.captions[frame]))
                 case Spline(glow=True) if group.id in lines:

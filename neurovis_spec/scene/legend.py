@@ -16,9 +16,8 @@ from neurovis_spec.scene import texts
 from neurovis_spec.scene.delays import bead
 from neurovis_spec.scene.encoding import THINNEST, glow_width
 from neurovis_spec.scene.gains import Gains
-from neurovis_spec.scene.geometry import Point
 from neurovis_spec.scene.lesions import FAINT
-from neurovis_spec.scene.model import Group, Ramp, Rectangle, Shape, Spline, Text, Theme
+from neurovis_spec.scene.model import Group, Ramp, Shape, Spline, Text, Theme, shifted
 from neurovis_spec.scene.teachers import dash
 from neurovis_spec.scene.themes import colours
 
@@ -86,7 +85,7 @@ def flow(items: Sequence[Entry], width: float, left: float, top: float) -> Group
     for row, members in enumerate(_rows(items, width)):
         x, y = left, top + row * (_ENTRY_HEIGHT + _ROW_GAP)
         for entry in members:
-            shapes += [_moved(shape, x, y) for shape in entry.shapes]
+            shapes += [shifted(shape, (x, y)) for shape in entry.shapes]
             x += entry.width + _ENTRY_GAP
     return Group(tuple(shapes), id="legend")
 
@@ -102,24 +101,6 @@ def _rows(items: Sequence[Entry], width: float) -> list[list[Entry]]:
             rows.append([entry])
             used = entry.width
     return rows
-
-
-def _moved(shape: Shape, x: float, y: float) -> Shape:
-    def move(point: Point) -> Point:
-        return point[0] + x, point[1] + y
-
-    match shape:
-        case Text():
-            return Text(move(shape.point), shape.text, shape.size, shape.fill, shape.anchor, shape.weight)
-        case Ramp():
-            return Ramp(move(shape.corner), shape.width, shape.height, shape.colours)
-        case Spline():
-            points = tuple(move(point) for point in shape.points)
-            return Spline(points, shape.stroke, shape.width, shape.dash, shape.glow, shape.opacity)
-        case Rectangle():
-            return replace(shape, corner=move(shape.corner))
-        case _:
-            raise TypeError(f"no {type(shape).__name__} in a legend")
 
 
 def _colour(contents: Contents, gains: Gains, theme: Theme) -> Entry:

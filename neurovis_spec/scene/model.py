@@ -1,14 +1,14 @@
 """The Scene: a flat drawing in plain units, and the Film: a scene whose colours and widths change.
 
 In: nothing; these are the values that ``scene.encode`` makes and that renderers read. A renderer knows nothing of
-networks: items are discs, splines, texts and rectangles, in groups that carry an opaque id, data
+networks: items are discs, splines, texts, rectangles and images of cells, in groups that carry an opaque id, data
 attributes and a tooltip. Lengths are user units (``Scene.density`` pixels), x right, y down. Colours are ``#rrggbb``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Literal, Protocol, TypeAlias
 
 import numpy as np
@@ -126,6 +126,19 @@ class Ramp:
 
 
 @dataclass(frozen=True, slots=True)
+class Image:
+    """Coloured cells of equal size, ``rows`` of ``columns`` each, without seams. ``pixels``: red, green and blue of
+    each cell (0…255), row by row from the top, from left to right."""
+
+    corner: Point
+    width: float
+    height: float
+    columns: int
+    rows: int
+    pixels: bytes = field(repr=False)
+
+
+@dataclass(frozen=True, slots=True)
 class Text:
     """A line of text; ``subscript`` follows it smaller and lower (K₁). The point is on the baseline."""
 
@@ -142,7 +155,26 @@ class Text:
     halo: str = ""
 
 
-Shape: TypeAlias = Disc | Spline | Arrowhead | Rectangle | Ramp | Text
+def shifted(shape: Shape, by: Point) -> Shape:
+    """The same shape, moved by so much to the right and down."""
+
+    def move(point: Point) -> Point:
+        return point[0] + by[0], point[1] + by[1]
+
+    match shape:
+        case Disc():
+            return replace(shape, centre=move(shape.centre))
+        case Spline():
+            return replace(shape, points=tuple(move(point) for point in shape.points))
+        case Arrowhead():
+            return replace(shape, tip=move(shape.tip))
+        case Rectangle() | Ramp() | Image():
+            return replace(shape, corner=move(shape.corner))
+        case Text():
+            return replace(shape, point=move(shape.point))
+
+
+Shape: TypeAlias = Disc | Spline | Arrowhead | Rectangle | Ramp | Image | Text
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,32 +219,35 @@ FloatArray: TypeAlias = npt.NDArray[np.float64]
 class Film:
     """A scene that changes: ``scene`` is frame 0, and the arrays say how groups differ, frame by frame.
 
-    For group ``discs[i]`` (an id) the disc has the colour value ``disc_values[f, i]`` in −1…1 at frame f. For group
-    ``lines[j]`` the line and its arrowhead have the colour value ``line_values[f, j]``, the line the width
-    ``line_widths[f, j]`` (user units; the head follows by ``head_half_width``), and its glow the width
+    For group ``fills[i]`` (an id) its first disc or rectangle has the colour value ``fill_values[f, i]`` in −1…1 at
+    frame f. For group ``lines[j]`` the line and its arrowhead have the colour value ``line_values[f, j]``, the line the
+    width ``line_widths[f, j]`` (user units; the head follows by ``head_half_width``), and its glow the width
     ``glow_widths[f, j]`` (0 for none; a group that glows at any time has a glow in ``scene``, of width 0 where it
-    does not glow in frame 0). From frame ``faint[id]`` on, a group that stands there has the opacity ``faintness``.
-    ``captions[f]`` is the text in group ``caption``. Colours are linear in sRGB between the
-    theme's anchors; ``still(f)`` is frame f as a scene.
+    does not glow in frame 0). Group ``shifts[k]`` is moved from where it stands in ``scene`` by ``shift_values[f, k]``
+    (x and y, user units; 0 in frame 0). A group may be in one of the three at most. From frame ``faint[id]`` on, a
+    group that stands there has the opacity ``faintness``. ``captions[f]`` is the text in group ``caption``. Colours are
+    linear in sRGB between the theme's anchors; ``still(f)`` is frame f as a scene.
     """
 
     scene: Scene
     fps: float
-    discs: tuple[str, ...]
+    fills: tuple[str, ...]
     lines: tuple[str, ...]
-    disc_values: FloatArray
+    fill_values: FloatArray
     line_values: FloatArray
     line_widths: FloatArray
     glow_widths: FloatArray
     caption: str
     captions: tuple[str, ...]
+    shifts: tuple[str, ...] = ()
+    shift_values: FloatArray = field(default_factory=lambda: np.zeros((0, 0, 2)))
     faint: Mapping[str, int] = field(default_factory=dict)
     faintness: float = 1.0
 
     @property
     def frames(self) -> int:
         """How many frames there are."""
-        return len(self.disc_values)
+        return len(self.captions)
 
     @property
     def changing(self) -> npt.NDArray[np.bool_]:

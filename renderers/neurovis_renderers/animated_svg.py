@@ -3,7 +3,8 @@
 In: a Film. Out: the bytes of an ``.svg`` that moves, also inside ``<img>``. The attributes are those of frame 0;
 each group that changes has one SMIL animation of its ``class``: a letter or two for the colour and, where a weight
 changes, one each for width and glow. What these classes look like stands in a style sheet that holds only where no
-reduced motion is asked for: where it is, the picture stands still at frame 0.
+reduced motion is asked for: where it is, the picture stands still at frame 0. A group that is shifted has an animation
+of its ``transform``, which the style sheet takes back there.
 """
 
 from __future__ import annotations
@@ -22,14 +23,19 @@ from neurovis_spec.scene import (
     HEAD_OF_LENGTH,
     HEAD_OF_WIDTH,
     Arrowhead,
+    Disc,
     Film,
     Group,
     Progress,
+    Rectangle,
     RendererCapabilities,
     Scene,
+    Shape,
+    Spline,
     Text,
     Theme,
     colours,
+    filled_shape,
     readable,
 )
 
@@ -42,8 +48,10 @@ LEVELS = 51
 LETTERS: tuple[str, ...] = (*ascii_lowercase, *(f"a{letter}" for letter in ascii_lowercase))
 #: At most so many different widths are told apart, and so many captions.
 _MOST_WIDTHS, _MOST_CAPTIONS = 240, 500
-#: The class of what is lesioned.
-_FAINT = "lesioned"
+#: The classes of what is lesioned, of what is shifted, and of shapes of a changing group that stay as they are.
+_FAINT, _SHIFTED, _FIXED = "lesioned", "shifted", "fixed"
+#: Groups that have the class of a colour.
+_COLOURED = f"[class]:not(.{_SHIFTED})"
 
 
 class AnimatedSvgRenderer:
@@ -74,7 +82,8 @@ class _Writer:
 
     def __init__(self, film: Film) -> None:
         self._film = film
-        self._discs = {name: place for place, name in enumerate(film.discs)}
+        self._fills = {name: place for place, name in enumerate(film.fills)}
+        self._shifts = {name: place for place, name in enumerate(film.shifts)}
         self._lines = {name: place for place, name in enumerate(film.lines)}
         self._changing = film.changing
         self._width_step = _step(film.line_widths)
@@ -83,14 +92,17 @@ class _Writer:
         self._widths: set[int] = set()
         self._glows: set[int] = set()
         self._captions = -1
+        self._moves = False
 
     def group(self, group: Group) -> str:
         """A group, animated where it changes."""
         if group.id == self._film.caption:
             return self._caption(group)
-        if group.id in self._discs:
-            levels = _levels(self._film.disc_values[:, self._discs[group.id]])
+        if group.id in self._fills:
+            levels = _levels(self._film.fill_values[:, self._fills[group.id]])
             return self._animated(group, [self._letter(level) for level in levels.tolist()])
+        if group.id in self._shifts:
+            return self._shifted(group, self._film.shift_values[:, self._shifts[group.id]])
         if group.id in self._lines:
             return self._connection(group, self._lines[group.id])
         shapes = "".join(element(shape) for shape in group.shapes)
@@ -114,14 +126,33 @@ class _Writer:
         since = self._film.faint.get(group.id)
         if since is not None:
             tokens = [f"{token} {_FAINT}" if frame >= since else token for frame, token in enumerate(tokens)]
-        shapes = "".join(
-            self._head_element(shape)
-            if isinstance(shape, Arrowhead) and group.id in self._lines and self._changing[self._lines[group.id]]
-            else element(shape, ' class="on"' if isinstance(shape, Text) and shape.on_disc else "")
-            for shape in group.shapes
-        )
+        filled = filled_shape(group) if group.id in self._fills else None
+        shapes = "".join(self._element(group, place, shape, filled) for place, shape in enumerate(group.shapes))
         frames = animation(tokens, self._film.frames / self._film.fps)
         return f"{open_group(group, _class(tokens[0]))}{shapes}{frames}</g>\n"
+
+    def _element(self, group: Group, place: int, shape: Shape, filled: int | None) -> str:
+        """A shape of a group whose colour changes."""
+        match shape:
+            case Text():
+                return element(shape, _class("on") if shape.on_disc else "")
+            case Disc() | Rectangle():
+                return element(shape, "" if place == filled else _class(_FIXED))
+            case Arrowhead() if group.id in self._lines and self._changing[self._lines[group.id]]:
+                return self._head_element(shape)
+            case Arrowhead() | Spline() if group.id not in self._lines:
+                return element(shape, _class(_FIXED))
+            case _:
+                return element(shape)
+
+    def _shifted(self, group: Group, shifts: FloatArray) -> str:
+        """A group that moves as a whole; its shapes are where they stand in frame 0."""
+        tokens = [f"{num(x)} {num(y)}" if y else num(x) for x, y in shifts.tolist()]
+        seconds = self._film.frames / self._film.fps
+        frames = animation(tokens, seconds, '<animateTransform attributeName="transform" type="translate"')
+        self._moves = True
+        shapes = "".join(element(shape) for shape in group.shapes)
+        return f"{open_group(group, _class(_SHIFTED))}{shapes}{frames}</g>\n"
 
     def _head_element(self, head: Arrowhead) -> str:
         """A head in its own coordinates, so that its width alone can be scaled: at the tip, pointing right."""
@@ -158,8 +189,9 @@ class _Writer:
         """The style sheet; its rules hold only within the class ``root``, and where motion is welcome."""
         theme = self._film.scene.theme
         rules = [
-            "[data-neuron]>circle,[data-connection] polygon{fill:currentColor}",
-            "[data-connection]>path:not(.glow){stroke:currentColor}",
+            ",".join(f"{_COLOURED}{shape}:not(.{_FIXED})" for shape in (">circle", ">rect", " polygon"))
+            + "{fill:currentColor}",
+            f"{_COLOURED}>path:not(.glow):not(.{_FIXED}){{stroke:currentColor}}",
             ".on{fill:var(--d)}",
             *self._palette(theme),
         ]
@@ -171,7 +203,11 @@ class _Writer:
             rules.append(".caption text{display:none}")
             rules += [f".t{n}>:nth-child({n + 1}){{display:inline}}" for n in range(self._captions)]
         scoped = "".join(_scoped(rule, root) for rule in rules)
-        return f"<style>@media (prefers-reduced-motion:no-preference){{{scoped}}}</style>\n"
+        still = ""
+        if self._moves:
+            rule = _scoped(f".{_SHIFTED}{{transform:none!important}}", root)
+            still = f"@media (prefers-reduced-motion:reduce){{{rule}}}"
+        return f"<style>@media (prefers-reduced-motion:no-preference){{{scoped}}}{still}</style>\n"
 
     def _palette(self, theme: Theme) -> list[str]:
         levels = sorted(self._letters)
@@ -218,8 +254,9 @@ def _step(widths: FloatArray) -> float:
     return max(0.05, float(widths.max(initial=0.0)) / _MOST_WIDTHS)
 
 
-def animation(tokens: Sequence[str], seconds: float) -> str:
-    """The SMIL animation of a class through ``tokens``, one a frame; '' where it never changes.
+def animation(tokens: Sequence[str], seconds: float, start: str = '<animate attributeName="class"') -> str:
+    """The SMIL animation, of a class or what else ``start`` says, through ``tokens``, one a frame; '' where it never
+    changes.
 
     Frames are told either one by one, which is even spacing, or where they change, whichever is shorter.
     """
@@ -234,9 +271,7 @@ def animation(tokens: Sequence[str], seconds: float) -> str:
     values = f'values="{every}"'
     if len(some) + len(times) + 12 < len(every):
         values = f'values="{some}" keyTimes="{times}"'
-    return (
-        f'<animate attributeName="class" calcMode="discrete" dur="{seconds:.6g}s" repeatCount="indefinite" {values}/>'
-    )
+    return f'{start} calcMode="discrete" dur="{seconds:.6g}s" repeatCount="indefinite" {values}/>'
 
 
 def _fraction(place: int, frames: int, digits: int) -> str:

@@ -6,9 +6,11 @@ lines, which state a value (Eq. 4), are written so that they read back exactly.
 
 from __future__ import annotations
 
+import base64
 import re
 from collections.abc import Mapping, Sequence
 
+from neurovis_renderers.png import png
 from neurovis_spec.scene import (
     FAMILIES,
     HALO,
@@ -17,6 +19,7 @@ from neurovis_spec.scene import (
     Arrowhead,
     Disc,
     Group,
+    Image,
     Point,
     Ramp,
     Rectangle,
@@ -103,6 +106,8 @@ def element(shape: Shape, attributes: str = "", content: str = "") -> str:
             )
         case Ramp():
             return _ramp(shape)
+        case Image():
+            return _image(shape)
         case Text():
             return _text(shape, attributes, content)
 
@@ -131,6 +136,16 @@ def _ramp(shape: Ramp) -> str:
         across = step if place == len(shape.colours) - 1 else step + 0.75
         result += f'<path d="M{num(x + place * step)} {num(y)}h{num(across)}v{down}h{num(-across)}z" fill="{fill}"/>'
     return result + "</g>"
+
+
+def _image(shape: Image) -> str:
+    """Cells as a PNG within the file: thousands of them would be too many elements."""
+    data = base64.b64encode(png(shape.columns, shape.rows, shape.pixels)).decode()
+    return (
+        f'<image x="{num(shape.corner[0])}" y="{num(shape.corner[1])}" width="{num(shape.width)}" '
+        f'height="{num(shape.height)}" preserveAspectRatio="none" image-rendering="pixelated" '
+        f'href="data:image/png;base64,{data}"/>'
+    )
 
 
 def _text(shape: Text, attributes: str, content: str) -> str:

@@ -14,16 +14,17 @@ from itertools import pairwise
 from typing import Generic, TypeVar
 
 import numpy as np
-from PIL import Image
+from PIL import Image as Pillow
 
 from neurovis_renderers import coverage
-from neurovis_renderers.coverage import Field, FloatArray, Mask, Size
+from neurovis_renderers.coverage import Field, FloatArray, IntArray, Mask, Size
 from neurovis_renderers.films import Pixels, gif, webp
 from neurovis_renderers.lettering import lettering
 from neurovis_spec.scene import (
     Arrowhead,
     Disc,
     Film,
+    Image,
     Point,
     Progress,
     Ramp,
@@ -56,7 +57,7 @@ class PillowRenderer:
 
     def draw(self, scene: Scene, suffix: str) -> bytes:
         """The picture as a file."""
-        picture = Image.fromarray(Canvas(scene).paint(scene))
+        picture = Pillow.fromarray(Canvas(scene).paint(scene))
         buffer = io.BytesIO()
         if suffix == ".webp":
             picture.save(buffer, "WEBP", lossless=True)
@@ -169,6 +170,8 @@ class _Band:
                 edge.onto(picture, channels(shape.stroke))
             case Ramp():
                 self._ramp(picture, shape)
+            case Image():
+                self._image(picture, shape)
             case Text():
                 key = (shape.point, shape.text, shape.size, shape.weight, shape.subscript, shape.anchor)
                 if shape.halo:
@@ -214,6 +217,23 @@ class _Band:
             corner = (round(near[0] + place * step), round(near[1]))
             extent = (round(far[0]) - corner[0], round(far[1]) - corner[1])
             coverage.rectangle(corner, extent, 0, self.size).onto(picture, channels(colour))
+
+    def _image(self, picture: FloatArray, shape: Image) -> None:
+        """Each pixel has the colour of the cell in which its centre lies."""
+        near, far = self._pixels((shape.corner, (shape.corner[0] + shape.width, shape.corner[1] + shape.height)))
+        columns, x = _cells(near[0], far[0], shape.columns, self.size[0])
+        rows, y = _cells(near[1], far[1], shape.rows, self.size[1])
+        cells = np.frombuffer(shape.pixels, np.uint8).reshape(shape.rows, shape.columns, 3)
+        picture.reshape(self.size[1], self.size[0], 3)[y, x] = cells[rows[:, None], columns[None, :]]
+
+
+def _cells(near: float, far: float, count: int, end: int) -> tuple[IntArray, slice]:
+    """Of ``count`` cells from ``near`` to ``far`` the one at each pixel of a side of ``end`` pixels, and which these
+    pixels are."""
+    first, last = max(0, round(near)), min(end, round(far))
+    centres = np.arange(first, last) + 0.5
+    which = np.floor((centres - near) / max(far - near, 1e-9) * count).astype(np.int64)
+    return np.clip(which, 0, count - 1), slice(first, max(first, last))
 
 
 Kept = TypeVar("Kept")

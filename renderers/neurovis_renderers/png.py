@@ -1,0 +1,33 @@
+"""PNG: coloured cells as the bytes of a file, by the standard library alone, so that SVG needs nothing else.
+
+In: red, green and blue of each cell. Out: a ``.png``, with a palette where there are few colours.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+
+import numpy as np
+
+_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_TRUE_COLOUR, _PALETTE = 2, 3
+
+
+def png(columns: int, rows: int, pixels: bytes) -> bytes:
+    """A picture of ``columns`` by ``rows`` cells, the same bytes for the same cells."""
+    cells = np.frombuffer(pixels, np.uint8).reshape(rows, columns, 3)
+    shades, which = np.unique(cells.reshape(-1, 3), axis=0, return_inverse=True)
+    if len(shades) <= 256:
+        kind, palette = _PALETTE, _chunk(b"PLTE", shades.tobytes())
+        lines = which.astype(np.uint8).reshape(rows, columns)
+    else:
+        kind, palette, lines = _TRUE_COLOUR, b"", cells.reshape(rows, -1)
+    filtered = np.concatenate([np.zeros((rows, 1), np.uint8), lines], axis=1)  # each line begins with its filter: none
+    header = struct.pack(">IIBBBBB", columns, rows, 8, kind, 0, 0, 0)
+    content = _chunk(b"IHDR", header) + palette + _chunk(b"IDAT", zlib.compress(filtered.tobytes(), 9))
+    return _SIGNATURE + content + _chunk(b"IEND", b"")
+
+
+def _chunk(name: bytes, content: bytes) -> bytes:
+    return struct.pack(">I", len(content)) + name + content + struct.pack(">I", zlib.crc32(name + content))

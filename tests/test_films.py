@@ -1,0 +1,182 @@
+"""What may change in a film (fills, lines, shifts): the same in a frame as a scene, in the animated SVG, in pixels."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+from neurovis_renderers.animated_svg import AnimatedSvgRenderer
+from neurovis_renderers.png import png
+from neurovis_renderers.raster import Canvas, PillowRenderer
+from neurovis_renderers.svg import SvgRenderer
+from PIL import Image as Pillow
+
+from neurovis_spec.scene import (
+    THEMES,
+    Arrowhead,
+    Disc,
+    Film,
+    Group,
+    Image,
+    Ramp,
+    Rectangle,
+    Scene,
+    Shape,
+    Spline,
+    Text,
+    channels,
+    colours,
+    shifted,
+    still,
+)
+
+NS = "{http://www.w3.org/2000/svg}"
+THEME = THEMES["default"]
+INK, EDGE = "#101010", "#202020"
+
+LINE = ((20.0, 10.0), (20.0, 30.0), (20.0, 60.0), (20.0, 90.0))
+SCENE = Scene(
+    200,
+    100,
+    THEME,
+    "things that change",
+    (
+        Group((Disc((60, 50), 12, "#969696", EDGE, 1), Disc((60, 50), 4, INK, EDGE, 1)), "disc", {"part": "disc"}),
+        Group(
+            (Rectangle((100, 40), 20, 20, 0, "#969696", EDGE, 1), Rectangle((105, 45), 5, 5, 0, INK, EDGE, 1)),
+            "cell",
+            {"part": "cell"},
+        ),
+        Group((Spline(LINE, INK, 2.0), Text((22, 12), "now", 10, INK)), "cursor", {"part": "cursor"}),
+        Group((Text((5, 95), "step 0", 10, INK),), "caption"),
+    ),
+)
+FILM = Film(
+    SCENE,
+    10.0,
+    fills=("disc", "cell"),
+    lines=(),
+    fill_values=np.array([[0, 0], [1, -1], [-0.5, 0.5]], float),
+    line_values=np.zeros((3, 0)),
+    line_widths=np.zeros((3, 0)),
+    glow_widths=np.zeros((3, 0)),
+    caption="caption",
+    captions=("step 0", "step 1", "step 2"),
+    shifts=("cursor",),
+    shift_values=np.array([[[0, 0]], [[50, 0]], [[100.5, -4]]], float),
+)
+
+
+def shapes(scene: Scene, name: str) -> tuple[Shape, ...]:
+    return next(group.shapes for group in scene.groups if group.id == name)
+
+
+@pytest.mark.parametrize("frame", range(3))
+def test_the_first_disc_or_rectangle_of_a_group_is_filled_and_nothing_else_of_it(frame: int) -> None:
+    drawn = still(FILM, frame)
+    wanted = colours(THEME, FILM.fill_values[frame])
+    for name, fill in zip(("disc", "cell"), wanted, strict=True):
+        first, second = shapes(drawn, name)
+        assert isinstance(first, Disc | Rectangle)
+        assert isinstance(second, Disc | Rectangle)
+        assert (first.fill, first.stroke) == (fill, EDGE)
+        assert second.fill == INK
+
+
+@pytest.mark.parametrize("frame", range(3))
+def test_a_group_that_is_shifted_moves_as_a_whole(frame: int) -> None:
+    line, text = shapes(still(FILM, frame), "cursor")
+    x, y = FILM.shift_values[frame, 0]
+    assert isinstance(line, Spline)
+    assert isinstance(text, Text)
+    assert line.points == tuple((a + x, b + y) for a, b in LINE)
+    assert text.point == (22 + x, 12 + y)
+    assert line.width == 2.0
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        Disc((1, 2), 3, INK, EDGE, 1),
+        Spline(((1, 2), (2, 3), (3, 4), (4, 5)), INK, 1),
+        Arrowhead((1, 2), (0, 1), 8, 3, INK),
+        Rectangle((1, 2), 3, 4, 0, INK, EDGE, 1),
+        Ramp((1, 2), 3, 4, (INK, EDGE)),
+        Image((1, 2), 3, 4, 1, 1, b"abc"),
+        Text((1, 2), "a", 10, INK, subscript="1", halo=EDGE),
+    ],
+)
+def test_every_shape_can_be_moved_and_moved_back(shape: Shape) -> None:
+    moved = shifted(shape, (2, -1))
+    assert moved != shape
+    assert shifted(moved, (-2, 1)) == shape
+
+
+def group_of(root: ET.Element, part: str) -> ET.Element:
+    return next(g for g in root.iter(NS + "g") if g.attrib.get("data-part") == part)
+
+
+def test_the_animated_svg_fills_and_moves_the_same() -> None:
+    root = ET.fromstring(AnimatedSvgRenderer().animate(FILM, ".svg"))
+    for part, element in (("disc", "circle"), ("cell", "rect")):
+        group = group_of(root, part)
+        first, second = group.findall(NS + element)
+        assert "class" not in first.attrib  # it has the colour of its group's class
+        assert second.attrib["class"] == "fixed"
+        moving = group.find(NS + "animate")
+        assert moving is not None
+        assert len(set(moving.attrib["values"].split(";"))) == 3
+    cursor = group_of(root, "cursor")
+    moving = cursor.find(NS + "animateTransform")
+    assert moving is not None
+    assert moving.attrib["attributeName"] == "transform"
+    assert moving.attrib["type"] == "translate"
+    assert moving.attrib["values"] == "0;50;100.5 -4"
+    assert (moving.attrib["calcMode"], moving.attrib["dur"]) == ("discrete", "0.3s")
+    assert "shifted" in cursor.attrib["class"]
+    style = root.findtext(NS + "style") or ""
+    assert "@media (prefers-reduced-motion:reduce){." in style
+    assert ".shifted{transform:none!important}" in style
+
+
+def test_a_still_of_the_film_has_its_frames_pixels() -> None:
+    for frame in range(3):
+        pixels = Canvas(SCENE).paint(still(FILM, frame))
+        x = int(20 + FILM.shift_values[frame, 0, 0])
+        assert tuple(pixels[45, x]) == channels(INK)
+        for at, value in ((52, 0), (117, 1)):
+            fill = colours(THEME, FILM.fill_values[frame])[value]
+            assert tuple(pixels[50 if value == 0 else 57, at]) == channels(fill)
+
+
+def test_a_film_in_which_only_a_group_moves_has_its_frames() -> None:
+    alone = replace(FILM, fills=(), fill_values=np.zeros((3, 0)))
+    assert alone.frames == 3
+    with Pillow.open(io.BytesIO(PillowRenderer().animate(alone, ".gif"))) as film:
+        assert film.n_frames == 3  # type: ignore[attr-defined]
+
+
+RNG = np.random.default_rng(7)
+
+
+@pytest.mark.parametrize("shades", [2, 256, 1000])
+def test_cells_are_the_same_in_the_svgs_png_and_in_pixels(shades: int) -> None:
+    palette = RNG.integers(0, 256, (shades, 3), np.uint8)
+    cells = palette[RNG.integers(0, shades, (30, 50))]
+    with Pillow.open(io.BytesIO(png(50, 30, cells.tobytes()))) as picture:
+        assert np.array_equal(np.asarray(picture.convert("RGB")), cells)
+    image = Image((20, 10), 150, 60, 50, 30, cells.tobytes())
+    scene = Scene(200, 100, THEME, "cells", (Group((image,)),))
+    pixels = Canvas(scene).paint(scene)
+    assert np.array_equal(pixels[10:70, 20:170], cells.repeat(2, axis=0).repeat(3, axis=1))
+    assert (pixels[:10] == 255).all()
+    assert (pixels[:, 170:] == 255).all()
+    root = ET.fromstring(SvgRenderer().draw(scene, ".svg"))
+    element = root.find(NS + "image")
+    assert element is not None
+    assert element.attrib["href"].startswith("data:image/png;base64,")
+    assert (element.attrib["x"], element.attrib["width"]) == ("20", "150")
+    assert element.attrib["image-rendering"] == "pixelated"
