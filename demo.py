@@ -18,7 +18,7 @@ STAGES = (
     ("compile it", "demo/network.txt", f"inspect {SPEC}"),
     ("lay it out", "demo/layout.yaml", f"layout {SPEC} -o demo/layout.yaml"),
     ("run 12,000 steps", "demo/run.npz", f"run {SPEC} --steps 12000 -o demo/run.npz"),
-    ("draw step 160", "demo/learning.svg", f"render {SPEC} --recording demo/run.npz --step 160 -o demo/learning.svg"),
+    ("draw step 90", "demo/learning.svg", f"render {SPEC} --recording demo/run.npz --step 90 -o demo/learning.svg"),
     ("draw the last step", "demo/learned.svg", f"render {SPEC} --recording demo/run.npz -o demo/learned.svg"),
     ("the same as PNG", "demo/learned.png", f"render {SPEC} --recording demo/run.npz -o demo/learned.png"),
     ("draw two periods, moving", "demo/moving.svg",
@@ -42,7 +42,7 @@ def main() -> int:
     print(_learned())
     print("\nOpen in a browser:")
     print("  demo/moving.svg    the first two periods: the rhythm runs, and what learns glows")
-    print("  demo/learning.svg  step 160, in the midst of it; demo/learned.svg, what was learned (also as .png)")
+    print("  demo/learning.svg  step 90, in the midst of it; demo/learned.svg, what was learned (also as .png)")
     print("\nThe same by hand, in the checkout (neurovis is .venv/bin/neurovis):")
     for _, file, command in STAGES:
         print(f"  neurovis {command}" + (f" > {file}" if _prints(command) else ""))

@@ -58,27 +58,30 @@ PICTURES = (
     Picture(
         "cpg_rbf_learning",
         "cpg_rbf",
-        100,
-        "Use case 1, moving: the second period",
-        "The rhythm of C1 and C2 wakes one kernel after another, from left to right and round again. Where O misses "
-        "its target T, the connections of the kernels that are awake glow: they are changing.",
+        90,
+        "Use case 1, moving: a period of learning",
+        "The rhythm of C1 and C2 wakes one kernel after another, from left to right and round again (K1 and K8, which "
+        "sit at the same place, together). Where O misses its target T, the connections of the kernels that are awake "
+        "glow: they are changing.",
         frames=129,
     ),
     Picture(
         "cpg_rbf",
         "cpg_rbf",
-        160,
+        90,
         "Use case 1, in the midst of learning",
-        "K4, K5 and K6 are active, and O is too low by 0.28 (the caption says so): only their three connections glow."
-        " C2 sends a negative signal to every kernel; C1 passes through zero, so its lines are grey.",
+        "The paper's Figure 5A. C1 is weakly negative, C2 strongly positive: K1 to K4 and K8 are active. O is too high "
+        "by 0.41 (the caption says so), so the connections of K2 and K3, which are the most active, glow: they turn "
+        "to inhibition.",
     ),
     Picture(
         "cpg_rbf_dark",
         "cpg_rbf",
-        1180,
-        "Use case 1 after nine periods, in the dark theme",
-        "The glow is faint by now, and the thickness has stayed: that is what has been learned so far. O follows T: "
-        "both have the same colour, and the error is 0.05.",
+        1248,
+        "Use case 1 nine periods later, in the dark theme",
+        "The paper's Figure 5C. C1, C2 and the kernels are as they were, the glow is faint, and the thickness has "
+        "stayed: that is what has been learned so far. The connection of K2 is the thickest and inhibits O, which "
+        "follows T: both have the same colour, and the error is 0.09.",
         theme="dark",
     ),
     Picture(

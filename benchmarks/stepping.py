@@ -68,7 +68,8 @@ def cpg_by_hand(network: Network) -> Run:
 
     def run(steps: int) -> None:
         k = np.arange(steps)
-        target = 0.5 * np.sin(2 * np.pi * k / 128.67) + 0.2 * np.sin(4 * np.pi * k / 128.67)
+        turn = 2 * np.pi * (k + 24) / 128.62
+        target = 0.5 * np.sin(turn) + 0.2 * np.sin(2 * turn)
         rhythm, weights = np.array([0.1, 0.0]), np.zeros(8)
         history, learned = np.empty((steps, 12)), np.empty((steps, 8))
         for t in range(steps):

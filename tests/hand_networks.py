@@ -159,7 +159,7 @@ class Case:
         return np.abs(self.activity).max(axis=0), np.abs(self.weights).max(axis=0), np.abs(sent).max(axis=0), change
 
 
-ALPHA, PHI, PERIOD, RATE, SIGMA = 1.01, 0.049, 128.67, 0.01, 40.0
+ALPHA, PHI, PERIOD, RATE, SIGMA = 1.0094, 0.049, 128.62, 0.01, 40.0
 
 
 def use_case_1(steps: int = 1300) -> Case:
@@ -178,7 +178,7 @@ def use_case_1(steps: int = 1300) -> Case:
     wires += [C(f"C{i + 1}", f"K{j + 1}", 1.0, 0, entry=1) for i in range(2) for j in range(8)]
     wires += [C(f"K{j + 1}", "O", 0.0, 0, rule=0, entry=2) for j in range(8)]
     made = network(
-        groups, wires, name="cpg_rbf", title="Function approximation", dt=0.025,
+        groups, wires, name="cpg_rbf", title="Function approximation", dt=0.05,
         entries=("C -> C", "C -> K", "K -> O"), rules=[("delta", {"target": "T"})],
     )  # fmt: skip
     activity, weights = _run(np.array(matrix), made.connections.weights, steps)
@@ -191,14 +191,16 @@ def _run(matrix: FloatArray, initial: FloatArray, steps: int) -> tuple[FloatArra
     for _ in range(3000):
         rhythm = np.tanh(rhythm @ matrix)
         orbit.append(rhythm)
-    round_ = np.array(orbit[-129:])
-    centres = round_[(np.arange(8) * 128.67 / 8).astype(int)]
+    round_ = np.array(orbit[-258:])
+    first = int(np.argmin(round_[:129, 0]))
+    centres = round_[first + (np.arange(8) * PERIOD / 7).round().astype(int)]
     activity, weights = np.zeros((steps, 12)), np.tile(initial, (steps, 1))
     rhythm, learned = np.array([0.1, 0.0]), np.zeros(8)
     for k in range(steps):
         rhythm = np.array([0.1, 0.0]) if k == 0 else np.tanh(rhythm @ matrix)
         kernels = np.exp(-SIGMA * ((rhythm - centres) ** 2).sum(axis=1))
-        aim = 0.5 * math.sin(2 * math.pi * k / PERIOD) + 0.2 * math.sin(4 * math.pi * k / PERIOD)
+        turn = 2 * math.pi * (k + 24) / PERIOD
+        aim = 0.5 * math.sin(turn) + 0.2 * math.sin(2 * turn)
         out = float(kernels @ learned)
         activity[k] = [*rhythm, *kernels, out, aim]
         weights[k, 20:] = learned

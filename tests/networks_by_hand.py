@@ -244,15 +244,15 @@ def cpg_rbf(learns: bool = True) -> Network:
     units = [Unit("C1", TANH, initial=0.1), Unit("C2", TANH, initial=0.0)]
     units += [Unit(f"K{i + 1}", GAUSSIAN, combine="distance", shape={"sigma": 40.0}) for i in range(8)]
     units += [Unit("O"), Unit("T", input=0)]
-    phi, alpha = 0.049, 1.01
+    phi, alpha = 0.049, 1.0094
     cosine, sine = alpha * np.cos(phi), alpha * np.sin(phi)
     links = [Link(0, 0, cosine), Link(0, 1, -sine), Link(1, 0, sine), Link(1, 1, cosine)]
-    angles = 2 * np.pi * np.arange(8) / 8
-    links += [Link(0, 2 + i, 1.0, 0, 0.2 * np.cos(angle)) for i, angle in enumerate(angles)]
-    links += [Link(1, 2 + i, 1.0, 0, 0.2 * np.sin(angle)) for i, angle in enumerate(angles)]
+    angles = np.pi - 2 * np.pi * np.arange(8) / 7  # from the minimum of C1 on, both ends included
+    links += [Link(0, 2 + i, 1.0, 0, 0.192 * np.cos(angle)) for i, angle in enumerate(angles)]
+    links += [Link(1, 2 + i, 1.0, 0, 0.192 * np.sin(angle)) for i, angle in enumerate(angles)]
     links += [Link(2 + i, 10, 0.0, 0, learns=0 if learns else -1) for i in range(8)]
     uses = [Use(DELTA, {"rate": 0.01}, {"target": 11})] if learns else []
-    target = Input("target", 0, 1, tree("0.5*sin(2*pi*k/128.67) + 0.2*sin(4*pi*k/128.67)"))
+    target = Input("target", 0, 1, tree("0.5*sin(2*pi*(k + 24)/128.62) + 0.2*sin(4*pi*(k + 24)/128.62)"))
     groups = [
         Group("C", 0, 2, "tanh", "static", "sum", {}, {}),
         Group("K", 2, 8, "gaussian", "static", "distance", {}, {}),
@@ -260,4 +260,4 @@ def cpg_rbf(learns: bool = True) -> Network:
         Group("T", 11, 1, "identity", "static", "sum", {}, {}),
     ]
     outputs = [Output("signal", np.array([10]), True), Output("kernels", np.arange(2, 10), False)]
-    return build(units, links, uses, [target], outputs, groups, dt=0.025)
+    return build(units, links, uses, [target], outputs, groups, dt=0.05)

@@ -153,7 +153,7 @@ def test_the_caption_follows() -> None:
     lines = [t.text for t in inner.findall(NS + "text")]
     shown = [lines[int(token[1:])] for token in tokens_at(inner, FILM.frames)]
     assert shown == list(FILM.captions)
-    assert shown[60].startswith("step 160 · 4.00 s · error ")  # type: ignore[union-attr]
+    assert shown[60].startswith("step 160 · 8.00 s · error ")  # type: ignore[union-attr]
 
 
 def test_a_film_of_one_frame_stands_still() -> None:

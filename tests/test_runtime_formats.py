@@ -103,7 +103,7 @@ def test_npz_holds_the_arrays_of_the_contract(tmp_path: Path) -> None:
         assert arrays["activity"].shape == (5, 12)
         assert arrays["activity"].dtype == np.float64
         assert arrays["neurons"].tolist() == ["C1", "C2", *(f"K{i}" for i in range(1, 9)), "O", "T"]
-        assert float(arrays["dt"]) == 0.025
+        assert float(arrays["dt"]) == 0.05
 
 
 def test_parallel_connections_keep_their_names(tmp_path: Path) -> None:

@@ -311,7 +311,7 @@ def test_a_recording_holds_what_the_contract_says() -> None:
     assert recording["O"].shape == (300,)
     assert np.array_equal(recording.weight("K2 -> O"), recording.weights[:, 1])
     assert np.array_equal(recording.weight("C1 -> K1"), np.ones(300))
-    assert recording.weight("C1 -> C2").tolist() == [-1.01 * math.sin(0.049)] * 300
+    assert recording.weight("C1 -> C2").tolist() == [-1.0094 * math.sin(0.049)] * 300
     assert recording.step.tolist() == list(range(300))
     with pytest.raises(ValueError, match="read-only"):
         recording.activity[0, 0] = 1.0

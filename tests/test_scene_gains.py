@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.scene.gains import choose_gains
 
-CASE = use_case_1(700)
+CASE = use_case_1(1300)
 
 
 def test_all_four_ingredients_of_use_case_1_show() -> None:

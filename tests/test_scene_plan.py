@@ -287,7 +287,7 @@ def test_the_caption_says_step_time_and_error() -> None:
     (caption,) = next(g for g in picture().groups if g.id == "caption").shapes
     assert isinstance(caption, Text)
     error = CASE.activity[160, 11] - CASE.activity[160, 10]
-    assert caption.text == f"step 160 · 4.00 s · error {error:+.2f}".replace("-", "−")
+    assert caption.text == f"step 160 · 8.00 s · error {error:+.2f}".replace("-", "−")
 
 
 def test_without_a_written_dt_there_are_no_seconds() -> None:

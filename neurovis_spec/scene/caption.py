@@ -1,6 +1,6 @@
 """The line under the title: the step, the time where the spec gives a time step, the error where a rule has a target.
 
-In: a network and activities. Out: texts such as ``step 160 · 4.00 s · error +0.28``.
+In: a network and activities. Out: texts such as ``step 160 · 8.00 s · error +0.28``.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Makes centres.csv: where the eight kernels of cpg_rbf.yaml sit.
 
-They are eight points of the oscillator's settled orbit, equally spaced in time, beginning where C1 passes through
-zero upward. Centres on the diagonal from -1 to 1 would not do: the orbit has an amplitude of 0.198, and hardly any
-kernel would ever be active.
+They are eight points of the oscillator's settled orbit, equally spaced in time over one period that begins at the
+minimum of C1, with both of its ends: the centre of K8 is that of K1. Centres on the diagonal from -1 to 1 would not
+do: the orbit has an amplitude of 0.192, and hardly any kernel would ever be active.
 
 Run it in this folder: python make_centres.py
 """
@@ -11,7 +11,7 @@ import csv
 import math
 from pathlib import Path
 
-ALPHA, PHI, KERNELS = 1.01, 0.049, 8
+ALPHA, PHI, KERNELS = 1.0094, 0.049, 8
 SETTLE, MEASURE = 20_000, 200  # steps; periods
 
 
@@ -27,18 +27,20 @@ def orbit():
 
 
 def settled():
-    """The settled orbit, from the step before an upward passage of C1 through zero, and the passages in steps."""
+    """The settled orbit, and when C1 is least, in steps: the vertices of the parabolas through the least points."""
     points = []
-    crossings = []
+    minima = []
     for step, point in enumerate(orbit()):
         if step < SETTLE:
             continue
-        if points and points[-1][0] < 0 <= point[0]:
-            before = points[-1][0]
-            crossings.append(len(points) - 1 + before / (before - point[0]))
-            if len(crossings) > MEASURE:
-                return points, crossings
         points.append(point)
+        if len(points) < 3:
+            continue
+        before, least, after = (c1 for c1, _ in points[-3:])
+        if least < before and least <= after:
+            minima.append(len(points) - 2 + 0.5 * (before - after) / (before - 2 * least + after))
+            if len(minima) > MEASURE:
+                return points, minima
     raise AssertionError("the orbit never ends")
 
 
@@ -58,9 +60,9 @@ def at(points, time):
 
 def main():
     """Write one row a source (C1, C2), one column a kernel (K1 … K8)."""
-    points, crossings = settled()
-    period = (crossings[-1] - crossings[0]) / MEASURE
-    centres = [at(points, crossings[1] + number * period / KERNELS) for number in range(KERNELS)]
+    points, minima = settled()
+    period = (minima[-1] - minima[0]) / MEASURE
+    centres = [at(points, minima[1] + number * period / (KERNELS - 1)) for number in range(KERNELS)]
     with Path(__file__).with_name("centres.csv").open("w", newline="") as file:
         writer = csv.writer(file)
         for axis in (0, 1):

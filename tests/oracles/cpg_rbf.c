@@ -6,7 +6,7 @@
 #include <stdlib.h>
 
 int main(int argc, char **argv) {
-  const double alpha = 1.01, phi = 0.049, sigma = 40, eta = 0.01, period = 128.67;
+  const double alpha = 1.0094, phi = 0.049, sigma = 40, eta = 0.01, period = 128.62;
   const double pi = 3.14159265358979323846;
   double centre[2][8], c[2] = {0.1, 0.0}, w[8] = {0};
   const long steps = argc > 1 ? strtol(argv[1], NULL, 10) : 12000;
@@ -20,7 +20,7 @@ int main(int argc, char **argv) {
       k[i] = exp(-sigma * (x * x + y * y)); /* Eq. 8 */
       o += w[i] * k[i];                     /* Eq. 9 */
     }
-    const double target = 0.5 * sin(2 * pi * t / period) + 0.2 * sin(4 * pi * t / period);
+    const double turn = 2 * pi * (t + 24) / period, target = 0.5 * sin(turn) + 0.2 * sin(2 * turn);
     printf("%.17g %.17g", c[0], c[1]);
     for (int i = 0; i < 8; i++) printf(" %.17g", k[i]);
     printf(" %.17g %.17g", o, target);
