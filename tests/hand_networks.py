@@ -18,6 +18,7 @@ from neurovis_spec.compiler.program import Plasticity, Rule
 from neurovis_spec.compiler.wishes import LayoutSettings, RenderSettings
 from neurovis_spec.layout.model import Layout, Point, Route
 from neurovis_spec.runtime.recording import Snapshot
+from neurovis_spec.scene.reached import Reached, reached_by
 
 
 @dataclass(frozen=True)
@@ -153,10 +154,11 @@ class Case:
         return Snapshot(step, self.activity[step], self.weights[step], previous)
 
     @property
-    def peaks(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        sent = self.activity[:, self.network.connections.sources] * self.weights
-        change = np.abs(np.diff(self.weights, axis=0)).max(axis=0) if len(self.weights) > 1 else 0 * self.weights[0]
-        return np.abs(self.activity).max(axis=0), np.abs(self.weights).max(axis=0), np.abs(sent).max(axis=0), change
+    def reached(self) -> Reached:
+        changing = self.network.changing
+        fixed = self.network.connections.weights.copy()
+        fixed[changing] = 0.0
+        return reached_by(self.network.connections.sources, fixed, self.activity, self.weights[:, changing], changing)
 
 
 ALPHA, PHI, PERIOD, RATE, SIGMA = 1.0094, 0.049, 128.62, 0.01, 40.0

@@ -22,7 +22,7 @@ from neurovis_spec.scene.themes import channels, colours
 
 NS = "{http://www.w3.org/2000/svg}"
 CASE = use_case_1(300)
-GAINS = choose_gains(CASE.network, RenderSettings(), *CASE.peaks)
+GAINS = choose_gains(CASE.network, RenderSettings(), CASE.reached)
 
 
 def make(frames: int = 128, start: int = 100, fps: float = 40.0) -> Film:

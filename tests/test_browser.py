@@ -35,7 +35,7 @@ from neurovis_spec.scene.gains import choose_gains
 pytestmark = pytest.mark.browser
 
 CASE = use_case_1(1300)
-GAINS = choose_gains(CASE.network, RenderSettings(), *CASE.peaks)
+GAINS = choose_gains(CASE.network, RenderSettings(), CASE.reached)
 FRAMES, FPS = 64, 40.0
 Browser = Callable[..., str]
 

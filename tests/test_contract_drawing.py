@@ -138,7 +138,7 @@ def test_the_defaults_of_render() -> None:
         True,
         None,
     )
-    assert (render.activity, render.signal, render.thickness, render.change) == (None, None, None, None)
+    assert (render.activity, render.signal, render.thickness, render.change) == ((), (), (), ())
 
 
 @pytest.mark.parametrize("theme", ["default", "dark", "print", "paper"])

@@ -88,7 +88,7 @@ def test_a_setting_of_the_layout_follows_the_parameter() -> None:
         f"parameters: {{far: 3}}\n{ONE}layout: {{positions: {{A: [far, 0]}}}}\nrender: {{gain: {{signal: far}}}}"
     )
     assert network.layout().positions == {"A": (3, 0)}
-    assert network.network.render.signal == 3
+    assert [stated.gain for stated in network.network.render.signal] == [3]
     assert not network.network.structural
 
 

@@ -26,7 +26,7 @@ from neurovis_spec.scene.gains import choose_gains
 
 SIZE = (200, 160)
 CASE = use_case_1(200)
-GAINS = choose_gains(CASE.network, RenderSettings(), *CASE.peaks)
+GAINS = choose_gains(CASE.network, RenderSettings(), CASE.reached)
 
 
 def scene(step: int = 160, theme: str = "default") -> Scene:

@@ -1,68 +1,131 @@
-"""Gains: the author's win, the rest shows the network's range, nothing is ever infinite."""
+"""Gains: the author's win, the rest shows what each group and entry reaches, nothing is ever infinite."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import astuple
 
 import numpy as np
 from hand_networks import C, G, network, numbered, use_case_1
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from neurovis_spec.compiler.wishes import RenderSettings
+from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.wishes import RenderSettings, StatedGain
 from neurovis_spec.scene.gains import choose_gains
+from neurovis_spec.scene.reached import Reached, nothing, reached_by
 
 CASE = use_case_1(1300)
 
 
+def reaches(
+    activity: list[float], weights: list[float], signals: list[float] | None = None, changes: list[float] | None = None
+) -> Reached:
+    """What is reached, activities by steady ones."""
+    peaks, heavy, none = np.array(activity), np.array(weights), np.zeros(len(weights))
+    sent = heavy if signals is None else np.array(signals)
+    return Reached(peaks, peaks, heavy, sent, none if changes is None else np.array(changes))
+
+
 def test_all_four_ingredients_of_use_case_1_show() -> None:
-    gains = choose_gains(CASE.network, RenderSettings(), *CASE.peaks)
-    activity, weights, signals, changes = CASE.peaks
-    groups = [activity[g.start : g.start + g.count].max() for g in CASE.network.neurons.groups]
-    assert all(0.6 <= gains.activity * peak <= 3.5 for peak in groups)
-    assert gains.signal * signals[4:20].max() >= 0.75
-    assert gains.signal * signals[20:].max() <= 3
-    assert weights.max() * gains.thickness <= 9
-    assert weights[20:].max() * gains.thickness >= 1.2
-    assert 0.5 <= np.median(changes[20:]) * gains.change <= 2
+    run = CASE.reached
+    gains = choose_gains(CASE.network, RenderSettings(), run)
+    assert ((gains.activity * run.activity >= 0.9) & (gains.activity * run.activity <= 5)).all()
+    assert (gains.signal * run.signals >= 0.24).all()
+    assert (gains.thickness * run.weights <= 6.5).all()
+    assert (gains.thickness * run.weights)[20:].max() >= 4
+    assert 0.5 <= np.median((gains.change * run.changes)[20:]) <= 2
 
 
 def test_what_the_author_states_wins_one_by_one() -> None:
-    stated = RenderSettings(activity=3.25, change=0.0)
-    gains, free = (choose_gains(CASE.network, s, *CASE.peaks) for s in (stated, RenderSettings()))
-    assert (gains.activity, gains.change) == (3.25, 0.0)
-    assert (gains.signal, gains.thickness) == (free.signal, free.thickness)
+    stated = RenderSettings(activity=(StatedGain(3.25),), change=(StatedGain(0.0),))
+    gains, free = (choose_gains(CASE.network, s, CASE.reached) for s in (stated, RenderSettings()))
+    assert set(gains.activity) == {3.25}
+    assert set(gains.change) == {0.0}
+    assert (gains.signal == free.signal).all()
+    assert (gains.thickness == free.thickness).all()
+    assert [(scale.gain, scale.names) for scale in gains.activity_scales] == [(3.25, ())]
+
+
+def test_a_later_gain_goes_before_an_earlier_one_and_what_is_left_has_its_own() -> None:
+    some, one = (2, 3, 4, 5), (3,)
+    stated = (StatedGain(2.0, some, "K1..K4"), StatedGain(7.0, one, "K2"))
+    gains = choose_gains(CASE.network, RenderSettings(activity=stated), CASE.reached)
+    assert gains.activity[2:6].tolist() == [2.0, 7.0, 2.0, 2.0]
+    shown = {name: scale.gain for scale in gains.activity_scales for name in scale.names}
+    assert shown["K1..K4"] == 2.0
+    assert shown["K2"] == 7.0
+    assert shown["K"] == gains.activity[7]
+    every = (*stated, StatedGain(4.0, tuple(range(2, 10)), "K"))
+    gains = choose_gains(CASE.network, RenderSettings(activity=every), CASE.reached)
+    assert not {"K1..K4", "K2"} & {name for scale in gains.activity_scales for name in scale.names}
+
+
+def test_a_range_is_drawn_around_its_middle() -> None:
+    stated = RenderSettings(activity=(StatedGain(0.02, (10,), "O", -30.0),))
+    gains = choose_gains(CASE.network, stated, CASE.reached)
+    assert gains.centre[10] == -30.0
+    assert not gains.centre[:10].any()
 
 
 def test_a_silent_network_has_finite_gains() -> None:
-    none = np.zeros(28)
-    gains = choose_gains(CASE.network, RenderSettings(), np.zeros(12), none, none, none)
-    assert all(math.isfinite(g) and g > 0 for g in astuple(gains))
+    gains = choose_gains(CASE.network, RenderSettings(), nothing(CASE.network))
+    for values in (gains.activity, gains.signal, gains.thickness, gains.change):
+        assert (np.isfinite(values) & (values > 0)).all()
 
 
 def test_a_network_without_connections() -> None:
     single = network([G("A", ("A",))], [])
-    none = np.zeros(0)
-    gains = choose_gains(single, RenderSettings(), np.array([0.5]), none, none, none)
-    assert gains.activity == 2.0
+    assert choose_gains(single, RenderSettings(), reaches([0.5], [])).activity.tolist() == [2.0]
 
 
-def test_a_small_group_is_not_drowned_by_a_big_one() -> None:
-    made = network([numbered("A", 30), numbered("B", 2)], [C("A1", "B1")])
-    peaks = np.array([1.0] * 30 + [0.1] * 2)
-    one = np.ones(1)
-    gains = choose_gains(made, RenderSettings(), peaks, one, one, one)
-    assert gains.activity * 0.1 > 0.25
+def test_a_quiet_group_has_a_scale_of_its_own_and_like_groups_share_one() -> None:
+    made = network([numbered("A", 30), numbered("B", 2), numbered("D", 2)], [C("A1", "B1")])
+    gains = choose_gains(made, RenderSettings(), reaches([1.0] * 30 + [0.01] * 2 + [0.8] * 2, [1.0]))
+    assert [scale.names for scale in gains.activity_scales] == [("A", "D"), ("B",)]
+    assert gains.activity[30] * 0.01 == 1.0
+    assert gains.activity[0] == gains.activity[33]
 
 
 def test_a_few_strong_neurons_do_not_take_the_colour_of_a_big_group() -> None:
     made = network([numbered("A", 100)], [C("A1", "A2")])
-    peaks = np.array([0.1] * 95 + [1.0] * 5)
-    one = np.ones(1)
-    assert choose_gains(made, RenderSettings(), peaks, one, one, one).activity == 10.0
-    few = network([numbered("A", 8)], [C("A1", "A2")])
-    assert choose_gains(few, RenderSettings(), np.array([0.1] * 7 + [1.0]), one, one, one).activity == 1.0
+    gains = choose_gains(made, RenderSettings(), reaches([0.1] * 95 + [1.0] * 5, [1.0]))
+    assert gains.activity[0] * 0.1 >= 0.6
+
+
+def test_the_weakest_of_an_entry_can_be_told_from_grey_and_the_scale_says_how_far_it_goes() -> None:
+    made = network([numbered("A", 2)], [C(f"A{i}", f"A{j}", 1.0) for i in (1, 2) for j in (1, 2)])
+    gains = choose_gains(made, RenderSettings(), reaches([1.0, 1.0], [1.0, 0.05, 0.05, 1.0]))
+    assert gains.signal[1] * 0.05 >= 0.6
+    (scale,) = gains.signal_scales
+    assert scale.reaches == 1.0
+
+
+def test_where_the_spread_is_too_wide_the_many_count() -> None:
+    made = network([numbered("A", 50)], [C("A1", f"A{i}") for i in range(1, 51)])
+    weights = [1.0] * 49 + [1e-4]
+    gains = choose_gains(made, RenderSettings(), reaches([1.0] * 50, weights))
+    assert gains.signal[0] <= 1 / 0.6 + 0.1
+
+
+def test_there_are_few_scales_however_many_entries() -> None:
+    lines = [C(f"A{i}", f"A{i + 1}", 1.0, entry=i - 1) for i in range(1, 21)]
+    made = network([numbered("A", 21)], lines, entries=[f"A{i} -> A{i + 1}" for i in range(1, 21)])
+    gains = choose_gains(made, RenderSettings(), reaches([1.0] * 21, [3.0**i for i in range(20)]))
+    assert len(gains.signal_scales) == 4
+    assert sum(len(scale.names) for scale in gains.signal_scales) == 20
+
+
+def test_what_a_kernel_does_while_it_sleeps_does_not_count() -> None:
+    """Typical is what a neuron does while it is awake; one that is at rest for long has the same scale."""
+    t = np.linspace(0, 2 * np.pi, 400, endpoint=False)
+    short, long = np.sin(t), np.concatenate([np.sin(t), np.zeros(4000)])
+    none = np.zeros(0)
+    one, other = (
+        reached_by(none.astype(np.int64), none, a[:, None], np.zeros((len(a), 0)), none.astype(np.int64))
+        for a in (short, long)
+    )
+    assert one.typical == other.typical
+    assert 2 * one.typical[0] >= 0.98
 
 
 peak = st.one_of(st.floats(0, 1e300), st.sampled_from([float("nan"), float("inf"), 0.0, 5e-324]))
@@ -70,7 +133,12 @@ peak = st.one_of(st.floats(0, 1e300), st.sampled_from([float("nan"), float("inf"
 
 @settings(max_examples=60, deadline=None)
 @given(st.lists(peak, min_size=12, max_size=12), st.lists(peak, min_size=28, max_size=28))
-def test_any_peaks_give_finite_gains(activity: list[float], other: list[float]) -> None:
-    w = np.array(other)
-    gains = choose_gains(CASE.network, RenderSettings(), np.array(activity), w, w, w)
-    assert all(math.isfinite(g) and g > 0 for g in astuple(gains))
+def test_any_run_gives_finite_gains(activity: list[float], other: list[float]) -> None:
+    rows: FloatArray = np.array([activity, activity[::-1]])
+    weights = np.array([other, other[::-1]])
+    fixed = np.where(np.arange(28) < 20, weights[0], 0.0)
+    changing = CASE.network.changing
+    run = reached_by(CASE.network.connections.sources, fixed, rows, weights[:, changing], changing)
+    gains = choose_gains(CASE.network, RenderSettings(), run)
+    for values in (gains.activity, gains.signal, gains.thickness, gains.change):
+        assert all(math.isfinite(gain) and gain > 0 for gain in values.tolist())

@@ -16,24 +16,24 @@ from neurovis_spec.layout.model import Layout, Point
 from neurovis_spec.scene import Arrowhead, Disc, Group, Rectangle, Scene, Spline, Text, still, texts
 from neurovis_spec.scene.encode import encode
 from neurovis_spec.scene.film import film
-from neurovis_spec.scene.gains import Gains, choose_gains
+from neurovis_spec.scene.gains import choose_gains, plain_gains
 from neurovis_spec.scene.geometry import Rect, overlap, sample, samples
-from neurovis_spec.scene.legend import nice_weights
+from neurovis_spec.scene.legend_scales import nice_weights
 from neurovis_spec.scene.lines import trimmed
 
 CASE = use_case_1(400)
-GAINS = choose_gains(CASE.network, RenderSettings(), *CASE.peaks)
-PLAIN = Gains(1.0, 1.0, 4.0, 100.0)
+GAINS = choose_gains(CASE.network, RenderSettings(), CASE.reached)
+PLAIN = (1.0, 1.0, 4.0, 100.0)
 
 
 def picture(case: Case = CASE, step: int = 160, settings: RenderSettings | None = None) -> Scene:
     return encode(case.network, case.layout, case.snapshot(step), GAINS, settings or RenderSettings())
 
 
-def small(made: Network, layout: Layout, settings: RenderSettings | None = None, gains: Gains = PLAIN) -> Scene:
+def small(made: Network, layout: Layout, settings: RenderSettings | None = None) -> Scene:
     weights = made.connections.weights
     case = Case(made, layout, np.full((1, len(made.neurons)), 0.5), weights[None])
-    return encode(made, layout, case.snapshot(0), gains, settings or RenderSettings())
+    return encode(made, layout, case.snapshot(0), plain_gains(made, *PLAIN), settings or RenderSettings())
 
 
 def with_data(scene: Scene, key: str) -> dict[str, Group]:
@@ -261,7 +261,7 @@ def test_a_title_that_finds_no_room_is_shortened_rather_than_crossed() -> None:
 
 def test_the_legend_explains_what_there_is_and_nothing_else() -> None:
     words = {t.text for t in all_texts(picture())}
-    assert {"Colour", "Thickness", "Glow", "Dotted"} <= words
+    assert {"Neurons: activity", "Lines: signal w·a", "Thickness: weight |w|", "Glow", "Dotted"} <= words
     made = network([numbered("A", 2)], [C("A1", "A2", 2.0)])
     layout = straight_layout(made, {"A1": (0, 0), "A2": (0, 2)})
     words = {t.text for t in all_texts(small(made, layout))}
@@ -271,8 +271,8 @@ def test_the_legend_explains_what_there_is_and_nothing_else() -> None:
 
 
 def test_the_legend_states_the_gains() -> None:
-    gains = Gains(2.0, 4.0, 5.0, 200.0)
     made = use_case_1(3)
+    gains = plain_gains(made.network, 2.0, 4.0, 5.0, 200.0)
     scene = encode(made.network, made.layout, made.snapshot(2), gains, RenderSettings())
     words = [t.text for t in all_texts(scene)]
     assert {"−0.5", "+0.5", "−0.25", "+0.25", "|Δw| 0.005 a step"} <= set(words)
@@ -310,10 +310,10 @@ def test_the_size_is_what_the_author_says() -> None:
 
 
 def test_a_picture_with_room_to_spare_has_more_pixels_for_each_unit() -> None:
-    natural = picture()
+    natural = picture(settings=RenderSettings(legend=False))
     assert natural.density > 1
     assert natural.pixels == (natural.width * natural.density, natural.height * natural.density)
-    large = picture(settings=RenderSettings(size=(1920, 1080)))
+    large = picture(settings=RenderSettings(size=(1920, 1080), legend=False))
     assert large.density > 1.8
     assert large.height == pytest.approx(natural.height, abs=8)  # its texts have grown with it
     assert picture(settings=RenderSettings(size=(300, 200))).density == 1  # rather smaller discs than smaller texts
@@ -331,7 +331,7 @@ def grid(columns: int, rows: int) -> Case:
 
 def test_a_large_network_stays_within_1280_by_960_and_drops_labels_rather_than_piling_them() -> None:
     case = grid(60, 12)
-    scene = encode(case.network, case.layout, case.snapshot(0), PLAIN, RenderSettings())
+    scene = encode(case.network, case.layout, case.snapshot(0), plain_gains(case.network, *PLAIN), RenderSettings())
     assert scene.pixels <= (1280, 960)
     assert scene.pixels[1] <= 960
     assert len(with_data(scene, "neuron")) == 720

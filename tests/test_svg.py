@@ -16,15 +16,16 @@ from neurovis_renderers.svg import SvgRenderer
 
 from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.scene.encode import encode
-from neurovis_spec.scene.gains import Gains
+from neurovis_spec.scene.gains import plain_gains
 from neurovis_spec.scene.themes import THEMES, channels
 
 NS = "{http://www.w3.org/2000/svg}"
 CASE = use_case_1(400)
-GAINS = Gains(2.5, 3.5, 5.3, 310.0)
+ACTIVITY, SIGNAL, THICKNESS, CHANGE = 2.5, 3.5, 5.3, 310.0
 
 
-def drawn(case: Case = CASE, step: int = 160, gains: Gains = GAINS, theme: str = "default") -> bytes:
+def drawn(case: Case = CASE, step: int = 160, theme: str = "default") -> bytes:
+    gains = plain_gains(case.network, ACTIVITY, SIGNAL, THICKNESS, CHANGE)
     scene = encode(case.network, case.layout, case.snapshot(step), gains, RenderSettings(theme=theme))
     return SvgRenderer().draw(scene, ".svg")
 
@@ -49,17 +50,17 @@ def test_fill_stroke_and_width_follow_equations_2_to_5(theme: str, step: int) ->
     circles = {g.attrib["data-neuron"]: next(g.iter(NS + "circle")) for g in groups(root, "data-neuron")}
     assert list(circles) == list(names)
     for index, name in enumerate(names):
-        assert circles[name].attrib["fill"] == plain_colour(theme, GAINS.activity * CASE.activity[step, index])
+        assert circles[name].attrib["fill"] == plain_colour(theme, ACTIVITY * CASE.activity[step, index])
     lines = {g.attrib["data-connection"]: g for g in groups(root, "data-connection")}
     assert len(lines) == len(wires)
     for index, name in enumerate(CASE.network.connection_names):
         paths = list(lines[name].iter(NS + "path"))
         line = next(p for p in paths if p.attrib.get("class") != "glow")
         a, w = float(CASE.activity[step, wires.sources[index]]), float(CASE.weights[step, index])
-        assert line.attrib["stroke"] == plain_colour(theme, GAINS.signal * a * w)
-        assert float(line.attrib["stroke-width"]) == max(0.6, abs(GAINS.thickness * w))
+        assert line.attrib["stroke"] == plain_colour(theme, SIGNAL * a * w)
+        assert float(line.attrib["stroke-width"]) == max(0.6, abs(THICKNESS * w))
         before = float(CASE.weights[step - 1, index]) if step else w
-        light = abs(GAINS.change * (w - before))
+        light = abs(CHANGE * (w - before))
         glows = [p for p in paths if p.attrib.get("class") == "glow"]
         assert len(glows) == (light >= 1e-3)
         if glows:

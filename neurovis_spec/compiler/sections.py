@@ -15,7 +15,7 @@ from neurovis_spec.compiler.pins import DIAMETER, FARTHEST, pins_of
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import Directory, key_of, look_at_keys, resolve, resolve_end
 from neurovis_spec.compiler.unit import Unit
-from neurovis_spec.compiler.wishes import LayoutSettings, RenderSettings
+from neurovis_spec.compiler.wishes import LayoutSettings, RenderSettings, StatedGain
 from neurovis_spec.diagnostics import Findings, Span, shown, suggest
 from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel, RenderModel
 from neurovis_spec.language.located import Formula, Located
@@ -119,11 +119,11 @@ def render_settings(model: RenderModel | None, constants: Constants) -> RenderSe
         return RenderSettings()
     gain = model.gain
 
-    def factor(formula: Formula | None) -> float | None:
+    def factor(formula: Formula | None) -> tuple[StatedGain, ...]:
         value = None if formula is None else constants.scalar(formula)
         if formula is not None and value is not None and value < 0:
             constants.findings.error("out-of-range", formula.span, f"a gain is not negative, this is {value:g}")
-        return value
+        return () if value is None else (StatedGain(value),)
 
     size = None
     if model.size is not None:
@@ -134,10 +134,10 @@ def render_settings(model: RenderModel | None, constants: Constants) -> RenderSe
             hint = "an '.svg' can be shown as large as one likes"
             constants.findings.error("out-of-range", model.size[1].span, message, hint)
     return RenderSettings(
-        activity=None if gain is None else factor(gain.activity),
-        signal=None if gain is None else factor(gain.signal),
-        thickness=None if gain is None else factor(gain.thickness),
-        change=None if gain is None else factor(gain.change),
+        activity=() if gain is None else factor(gain.activity),
+        signal=() if gain is None else factor(gain.signal),
+        thickness=() if gain is None else factor(gain.thickness),
+        change=() if gain is None else factor(gain.change),
         theme="default" if model.theme is None else model.theme.value,
         size=size,
         labels=model.labels is None or model.labels.value,

@@ -47,13 +47,25 @@ class LayoutSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class RenderSettings:
-    """The ``render`` section. A gain of None is chosen from the network's range."""
+class StatedGain:
+    """A gain that the author states: for the neurons or connections ``members``, which ``name`` refers to (None: for
+    all). ``centre`` is what is drawn as 0: the middle of a range of activity."""
 
-    activity: float | None = None
-    signal: float | None = None
-    thickness: float | None = None
-    change: float | None = None
+    gain: float
+    members: tuple[int, ...] | None = None
+    name: str = ""
+    centre: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class RenderSettings:
+    """The ``render`` section. Of the gains a later one goes before an earlier one; what has none gets one from what a
+    run reaches."""
+
+    activity: tuple[StatedGain, ...] = ()
+    signal: tuple[StatedGain, ...] = ()
+    thickness: tuple[StatedGain, ...] = ()
+    change: tuple[StatedGain, ...] = ()
     theme: str = "default"
     size: tuple[int, int] | None = None
     labels: bool = True

@@ -56,7 +56,7 @@ def looks(network: Network, snapshot: Snapshot, gains: Gains, widest: float) -> 
     changes = encoding.glow(snapshot.weights, snapshot.previous_weights, gains.change)
     sent = snapshot.activity[connections.sources]
     return Looks(
-        discs=encoding.neuron_colour(snapshot.activity, gains.activity),
+        discs=encoding.neuron_colour(snapshot.activity, gains.activity, gains.centre),
         lines=encoding.connection_colour(sent, snapshot.weights, gains.signal),
         widths=widths,
         glows=encoding.glow_width(widths, changes),

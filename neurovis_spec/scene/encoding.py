@@ -1,15 +1,19 @@
 """Eqs. 2–5: what activities and weights look like, as pure functions of arrays.
 
-In: activities, weights and gains. Out: colour values in −1…1, widths in user units. The paper prints Eq. 5 as
-|γ·w[t] − w[t−1]|, which would glow for ever when γ ≠ 1; the difference is meant.
+In: activities, weights, gains (one for all, or one for each). Out: colour values in −1…1, widths in user units. The
+paper prints Eq. 5 as |γ·w[t] − w[t−1]|, which would glow for ever when γ ≠ 1; the difference is meant.
 """
 
 from __future__ import annotations
+
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
+#: One for all, or one for each.
+Gain: TypeAlias = float | FloatArray
 
 #: The thinnest line, in user units.
 THINNEST = 0.6
@@ -24,28 +28,28 @@ def _quiet() -> np.errstate:
     return np.errstate(invalid="ignore", over="ignore")
 
 
-def neuron_colour(activity: FloatArray, gain: float) -> FloatArray:
-    """Eq. 2: NC_i[t] = clip(−1, γ_NC · a_i[t], 1)."""
+def neuron_colour(activity: FloatArray, gain: Gain, centre: Gain = 0.0) -> FloatArray:
+    """Eq. 2: NC_i[t] = clip(−1, γ_NC · a_i[t], 1); of a range that is not centred on 0, a_i[t] − centre."""
     with _quiet():
-        result: FloatArray = np.clip(gain * activity, -1.0, 1.0)
+        result: FloatArray = np.clip(gain * (activity - centre), -1.0, 1.0)
     return result
 
 
-def connection_colour(sent: FloatArray, weight: FloatArray, gain: float) -> FloatArray:
+def connection_colour(sent: FloatArray, weight: FloatArray, gain: Gain) -> FloatArray:
     """Eq. 3: CC_ij[t] = clip(−1, γ_CC · a_i[t] · w_ij[t], 1); ``sent`` is the activity of the source of each."""
     with _quiet():
         result: FloatArray = np.clip(gain * sent * weight, -1.0, 1.0)
     return result
 
 
-def thickness(weight: FloatArray, gain: float) -> FloatArray:
+def thickness(weight: FloatArray, gain: Gain) -> FloatArray:
     """Eq. 4: CT_ij[t] = |γ_CT · w_ij[t]|."""
     with _quiet():
         result: FloatArray = np.abs(gain * weight)
     return result
 
 
-def line_width(weight: FloatArray, gain: float, widest: float) -> FloatArray:
+def line_width(weight: FloatArray, gain: Gain, widest: float) -> FloatArray:
     """The width of a line: Eq. 4, never thinner than ``THINNEST``, never wider than ``widest``, which covers the whole
     picture. Weights that are no finite number are drawn as thin as can be."""
     drawn = np.clip(thickness(weight, gain), THINNEST, widest)
@@ -53,7 +57,7 @@ def line_width(weight: FloatArray, gain: float, widest: float) -> FloatArray:
     return result
 
 
-def glow(weight: FloatArray, previous: FloatArray | None, gain: float) -> FloatArray:
+def glow(weight: FloatArray, previous: FloatArray | None, gain: Gain) -> FloatArray:
     """Eq. 5: LI_ij[t] = |γ_LI · (w_ij[t] − w_ij[t−1])|, none where there is no step before."""
     if previous is None:
         return np.zeros_like(weight)

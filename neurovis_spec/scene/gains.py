@@ -1,102 +1,249 @@
-"""Gains for Eqs. 2–5: as the author states them, else such that this network's range shows.
+"""Gains for Eqs. 2–5: as the author states them, else such that the range of each group and each entry shows.
 
-In: the peaks of a probe run. Out: Gains. A gain is chosen from the peaks of groups of neurons and entries of
-connections rather than of single ones, so that one big group does not drown a small one: the value at which a colour is
-full lies between the weakest and the strongest group, nearer to the weakest, so that quiet groups have colour too.
+In: what a run reaches. Out: Gains, one for every neuron and connection, and the scales that a legend shows. The neurons
+of a group, and the connections of an entry, have one gain; what is declared in a module has one in all its instances.
+Those whose ranges are alike share a scale.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.wishes import RenderSettings
+from neurovis_spec.compiler.wishes import RenderSettings, StatedGain
+from neurovis_spec.scene.reached import Reached, nothing
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+IntArray: TypeAlias = npt.NDArray[np.int64]
 
-#: groups whose peak is below this share of the strongest are not looked at: they are silent
-_SILENT = 1 / 32
-#: of a group with many members: the share of them that do not saturate
+#: a colour of this value can surely be told from grey, in every theme; one of ``_JUST`` beside others
+_TOLD, _JUST = 0.6, 0.25
+#: one that cannot be told weighs as much as so many doublings of others beyond what a colour shows
+_LOST = 5.0
+#: where the strongest is more than so many times the weakest, no scale shows both
+_SPREAD = 32.0
+#: of a group with many members: the share of them that a scale goes by
 _MOST = 0.9
-#: where between the weakest (0) and the strongest group (1) a colour is full, on a logarithmic scale
-_BETWEEN = 0.25
-#: how wide, in user units, the strongest and a typical line are to be in a small network
-_WIDEST, _TYPICAL = 9.0, 4.5
+#: ranges that differ by less than this factor are alike; there are at most so many scales
+_ALIKE, _SCALES = 2.0, 4
+#: how wide, in user units, the strongest line is to be, one that learns, and a typical one, in a small network
+_WIDEST, _TYPICAL = 6.5, 2.6
 #: with more lines than this they get thinner
 _CROWD = 10
 
+_PATH = re.compile(r"[A-Za-z_]\w*(?:\.(?!\.)[A-Za-z_]\w*)+", re.ASCII)
+
 
 @dataclass(frozen=True, slots=True)
+class Scale:
+    """A gain and what has it: the groups, entries or references in ``names`` (empty: all that have no other).
+    ``reaches`` is how far their values go, as a distance from ``centre``; 0 where nothing is known of it."""
+
+    gain: float
+    names: tuple[str, ...] = ()
+    centre: float = 0.0
+    reaches: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
 class Gains:
-    """γ_NC (``activity``), γ_CC (``signal``), γ_CT (``thickness``, user units), γ_LI (``change``) of Eqs. 2–5."""
+    """γ_NC (``activity``, n) with what is drawn as 0 (``centre``, n), γ_CC (``signal``, m), γ_CT (``thickness``, m,
+    user units), γ_LI (``change``, m) of Eqs. 2–5, and the scales that they make, each sort in the order of the spec."""
 
-    activity: float
-    signal: float
-    thickness: float
-    change: float
+    activity: FloatArray
+    centre: FloatArray
+    signal: FloatArray
+    thickness: FloatArray
+    change: FloatArray
+    activity_scales: tuple[Scale, ...]
+    signal_scales: tuple[Scale, ...]
+    thickness_scales: tuple[Scale, ...]
+    change_scales: tuple[Scale, ...]
 
 
-def choose_gains(
-    network: Network,
-    settings: RenderSettings,
-    activity_peaks: FloatArray,
-    weight_peaks: FloatArray,
-    signal_peaks: FloatArray,
-    change_peaks: FloatArray,
-) -> Gains:
-    """Gains that use the range of this network well; those that ``settings`` states win.
-
-    The peaks are the largest magnitudes over a run: ``activity_peaks`` (n,) of a, ``weight_peaks`` (m,) of w,
-    ``signal_peaks`` (m,) of w·a, ``change_peaks`` (m,) of w[t] − w[t−1]. All results are finite and positive.
-    """
-    groups = np.zeros(len(network.neurons), np.int64)
-    for number, group in enumerate(network.neurons.groups):
-        groups[group.start : group.start + group.count] = number
-    entries = network.connections.entry
-    changes = _peaks(change_peaks, np.arange(len(change_peaks)))
-    chosen = Gains(
-        activity=_full_at(_peaks(activity_peaks, groups, _MOST)),
-        signal=_full_at(_peaks(signal_peaks, entries, _MOST)),
-        thickness=_thickness(_peaks(weight_peaks, entries), len(network.connections)),
-        change=1 / _nice(float(np.median(changes))) if len(changes) else 1.0,
+def plain_gains(network: Network, activity: float, signal: float, thickness: float, change: float) -> Gains:
+    """One gain of each sort for all."""
+    stated = RenderSettings(
+        activity=(StatedGain(activity),),
+        signal=(StatedGain(signal),),
+        thickness=(StatedGain(thickness),),
+        change=(StatedGain(change),),
     )
+    return choose_gains(network, stated, nothing(network))
+
+
+def choose_gains(network: Network, settings: RenderSettings, run: Reached) -> Gains:
+    """Gains that use the range of each group and entry well; those that ``settings`` states win. All that are chosen
+    are finite and positive."""
+    groups, entries = _groups(network), _entries(network)
+    learns = np.zeros(len(network.connections), bool)
+    learns[network.changing] = True
+    crowd = min(1.0, (_CROWD / max(len(network.connections), 1)) ** 0.25)
+    range_ = np.minimum(run.activity, 2 * run.typical)
+    activity = _chosen(groups, [_full(range_[m]) for m in groups.members], run.activity, settings.activity)
+    signal = _chosen(entries, [_full(run.signals[m]) for m in entries.members], run.signals, settings.signal)
+    widths = [_pixel(run.weights[m], bool(learns[m].any()), crowd) for m in entries.members]
+    thickness = _chosen(entries, widths, run.weights, settings.thickness, largest=True)
+    changes = [_typical(run.changes[m]) for m in entries.members]
+    change = _chosen(entries, changes, run.changes, settings.change, largest=True)
     return Gains(
-        activity=chosen.activity if settings.activity is None else settings.activity,
-        signal=chosen.signal if settings.signal is None else settings.signal,
-        thickness=chosen.thickness if settings.thickness is None else settings.thickness,
-        change=chosen.change if settings.change is None else settings.change,
+        activity=activity.gains,
+        centre=activity.centres,
+        signal=signal.gains,
+        thickness=thickness.gains,
+        change=change.gains,
+        activity_scales=activity.scales,
+        signal_scales=signal.scales,
+        thickness_scales=thickness.scales,
+        change_scales=change.scales,
     )
 
 
-def _peaks(values: FloatArray, members: IntArray, share: float = 1.0) -> FloatArray:
-    """The peak of every group of values that is not silent, finite and above zero: the value that a ``share`` of its
-    members do not exceed."""
-    finite = np.where(np.isfinite(values), np.abs(values), 0.0)
-    order = np.lexsort((finite, members))
-    first = np.flatnonzero(np.diff(members[order], prepend=-1))
-    count = np.diff(first, append=len(members))
-    peaks = finite[order][first + np.ceil(share * (count - 1)).astype(int)]
-    result: FloatArray = peaks[(peaks > 1e-12) & (peaks >= _SILENT * peaks.max(initial=0.0)) & (peaks < 1e12)]
-    return result
+@dataclass(frozen=True, slots=True, eq=False)
+class _Units:
+    """What has one gain: the names of groups or entries, and the members of each."""
+
+    names: tuple[str, ...]
+    members: tuple[IntArray, ...]
+    #: how many members there are in all
+    count: int
 
 
-def _full_at(peaks: FloatArray) -> float:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Chosen:
+    gains: FloatArray
+    centres: FloatArray
+    scales: tuple[Scale, ...]
+
+
+def _groups(network: Network) -> _Units:
+    of_neurons = np.zeros(len(network.neurons), np.int64)
+    names: dict[str, int] = {}
+    for group in network.neurons.groups:
+        name = group.name if group.module is None else f"{group.module}.{group.name.rpartition('.')[2]}"
+        of_neurons[group.start : group.start + group.count] = names.setdefault(name, len(names))
+    return _units(tuple(names), of_neurons)
+
+
+def _entries(network: Network) -> _Units:
+    """The entries of ``connections``; instances are called by their modules, so that an entry of a module is one."""
+    called = {instance.path: instance.module for instance in network.instances}
+    called |= {instance.declared: instance.module for instance in network.instances}
+
+    def by_module(match: re.Match[str]) -> str:
+        path, _, own = match[0].rpartition(".")
+        return f"{called[path]}.{own}" if path in called else match[0]
+
+    names: dict[str, int] = {}
+    numbers = [
+        names.setdefault(_PATH.sub(by_module, name) if called else name, len(names))
+        for name in network.connections.entries
+    ]
+    return _units(tuple(names), np.array(numbers, np.int64)[network.connections.entry])
+
+
+def _units(names: tuple[str, ...], numbers: IntArray) -> _Units:
+    order = np.argsort(numbers, kind="stable")
+    bounds = np.searchsorted(numbers[order], np.arange(len(names) + 1))
+    members = tuple(order[low:high] for low, high in pairwise(bounds.tolist()))
+    return _Units(names, members, len(numbers))
+
+
+def _chosen(
+    units: _Units, full: Sequence[float], reach: FloatArray, stated: Sequence[StatedGain], *, largest: bool = False
+) -> _Chosen:
+    """Gains for all members. ``full`` is the value that is to be full colour (or a pixel, …) in each unit, 0 where
+    nothing is reached; of units that share a scale the smallest counts, or the ``largest``."""
+    gains, centres = np.ones(units.count), np.zeros(units.count)
+    owner = np.full(units.count, -1, np.int64)  # the number of the scale that each member has
+    scales: list[Scale] = []
+    for together in _alike(full):
+        value = _nice((max if largest else min)(full[unit] for unit in together))
+        for unit in together:
+            gains[units.members[unit]], owner[units.members[unit]] = 1 / value, len(scales)
+        scales.append(Scale(1 / value, tuple(units.names[unit] for unit in together)))
+    if scales:
+        gains[owner < 0] = scales[0].gain
+    free = owner >= 0
+    for one in stated:
+        members = np.arange(units.count) if one.members is None else np.array(one.members, np.int64)
+        gains[members], centres[members], owner[members] = one.gain, one.centre, len(scales)
+        free[members] = False
+        scales.append(Scale(one.gain, (one.name,) if one.name else (), one.centre))
+    left = {name for name, members in zip(units.names, units.members, strict=True) if free[members].any()}
+    kept: dict[tuple[float, float], Scale] = {}
+    for number, scale in enumerate(scales):
+        mine = np.flatnonzero(owner == number)
+        if not len(mine):
+            continue
+        names = scale.names
+        if number < len(scales) - len(stated):
+            names = tuple(name for name in names if name in left)
+        reaches = float(np.abs(reach[mine] - 0.0).max(initial=0.0))
+        same = kept.get((scale.gain, scale.centre))
+        if same is not None:
+            names = () if not names or not same.names else (*same.names, *names)
+            reaches = max(reaches, same.reaches)
+        kept[scale.gain, scale.centre] = replace(scale, names=names, reaches=reaches)
+    return _Chosen(gains, centres, tuple(kept.values()))
+
+
+def _alike(full: Sequence[float]) -> list[list[int]]:
+    """Units by the scale that they share, each in order, the scales by their first unit: as few as there can be with no
+    two values in one that differ by more than ``_ALIKE``, or ``_SCALES`` where that would be more."""
+    order = sorted((unit for unit, value in enumerate(full) if value > 0), key=lambda unit: full[unit])
+    parts = [[unit] for unit in order]
+    while len(parts) > 1:
+        ratios = [full[high[-1]] / full[low[0]] for low, high in pairwise(parts)]
+        place = min(range(len(ratios)), key=ratios.__getitem__)
+        if ratios[place] > _ALIKE and len(parts) <= _SCALES:
+            break
+        parts[place : place + 2] = [parts[place] + parts[place + 1]]
+    return sorted(sorted(part) for part in parts)
+
+
+def _full(peaks: FloatArray) -> float:
+    """The value at which the colour is full, for members that reach so much; 0 where none reaches anything.
+
+    It is a balance: each member that cannot be told from grey weighs as much as some doublings of others beyond what a
+    colour shows; where the weakest and the strongest are not too far apart, none is lost.
+    """
+    peaks = np.sort(peaks[(peaks > 1e-12) & (peaks < 1e12)])
     if not len(peaks):
-        return 1.0
-    low, high = float(peaks.min()), float(peaks.max())
-    return 1 / _nice(low * (high / low) ** _BETWEEN)
+        return 0.0
+    top = float(peaks[int(np.ceil(_MOST * (len(peaks) - 1)))])
+    tried = np.unique(np.minimum(peaks / _TOLD, top))
+    lost = np.searchsorted(peaks, _TOLD * tried * (1 - 1e-9))
+    above = np.searchsorted(peaks, tried, side="right")
+    logs = np.log2(peaks)
+    sums = np.concatenate([np.cumsum(logs[::-1])[::-1], [0.0]])
+    beyond = sums[above] - (len(peaks) - above) * np.log2(tried)
+    best = float(tried[int(np.argmin(_LOST * lost + beyond))])
+    if peaks[-1] <= _SPREAD * peaks[0]:
+        best = min(best, float(peaks[0]) / _JUST)
+    return best
 
 
-def _thickness(peaks: FloatArray, connections: int) -> float:
-    """Thinner where there are many lines: half as wide at 160 as at 10."""
+def _pixel(peaks: FloatArray, learns: bool, crowd: float) -> float:
+    """The weight that is one user unit wide; 0 where there is none."""
+    peaks = peaks[(peaks > 1e-12) & (peaks < 1e12)]
     if not len(peaks):
-        return _TYPICAL
-    crowd = min(1.0, (_CROWD / max(connections, 1)) ** 0.25)
-    return _nice(crowd * min(_WIDEST / float(peaks.max()), _TYPICAL / float(np.median(peaks))))
+        return 0.0
+    widest = float(peaks.max()) / _WIDEST
+    return (widest if learns else max(widest, float(np.median(peaks)) / _TYPICAL)) / crowd
+
+
+def _typical(peaks: FloatArray) -> float:
+    """The median of what is reached; 0 where nothing is."""
+    peaks = peaks[(peaks > 1e-12) & (peaks < 1e12)]
+    return float(np.median(peaks)) if len(peaks) else 0.0
 
 
 def _nice(value: float) -> float:

@@ -21,6 +21,7 @@ from neurovis_spec.scene.frame import MARGIN, MOST, UNIT, Frame, Wishes, fit
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.geometry import FloatArray, Point, Rect, bounds, samples
 from neurovis_spec.scene.labels import Label, labels_of, room_beside
+from neurovis_spec.scene.legend_entry import Entry
 from neurovis_spec.scene.lesions import Lesions, lesions_of
 from neurovis_spec.scene.lines import Line, routes_of, trimmed
 from neurovis_spec.scene.model import Arrowhead, Group, Rectangle, Spline, Text, Theme, head_half_width
@@ -153,17 +154,16 @@ def _frame(
     teachers: list[Teacher],
     extent: Rect,
     delayed: str,
-) -> tuple[str | None, list[legend.Entry], Frame]:
+) -> tuple[str | None, list[Entry], Frame]:
     """The title (None: no header), the legend's entries, and the frame. In a picture too small for them both go."""
     words = settings.title if isinstance(settings.title, str) else network.title or network.name
     title = words if settings.title is not False and words else None
     wide, high = MOST if settings.size is None else settings.size
-    items: list[legend.Entry] = []
+    items: list[Entry] = []
     if settings.legend:
         contents = legend.Contents(
             lines=len(network.connections) > 0,
             learns=len(network.changing) > 0,
-            heaviest=_heaviest(network),
             teaches=label_of(teachers) if teachers else "",
             delays=delayed,
             lesions=bool(lesions_of(network)),
@@ -182,12 +182,6 @@ def _frame(
     narrowest = min(max(legend.row_width(items) + 2 * MARGIN, 120.0), _ROOM)
     wishes = Wishes((min(header[0], _ROOM - 2 * MARGIN), header[1]), footer, narrowest)
     return title, items, fit(extent, wishes, settings.size)
-
-
-def _heaviest(network: Network) -> float:
-    fixed = np.delete(np.abs(network.connections.weights), network.changing)
-    fixed = fixed[np.isfinite(fixed) & (fixed > 0)]
-    return float(fixed.max()) if len(fixed) else np.inf
 
 
 def _header(title: str, frame: Frame, theme: Theme) -> Group:

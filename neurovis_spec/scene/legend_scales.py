@@ -1,0 +1,178 @@
+"""The scales in a legend: which activities and signals have which colour, which weights which thickness, how far what
+changes glows.
+
+In: gains, a theme. Out: Entries. Where all have one scale, an entry is a sample and a line for it; else there is a line
+for each scale, with the names of what has it. A line says how far values go that a scale does not show.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from neurovis_spec.scene import texts
+from neurovis_spec.scene.encoding import THINNEST, glow_width
+from neurovis_spec.scene.gains import Gains, Scale
+from neurovis_spec.scene.legend_entry import FIRST_Y, LINE, SAMPLE_Y, SECOND_Y, SMALL, Entry, heading, high, stroke
+from neurovis_spec.scene.model import Ramp, Shape, Text, Theme
+from neurovis_spec.scene.themes import colours
+
+_RAMP, _STRIPES = 150.0, 75
+_STROKE, _STROKE_GAP, _WIDEST = 36.0, 10.0, 8.6
+#: in a table of scales: the length of a stroke and the room for its number
+_SHORT, _NUMBER = 22.0, 30.0
+#: how wide the names of a scale may be
+_NAMES = 132.0
+#: what goes less than this beyond a scale is not worth a word
+_BEYOND = 1.05
+
+
+def colour(gains: Gains, lines: bool, theme: Theme) -> list[Entry]:
+    """The scales of activities and, if there are ``lines``, of signals: in one entry, or two where one has several."""
+    neurons = _rows("neuron: activity", gains.activity_scales)
+    signals = _rows("line: signal w·a", gains.signal_scales) if lines else []
+    if len(neurons) <= 1 and len(signals) <= 1:
+        return [_ramp("Colour", [*neurons, *signals], theme)]
+    result = [_ramp("Neurons: activity", _rows("", gains.activity_scales), theme)]
+    if signals:
+        result.append(_ramp("Lines: signal w·a", _rows("", gains.signal_scales), theme))
+    return result
+
+
+def thickness(gains: Gains, theme: Theme) -> list[Entry]:
+    """What weights the widths of lines stand for; only widths that occur."""
+    shown = [
+        (scale, weights)
+        for scale in gains.thickness_scales
+        if scale.gain and math.isfinite(_WIDEST / scale.gain)
+        for weights in [nice_weights(scale.gain, scale.reaches or math.inf)]
+    ]
+    if not shown:
+        return []
+    if len(shown) == 1 and len(gains.thickness_scales) == 1:
+        return [_strokes(*shown[0], theme)]
+    shapes: list[Shape] = [heading("Thickness: weight |w|", theme)]
+    across = texts.width("Thickness: weight |w|", 11.5, 600)
+    for row, (scale, weights) in enumerate(shown):
+        y = 26.0 + 15.0 * row
+        for place, weight in enumerate(weights):
+            x = place * (_SHORT + _NUMBER)
+            shapes.append(stroke(x, _SHORT, theme.muted, abs(scale.gain) * weight, y - 4))
+            shapes.append(Text((x + _SHORT + 4, y), texts.number(weight), SMALL, theme.muted))
+        words, x = named(scale), 3 * (_SHORT + _NUMBER) + 6
+        shapes.append(Text((x, y), words, SMALL, theme.muted))
+        across = max(across, x + texts.width(words, SMALL))
+    return [Entry(tuple(shapes), across, max(high(1), 26.0 + 15.0 * (len(shown) - 1) + 3.0))]
+
+
+def glow(gains: Gains, theme: Theme) -> list[Entry]:
+    """How far what changes glows: a sample at full intensity."""
+    shown = [scale for scale in gains.change_scales if scale.gain]
+    if not shown:
+        return []
+    alone = len(shown) == 1 and len(gains.change_scales) == 1
+    told = [f"|Δw| {texts.number(1 / abs(scale.gain))} a step" for scale in shown]
+    lines = ["weight is changing", *(told if alone else map("{}: {}".format, told, map(named, shown)))]
+    width = 3.0
+    lit = float(glow_width(np.array(width), np.array(1.0)))
+    across = max(texts.width(line, SMALL) for line in lines)
+    shapes: list[Shape] = [heading("Glow", theme), stroke(0, 64, theme.glow, lit), stroke(0, 64, theme.muted, width)]
+    shapes += [Text((0, FIRST_Y + LINE * place), line, SMALL, theme.muted) for place, line in enumerate(lines)]
+    return [Entry(tuple(shapes), across, high(len(lines)))]
+
+
+def named(scale: Scale) -> str:
+    """The names of what has a scale, as many as there is room for."""
+    if not scale.names:
+        return "others"
+    names = [name.replace("->", "→") for name in scale.names]
+    for count in range(len(names), 0, -1):
+        more = f" + {len(names) - count} more" if count < len(names) else ""
+        words = ", ".join(names[:count]) + more
+        if texts.width(words, SMALL) <= _NAMES:
+            return words
+    more = f" + {len(names) - 1} more" if len(names) > 1 else ""
+    return texts.shorten(names[0], SMALL, _NAMES - texts.width(more, SMALL)) + more
+
+
+def nice_weights(gain: float, heaviest: float = math.inf) -> list[float]:
+    """Up to three weights that are 1, 2 or 5 times a power of ten, the largest at most ``heaviest`` and drawn no wider
+    than a legend has room for, the smallest no thinner than a line can be.
+
+    >>> nice_weights(4.0), nice_weights(4.0, 1.01), nice_weights(15.0, 0.1)
+    ([0.5, 1.0, 2.0], [0.2, 0.5, 1.0], [0.05, 0.1])
+    """
+    widest = _WIDEST / abs(gain)
+    value = _nice_below(min(widest, heaviest) if heaviest * abs(gain) >= THINNEST else widest)
+    values = [value]
+    while len(values) < 3:
+        value = _nice_below(value * 0.6)
+        if value * abs(gain) < THINNEST:
+            break
+        values.append(value)
+    return values[::-1]
+
+
+def _nice_below(value: float) -> float:
+    exponent = math.floor(math.log10(value))
+    factor = next((factor for factor in (5, 2) if factor * 10.0**exponent <= value * (1 + 1e-9)), 1)
+    return float(f"{factor}e{exponent}")
+
+
+def _rows(words: str, scales: Sequence[Scale]) -> list[tuple[str, str, str]]:
+    """For each scale what is full on the left, what it is of, and what is full on the right."""
+    rows = []
+    for scale in scales:
+        low, high = _ends(scale)
+        parts = (words, named(scale) if len(scales) > 1 else "", _beyond(scale))
+        rows.append((low, " ".join(part for part in parts if part), high))
+    return rows
+
+
+def _ends(scale: Scale) -> tuple[str, str]:
+    """The values at which the colour is full; they change places where the gain is negative."""
+    if not scale.gain:
+        return "−∞", "+∞"
+    half = 1 / scale.gain
+    low, high = (texts.number(scale.centre + side * half, sign=True) for side in (-1, 1))
+    return low, high
+
+
+def _beyond(scale: Scale) -> str:
+    """How far values go that a scale does not show."""
+    if scale.reaches * abs(scale.gain) <= _BEYOND:
+        return ""
+    return "(and beyond)" if scale.centre else f"(up to {texts.number(scale.reaches, 2)})"
+
+
+def _ramp(words: str, rows: Sequence[tuple[str, str, str]], theme: Theme) -> Entry:
+    # the words stand in the middle, so the longer end counts twice
+    needed = [
+        texts.width(middle, SMALL) + 2 * max(texts.width(low, SMALL), texts.width(right, SMALL)) + 14
+        for low, middle, right in rows
+    ]
+    across = max(_RAMP, *needed) if needed else _RAMP
+    stripes = colours(theme, np.linspace(-1, 1, _STRIPES))
+    shapes: list[Shape] = [heading(words, theme), Ramp((0, SAMPLE_Y - 5), across, 10, tuple(stripes))]
+    for place, (low, middle, right) in enumerate(rows):
+        y = FIRST_Y + LINE * place
+        shapes += [
+            Text((0, y), low, SMALL, theme.muted),
+            Text((across / 2, y), middle, SMALL, theme.muted, "middle"),
+            Text((across, y), right, SMALL, theme.muted, "end"),
+        ]
+    return Entry(tuple(shapes), across, high(len(rows)))
+
+
+def _strokes(scale: Scale, weights: Sequence[float], theme: Theme) -> Entry:
+    shapes: list[Shape] = [heading("Thickness", theme)]
+    strokes, words = len(weights) * (_STROKE + _STROKE_GAP) - _STROKE_GAP, "line: weight |w|"
+    across = max(strokes, texts.width(words, SMALL))
+    for place, value in enumerate(weights):
+        x = (across - strokes) / 2 + place * (_STROKE + _STROKE_GAP)
+        shapes.append(stroke(x, _STROKE, theme.muted, abs(scale.gain) * value))
+        shapes.append(Text((x + _STROKE / 2, FIRST_Y), texts.number(value), SMALL, theme.muted, "middle"))
+    shapes.append(Text((across / 2, SECOND_Y), words, SMALL, theme.muted, "middle"))
+    return Entry(tuple(shapes), across)

@@ -1,0 +1,88 @@
+"""Reached: how far the values of a run go, from which gains are chosen.
+
+In: the activities and weights of a run. Out: Reached. What is no finite number counts for nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.runtime.recording import Recording
+
+#: Rows looked at together.
+_CHUNK = 256
+#: What is below this share of a neuron's largest activity counts as rest.
+REST = 1 / 100
+
+
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """Of n neurons the largest |a| (``activity``) and the geometric mean of |a| while they are not at rest
+    (``typical``); of m connections the largest |w| (``weights``), |w·a| (``signals``) and |w[t] − w[t−1]|
+    (``changes``). 0 where there is nothing."""
+
+    activity: FloatArray
+    typical: FloatArray
+    weights: FloatArray
+    signals: FloatArray
+    changes: FloatArray
+
+
+def reached(network: Network, recording: Recording) -> Reached:
+    """What a recording of a network reaches."""
+    fixed = np.zeros(len(recording.sources))
+    fixed[np.delete(np.arange(len(fixed)), recording.plastic)] = recording.weights_static
+    return reached_by(network.connections.sources, fixed, recording.activity, recording.weights, recording.plastic)
+
+
+def nothing(network: Network) -> Reached:
+    """What is reached where nothing is run."""
+    neurons, connections = np.zeros(len(network.neurons)), np.zeros(len(network.connections))
+    return Reached(neurons, neurons, connections, connections, connections)
+
+
+def reached_by(
+    sources: IntArray, fixed: FloatArray, activity: FloatArray, weights: FloatArray, changing: IntArray
+) -> Reached:
+    """The same of arrays: ``activity`` (steps, n), ``weights`` (steps, p) of the connections ``changing`` (p,), and
+    those of all others in ``fixed`` (m,)."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        peaks = np.zeros(activity.shape[1])
+        for rows in _chunks(len(activity)):
+            peaks = np.maximum(peaks, _largest(activity[rows]))
+        logs, awake = np.zeros((2, len(peaks)))
+        reach, signals, changes = np.zeros((3, len(changing)))
+        for rows in _chunks(len(activity)):
+            size = np.abs(activity[rows])
+            counts = (size > REST * peaks) & np.isfinite(size)
+            logs += np.log(size, out=np.zeros_like(size), where=counts).sum(axis=0)
+            awake += counts.sum(axis=0)
+            if len(changing):
+                reach = np.maximum(reach, _largest(weights[rows]))
+                signals = np.maximum(signals, _largest(weights[rows] * activity[rows][:, sources[changing]]))
+                more = slice(rows.start, rows.stop + 1)
+                changes = np.maximum(changes, _largest(np.diff(weights[more], axis=0)))
+        weight_peaks = np.where(np.isfinite(fixed), np.abs(fixed), 0.0)
+        signal_peaks = weight_peaks * peaks[sources]
+    change_peaks = np.zeros(len(fixed))
+    weight_peaks[changing], signal_peaks[changing], change_peaks[changing] = reach, signals, changes
+    typical = np.where(awake > 0, np.exp(logs / np.maximum(awake, 1)), 0.0)
+    signal_peaks = np.where(np.isfinite(signal_peaks), signal_peaks, 0.0)
+    return Reached(peaks, typical, weight_peaks, signal_peaks, change_peaks)
+
+
+def _chunks(rows: int) -> Iterator[slice]:
+    for first in range(0, rows, _CHUNK):
+        yield slice(first, min(first + _CHUNK, rows))
+
+
+def _largest(values: FloatArray) -> FloatArray:
+    """The largest magnitude of each column that is a finite number, 0 without any."""
+    sizes = np.abs(values)
+    result: FloatArray = np.where(np.isfinite(sizes), sizes, 0.0).max(axis=0, initial=0.0)
+    return result
