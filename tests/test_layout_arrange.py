@@ -38,13 +38,25 @@ def test_auto_lays_tangles_out_by_distance_and_complete_ones_on_a_ring() -> None
     assert "densely" in choose_engine(tangle(300))[1]
     assert choose_engine(tangle(60, tuple(range(1, 60))))[0] == "circular"
     assert choose_engine(tangle(600))[0] == "large"
-    for ordinary in (tangle(20), tangle(60, (1,)), replace(tangle(60), boxes=(("b", (0, 1)),)), PAIR):
+    for ordinary in (tangle(20), tangle(60, (1,)), PAIR):
         assert choose_engine(ordinary)[0] == "layered"
     forward = tangle(60)
     acyclic = replace(forward, edges=tuple(e for e in forward.edges if e.target > e.source))
     assert choose_engine(acyclic)[0] == "layered"
     layers = [(f"{a}{i}", f"{b}{j}") for a, b in ("AB", "BC", "CA") for i in range(20) for j in range(0, 20, 4)]
     assert choose_engine(grouped("ABC", 20, layers))[0] == "layered"
+
+
+def test_auto_keeps_boxes_whole_that_many_connections_run_between() -> None:
+    halves = (("a", tuple(range(30))), ("b", tuple(range(30, 60))))
+    for steps in ((1, 7, 11), tuple(range(1, 60))):  # a ring would tear them apart
+        assert choose_engine(replace(tangle(60, steps), boxes=halves))[0] == "organic"
+    pairs = [
+        (f"{a}{i}", f"{b}{(7 * i + k) % 100}") for a, b in ("AB", "BC", "CA") for i in range(100) for k in range(4)
+    ]
+    loose = grouped("ABC", 100, pairs)
+    assert choose_engine(loose)[0] == "large"
+    assert choose_engine(replace(loose, boxes=(("one", tuple(range(100))),)))[0] == "organic"
 
 
 def grouped(groups: str, size: int, pairs: list[tuple[str, str]]) -> LayoutProblem:

@@ -41,9 +41,13 @@ def choose_engine(problem: LayoutProblem) -> tuple[str, str]:
         return "layered", "it can arrange, mirror and align as the spec says"
     if problem.modules and edges <= _MOST_IN_LAYERS:
         return "layered", "it draws instances as frames"
-    if not (problem.pins or problem.boxes or problem.modules) and _tangled(problem):
+    if not (problem.pins or problem.modules) and _tangled(problem):
         why = "its neurons drive one another in loops so densely that ranks would say nothing"
-        if len(problem.neurons) <= _MOST_IN_RING and edges > _COMPLETE * len(problem.neurons) ** 2:
+        if (
+            not problem.boxes
+            and len(problem.neurons) <= _MOST_IN_RING
+            and edges > _COMPLETE * len(problem.neurons) ** 2
+        ):
             return "circular", why
         if len(problem.neurons) <= _MOST_BY_DISTANCE:
             return "organic", why
@@ -53,6 +57,8 @@ def choose_engine(problem: LayoutProblem) -> tuple[str, str]:
     if edges > _MOST_IN_RANKS and _in_branches(problem):
         return "layered", f"its {edges} connections form chains or trees, whose flow ranks keep"
     if edges > _MOST_IN_RANKS and not _in_layers(problem):
+        if problem.boxes and not (problem.pins or problem.modules) and len(problem.neurons) <= _MOST_BY_DISTANCE:
+            return "organic", f"its {edges} connections are too many to follow each: boxes that stand apart say more"
         shown = ", and instances show as such, not as frames drawn alike" if problem.modules else ""
         return "large", f"its {edges} connections are too many to follow each: clusters say more{shown}"
     return "layered", "the default for networks whose positions are not all given"

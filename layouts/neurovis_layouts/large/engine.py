@@ -13,6 +13,7 @@ from functools import partial
 import numpy as np
 
 from neurovis_layouts.apart import apart
+from neurovis_layouts.boxed import boxes_apart
 from neurovis_layouts.finish import drawn, nearest, pinned_places
 from neurovis_layouts.large.field import GridField
 from neurovis_layouts.large.flow import downward, in_flow
@@ -54,6 +55,9 @@ class LargeEngine:
         if problem.pins:
             places = _around_pins(problem, wiring, places)
             return drawn(problem, self.name, places)
+        if problem.boxes:
+            real = places[: len(problem.neurons)]
+            return drawn(problem, self.name, boxes_apart(problem, real, _APART * problem.neuron_spacing))
         clear = [i for i, edge in enumerate(problem.edges) if planar[edge.source] and edge.source != edge.target]
         return drawn(problem, self.name, places, clear=_once(problem, clear))
 

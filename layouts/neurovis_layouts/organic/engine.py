@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from neurovis_layouts.apart import LEAST, apart, jitter
+from neurovis_layouts.boxed import boxes_apart
 from neurovis_layouts.finish import drawn, nearest, pinned_places
 from neurovis_layouts.organic.paths import distances
 from neurovis_layouts.organic.stress import Arcs, least_stress
@@ -52,7 +53,7 @@ class OrganicEngine:
             places[chosen] = _placed(problem, wiring, chosen, fixed, there)
             sizes.append(tuple((places[chosen].max(axis=0) - places[chosen].min(axis=0)).tolist()))
         _pack(places, part, numbers, sizes, max(_GAP * problem.neuron_spacing, LEAST))
-        return drawn(problem, self.name, places)
+        return drawn(problem, self.name, boxes_apart(problem, places, _APART * problem.neuron_spacing))
 
 
 def _stacked(wiring: Wiring, loops: IntArray) -> Wiring:
