@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 import subprocess
 import sys
 import threading
@@ -101,3 +103,29 @@ def test_a_library_that_somebody_else_may_have_put_there_is_not_loaded(
     kept.parent.chmod(0o777)
     assert c_library.load(text).answer() == 42
     assert kept.stat().st_mtime_ns == before
+
+
+def test_without_any_other_compiler_that_of_the_package_ziglang_is_taken(
+    cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Code for any machine of this kind, since several may share the cache; and it keeps its own things in ours."""
+    package = tmp_path / "packages" / "ziglang"
+    package.mkdir(parents=True)
+    (package / "__init__.py").write_text("")
+    compiler = next(found for name in ("cc", "gcc", "clang") if (found := shutil.which(name)))
+    (package / "__main__.py").write_text(
+        "import json, os, subprocess, sys\n"
+        "said = {'arguments': sys.argv[1:3], 'cache': os.environ['ZIG_GLOBAL_CACHE_DIR']}\n"
+        f"open({str(tmp_path / 'said')!r}, 'w').write(json.dumps(said))\n"
+        f"path = {{**os.environ, 'PATH': {str(Path(compiler).parent)!r}}}\n"
+        f"sys.exit(subprocess.call([{compiler!r}, *sys.argv[3:]], env=path))\n"
+    )
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.syspath_prepend(str(package.parent))
+    monkeypatch.setenv("PYTHONPATH", str(package.parent))
+    c_library._compiler.cache_clear()
+    assert load(TEXT % 47).answer() == 47
+    assert available("c").note.endswith("compiled by ziglang")
+    said = json.loads((tmp_path / "said").read_text())
+    assert said == {"arguments": ["cc", "-mcpu=baseline"], "cache": str(cache / "zig")}

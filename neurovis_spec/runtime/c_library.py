@@ -79,7 +79,8 @@ def _compiler(chosen: str, path: str) -> Compiler:
     except (ImportError, ValueError):
         zig = None
     if zig is not None and zig.origin is not None:
-        return Compiler((sys.executable, "-m", "ziglang", "cc"), "ziglang", _stamp(zig.origin))
+        # it makes code for this very processor unless it is told otherwise: another machine may share the cache
+        return Compiler((sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline"), "ziglang", _stamp(zig.origin))
     raise CompilerError("there is no C compiler; pip install 'neurovis-spec[c]' brings one")
 
 
@@ -146,7 +147,7 @@ def _made(text: str, path: Path) -> ctypes.CDLL:
         if not _is_ours(path.parent):
             raise OSError("not a folder that this user alone writes to")
         with tempfile.TemporaryDirectory(dir=path.parent, prefix=".making") as beside:
-            made = _compiled(text, Path(beside))
+            made = _compiled(text, Path(beside), path.parent / "zig")
             made.replace(path)
             library = ctypes.CDLL(str(path))
         _trim(path.parent, path)
@@ -155,13 +156,14 @@ def _made(text: str, path: Path) -> ctypes.CDLL:
         pass
     try:
         with tempfile.TemporaryDirectory(prefix="neurovis", ignore_cleanup_errors=True) as beside:
-            return ctypes.CDLL(str(_compiled(text, Path(beside))))
+            return ctypes.CDLL(str(_compiled(text, Path(beside), Path(beside) / "zig")))
     except OSError as error:
         raise CompilerError(f"what is compiled cannot be written or loaded: {error}") from None
 
 
-def _compiled(text: str, into: Path) -> Path:
-    """Compile in a folder. Raises OSError where it cannot be written to, CompilerError where the compiler fails."""
+def _compiled(text: str, into: Path, zig: Path) -> Path:
+    """Compile in a folder; ``zig`` is where ziglang may keep what it makes for itself (it waits for ever where it
+    cannot write). Raises OSError where the folder cannot be written to, CompilerError where the compiler fails."""
     source, library = into / "network.c", into / f"network{_SUFFIX}"
     source.write_text(text, encoding="ascii")
     made_by = compiler()
@@ -171,9 +173,16 @@ def _compiled(text: str, into: Path) -> Path:
     command += ["-o", str(library), str(source)]
     if sys.platform != "win32":
         command.append("-lm")
+    own = {"ZIG_GLOBAL_CACHE_DIR": str(zig), "ZIG_LOCAL_CACHE_DIR": str(into / "zig-local")}
     try:
         done = subprocess.run(
-            command, cwd=into, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False
+            command,
+            cwd=into,
+            env={**own, **os.environ},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            check=False,
         )
     except OSError as error:
         raise CompilerError(f"'{made_by.name}' cannot be started: {error.strerror}") from None
