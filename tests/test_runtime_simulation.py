@@ -6,7 +6,7 @@ import math
 import warnings
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import cast
+from typing import ClassVar, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,8 @@ from neurovis_spec.runtime.inputs import STRETCH, InputError, InputReader
 from neurovis_spec.runtime.record import record
 from neurovis_spec.runtime.recording import RecordingError
 from neurovis_spec.runtime.simulation import ParameterError, Simulation
+from neurovis_spec.runtime.state import initial_state
+from neurovis_spec.runtime.watch import Watch
 
 BOTH = ("reference", "numpy")
 
@@ -240,6 +242,35 @@ def test_one_warning_names_the_connection(backend: str) -> None:
     with pytest.warns(RuntimeWarning, match="the weight of A -> B is inf after step 2") as caught:
         record(network, 10, backend=backend)
     assert len(caught) == 1
+
+
+@pytest.mark.parametrize("place", [0, 9_000, 19_999])
+def test_a_neuron_among_many_is_warned_of(place: int) -> None:
+    network = nv.compile_text("neurovis: 1\nname: x\nneurons: {A: {count: 20000}}").network
+    state = initial_state(network)
+    state.activity[place] = np.inf
+    with pytest.warns(RuntimeWarning, match=f"the activity of A{place + 1} is inf"):
+        Watch(network).look(state)
+
+
+class Multiplied(np.ndarray[tuple[int], np.dtype[np.float64]]):
+    """Numbers that say how many of them are multiplied at a time."""
+
+    sizes: ClassVar[list[int]] = []
+
+    def dot(self, *given: object, **more: object) -> object:  # type: ignore[override]
+        self.sizes.append(len(self))
+        return np.asarray(self).dot(np.asarray(given[0]))
+
+
+def test_no_product_is_so_large_that_threads_share_it() -> None:
+    """OpenBLAS does from 10,001 numbers on, and then waits for them where the processors are busy."""
+    network = nv.compile_text("neurovis: 1\nname: x\nneurons: {A: {count: 50000}}").network
+    state = initial_state(network)
+    state.activity = state.activity.view(Multiplied)
+    Watch(network).look(state)
+    assert sum(Multiplied.sizes) == 50_000
+    assert max(Multiplied.sizes) <= 10_000
 
 
 HIDDEN = [

@@ -16,6 +16,9 @@ from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.state import State
 
+#: Numbers of one product. More of them BLAS shares among threads, which takes a thousand times as long as the product
+#: where the processors have other work to do.
+_PIECE = 8192
 #: No step.
 _NEVER = -1
 
@@ -53,9 +56,9 @@ class Watch:
         # A sum of squares is finite only if all terms are: one cheap product instead of a test each. Where those of
         # activities and weights are, the signals that leave, products of both, are finite as well.
         if (
-            math.isfinite(state.activity.dot(state.activity))
-            and (not self._learns or math.isfinite(state.weights.dot(state.weights)))
-            and (not self._remembers or (_finite(state.cells) and _finite(state.traces)))
+            _finite(state.activity)
+            and (not self._learns or _finite(state.weights))
+            and (not self._remembers or (_all_finite(state.cells) and _all_finite(state.traces)))
             and state.k - 1 != self._step
         ):
             return
@@ -98,13 +101,17 @@ class Watch:
         return f"input '{entry.name}'" + (f" of {names[takers[0]]}" if len(takers) else "")
 
 
-def _finite(states: tuple[tuple[FloatArray, ...], ...]) -> bool:
-    """Whether these states surely are: their squares, too."""
-    for group in states:
-        for values in group:
-            if not math.isfinite(values.dot(values)):
-                return False
-    return True
+def _finite(values: FloatArray) -> bool:
+    """Whether all of these surely are: their squares, too."""
+    if len(values) <= _PIECE:
+        return math.isfinite(values.dot(values))
+    pieces = (values[first : first + _PIECE] for first in range(0, len(values), _PIECE))
+    return all(math.isfinite(piece.dot(piece)) for piece in pieces)
+
+
+def _all_finite(states: tuple[tuple[FloatArray, ...], ...]) -> bool:
+    """The same of states."""
+    return all(_finite(values) for group in states for values in group)
 
 
 def _wrong(values: FloatArray) -> list[int]:
