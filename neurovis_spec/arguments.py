@@ -9,13 +9,14 @@ from __future__ import annotations
 import math
 import operator
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import SupportsFloat, SupportsIndex, TypeVar
 
 import numpy as np
 
 Kind = TypeVar("Kind")
+Item = TypeVar("Item")
 
 
 def text(name: str, value: object) -> str:
@@ -94,6 +95,13 @@ def mapping(name: str, value: object) -> Mapping[str, object]:
     if not isinstance(value, Mapping):
         raise _wrong(name, "a mapping", value)
     return {text(f"{name}: key", key): item for key, item in value.items()}
+
+
+def several(name: str, values: Iterable[Item], what: str) -> Iterable[Item]:
+    """Values one after the other."""
+    if not isinstance(values, Iterable):
+        raise _wrong(name, what, values)
+    return values
 
 
 def instance(name: str, value: object, kind: type[Kind], what: str) -> Kind:

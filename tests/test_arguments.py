@@ -33,9 +33,12 @@ WRONG: dict[str, tuple[object, ...]] = {
     "a recording": (5, "x.npz", {}, np.zeros(3)),
     "a layout": (5, "x.yaml", {}),
     "a function": (5, "f", {}),
+    "a text, several, or a mapping": (5, None, 1.5),
+    "a range or numbers": (5, None, 1.5),
 }
 #: what may be left out: None stands for the default
-OPTIONAL = {"limit", "seed", "root", "steps", "step", "fps", "engine", "theme", "backend"}
+OPTIONAL = {"limit", "root", "steps", "step", "fps", "engine", "theme", "backend", "scheduler"}
+OVER = {"seed": [1]}
 CALLS: dict[tuple[str, str, str], Callable[..., object]] = {
     ("compile", "source", "a path"): lambda v: nv.compile(v),
     ("compile", "root", "a path"): lambda v: nv.compile(SPEC, root=v),
@@ -69,6 +72,21 @@ CALLS: dict[tuple[str, str, str], Callable[..., object]] = {
     ("weight", "name", "a text"): lambda v: RECORDING.weight(v),
     ("snapshot", "step", "an integer"): lambda v: RECORDING.snapshot(v),
     ("save", "path", "a path"): lambda v: RECORDING.save(v),
+    ("sweep", "source", "a path"): lambda v: nv.sweep(v, OVER, "A"),
+    ("sweep", "over", "a mapping"): lambda v: nv.sweep(SPEC, v, "A"),
+    ("sweep", "steps", "an integer"): lambda v: nv.sweep(SPEC, OVER, "A", steps=v),
+    ("sweep", "inputs", "a mapping"): lambda v: nv.sweep(SPEC, OVER, "A", inputs=v),
+    ("sweep", "parameters", "a mapping"): lambda v: nv.sweep(SPEC, OVER, "A", parameters=v),
+    ("sweep", "backend", "a text"): lambda v: nv.sweep(SPEC, OVER, "A", backend=v),
+    ("sweep", "jobs", "an integer"): lambda v: nv.sweep(SPEC, OVER, "A", jobs=v),
+    ("sweep", "scheduler", "a text"): lambda v: nv.sweep(SPEC, OVER, "A", scheduler=v),
+    ("sweep", "path", "a path"): lambda v: nv.sweep(SPEC, OVER, "A", path=v),
+    ("sweep", "root", "a path"): lambda v: nv.sweep(SPEC, OVER, "A", root=v),
+    ("sweep", "limit", "an integer"): lambda v: nv.sweep(SPEC, OVER, "A", limit=v),
+    ("sweep", "progress", "a function"): lambda v: nv.sweep(SPEC, OVER, "A", progress=v),
+    ("sweep", "m", "a text"): lambda v: nv.sweep(SPEC, OVER, {"m": v}),
+    ("sweep", "metrics", "a text, several, or a mapping"): lambda v: nv.sweep(SPEC, OVER, v),
+    ("sweep", "seed", "a range or numbers"): lambda v: nv.sweep(SPEC, {"seed": v}, "A"),
 }
 
 
@@ -78,7 +96,7 @@ def test_a_wrong_type_is_named(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     for value in WRONG[what]:
-        if value is None and name in OPTIONAL:
+        if value is None and (name in OPTIONAL or (call, name) in {("compile", "seed"), ("sweep", "path")}):
             continue
         with pytest.raises(TypeError, match=f"^'{name}' is {what}, not {type(value).__name__}$"):
             CALLS[call, name, what](value)
@@ -93,6 +111,9 @@ def test_a_wrong_type_is_named(
         (lambda: nv.compile_text(TEXT, seed=-(2**63) - 1), "'seed' is at least -9223372036854775808"),
         (lambda: nv.compile_text(TEXT, g=10**400), "'g' is beyond what a double can hold"),
         (lambda: nv.compile("a\0b"), "'source' holds a NUL character"),
+        (lambda: nv.sweep(SPEC, OVER, "A", steps=-1), "'steps' is at least 1, not -1"),
+        (lambda: nv.sweep(SPEC, OVER, "A", jobs=0), "'jobs' is at least 1, not 0"),
+        (lambda: nv.sweep(SPEC, OVER, "A", path="a\0b"), "'path' holds a NUL character"),
         (lambda: NETWORK.run(-1), "'steps' is at least 0, not -1"),
         (lambda: NETWORK.run(2**80), "'steps' is at most 9007199254740992"),
         (lambda: NETWORK.run_to("x.npz", 3, every=2**80), "'every' is at most 9007199254740992"),

@@ -15,6 +15,8 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
+from neurovis_spec import arguments
+
 Number: TypeAlias = int | float
 Point: TypeAlias = tuple[Number, ...]
 
@@ -45,7 +47,11 @@ class Axis:
 
 def axis(name: str, values: str | Iterable[Number]) -> Axis:
     """The values of a name, from a text or as they are. Raises SweepError."""
-    found = _of_text(name, values) if isinstance(values, str) else tuple(_plain(name, value) for value in values)
+    if isinstance(values, str):
+        found = _of_text(name, values)
+    else:
+        given = arguments.several(name, values, "a range or numbers")
+        found = tuple(_plain(name, value) for value in given)
     if not found:
         raise SweepError(f"'{name}' has no value")
     wrong = next((value for value in found if not math.isfinite(value)), None)
@@ -64,7 +70,8 @@ def axis(name: str, values: str | Iterable[Number]) -> Axis:
 
 def axes(over: Mapping[str, str | Iterable[Number]]) -> tuple[Axis, ...]:
     """The axes of a grid, in the order given. Raises SweepError."""
-    found = tuple(axis(name, values) for name, values in over.items())
+    arguments.mapping("over", over)
+    found = tuple(axis(name, values) for name, values in (over or {}).items())
     if not found:
         raise SweepError("a sweep is over one name at least", f"as in eta=0.1:0.5:5; a range is {FORMS}")
     if math.prod(len(one.values) for one in found) > _MOST:

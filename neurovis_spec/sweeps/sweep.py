@@ -37,6 +37,8 @@ from neurovis_spec.whole import whole_text
 #: Runs points: their places and results, as they come.
 Runner: TypeAlias = Callable[[Job, Sequence[Point]], Generator[tuple[int, Result], None, None]]
 
+#: The most steps of a run.
+_MOST_STEPS = 1 << 53
 _NAMED = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*=(?!=)(.*)", re.DOTALL)
 
 
@@ -90,6 +92,17 @@ def sweep(
     not run again. Raises SweepError, InputError, BackendError, OSError, and SpecError where the spec or a metric is
     invalid at both ends of the grid and without it; what is wrong with a single point is in its row.
     """
+    for name, text in (("backend", backend), ("scheduler", scheduler)):
+        if text is not None:
+            arguments.text(name, text)
+    for name, place in (("root", root), ("path", path)):
+        if place is not None:
+            arguments.path(name, place)
+    if steps is not None:
+        steps = arguments.integer("steps", steps, least=1, most=_MOST_STEPS)
+    arguments.mapping("inputs", inputs)
+    arguments.function("progress", progress)
+    jobs = arguments.integer("jobs", jobs, least=1)
     plan = planned(source, over, metrics, steps=steps, parameters=parameters, backend=backend, root=root, limit=limit)
     return carried_out(plan, inputs, jobs=jobs, scheduler=scheduler, path=path, progress=progress)
 
@@ -119,7 +132,7 @@ def planned(
         str(spec.folder.resolve()),
         tuple(one.name for one in grid),
         tuple(named.values()),
-        {name: float(value) for name, value in (parameters or {}).items()},
+        {name: arguments.number(name, value) for name, value in arguments.mapping("parameters", parameters).items()},
         steps,
         {},
         backend,
@@ -180,9 +193,11 @@ def _by_itself(plan: Plan) -> Job:
 def named_metrics(metrics: str | Iterable[str] | Mapping[str, str]) -> dict[str, str]:
     """Metrics by name; one that has none is called as it is written. Raises SweepError."""
     if isinstance(metrics, Mapping):
-        pairs = list(metrics.items())
+        pairs = [(name, arguments.text(name, value)) for name, value in arguments.mapping("metrics", metrics).items()]
     else:
-        pairs = [_pair(text) for text in ([metrics] if isinstance(metrics, str) else metrics)]
+        texts = (metrics,) if isinstance(metrics, str) else metrics
+        texts = arguments.several("metrics", texts, "a text, several, or a mapping")
+        pairs = [_pair(arguments.text("metric", text)) for text in texts]
     if not pairs:
         raise SweepError("a sweep has one metric at least", 'as in "rms(O - T, last=100)"')
     result: dict[str, str] = {}
