@@ -97,6 +97,15 @@ def mapping(name: str, value: object) -> Mapping[str, object]:
     return {text(f"{name}: key", key): item for key, item in value.items()}
 
 
+def texts(name: str, value: object, what: str = "a text or several") -> tuple[str, ...]:
+    """One text, or several."""
+    if isinstance(value, str):
+        return (value,)
+    if not isinstance(value, Iterable):
+        raise _wrong(name, what, value)
+    return tuple(text(name, one) for one in value)
+
+
 def several(name: str, values: Iterable[Item], what: str) -> Iterable[Item]:
     """Values one after the other."""
     if not isinstance(values, Iterable):

@@ -47,8 +47,7 @@ def _keep(states: str | Sequence[str], neurons: str | Sequence[str], weights: st
 
     if weights not in ("plastic", "none"):
         raise ValueError(f"weights are 'plastic' or 'none', not {weights!r}")
-    states, neurons = ((one,) if isinstance(one, str) else tuple(one) for one in (states, neurons))
-    return Keep(neurons, weights == "plastic", states)
+    return Keep(arguments.texts("neurons", neurons), weights == "plastic", arguments.texts("states", states))
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,12 +142,15 @@ class CompiledNetwork:
         SpecError."""
         from neurovis_spec.runtime.until import Until
 
-        return Until(text, self.network)
+        return Until(arguments.text("text", text), self.network)
 
     def measure(self, text: str, recording: Recording) -> FloatArray:
         """What a measure (``rms(O - T, last=129)``) is after each step of a recording of every step, (steps,): NaN
         while it has no value. Raises SpecError, RecordingError."""
-        return pipeline.gauge(self.network, text, recording)
+        from neurovis_spec.runtime.recording import Recording
+
+        arguments.instance("recording", recording, Recording, "a recording")
+        return pipeline.gauge(self.network, arguments.text("text", text), recording)
 
     def run_to(
         self,
@@ -191,6 +193,10 @@ class CompiledNetwork:
         from neurovis_spec.runtime.record import Course
 
         ends = self.until(until) if isinstance(until, str) else until
+        if ends is not None:
+            from neurovis_spec.runtime.until import Until
+
+            arguments.instance("until", ends, Until, "a text or an Until")
         if inputs is not None:
             arguments.mapping("inputs", inputs)
         whole = self.network.steps if steps is None else arguments.integer("steps", steps, 0, _MOST_STEPS)
@@ -254,8 +260,9 @@ class CompiledNetwork:
 
         if to != "c" or real not in ("double", "float"):
             raise ValueError(f"a network is exported to c, of double or float, not to {to} of {real}")
+        _check(start=start)
         state = None if start is None else resumed_state(self.network, start)
-        return write(Path(folder), files(self.network, state, real))
+        return write(arguments.path("folder", folder), files(self.network, state, real))
 
     def choose_engine(self) -> tuple[str, str]:
         """The layout engine, and why."""

@@ -33,6 +33,8 @@ WRONG: dict[str, tuple[object, ...]] = {
     "a recording": (5, "x.npz", {}, np.zeros(3)),
     "a layout": (5, "x.yaml", {}),
     "a function": (5, "f", {}),
+    "a text or several": (5, None, 1.5),
+    "a text or an Until": (5, b"x", ["x"]),
     "a text, several, or a mapping": (5, None, 1.5),
     "a range or numbers": (5, None, 1.5),
 }
@@ -72,6 +74,15 @@ CALLS: dict[tuple[str, str, str], Callable[..., object]] = {
     ("weight", "name", "a text"): lambda v: RECORDING.weight(v),
     ("snapshot", "step", "an integer"): lambda v: RECORDING.snapshot(v),
     ("save", "path", "a path"): lambda v: RECORDING.save(v),
+    ("run", "states", "a text or several"): lambda v: NETWORK.run(3, states=v),
+    ("run", "neurons", "a text or several"): lambda v: NETWORK.run_to("x.npz", 3, neurons=v),
+    ("run", "until", "a text or an Until"): lambda v: NETWORK.run(3, until=v),
+    ("until", "text", "a text"): lambda v: NETWORK.until(v),
+    ("measure", "text", "a text"): lambda v: NETWORK.measure(v, RECORDING),
+    ("measure", "recording", "a recording"): lambda v: NETWORK.measure("A", v),
+    ("save_state", "path", "a path"): lambda v: NETWORK.simulator().save_state(v),
+    ("export", "folder", "a path"): lambda v: NETWORK.export(v),
+    ("export", "start", "a recording"): lambda v: NETWORK.export("x", start=v),
     ("sweep", "source", "a path"): lambda v: nv.sweep(v, OVER, "A"),
     ("sweep", "over", "a mapping"): lambda v: nv.sweep(SPEC, v, "A"),
     ("sweep", "steps", "an integer"): lambda v: nv.sweep(SPEC, OVER, "A", steps=v),
@@ -152,6 +163,18 @@ def test_a_mapping_that_is_no_spec_is_refused(monkeypatch: pytest.MonkeyPatch) -
         shared = [shared, shared]
     with pytest.raises(ValueError, match="too large for a spec"):
         nv.compile({**SPEC, "neurons": shared})
+
+
+@pytest.mark.parametrize("value", [b"x", [5], [None]])
+def test_what_is_no_text_among_several_is_named(value: object) -> None:
+    calls: dict[str, Callable[..., object]] = {
+        "states": lambda: NETWORK.run(3, states=value),  # type: ignore[arg-type]
+        "neurons": lambda: NETWORK.run(3, neurons=value),  # type: ignore[arg-type]
+        "metrics": lambda: nv.sweep(SPEC, OVER, value),  # type: ignore[arg-type]
+    }
+    for name, call in calls.items():
+        with pytest.raises(TypeError, match=f"^'{name}' is a text, not (int|NoneType)$"):
+            call()
 
 
 def test_numbers_of_any_make_are_taken() -> None:

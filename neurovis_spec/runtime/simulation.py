@@ -231,7 +231,7 @@ class Simulation:
         Raises OSError."""
         from neurovis_spec.runtime.checkpoint import save_state
 
-        save_state(self._state, Path(path))
+        save_state(self._state, arguments.path("path", path))
 
     def restore(self, state: State | str | os.PathLike[str]) -> None:
         """Go on from a state of this network, or from a checkpoint, exactly as it was. Raises ValueError for one of

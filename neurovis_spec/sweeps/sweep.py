@@ -195,9 +195,7 @@ def named_metrics(metrics: str | Iterable[str] | Mapping[str, str]) -> dict[str,
     if isinstance(metrics, Mapping):
         pairs = [(name, arguments.text(name, value)) for name, value in arguments.mapping("metrics", metrics).items()]
     else:
-        texts = (metrics,) if isinstance(metrics, str) else metrics
-        texts = arguments.several("metrics", texts, "a text, several, or a mapping")
-        pairs = [_pair(arguments.text("metric", text)) for text in texts]
+        pairs = [_pair(text) for text in arguments.texts("metrics", metrics, "a text, several, or a mapping")]
     if not pairs:
         raise SweepError("a sweep has one metric at least", 'as in "rms(O - T, last=100)"')
     result: dict[str, str] = {}
