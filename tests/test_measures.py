@@ -161,6 +161,7 @@ def test_a_measure_is_of_every_step() -> None:
         ("mean(rms(A, last=2), last=3)", "bad-window", 6, "inside 'mean'"),
         ("clip(A, low=1)", "foreign-operator", 12, "have no names"),
         ("A = 3", "foreign-operator", 3, "'=='"),
+        ("(A -> K1).eligibility > 0", "no-attributes", 10, "name the state of a rule under 'outputs'"),
         ("rms(A", "unbalanced-parenthesis", 4, "never closed"),
         ("", "empty-expression", 1, ""),
         ("A +", "missing-operand", 3, ""),

@@ -32,6 +32,10 @@ from neurovis_spec.runtime.windows import running
 _OF_TIME: Final = ("k", "t", "dt", "pi", "e")
 
 
+#: What to do about ``(K1 -> O).eligibility``, which is no name.
+_OF_RULE: Final = "name the state of a rule under 'outputs', as in 'outputs: {x: (A -> B).STATE}', and write x here"
+
+
 @dataclass(frozen=True, eq=False)
 class Measure:
     """A measure of the runs of a network: ``neurons`` gives the index of each neuron that it names, ``slots`` the slot
@@ -82,7 +86,8 @@ def parsed(text: str, label: str, *, bounded: bool = False) -> Formula:
         formula = parse_measure(text)
     except ExpressionError as error:
         for one in (error, *error.others):
-            findings.error(one.code, _span(label, one.start, one.end), one.message, one.hint)
+            hint = _OF_RULE if one.code == "no-attributes" and "->" in text else one.hint
+            findings.error(one.code, _span(label, one.start, one.end), one.message, hint)
     for window in () if formula is None or not bounded else formula.windows:
         if window.last is None:
             message = f"'{window.summary}' here needs the number of steps that it is of"

@@ -159,7 +159,8 @@ class Recording:
         missing = [self.neurons[index] for index in found.neurons if index not in columns]
         if missing:
             there = listed([self.neurons[index] for index in self.recorded.tolist()])
-            raise UnknownNameError(f"{listed(missing)} was not recorded: the recording is partial and holds {there}")
+            was = "was" if len(missing) == 1 else "were"
+            raise UnknownNameError(f"{listed(missing)} {was} not recorded: the recording is partial and holds {there}")
         return self.activity, Found(tuple(columns[index] for index in found.neurons), found.single)
 
     @cached_property
