@@ -308,7 +308,8 @@ class CompiledNetwork:
         renderer_for(suffix := place.suffix, moving=False)
         layout = self.drawn(engine).value
         snapshot = self._snapshot(wanted, recording, progress)
-        scene = pipeline.picture(self.network, layout, snapshot, self.gains, self._settings(theme))
+        gains = self._gains_for(recording)
+        scene = pipeline.picture(self.network, layout, snapshot, gains, self._settings(theme))
         content = pipeline.draw(scene, suffix)
         with replacing(place) as file:
             file.write(content)
@@ -344,7 +345,8 @@ class CompiledNetwork:
         check_film(self.network, frames_of(self.network, first, count, recording), suffix, renderer.capabilities)
         run = partial(self.run, progress=progress)
         snapshots = snapshots_from(self.network, first, count, recording, run)
-        film = pipeline.moving(self.network, self._layout, snapshots, self.gains, self._settings(theme), fps)
+        gains = self._gains_for(recording)
+        film = pipeline.moving(self.network, self._layout, snapshots, gains, self._settings(theme), fps)
         content = pipeline.animate(film, suffix, progress)
         with replacing(place) as file:
             file.write(content)
@@ -369,6 +371,14 @@ class CompiledNetwork:
             step = wanted - 1
         return snapshot_at(self.network, step, recording, self.run)
 
+    def _gains_for(self, recording: Recording | None) -> Gains:
+        """The gains of pictures of a recording, or of runs of its own."""
+        if recording is None:
+            return self.gains
+        from neurovis_spec.snapshots import fitted
+
+        return pipeline.measure_recording(self.network, fitted(recording, self.network))
+
     @property
     def _gain_steps(self) -> int:
         """The steps to run for the gains: 0 where these are known."""
@@ -377,10 +387,10 @@ class CompiledNetwork:
         return 0 if "gains" in self.__dict__ else probe_steps(self.network)
 
     def steps_to_draw(self, step: int | None = None, recording: Recording | None = None) -> int:
-        """How many steps ``render`` will run: those up to the step, without a recording, and those that the gains take
-        which the spec does not state, in one run."""
+        """How many steps ``render`` will run: none with a recording, else those up to the step and those that the gains
+        take, in one run."""
         wanted = self.network.steps if step is None else step + 1
-        return max(wanted if recording is None else 0, self._gain_steps)
+        return 0 if recording is not None else max(wanted, self._gain_steps)
 
     def _repr_svg_(self) -> str:
         """The network at the last step of its default run, for a notebook."""

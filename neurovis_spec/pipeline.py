@@ -180,6 +180,13 @@ def measure(network: Network, progress: Progress | None = None, made: Recording 
     return probe(network, progress, made)
 
 
+def measure_recording(network: Network, recording: Recording) -> Gains:
+    """The same for a recording that is drawn: from all of its steps."""
+    from neurovis_spec.scene.probe import gains_of
+
+    return gains_of(network, recording)
+
+
 def picture(network: Network, layout: Layout, snapshot: Snapshot, gains: Gains, settings: RenderSettings) -> Scene:
     """One step as discs, splines and texts."""
     from neurovis_spec.scene.encode import encode

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -40,7 +42,7 @@ def test_a_picture_takes_one_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     runs.clear()
     again = nv.compile_text(text)
     again.render(tmp_path / "z.svg", step=20, recording=recording)
-    assert runs == [300]
+    assert runs == []
     assert (tmp_path / "z.svg").read_bytes() == render_of(text, tmp_path)
 
 
@@ -59,3 +61,42 @@ def test_the_command_says_on_a_terminal_when_it_runs(tmp_path: Path, monkeypatch
     assert done.exit_code == 0
     assert "running 300 steps, which show the range of its values" in done.stderr
     assert done.stdout == f"{tmp_path / 'x.svg'}\n"
+
+
+LED = """\
+neurovis: 1
+name: led
+time: {steps: 40}
+inputs: {push: {}}
+neurons: {A: {input: push}, B: {}}
+connections: {A -> B: 0.5}
+"""
+
+
+def fills(path: Path) -> dict[str, str]:
+    found = re.findall(r'data-neuron="(\w+)".*?<circle[^>]* fill="(#\w+)"', path.read_text(encoding="utf-8"), re.DOTALL)
+    return dict(found)
+
+
+def test_the_gains_of_a_recording_are_those_of_all_of_it(tmp_path: Path) -> None:
+    """A controller that is led from outside does nothing by itself: its own run says nothing of what it is given."""
+    network = nv.compile_text(LED)
+    recording = network.run(inputs={"push": np.array([[10.0 * (step % 4)] for step in range(40)])})
+    drawn = []
+    for step in (37, 38, 39):
+        network.render(tmp_path / f"{step}.svg", step=step, recording=recording)
+        drawn.append(fills(tmp_path / f"{step}.svg")["A"])
+    assert len(set(drawn)) == 3, "no step is saturated beside the next"
+    legends = {re.findall(r">(\+[^<]*)<", path.read_text(encoding="utf-8"))[0] for path in tmp_path.iterdir()}
+    assert legends == {"+21"}, "the middle of what A and B reach"
+    network.render(tmp_path / "own.svg", step=39)
+    assert ">+21<" not in (tmp_path / "own.svg").read_text(encoding="utf-8")
+
+
+def test_a_recording_of_every_other_step_has_gains_but_no_glow(tmp_path: Path) -> None:
+    """What a weight has changed in two steps is no change of one."""
+    text = "neurovis: 1\nname: x\ntime: {steps: 60}\nneurons: {A: {bias: 1}, B: {bias: 0.5}}\n"
+    network = nv.compile_text(text + "connections: {A -> B: {weight: 0.1, plasticity: {hebbian: {rate: 0.01}}}}\n")
+    for every, glows in ((1, True), (2, False)):
+        network.render(tmp_path / "x.svg", recording=network.run(every=every))
+        assert ('class="glow"' in (tmp_path / "x.svg").read_text(encoding="utf-8")) == glows

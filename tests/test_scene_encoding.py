@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
+from colour_vision import VISIONS, difference
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -48,7 +49,7 @@ def test_lines_are_never_thinner_than_the_thinnest_and_else_exact() -> None:
     assert widths.tolist() == [0.6, 0.6, 0.6, 0.6, 8.0, 0.6, 0.6]
 
 
-@given(st.floats(1e-3, 1e6), st.floats(1.001, 10), st.floats(0.6, 20))
+@given(st.floats(encoding.FAINTEST, 1e6), st.floats(1.001, 10), st.floats(0.6, 20))
 def test_a_glow_grows_with_its_intensity_and_surrounds_its_line(light: float, factor: float, width: float) -> None:
     low, high = encoding.glow_width(np.array([width, width]), np.array([light, light * factor]))
     assert width < low <= high <= width + 2 * encoding.GLOW_REACH
@@ -57,9 +58,19 @@ def test_a_glow_grows_with_its_intensity_and_surrounds_its_line(light: float, fa
 
 
 def test_a_faint_glow_is_left_out() -> None:
-    widths = encoding.glow_width(np.array([2.0, 2.0]), np.array([0.99e-3, 1e-3]))
+    """It would be thinner than a pixel on either side, and tint its line rather than glow."""
+    widths = encoding.glow_width(np.array([2.0, 2.0]), encoding.FAINTEST * np.array([0.99, 1]))
     assert widths[0] == 0
-    assert widths[1] > 2
+    assert widths[1] >= 2 + 2 * 1
+
+
+@pytest.mark.parametrize("vision", VISIONS)
+@pytest.mark.parametrize("theme", THEMES.values(), ids=lambda t: t.name)
+def test_a_glow_reads_as_no_colour_of_a_signal(theme: Theme, vision: str) -> None:
+    """Neither of the anchors nor of what lies between them, and it can be seen on the background."""
+    for fill in colours(theme, np.linspace(-1, 1, 41)):
+        assert difference(theme.glow, fill, vision) >= 15
+    assert difference(theme.glow, theme.background, vision) >= 15
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from neurovis_renderers.markup import escape, exact, num, path
 from neurovis_renderers.svg import SvgRenderer
 
 from neurovis_spec.compiler.wishes import RenderSettings
+from neurovis_spec.scene import encoding
 from neurovis_spec.scene.encode import encode
 from neurovis_spec.scene.gains import plain_gains
 from neurovis_spec.scene.themes import THEMES, channels
@@ -62,7 +63,7 @@ def test_fill_stroke_and_width_follow_equations_2_to_5(theme: str, step: int) ->
         before = float(CASE.weights[step - 1, index]) if step else w
         light = abs(CHANGE * (w - before))
         glows = [p for p in paths if p.attrib.get("class") == "glow"]
-        assert len(glows) == (light >= 1e-3)
+        assert len(glows) == (light >= encoding.FAINTEST)
         if glows:
             assert glows[0].attrib["stroke"] == THEMES[theme].glow
             assert float(glows[0].attrib["stroke-width"]) > float(line.attrib["stroke-width"])

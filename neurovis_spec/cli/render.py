@@ -22,12 +22,11 @@ from neurovis_spec.cli.targets import check_files, check_target
 
 if TYPE_CHECKING:
     from neurovis_spec.compiled import CompiledNetwork
-    from neurovis_spec.runtime.recording import Recording
 
 
-def _why(network: CompiledNetwork, step: int | None, recording: Recording | None, steps: int) -> str:
+def _why(network: CompiledNetwork, step: int | None, steps: int) -> str:
     """What a run is for, where it is not for the step that is drawn."""
-    wanted = 0 if recording is not None else network.network.steps if step is None else step + 1
+    wanted = network.network.steps if step is None else step + 1
     return "" if steps <= wanted else ", which show the range of its values (render: {gain: …} in the spec states it)"
 
 
@@ -65,7 +64,7 @@ def command(
     record = recording_of(recording)
     steps = network.steps_to_draw(step, record)
     if steps and on_terminal():
-        click.echo(f"running {count(steps, 'step')}{_why(network, step, record, steps)}", err=True)
+        click.echo(f"running {count(steps, 'step')}{_why(network, step, steps)}", err=True)
     with progress("drawing") as bar, writing(output):
         network.render(output, step=step, recording=record, theme=theme, engine=engine, progress=bar)
     show_warnings(network.drawn(engine))

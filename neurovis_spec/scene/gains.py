@@ -24,7 +24,7 @@ FloatArray: TypeAlias = npt.NDArray[np.float64]
 IntArray: TypeAlias = npt.NDArray[np.int64]
 
 #: a colour of this value can surely be told from grey, in every theme; one of ``_JUST`` beside others
-_TOLD, _JUST = 0.6, 0.25
+_TOLD, _JUST = 0.9, 0.25
 #: one that cannot be told weighs as much as so many doublings of others beyond what a colour shows
 _LOST = 5.0
 #: where the strongest is more than so many times the weakest, no scale shows both
@@ -34,7 +34,7 @@ _MOST = 0.9
 #: ranges that differ by less than this factor are alike; there are at most so many scales
 _ALIKE, _SCALES = 2.0, 4
 #: how wide, in user units, the strongest line is to be, one that learns, and a typical one, in a small network
-_WIDEST, _TYPICAL = 6.5, 2.6
+_WIDEST, _LEARNED, _TYPICAL = 6.5, 5.0, 2.6
 #: with more lines than this they get thinner
 _CROWD = 10
 
@@ -85,14 +85,18 @@ def choose_gains(network: Network, settings: RenderSettings, run: Reached) -> Ga
     groups, entries = _groups(network), _entries(network)
     learns = np.zeros(len(network.connections), bool)
     learns[network.changing] = True
-    crowd = min(1.0, (_CROWD / max(len(network.connections), 1)) ** 0.25)
     range_ = np.minimum(run.activity, 2 * run.typical)
     activity = _chosen(groups, [_full(range_[m]) for m in groups.members], run.activity, settings.activity)
-    signal = _chosen(entries, [_full(run.signals[m]) for m in entries.members], run.signals, settings.signal)
-    widths = [_pixel(run.weights[m], bool(learns[m].any()), crowd) for m in entries.members]
-    thickness = _chosen(entries, widths, run.weights, settings.thickness, largest=True)
+    signal = _chosen(
+        entries, [_full(run.signals[m]) for m in entries.members], run.signals, settings.signal, least=True
+    )
+    widths = [
+        _learning(run.weights[m], len(network.changing)) if learns[m].any() else _fixed(run.weights[m], len(learns))
+        for m in entries.members
+    ]
+    thickness = _chosen(entries, widths, run.weights, settings.thickness)
     changes = [_typical(run.changes[m]) for m in entries.members]
-    change = _chosen(entries, changes, run.changes, settings.change, largest=True)
+    change = _chosen(entries, changes, run.changes, settings.change)
     return Gains(
         activity=activity.gains,
         centre=activity.centres,
@@ -157,15 +161,16 @@ def _units(names: tuple[str, ...], numbers: IntArray) -> _Units:
 
 
 def _chosen(
-    units: _Units, full: Sequence[float], reach: FloatArray, stated: Sequence[StatedGain], *, largest: bool = False
+    units: _Units, full: Sequence[float], reach: FloatArray, stated: Sequence[StatedGain], *, least: bool = False
 ) -> _Chosen:
     """Gains for all members. ``full`` is the value that is to be full colour (or a pixel, …) in each unit, 0 where
-    nothing is reached; of units that share a scale the smallest counts, or the ``largest``."""
+    nothing is reached; of units that share a scale the middle counts, or the ``least``."""
     gains, centres = np.ones(units.count), np.zeros(units.count)
     owner = np.full(units.count, -1, np.int64)  # the number of the scale that each member has
     scales: list[Scale] = []
     for together in _alike(full):
-        value = _nice((max if largest else min)(full[unit] for unit in together))
+        low, high = (end(full[unit] for unit in together) for end in (min, max))
+        value = _nice(low if least else float(np.sqrt(low * high)))
         for unit in together:
             gains[units.members[unit]], owner[units.members[unit]] = 1 / value, len(scales)
         scales.append(Scale(1 / value, tuple(units.names[unit] for unit in together)))
@@ -231,13 +236,24 @@ def _full(peaks: FloatArray) -> float:
     return best
 
 
-def _pixel(peaks: FloatArray, learns: bool, crowd: float) -> float:
-    """The weight that is one user unit wide; 0 where there is none."""
+def _fixed(peaks: FloatArray, lines: int) -> float:
+    """The weight that is one user unit wide among so many ``lines``; 0 where there is none."""
     peaks = peaks[(peaks > 1e-12) & (peaks < 1e12)]
     if not len(peaks):
         return 0.0
-    widest = float(peaks.max()) / _WIDEST
-    return (widest if learns else max(widest, float(np.median(peaks)) / _TYPICAL)) / crowd
+    return max(float(peaks.max()) / _WIDEST, float(np.median(peaks)) / _TYPICAL) / _crowd(lines)
+
+
+def _learning(peaks: FloatArray, lines: int) -> float:
+    """The same for weights that change, of which there are so many: by what the strongest reaches, so that it is seen
+    to grow."""
+    peaks = peaks[(peaks > 1e-12) & (peaks < 1e12)]
+    return float(peaks.max()) / _LEARNED / _crowd(lines) if len(peaks) else 0.0
+
+
+def _crowd(lines: int) -> float:
+    """By how much lines are thinner where there are many of them: half as wide at 160 as at 10."""
+    return float(min(1.0, (_CROWD / max(lines, 1)) ** 0.25))
 
 
 def _typical(peaks: FloatArray) -> float:

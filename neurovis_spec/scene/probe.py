@@ -1,7 +1,7 @@
 """The probe: a run whose only purpose is to see how far the values of a network go.
 
-In: a network. Out: Gains. The run is the network's own (its inputs, its default length, within a bound), never
-somebody's recording, so that a picture of a step is the same wherever the step comes from.
+In: a network. Out: Gains. The run is the network's own (its inputs, its default length, within a bound). Where a
+recording is drawn, its gains are those of the whole of it: what comes from outside is in no run of ours.
 """
 
 from __future__ import annotations
@@ -44,4 +44,10 @@ def probe(network: Network, progress: Progress | None = None, made: Recording | 
     recording = replace(
         made, step=made.step[rows], activity=made.activity[rows], weights=made.weights[rows], states=made.states[rows]
     )
+    return choose_gains(network, network.render, reached(network, recording))
+
+
+def gains_of(network: Network, recording: Recording) -> Gains:
+    """The gains for a recording: what the spec states, else from all of its steps, so that each looks the same. Raises
+    RecordingError for a partial one."""
     return choose_gains(network, network.render, reached(network, recording))

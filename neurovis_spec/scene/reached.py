@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
@@ -17,7 +18,7 @@ from neurovis_spec.runtime.recording import Recording
 #: Rows looked at together.
 _CHUNK = 256
 #: What is below this share of a neuron's largest activity counts as rest.
-REST = 1 / 100
+REST = 1 / 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +35,12 @@ class Reached:
 
 
 def reached(network: Network, recording: Recording) -> Reached:
-    """What a recording of a network reaches."""
+    """What a recording of a network reaches. Raises RecordingError for a partial one."""
+    recording.check_whole("a picture cannot be drawn from")
     fixed = np.zeros(len(recording.sources))
     fixed[np.delete(np.arange(len(fixed)), recording.plastic)] = recording.weights_static
-    return reached_by(network.connections.sources, fixed, recording.activity, recording.weights, recording.plastic)
+    sources, follows = network.connections.sources, np.diff(recording.step) == 1
+    return reached_by(sources, fixed, recording.activity, recording.weights, recording.plastic, follows)
 
 
 def nothing(network: Network) -> Reached:
@@ -47,10 +50,16 @@ def nothing(network: Network) -> Reached:
 
 
 def reached_by(
-    sources: IntArray, fixed: FloatArray, activity: FloatArray, weights: FloatArray, changing: IntArray
+    sources: IntArray,
+    fixed: FloatArray,
+    activity: FloatArray,
+    weights: FloatArray,
+    changing: IntArray,
+    follows: npt.NDArray[np.bool_] | None = None,
 ) -> Reached:
-    """The same of arrays: ``activity`` (steps, n), ``weights`` (steps, p) of the connections ``changing`` (p,), and
-    those of all others in ``fixed`` (m,)."""
+    """The same of arrays: ``activity`` (rows, n), ``weights`` (rows, p) of the connections ``changing`` (p,), and
+    those of all others in ``fixed`` (m,). ``follows`` (rows − 1,) says which row is the step after the one before;
+    without it all are."""
     with np.errstate(over="ignore", invalid="ignore"):
         peaks = np.zeros(activity.shape[1])
         for rows in _chunks(len(activity)):
@@ -65,8 +74,8 @@ def reached_by(
             if len(changing):
                 reach = np.maximum(reach, _largest(weights[rows]))
                 signals = np.maximum(signals, _largest(weights[rows] * activity[rows][:, sources[changing]]))
-                more = slice(rows.start, rows.stop + 1)
-                changes = np.maximum(changes, _largest(np.diff(weights[more], axis=0)))
+                steps = np.diff(weights[rows.start : rows.stop + 1], axis=0)
+                changes = np.maximum(changes, _largest(steps if follows is None else steps[follows[rows]]))
         weight_peaks = np.where(np.isfinite(fixed), np.abs(fixed), 0.0)
         signal_peaks = weight_peaks * peaks[sources]
     change_peaks = np.zeros(len(fixed))
