@@ -211,6 +211,23 @@ def test_each_frame_of_a_film_shows_its_step(browser: Browser) -> None:
     assert len({row[3] for row in read}) > 10
 
 
+def test_a_line_ends_in_a_bar_while_its_weight_is_negative(browser: Browser) -> None:
+    steps = [CASE.snapshot(k) for k in range(70)]
+    made = film(CASE.network, CASE.layout, steps, GAINS, RenderSettings(), FPS)
+    name = "K8 -> O"
+    weights = CASE.weights[:70, CASE.network.connection_index[name]]
+    script = f"""svg.pauseAnimations();
+    const line = svg.querySelector('[data-connection="{name}"]'), path = line.querySelector('path:not(.glow)');
+    const shown = c => getComputedStyle(line.querySelector(c)).display != 'none';
+    return [...Array(70).keys()].map(k => {{ svg.setCurrentTime((k + 0.02) / {FPS});
+      return [shown('.arrow'), shown('.bar'), getComputedStyle(line.querySelector('.stem')).strokeWidth
+        == getComputedStyle(path).strokeWidth]; }});"""
+    read = measured(browser, AnimatedSvgRenderer().animate(made, ".svg"), script)
+    assert read == [[bool(w >= 0), bool(w < 0), True] for w in weights]
+    assert (weights < 0).any()
+    assert (weights >= 0).any()
+
+
 def test_a_film_shows_the_same_in_a_page_of_quirks_mode(browser: Browser) -> None:
     """There class names are told apart by more than their case."""
     svg = AnimatedSvgRenderer().animate(moving(), ".svg")
@@ -252,7 +269,7 @@ def test_what_is_shifted_moves_and_stands_still_with_reduced_motion(browser: Bro
     dot = Group((Disc((20, 30), 5, "#101010", "#101010", 1),), "dot", {"part": "dot"})
     empty = np.zeros((3, 0))
     made = Film(
-        Scene(200, 100, theme, "a dot", (dot,)), 10.0, (), (), empty, empty, empty, empty, "caption", ("",) * 3,
+        Scene(200, 100, theme, "a dot", (dot,)), 10.0, (), (), empty, empty, empty, empty, empty > 0, "caption", ("",) * 3,
         shifts=("dot",), shift_values=np.array([[[0, 0]], [[50, 0]], [[100.5, -4]]], float),
     )  # fmt: skip
     svg = AnimatedSvgRenderer().animate(made, ".svg")

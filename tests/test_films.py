@@ -63,6 +63,7 @@ FILM = Film(
     line_values=np.zeros((3, 0)),
     line_widths=np.zeros((3, 0)),
     glow_widths=np.zeros((3, 0)),
+    line_bars=np.zeros((3, 0), np.bool_),
     caption="caption",
     captions=("step 0", "step 1", "step 2"),
     shifts=("cursor",),

@@ -128,7 +128,7 @@ def test_lines_run_from_rim_to_rim_and_heads_point_at_their_targets() -> None:
         assert isinstance(target, Disc)
         assert source.radius < math.dist(line.points[0], source.centre) < source.radius + 4
         assert target.radius < math.dist(head.tip, target.centre) < target.radius + 4
-        assert math.dist(line.points[-1], head.points[2]) < 0.6
+        assert math.dist(line.points[-1], head.notch) < 0.6
         dots = sample(line.points, 40)
         for disc in (source, target):
             assert np.hypot(*(dots - np.array(disc.centre)).T).min() > disc.radius

@@ -20,7 +20,7 @@ from neurovis_spec.scene.caption import caption
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.geometry import FloatArray
 from neurovis_spec.scene.lesions import FAINT
-from neurovis_spec.scene.model import Arrowhead, Disc, Group, Scene, Shape, Spline, head_half_width
+from neurovis_spec.scene.model import Disc, Group, Scene, Shape, Spline, ended
 from neurovis_spec.scene.plan import Plan, plan
 from neurovis_spec.scene.themes import colours, readable
 
@@ -32,12 +32,14 @@ CAPTION = "caption"
 
 @dataclass(frozen=True, slots=True)
 class Looks:
-    """Eqs. 2–5 at one step: colour values (n,) and (m,) in −1…1, widths and glow widths (m,) in user units."""
+    """Eqs. 2–5 at one step: colour values (n,) and (m,) in −1…1, widths and glow widths (m,) in user units; and which
+    lines end in a bar, for their weight is negative."""
 
     discs: FloatArray
     lines: FloatArray
     widths: FloatArray
     glows: FloatArray
+    bars: npt.NDArray[np.bool_]
 
 
 def encode(network: Network, layout: Layout, snapshot: Snapshot, gains: Gains, settings: RenderSettings) -> Scene:
@@ -60,6 +62,7 @@ def looks(network: Network, snapshot: Snapshot, gains: Gains, widest: float) -> 
         lines=encoding.connection_colour(sent, snapshot.weights, gains.signal),
         widths=widths,
         glows=encoding.glow_width(widths, changes),
+        bars=snapshot.weights < 0,
     )
 
 
@@ -127,11 +130,12 @@ def _neurons(planned: Plan, seen: Looks, titles: list[str]) -> list[Group]:
 def _connections(planned: Plan, seen: Looks, glowing: npt.NDArray[np.bool_], titles: list[str]) -> list[Group]:
     strokes = colours(planned.theme, seen.lines)
     widths, glows = seen.widths.tolist(), seen.glows.tolist()
+    bars = (seen.bars & (planned.theme.ends == "signs")).tolist()
     attributes = data_attributes(planned.network)
     groups = []
     for index in planned.order:
         line, width = planned.lines[index], widths[index]
-        head = Arrowhead(line.tip, line.direction, line.head, head_half_width(width, line.head), strokes[index])
+        head = ended(line.end, width, strokes[index], bars[index])
         shapes: tuple[Shape, ...] = (Spline(line.points, strokes[index], width), head)
         if glowing[index]:
             shapes = (Spline(line.points, planned.theme.glow, glows[index], glow=True), *shapes)

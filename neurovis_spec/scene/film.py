@@ -31,7 +31,7 @@ from neurovis_spec.scene.model import (
     Shape,
     Spline,
     Text,
-    head_half_width,
+    ended,
     shifted,
 )
 from neurovis_spec.scene.plan import plan
@@ -56,11 +56,12 @@ def film(
         raise ValueError("a film has at least one frame")
     fill_values, line_values = np.empty((frames, neurons)), np.empty((frames, connections))
     widths, glows = np.empty((2, frames, connections))
+    bars = np.empty((frames, connections), np.bool_)
     captions, steps, low, high = list[str](), list[int](), None, None
     for frame, snapshot in enumerate(snapshots):
         seen = looks(network, snapshot, gains, planned.frame.widest)
         fill_values[frame], line_values[frame] = seen.discs, seen.lines
-        widths[frame], glows[frame] = seen.widths, seen.glows
+        widths[frame], glows[frame], bars[frame] = seen.widths, seen.glows, seen.bars
         steps.append(snapshot.step)
         words = caption(network, snapshot.step, snapshot.activity)
         shape = planned.caption_shape(words)
@@ -71,7 +72,7 @@ def film(
     assert low is not None
     assert high is not None
     glowing: npt.NDArray[np.bool_] = glows.max(axis=0) > 0
-    first = Looks(fill_values[0], line_values[0], widths[0], glows[0])
+    first = Looks(fill_values[0], line_values[0], widths[0], glows[0], bars[0])
     titles = tooltips(network, np.stack([low[0], high[0]]), np.stack([low[1], high[1]]))
     return Film(
         scene=paint(planned, first, glowing, captions[0], titles, steps[0]),
@@ -82,6 +83,7 @@ def film(
         line_values=line_values,
         line_widths=widths,
         glow_widths=glows,
+        line_bars=bars & (planned.theme.ends == "signs"),
         caption=CAPTION,
         captions=tuple(captions),
         faint={
@@ -107,12 +109,13 @@ def still(film: Film, frame: int) -> Scene:
     if film.shifts:
         shifts = {name: (x, y) for name, (x, y) in zip(film.shifts, film.shift_values[frame].tolist(), strict=True)}
     lines = {
-        name: (colour, width, glow)
-        for name, colour, width, glow in zip(
+        name: (colour, width, glow, bar)
+        for name, colour, width, glow, bar in zip(
             film.lines,
             colours(theme, film.line_values[frame]),
             film.line_widths[frame].tolist(),
             film.glow_widths[frame].tolist(),
+            film.line_bars[frame].tolist(),
             strict=True,
         )
     }
@@ -136,8 +139,8 @@ def still(film: Film, frame: int) -> Scene:
                 case Spline() if group.id in lines:
                     shapes.append(replace(shape, stroke=lines[group.id][0], width=lines[group.id][1]))
                 case Arrowhead() if group.id in lines:
-                    half = head_half_width(lines[group.id][1], shape.length)
-                    shapes.append(replace(shape, fill=lines[group.id][0], half_width=half))
+                    colour, width, _, bar = lines[group.id]
+                    shapes.append(ended(shape, width, colour, bar))
                 case _:
                     shapes.append(shape)
         faint = group.id in film.faint and frame >= film.faint[group.id]

@@ -1,4 +1,4 @@
-"""The legend: what colour, thickness, glow, dotted and faint lines and beads mean, with their scales.
+"""The legend: what colour, thickness, ends, glow, dotted and faint lines and beads mean, with their scales.
 
 In: gains, a theme and what the picture holds. Out: entries, which flow into rows at the foot of a picture. An entry is
 a heading, a sample and lines of text; those of scales are in ``legend_scales``.
@@ -14,10 +14,11 @@ from neurovis_spec.scene.delays import bead
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.legend_entry import FIRST_Y, SAMPLE_Y, SECOND_Y, SMALL, Entry, heading, stroke
 from neurovis_spec.scene.lesions import FAINT
-from neurovis_spec.scene.model import Group, Shape, Spline, Text, Theme, shifted
+from neurovis_spec.scene.model import Arrowhead, Group, Shape, Spline, Text, Theme, ended, shifted
 from neurovis_spec.scene.teachers import dash
 
 _ROW_GAP, _ENTRY_GAP = 10.0, 24.0
+_HEAD, _STROKE, _STROKE_GAP = 9.0, 36.0, 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +33,8 @@ class Contents:
     delays: str = ""
     #: whether something is removed in the course of a run
     lesions: bool = False
+    #: whether weights are negative, or can become so
+    inhibits: bool = False
 
 
 def entries(contents: Contents, gains: Gains, theme: Theme) -> list[Entry]:
@@ -39,6 +42,8 @@ def entries(contents: Contents, gains: Gains, theme: Theme) -> list[Entry]:
     result = legend_scales.colour(gains, contents.lines, theme)
     if contents.lines:
         result += legend_scales.thickness(gains, theme)
+    if contents.inhibits and theme.ends == "signs":
+        result.append(_ends_in(theme))
     if contents.learns:
         result += legend_scales.glow(gains, theme)
     if contents.teaches:
@@ -89,6 +94,21 @@ def _rows(items: Sequence[Entry], width: float) -> list[list[Entry]]:
             rows.append([entry])
             used = entry.width
     return rows
+
+
+def _ends_in(theme: Theme) -> Entry:
+    """Lines that end in an arrowhead, and in a bar."""
+    words = "line: sign of w"
+    across = max(2 * _STROKE + _STROKE_GAP, texts.width(words, SMALL))
+    shapes: list[Shape] = [heading("End", theme)]
+    for place, sign in enumerate(("w ≥ 0", "w < 0")):
+        x = (across - 2 * _STROKE - _STROKE_GAP) / 2 + place * (_STROKE + _STROKE_GAP)
+        end = Arrowhead((x + _STROKE, SAMPLE_Y), (1.0, 0.0), _HEAD, 0.0, "")
+        end = ended(end, 2.0, theme.muted, bar=place == 1)
+        shapes += [stroke(x, end.notch[0] - x, theme.muted, 2.0), end]
+        shapes.append(Text((x + _STROKE / 2, FIRST_Y), sign, SMALL, theme.muted, "middle"))
+    shapes.append(Text((across / 2, SECOND_Y), words, SMALL, theme.muted, "middle"))
+    return Entry(tuple(shapes), across)
 
 
 def _dotted(words: str, theme: Theme) -> Entry:

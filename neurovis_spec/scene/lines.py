@@ -27,6 +27,11 @@ class Line:
     direction: Point
     head: float
 
+    @property
+    def end(self) -> Arrowhead:
+        """What it ends in, whatever its width and its colour."""
+        return Arrowhead(self.tip, self.direction, self.head, 0.0, "")
+
 
 def routes_of(names: Sequence[str], ends: Sequence[tuple[str, str]], layout: Layout) -> list[FloatArray]:
     """The route of every connection in layout units; a straight one where the layout has none."""

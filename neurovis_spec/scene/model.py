@@ -39,6 +39,8 @@ class Theme:
     #: text on a disc: the one that is easier to read on the disc's colour
     light: str
     dark: str
+    #: how lines end: as the sign of the weight says (an arrowhead for w ≥ 0, a bar for w < 0), or all with arrowheads
+    ends: Literal["signs", "arrows"] = "signs"
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,26 +70,43 @@ class Spline:
 
 @dataclass(frozen=True, slots=True)
 class Arrowhead:
-    """A filled head that points at ``tip`` along the unit vector ``direction``; its back is notched."""
+    """The filled end of a line at ``tip``, along the unit vector ``direction``: an arrow whose back is notched, or a
+    bar across, with a stem that leads the line (``width`` wide) on to it. The line ends in the notch of either."""
 
     tip: Point
     direction: Point
     length: float
     half_width: float
     fill: str
+    kind: Literal["arrow", "bar"] = "arrow"
+    width: float = 0.0
 
-    #: how far along the head, from the tip, the notch lies
+    #: in its lengths: how far from the tip the notch lies, how thick a bar is, how far its stem laps over the line
     NOTCH: ClassVar[float] = 0.78
+    BAR: ClassVar[float] = 0.3
+    LAP: ClassVar[float] = 0.06
 
     @property
-    def points(self) -> tuple[Point, Point, Point, Point]:
-        """The corners: tip, one barb, notch, the other barb."""
+    def corners(self) -> tuple[Point, ...]:
+        """The corners where the tip is the origin and points right: of an arrow tip, one barb, notch, the other."""
+        half, notch = self.half_width, -self.NOTCH * self.length
+        if self.kind == "arrow":
+            return (0.0, 0.0), (-self.length, half), (notch, 0.0), (-self.length, -half)
+        bar, stem, lap = -self.BAR * self.length, self.width / 2, notch - self.LAP * self.length
+        one = ((0.0, half), (bar, half), (bar, stem), (lap, stem))
+        return (*one, *((along, -across) for along, across in reversed(one)))
+
+    @property
+    def points(self) -> tuple[Point, ...]:
+        """The corners where they are."""
         (x, y), (dx, dy) = self.tip, self.direction
-        back = (x - self.length * dx, y - self.length * dy)
-        notch = (x - self.NOTCH * self.length * dx, y - self.NOTCH * self.length * dy)
-        across = (-self.half_width * dy, self.half_width * dx)
-        left, right = (back[0] + across[0], back[1] + across[1]), (back[0] - across[0], back[1] - across[1])
-        return self.tip, left, notch, right
+        return tuple((x + along * dx - across * dy, y + along * dy + across * dx) for along, across in self.corners)
+
+    @property
+    def notch(self) -> Point:
+        """Where the line ends."""
+        (x, y), (dx, dy) = self.tip, self.direction
+        return x - self.NOTCH * self.length * dx, y - self.NOTCH * self.length * dy
 
 
 #: How far a halo reaches, in sizes of its text.
@@ -100,6 +119,12 @@ HEAD_OF_LENGTH, HEAD_OF_WIDTH, HEAD_MORE = 0.3, 0.6, 0.6
 def head_half_width(width: float, length: float) -> float:
     """Half the width of the head on a line of this width: it grows slower than the line, but always covers its end."""
     return max(HEAD_OF_LENGTH * length + HEAD_OF_WIDTH * width, 0.5 / Arrowhead.NOTCH * width + HEAD_MORE)
+
+
+def ended(head: Arrowhead, width: float, fill: str, bar: bool) -> Arrowhead:
+    """The same end on a line of another width and colour, as a bar or as an arrow."""
+    half = head_half_width(width, head.length)
+    return Arrowhead(head.tip, head.direction, head.length, half, fill, "bar" if bar else "arrow", width)
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,10 +248,11 @@ class Film:
     frame f. For group ``lines[j]`` the line and its arrowhead have the colour value ``line_values[f, j]``, the line the
     width ``line_widths[f, j]`` (user units; the head follows by ``head_half_width``), and its glow the width
     ``glow_widths[f, j]`` (0 for none; a group that glows at any time has a glow in ``scene``, of width 0 where it
-    does not glow in frame 0). Group ``shifts[k]`` is moved from where it stands in ``scene`` by ``shift_values[f, k]``
-    (x and y, user units; 0 in frame 0). A group may be in one of the three at most. From frame ``faint[id]`` on, a
-    group that stands there has the opacity ``faintness``. ``captions[f]`` is the text in group ``caption``. Colours are
-    linear in sRGB between the theme's anchors; ``still(f)`` is frame f as a scene.
+    does not glow in frame 0). Where ``line_bars[f, j]`` it ends in a bar rather than in an arrow. Group ``shifts[k]``
+    is moved from where it stands in ``scene`` by ``shift_values[f, k]`` (x and y, user units; 0 in frame 0). A group
+    may be in one of the three at most. From frame ``faint[id]`` on, a group that stands there has the opacity ``faintness``.
+    ``captions[f]`` is the text in group ``caption``. Colours are linear in sRGB between the theme's anchors;
+    ``still(f)`` is frame f as a scene.
     """
 
     scene: Scene
@@ -237,6 +263,7 @@ class Film:
     line_values: FloatArray
     line_widths: FloatArray
     glow_widths: FloatArray
+    line_bars: npt.NDArray[np.bool_]
     caption: str
     captions: tuple[str, ...]
     shifts: tuple[str, ...] = ()
@@ -251,9 +278,9 @@ class Film:
 
     @property
     def changing(self) -> npt.NDArray[np.bool_]:
-        """Which lines change their width or their glow."""
-        widths, glows = self.line_widths, self.glow_widths
-        result: npt.NDArray[np.bool_] = (widths != widths[:1]).any(axis=0) | (glows != glows[:1]).any(axis=0)
+        """Which lines change their width, their glow or their end."""
+        kept = (self.line_widths, self.glow_widths, self.line_bars)
+        result: npt.NDArray[np.bool_] = np.any([(values != values[:1]).any(axis=0) for values in kept], axis=0)
         return result
 
 

@@ -33,7 +33,7 @@ from neurovis_spec.scene.titles import Titled, outline, titles_of
 _TITLE, _CAPTION = 17.0, 11.5
 _TITLE_Y, _CAPTION_Y, _HEADER = 35.0, 54.0, 58.0
 #: a picture is made so wide at most to have its legend in one row, and its whole title
-_ROOM = 740.0
+_ROOM = 840.0
 #: more dotted lines than this would not be quiet
 _MOST_TEACHERS = 200
 
@@ -167,6 +167,7 @@ def _frame(
             teaches=label_of(teachers) if teachers else "",
             delays=delayed,
             lesions=bool(lesions_of(network)),
+            inhibits=_inhibits(network),
         )
         items = legend.entries(contents, gains, theme)
         widest = max(item.width for item in items)
@@ -182,6 +183,12 @@ def _frame(
     narrowest = min(max(legend.row_width(items) + 2 * MARGIN, 120.0), _ROOM)
     wishes = Wishes((min(header[0], _ROOM - 2 * MARGIN), header[1]), footer, narrowest)
     return title, items, fit(extent, wishes, settings.size)
+
+
+def _inhibits(network: Network) -> bool:
+    """Whether a weight is negative, or may become so by learning."""
+    connections, changing = network.connections, network.changing
+    return bool((connections.weights < 0).any() or (connections.low[changing] < 0).any())
 
 
 def _header(title: str, frame: Frame, theme: Theme) -> Group:

@@ -1,16 +1,17 @@
 """Animated SVG: a Film as one file without script, the structure of the still with palettes on top.
 
 In: a Film. Out: the bytes of an ``.svg`` that moves, also inside ``<img>``. The attributes are those of frame 0;
-each group that changes has one SMIL animation of its ``class``: a letter or two for the colour and, where a weight
-changes, one each for width and glow. What these classes look like stands in a style sheet that holds only where no
-reduced motion is asked for: where it is, the picture stands still at frame 0. A group that is shifted has an animation
-of its ``transform``, which the style sheet takes back there.
+each group that changes has one SMIL animation of its ``class``: a letter or two for the colour, where a weight
+changes one each for width and glow, and where it changes its sign one more while it is negative. What these classes
+look like stands in a style sheet that holds only where no reduced motion is asked for: where it is, the picture stands
+still at frame 0. A group that is shifted has an animation of its ``transform``, which the style sheet takes back there.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from string import ascii_lowercase
 from zlib import crc32
 
@@ -26,6 +27,7 @@ from neurovis_spec.scene import (
     Disc,
     Film,
     Group,
+    Point,
     Progress,
     Rectangle,
     RendererCapabilities,
@@ -52,6 +54,8 @@ _MOST_WIDTHS, _MOST_CAPTIONS = 240, 500
 _FAINT, _SHIFTED, _FIXED = "lesioned", "shifted", "fixed"
 #: Groups that have the class of a colour.
 _COLOURED = f"[class]:not(.{_SHIFTED})"
+#: The class of a line whose weight is less than 0 at the moment, where it is not always.
+_LESS = "less"
 
 
 class AnimatedSvgRenderer:
@@ -91,6 +95,7 @@ class _Writer:
         self._letters: set[int] = set()
         self._widths: set[int] = set()
         self._glows: set[int] = set()
+        self._turning = False
         self._captions = -1
         self._moves = False
 
@@ -120,6 +125,10 @@ class _Writer:
             self._widths.update(widths)
             self._glows.update(glows)
             tokens = [f"{c} w{w} g{g}" for c, w, g in zip(tokens, widths, glows, strict=True)]
+            bars = self._film.line_bars[:, place].tolist()
+            if len(set(bars)) > 1:
+                tokens = [f"{token} {_LESS}" if bar else token for token, bar in zip(tokens, bars, strict=True)]
+                self._turning = True
         return self._animated(group, tokens)
 
     def _animated(self, group: Group, tokens: Sequence[str]) -> str:
@@ -139,7 +148,7 @@ class _Writer:
             case Disc() | Rectangle():
                 return element(shape, "" if place == filled else _class(_FIXED))
             case Arrowhead() if group.id in self._lines and self._changing[self._lines[group.id]]:
-                return self._head_element(shape)
+                return self._head_element(shape, self._film.line_bars[:, self._lines[group.id]])
             case Arrowhead() | Spline() if group.id not in self._lines:
                 return element(shape, _class(_FIXED))
             case _:
@@ -154,15 +163,28 @@ class _Writer:
         shapes = "".join(element(shape) for shape in group.shapes)
         return f"{open_group(group, _class(_SHIFTED))}{shapes}{frames}</g>\n"
 
-    def _head_element(self, head: Arrowhead) -> str:
-        """A head in its own coordinates, so that its width alone can be scaled: at the tip, pointing right."""
+    def _head_element(self, head: Arrowhead, bars: npt.NDArray[np.bool_]) -> str:
+        """A head in its own coordinates, so that its width alone can be scaled: at the tip, pointing right. One that
+        is now a bar and now an arrow has both, of which the one that it is not at the moment is not displayed."""
         (x, y), (dx, dy) = head.tip, head.direction
-        half, back, notch = head.half_width, -head.length, -head.NOTCH * head.length
-        points = pairs([(0, 0), (back, half), (notch, 0), (back, -half)])
         place = f"matrix({dx:.4g} {dy:.4g} {-dy:.4g} {dx:.4g} {num(x)} {num(y)})"
+        both, bar = bool(bars.any() and not bars.all()), head.kind == "bar"
+        inner = ""
+        if both or not bar:
+            inner += self._part(replace(head, kind="arrow").corners, head, _shown("arrow", not bar) if both else "")
+        if both or bar:
+            start, back, half = -(head.NOTCH + head.LAP) * head.length, -head.BAR * head.length, head.half_width
+            stem = f'<path class="stem" d="M{num(start)} 0H{num(back)}" stroke="{head.fill}" '
+            stem += f'stroke-width="{num(head.width)}"/>'
+            across = self._part(((0.0, half), (back, half), (back, -half), (0.0, -half)), head)
+            inner += f"<g{_shown('bar', bar)}>{stem}{across}</g>"
+        return f'<g{_class("both") if both else ""} transform="{place}">{inner}</g>'
+
+    def _part(self, corners: Sequence[Point], head: Arrowhead, attributes: str = "") -> str:
+        """What is filled of a head; its style says what its width follows from."""
         return (
-            f'<g transform="{place}"><polygon points="{points}" fill="{head.fill}" '
-            f'style="--h:{half:.4g};--l:{head.length:.4g}"/></g>'
+            f'<polygon{attributes} points="{pairs(corners)}" fill="{head.fill}" '
+            f'style="--h:{head.half_width:.4g};--l:{head.length:.4g}"/>'
         )
 
     def _caption(self, group: Group) -> str:
@@ -192,11 +214,15 @@ class _Writer:
             ",".join(f"{_COLOURED}{shape}:not(.{_FIXED})" for shape in (">circle", ">rect", " polygon"))
             + "{fill:currentColor}",
             f"{_COLOURED}>path:not(.glow):not(.{_FIXED}){{stroke:currentColor}}",
+            f"{_COLOURED} .stem{{stroke:currentColor}}",
             ".on{fill:var(--d)}",
             *self._palette(theme),
         ]
         if self._widths:
             rules += self._width_rules()
+        if self._turning:
+            rules += [".both>.bar{display:none}", ".both>.arrow{display:inline}"]
+            rules += [f".{_LESS}>.both>.bar{{display:inline}}", f".{_LESS}>.both>.arrow{{display:none}}"]
         if self._film.faint:
             rules.append(f".{_FAINT}{{opacity:{num(self._film.faintness)}}}")
         if self._captions > 1:
@@ -219,7 +245,7 @@ class _Writer:
 
     def _width_rules(self) -> list[str]:
         rules = [
-            '[class*=" w"]>path:not(.glow){stroke-width:calc(var(--w)*1px)}',
+            '[class*=" w"]>path:not(.glow),[class*=" w"] .stem{stroke-width:calc(var(--w)*1px)}',
             '[class*=" w"]>.glow{stroke-width:calc(var(--g)*1px)}',
             f'[class*=" w"] polygon{{transform:scaleY(calc({_half_width("var(--w)", "var(--l)")}/var(--h)))}}',
         ]
@@ -242,6 +268,11 @@ def _scoped(rule: str, root: str) -> str:
 
 def _class(token: str) -> str:
     return f' class="{token}"'
+
+
+def _shown(token: str, shown: bool) -> str:
+    """The class of something that may not be displayed."""
+    return _class(token) + ("" if shown else ' display="none"')
 
 
 def _levels(values: FloatArray) -> IntArray:

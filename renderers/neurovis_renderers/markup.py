@@ -93,8 +93,9 @@ def element(shape: Shape, attributes: str = "", content: str = "") -> str:
         case Spline():
             return _close(f"<path{_spline(shape)}{attributes}", "path", content)
         case Arrowhead():
+            kind = ' class="bar"' if shape.kind == "bar" else ""
             return _close(
-                f'<polygon points="{pairs(shape.points)}" fill="{shape.fill}"{attributes}', "polygon", content
+                f'<polygon{kind} points="{pairs(shape.points)}" fill="{shape.fill}"{attributes}', "polygon", content
             )
         case Rectangle():
             return _close(
