@@ -292,3 +292,43 @@ def test_positions() -> None:
     assert np.isnan(position[3]).all()
     assert codes("neurons: {B: {count: 2, position: [[0, 0]]}}") == ["wrong-size"]
     assert codes("neurons: {B: {count: 2, position: [0, 0]}}") == ["wrong-type", "wrong-type"]
+
+
+def test_labels_hold_expressions_of_the_instances_number_and_parameters() -> None:
+    text = """modules:
+  leg:
+    parameters: {side: 0, gain: 0.25}
+    neurons:
+      CF: {label: "CF{2*(number - 1) + side}"}
+      d: {count: 2, label: "d{number}.{i} of {n} {{{gain}}}"}
+      e: {count: 2, label: ["{{x}", "y{i}"]}
+  own:
+    parameters: {number: 7}
+    neurons: {A: {label: "{number}"}}
+  pair: {instances: {leg: {module: leg, count: 2}}}
+instances:
+  left: {module: leg, count: 2}
+  right: {module: leg, count: 2, set: {side: 1}}
+  tail: {module: leg}
+  own: {module: own, count: 2}
+  pair: {module: pair, count: 3}
+parameters: {of: 3}
+neurons: {K: {count: 3, label: "{of*(i + 1)}"}, L: {label: "{1/3} {-of} {1e20} }"}}"""
+    neurons = network_of(text).neurons
+    labels = dict(zip(neurons.names, neurons.labels, strict=True))
+    shown = {name: labels[name] for name in ("left1.CF", "right1.CF", "left2.CF", "right2.CF", "tail.CF")}
+    assert list(shown.values()) == ["CF0", "CF1", "CF2", "CF3", "CF0"]
+    assert [labels[f"left2.{name}"] for name in ("d1", "d2", "e1", "e2")] == [
+        "d2.0 of 2 {0.25}", "d2.1 of 2 {0.25}", "{x}", "y1",
+    ]  # fmt: skip
+    assert labels["own2.A"] == "7"  # a parameter of this name is meant, where there is one
+    assert labels["pair3.leg2.CF"] == "CF2"
+    assert [labels[name] for name in ("K1", "K2", "K3", "L")] == ["3", "6", "9", "0.333333 -3 1e+20 }"]
+
+
+def test_a_label_changes_nothing_but_the_picture() -> None:
+    """Nor does a parameter become structural by it."""
+    text = "parameters: {a: 1}\nneurons: {A: {label: 'x{a}', bias: a}}\nevents: [{at: 2, set: {a: 2}}]"
+    one, other = network_of(text), network_of(text.replace("x{a}", "y{2*a}"))
+    assert one.hash == other.hash
+    assert (one.neurons.labels, other.neurons.labels) == (("x1",), ("y2",))

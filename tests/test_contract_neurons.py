@@ -116,9 +116,10 @@ def test_a_position_is_data_and_no_pin() -> None:
 
 
 def test_labels_titles_and_boxes_are_free_texts(tmp_path: Path) -> None:
-    """With whatever characters; names are not."""
+    """With whatever characters (in a label a brace is written twice); names are not."""
     free = "a, b: {c} <d> & \u00fc # e"
-    text = f'title: "{free}"\nneurons: {{A: {{label: "{free}", box: "{free}"}}, B: {{box: "{free}"}}}}'
+    label = free.replace("{", "{{").replace("}", "}}")
+    text = f'title: "{free}"\nneurons: {{A: {{label: "{label}", box: "{free}"}}, B: {{box: "{free}"}}}}'
     network = network_of(text)
     assert (network.title, network.neurons.labels[0]) == (free, free)
     assert [name for name, _ in network.layout.boxes] == [free] or {group.box for group in network.neurons.groups} == {

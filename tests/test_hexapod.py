@@ -264,3 +264,16 @@ def test_five_legs_are_on_the_soft_floor_before_the_sixth(walk: Recording) -> No
 def test_k_stretches_the_leg(walk: Recording) -> None:
     rigid, soft = (walk["right1.FT"][window].min() for window in (slice(2240, 2300), slice(2840, 2900)))
     assert soft - rigid == pytest.approx(0.115, abs=0.015)
+
+
+def test_the_picture_shows_the_names_of_the_paper() -> None:
+    neurons = nv.compile(SPEC).network.neurons
+    assert {f"{kind}{leg}" for kind in ("S", "K", "CF", "FT", "BC", "d") for leg in range(6)} | {
+        f"d{number}" for number in range(6, 12)
+    } | {"C0", "C1"} | {f"DL{number}" for number in range(12)} <= set(neurons.labels)
+    labels = dict(zip(neurons.names, neurons.labels, strict=True))
+    # the paper's leg 1 is the right front one; d6 to d11 carry the news from front to hind
+    assert [labels[f"right1.{name}"] for name in ("CF", "S", "K", "dr", "dp")] == ["CF1", "S1", "K1", "d1", "d7"]
+    assert [labels[f"{side}{row}.dp"] for row in (1, 2, 3) for side in ("left", "right")] == [
+        f"d{number}" for number in range(6, 12)
+    ]

@@ -384,3 +384,30 @@ def test_a_group_is_renamed_in_the_states_of_its_model_too() -> None:
         "neurons:\n  L: {count: 2, model: adaptive}\n  O: {}\noutputs: {m: L.v, k: [left.K.b, L1.b], e: (L -> O).z}\n"
     )
     assert renamed(text, "L") == wanted
+
+
+LABELLED = """neurovis: 1
+name: legs
+modules:
+  leg:
+    parameters: {side: 0}
+    neurons:
+      A: {label: "side {2*(number - 1) + side}"}
+instances: {left: {module: leg, count: 2, set: {side: 1}}}
+"""
+
+
+def test_a_parameter_is_renamed_in_the_expressions_of_a_label_and_not_in_its_text() -> None:
+    edited = renamed(LABELLED.replace("{side: 0}", "{si¦de: 0}"), "hand")
+    assert 'label: "side {2*(number - 1) + hand}"' in edited
+    assert "set: {hand: 1}" in edited
+    assert "parameters: {hand: 0}" in edited
+
+
+def test_within_the_braces_of_a_label_parameters_and_the_number_are_offered_and_explained() -> None:
+    offered = {one.label for one in complete(*marked(LABELLED.replace("+ side}", "+ ¦}")))}
+    assert {"side", "number", "i", "n", "sin"} <= offered
+    assert not {"side", "number"} & {one.label for one in complete(*marked(LABELLED.replace('"side {', '"¦side {')))}
+    shown = hover(*marked(LABELLED.replace("(number", "(num¦ber")))
+    assert shown is not None
+    assert "number of the instance" in shown.markdown

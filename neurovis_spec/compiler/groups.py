@@ -16,6 +16,7 @@ from neurovis_spec.compiler.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.definitions import Defaults, Definitions
 from neurovis_spec.compiler.draws import Stream
+from neurovis_spec.compiler.labels import labels_of
 from neurovis_spec.compiler.limits import MOST_HINTS, PATIENCE, Limits, amount, plural
 from neurovis_spec.compiler.network import Group, Role
 from neurovis_spec.compiler.positions import positions_of
@@ -300,12 +301,9 @@ class Builder:
         if model.label is None:
             return None
         node = model.source.get("label")
-        labels = tuple(item.value for item in model.label)
-        if node is None or isinstance(node, Scalar):
-            return labels * len(names)
-        if len(labels) == len(names):
-            return labels
-        message = f"'label' has {plural(len(labels), 'text')} for {plural(len(names), 'neuron')}"
+        if node is None or isinstance(node, Scalar) or len(model.label) == len(names):
+            return labels_of(model.label, len(names), self.unit)
+        message = f"'label' has {plural(len(model.label), 'text')} for {plural(len(names), 'neuron')}"
         self.constants.findings.error("wrong-size", model.label[0].span if model.label else node.span, message)
         return None
 

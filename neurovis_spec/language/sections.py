@@ -126,7 +126,9 @@ class GroupModel(Model):
         FileReference | Sequence | Packed | None,
         Leaf(_position, {"anyOf": [_POINT, {"type": "array", "items": _POINT}, FILE]}),
     ] = Field(None, description="Where the neuron is, as data: [x, y], a list of them, a file. It is no pin.")
-    label: TextsField | None = Field(None, description="Display text; a counted group may give a list.")
+    label: TextsField | None = Field(
+        None, description="Display text; a counted group may give a list. May hold expressions: 'd{number}'."
+    )
     box: TextField | None = Field(None, description="The named box of the picture that holds the group.")
     role: Annotated[Located[str], words("input", "hidden", "output")] | None = Field(
         None, description="What the picture and the layout take it for: input, hidden or output."

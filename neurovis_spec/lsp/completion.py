@@ -15,6 +15,7 @@ from neurovis_spec import plugins
 from neurovis_spec.compiler.constants import ALWAYS
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.ros_types import all_types, numbers_of
+from neurovis_spec.language.templates import Hole, pieces
 from neurovis_spec.lsp.definitions import Definition, known
 from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.index import Index
@@ -93,7 +94,7 @@ def _offers(
     role, scope = role_of(path, is_key)
     word = at.typed
     rest = at.rest
-    if role is not None and role.use in ("formula", "references", "ends", "setting value"):
+    if role is not None and role.use in ("formula", "template", "references", "ends", "setting value"):
         match = _WORD.search(at.typed)
         word = "" if match is None else match[0].rpartition(".")[2]
         following = _REST.match(at.rest)
@@ -117,7 +118,9 @@ def _of_role(role: Role | None, scope: Scope, path: Path, front: str, index: Ind
     if role is None:
         return
     match role.use:
-        case "formula":
+        case "template" if not _in_braces(front):
+            return
+        case "formula" | "template":
             yield from _formula(role, scope, path, index, place)
         case "ends" | "references":
             yield from _neurons(scope, front, index, single=path[-2:-1] == ("positions",))
@@ -151,6 +154,13 @@ def _of_role(role: Role | None, scope: Scope, path: Path, front: str, index: Ind
             yield from _modules(index)
         case "names" if role.kind == "output":
             yield from (_Offer(name.text, "word", "output") for name in index.declared("output"))
+
+
+def _in_braces(front: str) -> bool:
+    """Whether an expression in braces is open at the end of a text."""
+    found = pieces(front)
+    last = found[-1] if found else ""
+    return isinstance(last, Hole) and not last.closed
 
 
 def _modules(index: Index) -> Iterator[_Offer]:

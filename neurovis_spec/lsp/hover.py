@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from neurovis_spec.diagnostics import Span
+from neurovis_spec.language.templates import Hole, pieces
 from neurovis_spec.lsp.definitions import known
 from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.index import Found, Index
@@ -43,7 +44,7 @@ def hover(document: Document, place: Place) -> Hover | None:
     if item is None:
         return None
     role, _ = role_of(item.path, item.is_key)
-    if role is not None and role.use in ("formula", "setting value") and not item.is_key:
+    if role is not None and role.use in ("formula", "template", "setting value") and not item.is_key:
         return _given(item, role, place)
     if role is not None and role.use == "pattern" and item.text in PATTERNS:
         settings = ", ".join(PATTERN_SETTINGS.get(item.text, ()))
@@ -64,7 +65,7 @@ def _given(item: Item, role: Role, place: Place) -> Hover | None:
     called = functions(role.random, role.functions)
     for match in _WORD.finditer(item.text):
         span = item.scalar.at(match.start(), match.end())
-        if not holds(span, place):
+        if not holds(span, place) or not _in_expression(item.text, role, match.start()):
             continue
         if match[0] in called and item.text[match.end() :].lstrip().startswith("("):
             usage, meaning = called[match[0]]
@@ -72,6 +73,13 @@ def _given(item: Item, role: Role, place: Place) -> Hover | None:
         if match[0] in GIVEN:
             return Hover(f"`{match[0]}`: {GIVEN[match[0]]}", span)
     return None
+
+
+def _in_expression(text: str, role: Role, at: int) -> bool:
+    """Whether the character ``at`` belongs to an expression: in a label only what stands in braces does."""
+    if role.use != "template":
+        return True
+    return any(isinstance(piece, Hole) and piece.start <= at < piece.end for piece in pieces(text))
 
 
 def _name(document: Document, name: Name) -> str | None:

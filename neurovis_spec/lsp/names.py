@@ -13,6 +13,7 @@ from functools import partial
 
 from neurovis_spec.compiler.constants import ALWAYS
 from neurovis_spec.diagnostics import Span
+from neurovis_spec.language.templates import Hole, pieces
 from neurovis_spec.lsp.outline import Item
 from neurovis_spec.lsp.roles import SECTIONS, Kind, Role, Scope, role_of
 from neurovis_spec.lsp.text import Text
@@ -58,7 +59,7 @@ def names_of(items: Iterable[Item], text: Text, lookup: Lookup) -> Iterator[Name
 
 def _names(item: Item, role: Role, scope: Scope, text: Text, lookup: Lookup) -> Iterator[Name]:
     match role.use:
-        case "formula":
+        case "formula" | "template":
             yield from _formula(item, role, scope, text)
         case "setting value":
             rule, setting = item.path[-2:] if isinstance(item.path[-1], str) else item.path[-3:-1]
@@ -96,6 +97,9 @@ def _whole(item: Item, kind: Kind, scope: Scope, text: Text, declares: bool = Fa
 def _formula(item: Item, role: Role, scope: Scope, text: Text) -> Iterator[Name]:
     """The names of an expression that somebody declares: no constants, no functions, nothing that is given here."""
     found = [match for match in _IN_FORMULA.finditer(item.text) if match[1] not in _WORDS]
+    if role.use == "template":
+        holes = [piece for piece in pieces(item.text) if isinstance(piece, Hole)]
+        found = [match for match in found if any(hole.start <= match.start() < hole.end for hole in holes)]
     places = _inside(item, text, [match.span(1) for match in found])
     local = scope.definition is not None
     for match, (span, exact) in zip(found, places, strict=True):

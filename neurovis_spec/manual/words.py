@@ -51,6 +51,7 @@ NAMES: Mapping[str, str] = MappingProxyType(
         "i": "The index from 0: of a neuron in its group; in a connection, of the source in its reference.",
         "j": "In a connection, the index from 0 of the target in its reference.",
         "n": "The number of neurons of the group.",
+        "number": "In a label within a module, the number of the instance: 1 of left1, and where there is only one.",
         "n_from": "In a connection, the number of sources.",
         "n_to": "In a connection, the number of targets.",
         "distance": "In a connection, how far apart the positions of both neurons are.",

@@ -113,8 +113,8 @@ def _together(network: Network, missing: list[int]) -> list[list[int]]:
 
 
 def _parts(label: str, name: str) -> tuple[str, str]:
-    """The label and its subscript: a numbered neuron without a label of its own has one."""
-    return texts.with_subscript(label) if label == name.rsplit(".", 1)[-1] else (label, "")
+    """The label and its subscript: a numbered neuron has one, and a label of its own that is such a name."""
+    return texts.with_subscript(label) if label == name.rsplit(".", 1)[-1] or label.isidentifier() else (label, "")
 
 
 def _fits(parts: tuple[str, str], size: float, radius: float) -> bool:
