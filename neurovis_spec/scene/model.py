@@ -251,8 +251,8 @@ class Film:
     does not glow in frame 0). Where ``line_bars[f, j]`` it ends in a bar rather than in an arrow. Group ``shifts[k]``
     is moved from where it stands in ``scene`` by ``shift_values[f, k]`` (x and y, user units; 0 in frame 0). A group
     may be in one of the three at most. From frame ``faint[id]`` on, a group that stands there has the opacity
-    ``faintness``. ``captions[f]`` is the text in group ``caption``. Colours are linear in sRGB between the theme's anchors;
-    ``still(f)`` is frame f as a scene.
+    ``faintness``. ``captions[f]`` is the text in group ``caption``. Colours are linear in sRGB between the theme's
+    anchors; ``still(f)`` is frame f as a scene.
     """
 
     scene: Scene
