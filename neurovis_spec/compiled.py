@@ -120,6 +120,7 @@ class CompiledNetwork:
         neurons: str | Sequence[str] = (),
         weights: Literal["plastic", "none"] = "plastic",
         checkpoint: str | Path | None = None,
+        last: bool = False,
     ) -> Recording:
         """Run ``steps`` steps (default ``time.steps``) and record every ``every``-th.
 
@@ -127,12 +128,13 @@ class CompiledNetwork:
         (``K.v``, ``(K -> O).eligibility``), and so are those that outputs name; ``neurons`` (``O + K``) are the only
         ones that are recorded, ``weights="none"`` leaves the weights out. The run ends at the first step after which
         ``until`` is true (``"rms(O - T, last=129) < 0.01"``). ``checkpoint`` is a file from which the run goes on
-        exactly, if it is there, and which holds its state at the end; ``steps`` are those to be made now. Raises
+        exactly, if it is there, and which holds its state at the end; ``steps`` are those to be made now. With ``last``
+        the last of the steps that would be recorded is the only one, and memory does not grow with the steps. Raises
         InputError, BackendError, RecordingError, KeyError for a name that there is not, SpecError where ``until`` is
         invalid.
         """
         _check(backend=backend, start=start, progress=progress)
-        keep = _keep(states, neurons, weights)
+        keep = replace(_keep(states, neurons, weights), last=arguments.truth("last", last))
         course = self._course(steps, inputs, backend, every, until, keep)
         kept = None if checkpoint is None else arguments.path("checkpoint", checkpoint)
         return pipeline.simulate(self.network, course, start, progress, kept)

@@ -7,9 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from test_runtime_backends import parts
 
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
+from neurovis_spec.runtime.c_backend import CStepper
+from neurovis_spec.runtime.checkpoint import load_state
 
 SPEC = """\
 neurovis: 1
@@ -24,6 +27,7 @@ events: [{at: 300, set: {slope: 0.02}}]
 """
 MEAN = "mean(signal, last=5) >= 1"  # of 0.01·(k − 2): from k = 102 on
 FIRST = 102
+BACKENDS = ["numpy", "reference", pytest.param("c", marks=pytest.mark.compiler)]
 
 
 @pytest.fixture
@@ -39,7 +43,7 @@ def call(*arguments: object) -> Result:
     return result
 
 
-@pytest.mark.parametrize("backend", ["numpy", "reference"])
+@pytest.mark.parametrize("backend", BACKENDS)
 def test_a_run_ends_at_the_first_step_after_which_it_is_true(backend: str) -> None:
     network = nv.compile_text(SPEC)
     until = network.until(MEAN)
@@ -142,3 +146,75 @@ def test_a_mistake_is_answered_with_its_place(folder: Path, text: str, code: str
     assert "^" in result.stderr
     assert words in result.stderr
     assert sorted(folder.iterdir()) == before
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("every", [1, 7])
+@pytest.mark.parametrize(
+    "measure",
+    [
+        "rms(rhythm - goal, last=5) < 0.02",
+        "max(abs(A), last=3) - min(A, last=40) > 0.3 and k > 517",
+        "exp(A) > 1.2 and k >= 33",
+        "k >= 520",
+        "k >= 1400",
+        "A > 1e9",
+    ],
+)
+def test_it_ends_in_c_where_it_ends_step_by_step_and_goes_on_alike(
+    measure: str, every: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Blocks of steps, and an end within one: all of the state is that of the last step, noise and delays included."""
+    spec = """
+neurovis: 1
+name: noisy
+seed: 4
+parameters: {gain: 0.9}
+inputs: {goal: {expression: "0.4*sin(k/7)"}}
+neurons:
+  A: {bias: 0.1, noise: "normal(0, 0.2)", model: {leaky_integrator: {leak: 0.3}}, activation: tanh}
+  B: {input: goal}
+connections:
+  A -> A: {weight: gain, delay: 3}
+  B -> A: {weight: 0.2, delay: 2, plasticity: {oja: {rate: 0.01}}}
+outputs: {rhythm: A, goal: B}
+events: [{at: 515, set: {gain: 0.5}}]
+"""
+    network, calls, files = nv.compile_text(spec), [], []
+    run = CStepper.run
+    monkeypatch.setattr(CStepper, "run", lambda *given: calls.append(len(given[2])) or run(*given))
+    monkeypatch.setattr(CStepper, "step", lambda *_: pytest.fail("step by step")) if "exp" not in measure else None
+    runs, ends = [], []
+    for backend in ("reference", "c"):
+        until, checkpoint = network.until(measure), tmp_path / f"{backend}.npz"
+        runs.append(network.run(1500, until=until, backend=backend, every=every, checkpoint=checkpoint))
+        ends.append(until.ending)
+        files.append(load_state(network.network, checkpoint))
+    assert ends[0] == ends[1]
+    assert runs[0].step.tolist() == runs[1].step.tolist()
+    for plain, fast in zip(*(rows_of(one) for one in runs), strict=True):
+        assert plain.tobytes() == fast.tobytes()
+    for plain, fast in zip(*(parts(one) for one in files), strict=True):
+        np.testing.assert_array_equal(plain, fast)
+    assert ("exp" in measure) == (not calls)
+
+
+def rows_of(recording: nv.Recording) -> tuple[np.ndarray, ...]:
+    return recording.activity, recording.weights, recording.weights_after
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("every", [1, 10])
+def test_without_a_file_no_more_than_the_last_step_is_kept(folder: Path, backend: str, every: int) -> None:
+    """A run of 10¹² steps at the most ends early, and reserves nothing for the others."""
+    result = call("run", "ramp.yaml", "--until", MEAN, "--steps", 10**12, "--backend", backend, "--every", every)
+    assert result.exit_code == 0, result.output
+    assert f"outputs at step {FIRST - FIRST % every}:" in result.output
+    assert f"{FIRST + 1} steps in" in result.output
+    network = nv.compile_text(SPEC)
+    last = network.run(until=MEAN, backend=backend, every=every, last=True)
+    whole = network.run(until=MEAN, backend=backend, every=every)
+    assert last.step.tolist() == whole.step[-1:].tolist()
+    assert last.activity.tobytes() == whole.activity[-1:].tobytes()
+    assert last.weights.tobytes() == whole.weights[-1:].tobytes()
+    assert last.weights_after.tobytes() == whole.weights_after.tobytes()

@@ -152,7 +152,7 @@ def command(
         click.echo(f"{output}: {_summary(network, steps, perf_counter() - begun, backend, ends)}")
         return
     with progress("running") as bar:
-        recording = network.run(steps, arrays, progress=bar, **chosen)
+        recording = network.run(steps, arrays, progress=bar, last=ends is not None, **chosen)
     _tell(ends)
     _print(network, recording, _summary(network, steps, perf_counter() - begun, backend, ends), states)
 

@@ -34,12 +34,13 @@ from neurovis_spec.runtime.state import State
 class Keep:
     """What is recorded: these neurons (references; all without), the changing weights or none, these states
     (references) besides those that the outputs of the spec name; and the spec itself, as one text, where a format holds
-    it."""
+    it. ``last``: of the steps that would be recorded the last alone."""
 
     neurons: tuple[str, ...] = ()
     weights: bool = True
     states: tuple[str, ...] = ()
     spec: str = ""
+    last: bool = False
 
 
 #: Everything but states that nobody asks for.

@@ -6,6 +6,7 @@ with every finding; a Meter, which gives its value after each step.
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -21,7 +22,7 @@ from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.measures import PLACE, Formula, parse_measure
 from neurovis_spec.language.expressions.parser import ExpressionError
-from neurovis_spec.language.expressions.tree import Name, Tree, names, walk
+from neurovis_spec.language.expressions.tree import Binary, Call, Name, Tree, is_square, names, walk
 from neurovis_spec.runtime.columns import Probe, find_states, probe_of
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.recording import UnknownNameError
@@ -60,6 +61,13 @@ class Measure:
         """How many steps have to be made before it has a value."""
         return self.formula.longest
 
+    @property
+    def together(self) -> bool:
+        """Whether ``Meter.rows`` gives the bits of ``Meter.step``, from activities and parameters alone: no function
+        takes part that NumPy works out by itself."""
+        trees = (self.formula.tree, *(window.tree for window in self.formula.windows))
+        return not self.states and not any(_by_numpy(node) for tree in trees for node in walk(tree))
+
     def check_steps(self, steps: int) -> None:
         """Refuse a window that is longer than a run of so many steps. Raises SpecError."""
         findings = findings_of(self.text, self.label)
@@ -69,6 +77,13 @@ class Measure:
                 hint = "make more steps, or 'last' smaller"
                 findings.error("bad-window", _span(self.label, window.start, window.end), message, hint)
         findings.check()
+
+
+def _by_numpy(node: Tree) -> bool:
+    """Whether NumPy works out a part of a formula in its own way; a square is a product to both."""
+    if isinstance(node, Binary):
+        return node.operator == "%" or (node.operator == "^" and is_square(node) is None)
+    return isinstance(node, Call) and node.function not in ("abs", "min", "max", "clip", "sign", "step", "sqrt")
 
 
 def findings_of(text: str, label: str) -> Findings:
@@ -200,6 +215,12 @@ class Meter:
         self._constants = constants(measure.dt)
         #: the value of each window after the last step
         self.values: list[float] = [math.nan] * len(self._running)
+
+    def copy(self) -> Meter:
+        """One that goes on by itself from here."""
+        other = copy.copy(self)
+        other._running, other.values = copy.deepcopy(self._running), list(self.values)
+        return other
 
     def step(self, activity: FloatArray, parameters: FloatArray, states: FloatArray) -> float:
         """After one more step: a[t] of all neurons, the parameters of the step (one a slot), the states of the probe.

@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.changes import Change
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.patch import PatchError
@@ -31,7 +31,7 @@ from neurovis_spec.runtime.recording import After, Numbers, Recording, Recording
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.rows import Steps
 from neurovis_spec.runtime.state import State, initial_state
-from neurovis_spec.runtime.until import Until
+from neurovis_spec.runtime.until import Until, Watched
 from neurovis_spec.runtime.watch import Watch
 
 
@@ -69,15 +69,15 @@ def record_course(
     """
     steps = checked_steps(network, course.steps, course.every)
     columns = columns_of(network, course.keep)
-    check_room(steps, course.every, sum(columns.widths(network)))
     state = first_state(network, start, checkpoint)
-    kept = np.concatenate([np.zeros(0, dtype=np.int64), *Steps(steps, course.every, state.k).parts()])
+    kept, widths = Steps(steps, course.every, state.k), columns.widths(network)
+    if not course.keep.last:
+        check_room(steps, course.every, sum(widths))
+    rows: InMemory | Last = Last(widths) if course.keep.last else InMemory(widths, len(kept))
     if checkpoint is None:
-        rows = InMemory(columns.widths(network), len(kept))
         go(network, state, course, rows, progress)
     else:
-        with deferred() as asked:
-            rows = InMemory(columns.widths(network), len(kept), asked)
+        with deferred() as rows.asked:
             go(network, state, course, rows, progress)
             save_state(state, checkpoint)
     return recording_of(network, columns, rows.numbers(kept), state.weights, after(network, state))
@@ -133,14 +133,16 @@ class Rows(Protocol):
 class InMemory:
     """All rows in arrays of these widths."""
 
-    def __init__(self, widths: tuple[int, int, int], rows: int, asked: Asked | None = None) -> None:
+    def __init__(self, widths: tuple[int, int, int], rows: int) -> None:
         self.activity, self.weights, self.states = (np.empty((rows, width)) for width in widths)
-        self._filled, self._asked = 0, asked
+        self._filled = 0
+        self.asked: Asked | None = None
 
-    def numbers(self, steps: IntArray) -> Numbers:
-        """All that has come, for these steps."""
+    def numbers(self, steps: Steps) -> Numbers:
+        """All that has come, for the first of these steps."""
         made = slice(self._filled)
-        return Numbers(steps[made], self.activity[made], self.weights[made], self.states[made])
+        kept = np.concatenate([np.zeros(0, dtype=np.int64), *steps.parts()])
+        return Numbers(kept[made], self.activity[made], self.weights[made], self.states[made])
 
     def begin(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         """The next rows of the arrays."""
@@ -157,7 +159,44 @@ class InMemory:
 
     def over(self) -> bool:
         """After a signal, where somebody listens."""
-        return bool(self._asked)
+        return bool(self.asked)
+
+
+class Last:
+    """The last row alone, of rows of these widths: memory does not grow with the steps."""
+
+    def __init__(self, widths: tuple[int, int, int]) -> None:
+        self._widths, self._count = widths, 0
+        self._rows = self._last = self._room(0)
+        self.asked: Asked | None = None
+
+    def numbers(self, steps: Steps) -> Numbers:
+        """The last that has come, for one of these steps."""
+        number = [steps.at(self._count - 1)] if self._count else []
+        return Numbers(np.array(number, dtype=np.int64), *self._last)
+
+    def begin(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Room for the next rows."""
+        self._rows = self._room(count)
+        return self._rows
+
+    def end(self, count: int) -> None:
+        """So many are filled."""
+        if count:
+            activity, weights, states = (rows[count - 1 : count].copy() for rows in self._rows)
+            self._last, self._count = (activity, weights, states), self._count + count
+
+    def due(self) -> bool:
+        """Only where the run is to end."""
+        return self.over()
+
+    def over(self) -> bool:
+        """After a signal, where somebody listens."""
+        return bool(self.asked)
+
+    def _room(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        activity, weights, states = (np.empty((count, width)) for width in self._widths)
+        return activity, weights, states
 
 
 @dataclass(frozen=True)
@@ -184,16 +223,16 @@ def checked_steps(network: Network, steps: int | None, every: int) -> int:
 def go(network: Network, state: State, course: Course, rows: Rows, progress: Progress | None = None) -> None:
     """Run a network from a state, and hand on the rows that are kept."""
     every, steps = course.every, course.steps
-    if course.until is not None:
-        rows = course.until.watch(rows, state, steps)
+    watched = None if course.until is None else course.until.watch(rows, state, steps)
+    rows = rows if watched is None else watched
     watch = Watch(network)
     columns = columns_of(network, course.keep)
     reader = InputReader(network, course.inputs, watch.given)
     stepper = prepare(network, course.backend, steps)
     make: _Make = _OneByOne(columns, stepper)
     plain = columns.neurons is None and not columns.probe.names and len(columns.weights) == len(network.changing)
-    if isinstance(stepper, Runner) and plain and course.until is None:  # which is asked after each step
-        make = _Together(stepper)
+    if isinstance(stepper, Runner) and plain and (course.until is None or course.until.measure.together):
+        make = _Together(stepper, watched)
     controls, origin, last = Controls(network), state.k, state.k + steps
     changes = [change for change in network.changes if origin <= change.at < last]
     _check_events(controls, state, changes)
@@ -259,9 +298,11 @@ class _OneByOne:
 
 @dataclass(frozen=True)
 class _Together:
-    """Many steps by a call."""
+    """Many steps by a call. What may end the run between them (``watched``) is asked behind them: where it ends before
+    the last of them, the state of before is taken, and the steps up to there are made again."""
 
     runner: Runner
+    watched: Watched | None = None
 
     def steps(
         self, state: State, first: int, stop: int, every: int, rows: Rows, reader: InputReader, watch: Watch
@@ -274,11 +315,11 @@ class _Together:
             while k < begin + len(part):
                 until = watch.until(k, min(k + most, begin + len(part)))
                 vectors = part[k - begin : until - begin]
-                made = self.runner.run(state, vectors, activity[row:], weights[row:], every, not watch.warned)
+                made = self._run(state, vectors, activity[row:], weights[row:], every, not watch.warned)
                 row += _kept(k, k + made, every)
                 k += made
                 watch.look(state)
-                if rows.due():
+                if rows.due() if self.watched is None else self.watched.asked():
                     rows.end(row)
                     if rows.over():
                         return False
@@ -287,6 +328,28 @@ class _Together:
                     row = 0
         rows.end(row)
         return True
+
+    def _run(
+        self, state: State, vectors: FloatArray, activity: FloatArray, weights: FloatArray, every: int, look: bool
+    ) -> int:
+        """Steps, as the runner makes them, or fewer where the run is to end before."""
+        if self.watched is None:
+            return self.runner.run(state, vectors, activity, weights, every, look)
+        before = state.copy()
+        if every == 1:
+            seen, learned = activity, weights
+        else:
+            seen, learned = (np.empty((len(vectors), rows.shape[1])) for rows in (activity, weights))
+        made = self.runner.run(state, vectors, seen, learned, 1, look)
+        count = self.watched.made(seen[:made])
+        if every > 1:
+            kept = slice(-before.k % every, count, every)
+            wanted = _kept(before.k, before.k + count, every)
+            activity[:wanted], weights[:wanted] = seen[kept], learned[kept]
+        if count < made:
+            state.become(before)
+            self.runner.run(state, vectors[:count], seen, learned, 1, False)
+        return count
 
 
 def _kept(first: int, stop: int, every: int) -> int:

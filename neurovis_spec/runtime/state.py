@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -59,6 +59,11 @@ class State:
             traces=tuple(tuple(array.copy() for array in rule) for rule in self.traces),
             conditions=self.conditions.copy(),
         )
+
+    def become(self, other: State) -> None:
+        """Be what another state is; its arrays are shared."""
+        for field in fields(self):
+            setattr(self, field.name, getattr(other, field.name))
 
 
 def initial_state(network: Network) -> State:

@@ -61,7 +61,7 @@ def record_to(
     state = first_state(network, start, checkpoint)
     steps = Steps(checked_steps(network, course.steps, course.every), course.every, state.k)
     columns = columns_of(network, course.keep)
-    none = InMemory(columns.widths(network), 0).numbers(np.zeros(0, dtype=np.int64))
+    none = InMemory(columns.widths(network), 0).numbers(Steps(0))
     frame = recording_of(network, columns, none, state.weights, after(network, state))
     settle(path, format_)
     check_disk(path, steps.total, steps.every, format_.size(frame, steps))

@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.measures import Measure, Meter, measure_of
@@ -43,16 +45,16 @@ class Until:
         self.measure: Measure = measure_of(text, network, LABEL, bounded=True)
         self.ending: Ending | None = None
 
-    def watch(self, rows: Rows, state: State, steps: int) -> Rows:
+    def watch(self, rows: Rows, state: State, steps: int) -> Watched:
         """Rows that ask after each step whether the run is to end. Raises SpecError where there are fewer steps than a
         window has."""
         self.measure.check_steps(steps)
         self.ending = None
-        return _Watched(self, rows, state)
+        return Watched(self, rows, state)
 
 
-class _Watched:
-    """Rows as they are handed on, and the meter."""
+class Watched:
+    """Rows as they are handed on, and the meter: it is asked after each step (``due``), or behind many (``made``)."""
 
     def __init__(self, until: Until, rows: Rows, state: State) -> None:
         self._until, self._rows, self._state = until, rows, state
@@ -60,19 +62,40 @@ class _Watched:
         self._met = False
 
     def begin(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Arrays for the next rows."""
         return self._rows.begin(count)
 
     def end(self, count: int) -> None:
+        """So many are filled."""
         self._rows.end(count)
         self._until.ending = self._ending()
 
+    def made(self, activity: FloatArray) -> int:
+        """Ask after many steps at once, of which these are the activities (steps, n): with how many of them the run
+        ends, all where it goes on. Only where the measure is ``together``."""
+        before, parameters = self._meter.copy(), self._state.conditions.parameters
+        values = self._meter.rows(activity, parameters, np.zeros((len(activity), 0)))
+        true = np.flatnonzero((values == values) & (values != 0))
+        if not len(true):
+            return len(activity)
+        self._met, count = True, int(true[0]) + 1
+        self._meter = before
+        before.rows(activity[:count], parameters, np.zeros((count, 0)))
+        return count
+
+    def asked(self) -> bool:
+        """Whether rows are to be handed on now, the measure apart."""
+        return self._rows.due() or self._met
+
     def due(self) -> bool:
+        """Whether rows are to be handed on now, asked after each step."""
         state, probe = self._state, self._until.measure.probe
         value = self._meter.step(state.activity, state.conditions.parameters, probe.now(state))
         self._met = value == value and value != 0
         return self._rows.due() or self._met
 
     def over(self) -> bool:
+        """Whether the run is to end here."""
         return self._met or self._rows.over()
 
     def _ending(self) -> Ending | None:
