@@ -1,10 +1,11 @@
 """How long a step takes: the C backend beside C by hand, NumPy beside NumPy by hand, and Brian2 where it is installed.
 
-In: nothing. Out: a table of microseconds a step and ratios, on standard output. Run it with
-``python benchmarks/runtime.py``; only the ratios of one run can be compared. C by hand is what a careful author would
-write for the one network: a loop over neurons, one over the connections of each (CSR), arrays that are made beforehand;
-it is compiled by the same compiler with the same flags. All keep every activity, and every weight that learns. Inputs
-are given beforehand. Brian2 runs ``cpp_standalone`` and keeps nothing.
+In: nothing. Out: a table of microseconds a step and ratios, on standard output. Run it with ``python
+benchmarks/runtime.py``; only the ratios of one run can be compared. C by hand is what a careful author would write for
+the one network: a loop over neurons, one over the connections of each (CSR), arrays that are made beforehand; it is
+compiled by the same compiler with the same flags. "tanh alone" is what the C library takes for the tanh of as many
+neurons, on the numbers of a real step: what no program that calls it can be quicker than. All keep every activity, and
+every weight that learns. Inputs are given beforehand. Brian2 runs ``cpp_standalone`` and keeps nothing.
 """
 
 from __future__ import annotations
@@ -213,6 +214,34 @@ def tanh_in_c(network: Network) -> Run:
     return made
 
 
+#: the functions of the C library that a step calls, and nothing else
+TANH_ALONE = """
+void run(int64_t steps, int64_t n, const double *restrict u, double *restrict y)
+{
+    for (int64_t k = 0; k < steps; k++) {
+        const double *now = u + 7*k % n;
+        for (int64_t i = 0; i < n; i++)
+            y[i] = tanh(now[i]);
+    }
+}
+"""
+
+
+def tanh_alone(network: Network) -> Run:
+    """tanh of what arrives at each neuron after some steps."""
+    run, n, links = loaded(TANH_ALONE), len(network.neurons), network.connections
+    state, stepper = initial_state(network), CBackend().prepare(network)
+    for _ in range(50):
+        stepper.step(state, np.zeros(0))
+    arriving = links.weights * state.activity[links.sources]
+    u = np.tile(np.bincount(links.targets, arriving, n) + network.neurons.bias, 2)
+
+    def made(steps: int) -> None:
+        run(ctypes.c_int64(steps), ctypes.c_int64(n), at(u), at(ROOM))
+
+    return made
+
+
 def cpg_in_c(network: Network) -> Run:
     run = loaded(CPG_BY_HAND)
     matrix, centres = network.connections.weights[[0, 2, 1, 3]].copy(), network.connections.centres
@@ -402,12 +431,27 @@ def main() -> None:
         Case("1,000/10,000", random_network(1000, 10000), tanh_in_c, random_by_hand, 1000),
         Case("10,000/100,000", random_network(10000, 100000), tanh_in_c, random_by_hand, 100),
     )
-    heads = ("c", "c by hand", "ratio", "a step", "above", "record", "numpy", "by hand", "ratio", "brian2", "/c")
+    heads = (
+        "c",
+        "c by hand",
+        "ratio",
+        "tanh",
+        "a step",
+        "above",
+        "record",
+        "numpy",
+        "by hand",
+        "ratio",
+        "brian2",
+        "/c",
+    )
     print(f"{'µs a step':20}" + "".join(f"{head:>10}" for head in heads))
     for case in cases:
         network = case.network
         same(case)
         runs = {"c": ours_in_c(network), "c by hand": case.in_c(network), "a step": one_by_one(network)}
+        if case.in_c is tanh_in_c:
+            runs["tanh"] = tanh_alone(network)
         found = microseconds(runs, case.steps)
         slower = {"record": recorded(network, "c"), "numpy": numpy_steps(network)}
         if case.in_numpy is not None:
@@ -416,7 +460,8 @@ def main() -> None:
         if case.brian:
             found["brian2"] = brian(network, case.steps * 2)
         above = found["a step"] - found["c"]
-        numbers = [found["c"], found["c by hand"], found["c"] / found["c by hand"], found["a step"], above]
+        numbers = [found["c"], found["c by hand"], found["c"] / found["c by hand"]]
+        numbers += [found.get("tanh", np.nan), found["a step"], above]
         numbers += [found["record"], found["numpy"], found.get("numpy by hand", np.nan)]
         numbers += [found["numpy"] / numbers[-1], found.get("brian2", np.nan)]
         numbers.append(numbers[-1] / found["c"])

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
-from networks_by_hand import TANH, Link, Unit, build, cpg_rbf, model
+from networks_by_hand import TANH, Link, Unit, Use, build, cpg_rbf, model, rule
 from random_specs import specs
 from test_runtime_backends import networks, parts
 
@@ -231,3 +231,52 @@ def test_one_state_goes_from_backend_to_backend() -> None:
     for expected, found in zip(parts(plain), parts(state), strict=True):
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
     assert math.isfinite(float(state.activity.sum()))
+
+
+LANES = """
+neurovis: 1
+name: lanes
+seed: 5
+neurons:
+  S: {count: 9, bias: "0.1*i", activation: tanh, noise: "normal(0, 0.2)"}
+  T: {count: 21, combine: COMBINE, activation: tanh}
+connections:
+  S -> T: {weight: "uniform(-2, 2)", pattern: {random: {probability: 0.6}}, delay: DELAY, PLASTIC}
+  T -> S: {weight: "normal(0, 0.4)", pattern: {random: {probability: 0.9}}}
+"""
+
+
+@pytest.mark.compiler
+@pytest.mark.usefixtures("small")
+@pytest.mark.parametrize("combine", ["sum", "product", "distance"])
+@pytest.mark.parametrize("delay", [0, 1, 2])
+@pytest.mark.parametrize("learns", [False, True])
+def test_neurons_with_different_numbers_of_connections_go_on_beside_each_other(
+    combine: str, delay: int, learns: bool
+) -> None:
+    """Groups of eight neurons and a rest, groups of four connections and a rest."""
+    more = ", plasticity: {oja: {rate: 0.01}}" if learns else ""
+    text = LANES.replace("COMBINE", combine).replace("DELAY", str(delay)).replace(", PLASTIC", more)
+    network = nv.compile_text(text).network
+    degrees = np.bincount(network.connections.targets, minlength=30)
+    assert len(set(degrees.tolist())) > 3
+    follow(network, CBackend(), 12)
+    runs = [record(network, 40, backend=name) for name in ("reference", "c")]
+    assert runs[0].activity.tobytes() == runs[1].activity.tobytes()
+    assert runs[0].weights.tobytes() == runs[1].weights.tobytes()
+    assert runs[0].weights_after.tobytes() == runs[1].weights_after.tobytes()
+
+
+@pytest.mark.compiler
+@pytest.mark.usefixtures("small")
+def test_a_weight_that_is_not_finite_for_one_step_is_told_in_whole_runs() -> None:
+    """What learns is looked at where it is stored: a weight may be infinite for a step and finite again."""
+    passing = rule("(1e308*10 if k == 37 else 0.5) + 0*pre")
+    units = [Unit(f"N{i}", TANH, bias=0.1 * i) for i in range(11)]
+    links = [Link(i, (3 * i + 1) % 11, 0.1, learns=0) for i in range(11)]
+    network = build(units, links, [Use(passing)])
+    with pytest.warns(RuntimeWarning, match="inf after step 37") as first:
+        record(network, 90, backend="reference")
+    with pytest.warns(RuntimeWarning) as second:
+        record(network, 90, backend="c")
+    assert [str(w.message) for w in second] == [str(w.message) for w in first]

@@ -255,19 +255,18 @@ class StepCode:
                 continue
             members = kind.connections[sent]
             if self.form.written_out:
-                for place in range(len(members)):
-                    self.signal_leaves(members, place)
+                self.store([self.leaving(members, place) for place in range(len(members))])
             else:
                 with code.block(code.loop("p", len(members))):
-                    self.signal_leaves(members, "p")
+                    self.store([self.leaving(members, "p")])
 
-    def signal_leaves(self, members: IntArray, place: Place) -> None:
-        """The signal of one of some connections, all of one delay, leaves."""
+    def leaving(self, members: IntArray, place: Place) -> tuple[str, Value]:
+        """The signal of one of some connections, all of one delay: its slot, and what leaves."""
         code, connections = self.code, self.network.connections
         delay = int(connections.delays[members[0]])
         slot, source = code.at(self.layout.offsets[members], place), code.at(connections.sources[members], place)
         shift = "" if delay == 1 else f" + {code.remainder(delay)}"
-        code.line(f"signals[{slot}{shift}] = weights[{code.at(members, place)}]*activity[{source}];")
+        return f"signals[{slot}{shift}]", f"weights[{code.at(members, place)}]*activity[{source}]"
 
     # ---- connections -------------------------------------------------------------------------------------------
 
@@ -294,25 +293,35 @@ class StepCode:
     def connections(self, number: int, places: Sequence[Place], sums: Sequence[str] = ()) -> None:
         """The rule at some connections: all is read before anything is stored. To each of ``sums``, one a connection,
         what is stored adds 0, or NaN where it is not finite."""
+        code, leaving = self.code, []
+        if number in self.sent_with:
+            leaving = [self.leaving(self.network.plasticity[number].members, place) for place in places]
+            leaving = [(slot, code.let("s", signal)) for slot, signal in leaving]
+        if self.form.still:
+            self.store(leaving)
         stores = [self.connection(number, place) for place in places]
         for name, made in zip(sums, stores, strict=False):
             for _, value in made:
                 if not isinstance(value, float):
-                    self.code.line(f"{name} += {value} - {value};")
+                    code.line(f"{name} += {value} - {value};")
+        if not self.form.still:
+            self.store(leaving)
         for made in stores:
-            for cell, value in made:
-                self.code.line(f"{cell} = {self.code.text(value)};")
+            self.store(made)
         if self.form.still and isinstance(places[0], int):
-            self.code.indent -= 1
-            self.code.line("}")
+            code.indent -= 1
+            code.line("}")
+
+    def store(self, made: Sequence[tuple[str, Value]]) -> None:
+        """Values, each in its cell."""
+        for cell, value in made:
+            self.code.line(f"{cell} = {self.code.text(value)};")
 
     def connection(self, number: int, place: Place) -> list[tuple[str, Value]]:
         """The weight and the states of one connection, at a step and, where it has one, at an episode's end: where
         each is stored, and what."""
         code, plasticity = self.code, self.network.plasticity[number]
         rule, connection = plasticity.rule, code.at(plasticity.members, place)
-        if number in self.sent_with:
-            self.signal_leaves(plasticity.members, place)
         if self.form.still:
             if isinstance(place, int):
                 code.line(f"if (!still[{connection}]) {{")
