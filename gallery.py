@@ -146,9 +146,9 @@ PICTURES = (
         "hexapod/hexapod",
         1189,
         "Use case 3, learning to step over a beam",
-        "The front legs hit the fourth beam 49 steps ago, and dp carries the news to the legs behind. The middle legs "
-        "stepped high too early and have just hit the beam, too (H is active): the connection that warned them glows. "
-        "Thicker, it keeps the news up for longer, and they will step later.",
+        "The front legs hit the fourth beam 49 steps ago, and d6 and d7 carry the news to the legs behind. The middle "
+        "legs stepped high too early and have just hit the beam, too (H is active): the connection that warned them "
+        "glows. Thicker, it keeps the news up for longer, and they will step later.",
     ),
     Picture(
         "hexapod_floor",

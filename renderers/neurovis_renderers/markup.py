@@ -93,7 +93,7 @@ def element(shape: Shape, attributes: str = "", content: str = "") -> str:
         case Spline():
             return _close(f"<path{_spline(shape)}{attributes}", "path", content)
         case Arrowhead():
-            kind = ' class="bar"' if shape.kind == "bar" else ""
+            kind = ' class="bar"' if shape.kind == "bar" and "class=" not in attributes else ""
             return _close(
                 f'<polygon{kind} points="{pairs(shape.points)}" fill="{shape.fill}"{attributes}', "polygon", content
             )
