@@ -81,7 +81,7 @@ def test_each_frame_has_the_widths_and_glows_of_its_step() -> None:
             continue
         place = CASE.network.connection_index[g.attrib["data-connection"]]
         for frame, token in enumerate(tokens_at(g, FILM.frames)):
-            _, width, glow = token.split()
+            _, width, glow, *_ = token.split()
             assert float(rule(width, "--w")) == pytest.approx(FILM.line_widths[frame, place], abs=0.031)
             assert float(rule(glow, "--g")) == pytest.approx(FILM.glow_widths[frame, place], abs=0.04)
             seen += 1
