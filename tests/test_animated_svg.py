@@ -80,12 +80,14 @@ def test_each_frame_has_the_widths_and_glows_of_its_step() -> None:
         if g.attrib.get("data-to") != "O":
             continue
         place = CASE.network.connection_index[g.attrib["data-connection"]]
+        if not FILM.changing[place]:
+            continue
         for frame, token in enumerate(tokens_at(g, FILM.frames)):
             _, width, glow, *_ = token.split()
             assert float(rule(width, "--w")) == pytest.approx(FILM.line_widths[frame, place], abs=0.031)
             assert float(rule(glow, "--g")) == pytest.approx(FILM.glow_widths[frame, place], abs=0.04)
             seen += 1
-    assert seen == 8 * 128
+    assert seen == FILM.changing.sum() * 128 >= 6 * 128
 
 
 def test_it_lasts_its_frames_and_starts_over() -> None:

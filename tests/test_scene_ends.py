@@ -20,7 +20,7 @@ from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.scene import Arrowhead, Film, Scene, Spline, Text, still
 from neurovis_spec.scene.encode import encode
 from neurovis_spec.scene.film import film
-from neurovis_spec.scene.gains import choose_gains
+from neurovis_spec.scene.gains import choose_gains, plain_gains
 from neurovis_spec.scene.model import ended
 
 NS = "{http://www.w3.org/2000/svg}"
@@ -57,7 +57,7 @@ def drawn(weights: list[float]) -> Scene:
     layout = straight_layout(network, {name: (float(i), 2.0 * (i > 0)) for i, name in enumerate(names)})
     w = np.array(weights)
     case = Case(network, layout, np.ones((1, count + 1)), w[None])
-    return encode(network, layout, case.snapshot(0), GAINS, RenderSettings())
+    return encode(network, layout, case.snapshot(0), plain_gains(network, 1, 1, 2, 1), RenderSettings())
 
 
 def test_a_bar_means_less_than_nothing() -> None:
