@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from small_specs import answer, codes, compiled, network_of
 
+from neurovis_spec.scene import THEMES, colours
+
 PAIR = "neurons: {A: {bias: 1, position: [0, 0]}, B: {position: [3, 4]}}\nconnections: {A -> B: 1}\n"
 
 
@@ -168,6 +170,42 @@ def test_gains_size_labels_legend_and_title_do_what_they_say(tmp_path: Path) -> 
     texts = [len(re.findall(r"<text", shown)) for shown in (svg, plain)]
     assert texts[0] < texts[1]
     assert "Quite another" not in plain
+
+
+def test_gains_are_for_all_or_for_what_references_name(tmp_path: Path) -> None:
+    """Entries as the spec writes them, or any A -> B; where they overlap, the one that names the fewest holds."""
+    text = """
+neurons: {K: {count: 4, bias: 0.25}, O: {}}
+connections: {K -> O: {weight: 0.5, delay: 0}}
+render: {gain: {activity: {K: 1, K2: 2, K2..K3: 4}, signal: 2, thickness: {K -> O: 10, K4 -> O: 2}}}
+"""
+    svg = drawn(text, tmp_path)
+    values = [1, 2, 4, 1]
+    for neuron, value in zip(("K1", "K2", "K3", "K4"), values, strict=True):
+        fill = re.search(rf'data-neuron="{neuron}".*?fill="(#\w+)"', svg, re.DOTALL)
+        assert fill is not None
+        assert [fill[1]] == colours(THEMES["default"], [value * 0.25])
+    widths = re.findall(r'data-from="K\d".*?stroke-width="([\d.]+)"', svg, re.DOTALL)
+    assert sorted(widths) == ["1", "5", "5", "5"]
+
+
+def test_a_range_maps_on_the_colours(tmp_path: Path) -> None:
+    """From low, which is −1, to high, which is +1: for what is not centred on 0."""
+    text = "neurons: {N: {count: 3, bias: i*50 - 80}}\nrender: {gain: {activity: {N: [-80, 20]}}}\n"
+    svg = drawn(text, tmp_path)
+    fills = re.findall(r'data-neuron="N\d".*?fill="(#\w+)"', svg, re.DOTALL)
+    assert fills == colours(THEMES["default"], [-1, 0, 1])
+    words = re.findall(r">([^<>]+)</text>", svg)
+    assert {"−80", "+20"} <= set(words), "the legend says what the ends of the colours are"
+
+
+def test_a_tooltip_says_the_gain(tmp_path: Path) -> None:
+    text = PAIR + "render: {gain: {activity: {A: 3}, signal: 4, thickness: 5}}"
+    titles = re.findall(r"<title>([^<]*)</title>", drawn(text, tmp_path))
+    assert any("gain 3" in title for title in titles if title.startswith("A\n"))
+    assert any("gain: signal 4, thickness 5" in title for title in titles if title.startswith("A → B"))
+    ranged = drawn(PAIR + "render: {gain: {activity: [-80, 20]}}", tmp_path)
+    assert "colours from −80 to 20" in ranged
 
 
 def test_words_that_no_section_knows_are_findings() -> None:

@@ -23,7 +23,7 @@ def reaches(
     """What is reached, activities by steady ones."""
     peaks, heavy, none = np.array(activity), np.array(weights), np.zeros(len(weights))
     sent = heavy if signals is None else np.array(signals)
-    return Reached(peaks, peaks, heavy, sent, none if changes is None else np.array(changes))
+    return Reached(0 * peaks, peaks, peaks, heavy, sent, none if changes is None else np.array(changes))
 
 
 def test_all_four_ingredients_of_use_case_1_show() -> None:

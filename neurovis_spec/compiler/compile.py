@@ -41,6 +41,7 @@ from neurovis_spec.compiler.tables import Files
 from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.compiler.units import Expander, constants_of
 from neurovis_spec.compiler.warnings import warn
+from neurovis_spec.compiler.wires import Finder, wires_of
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.includes import Includes, read_includes
@@ -89,7 +90,6 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
     units, inputs = expansion.units, expansion.inputs
     population = populate(units, request.limits, seed)
     _look_at_unused(expander, request.limits, seed)
-    render = render_settings(spec.render, constants)
     if not len(population.neurons):
         _report_no_neurons(spec, population, findings)
         population = without_neurons(population)
@@ -97,6 +97,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
     layout = layout_settings(spec.layout, units, population, findings)
     made = connect(units, population, request.limits, seed)
     bundles = made.bundles
+    render = render_settings(spec.render, Finder(wires_of(made), directory, findings), constants)
     outputs = make_outputs(spec, population, made, findings)
     ros = _ros(spec, inputs, outputs, units[0].gaps, constants)
     noises = make_noises(units, population, sum(entry.size for entry in inputs))
@@ -223,9 +224,10 @@ def _read_events(spec: Spec, connected: Connected, directory: Directory, constan
     """The events of a spec. Most specs have none: nothing that reads them is imported then."""
     if not spec.events:
         return ()
-    from neurovis_spec.compiler.events import EventReader, wires_of
+    from neurovis_spec.compiler.events import EventReader
 
-    return EventReader(wires_of(connected), directory, constants).read(spec.events)
+    finder = Finder(wires_of(connected), directory, constants.findings)
+    return EventReader(finder, constants).read(spec.events)
 
 
 def _report_no_neurons(spec: Spec, population: Population, findings: Findings) -> None:

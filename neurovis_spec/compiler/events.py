@@ -1,7 +1,7 @@
 """Events: what changes during a run (§9).
 
-In: the ``events`` section, the neurons and connections that it names. Out: the events, resolved; those that name the
-same share one array. What they change in a run is for ``timeline``.
+In: the ``events`` section, who finds what it names. Out: the events, resolved; those that name the same share one
+array. What they change in a run is for ``timeline``.
 """
 
 from __future__ import annotations
@@ -9,22 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-import numpy.typing as npt
-
-from neurovis_spec.compiler.arrays import IntArray, frozen
-from neurovis_spec.compiler.connect import Connected
+from neurovis_spec.compiler.arrays import IntArray
 from neurovis_spec.compiler.constants import Constants
-from neurovis_spec.compiler.references import (
-    Directory,
-    few,
-    key_of,
-    look_at_keys,
-    other_parameter,
-    resolve_end,
-    resolve_ends,
-)
-from neurovis_spec.diagnostics import Findings, Span, shown, suggest
+from neurovis_spec.compiler.references import key_of, look_at_keys, other_parameter
+from neurovis_spec.compiler.wires import Finder
+from neurovis_spec.diagnostics import Findings, Span, shown
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.model import lost_names
 from neurovis_spec.language.sections import EventModel
@@ -53,37 +42,11 @@ class Event:
 
 
 @dataclass(frozen=True)
-class Wires:
-    """The connections that a lesion may name: sources and targets, one each, and what the entries are called."""
-
-    sources: IntArray
-    targets: IntArray
-    names: tuple[str, ...]
-    #: whether each of them learns
-    plastic: npt.NDArray[np.bool_]
-
-    def between(self, sources: tuple[int, ...], targets: tuple[int, ...]) -> IntArray:
-        """The connections from any of some neurons to any of others."""
-        return np.flatnonzero(np.isin(self.sources, sources) & np.isin(self.targets, targets))
-
-
-def wires_of(made: Connected) -> Wires | None:
-    """The connections of a spec, if all of them are known."""
-    if not made.complete:
-        return None
-    plastic = np.repeat([one.learning is not None for one in made.bundles], [len(one.sources) for one in made.bundles])
-    return Wires(made.sources, made.targets, tuple(one.name for one in made.bundles), plastic)
-
-
-@dataclass(frozen=True)
 class EventReader:
-    """Reads the events of a spec, whose connections are ``wires``; None where these are not known."""
+    """Reads the events of a spec; ``finder`` knows what references in them name."""
 
-    wires: Wires | None
-    directory: Directory
+    finder: Finder
     constants: Constants
-    #: what references mean, those that are valid
-    known: dict[str, IntArray] = field(default_factory=dict)
 
     @property
     def findings(self) -> Findings:
@@ -109,7 +72,7 @@ class EventReader:
         for name, formula in model.set.items():
             self._check_set(model, name)
             self.constants.scalar(formula)
-        look_at_keys(model.source, "clamp", model.clamp, self.directory, self.findings)
+        look_at_keys(model.source, "clamp", model.clamp, self.finder.directory, self.findings)
         clamps = [one for name, formula in model.clamp.items() for one in self._clamp(model, name, formula)]
         neurons, connections = self._parts(model.lesion)
         mended, joined = self._parts(model.mend)
@@ -167,22 +130,9 @@ class EventReader:
             self.findings.error("structural-parameter", span, message)
 
     def _clamp(self, model: EventModel, name: str, formula: Formula) -> list[tuple[IntArray, Formula]]:
-        neurons = self._neurons(key_of(model.source, "clamp", name))
+        neurons = self.finder.neurons(key_of(model.source, "clamp", name))
         value = self.constants.scalar(formula)
         return [] if neurons is None or value is None else [(neurons, formula)]
-
-    def _neurons(self, text: Located[str]) -> IntArray | None:
-        """The neurons of a reference; None where it is invalid."""
-        if text.value not in self.known:
-            found = resolve_end(text, self.directory, self.findings)
-            if found is None:
-                return None
-            self._know(text, np.unique(np.array(found, dtype=np.int64)))
-        return self.known[text.value]
-
-    def _know(self, text: Located[str], indices: IntArray) -> None:
-        frozen(indices)
-        self.known[text.value] = indices
 
     def _parts(self, texts: Iterable[Located[str]]) -> tuple[tuple[IntArray, ...], tuple[IntArray, ...]]:
         """The neurons and the connections that are lesioned or mended."""
@@ -190,46 +140,17 @@ class EventReader:
         connections: list[IntArray] = []
         for text in texts:
             joined = "->" in text.value
-            found = self._connections(text) if joined else self._neurons(text)
+            found = self.finder.connections(text) if joined else self.finder.neurons(text)
             if found is not None:
                 (connections if joined else neurons).append(found)
         return tuple(neurons), tuple(connections)
 
     def _learning(self, name: Located[str], on: bool) -> list[tuple[IntArray, bool]]:
         """The connections whose rules are stopped or started."""
-        if "->" not in name.value:
-            self.findings.error(
-                "bad-connection", name.span, f"'{shown(name.value)}' is no connection", "write FROM -> TO"
-            )
+        found = self.finder.connections(name)
+        if found is None or self.finder.wires is None:
             return []
-        found = self._connections(name)
-        if found is None or self.wires is None:
-            return []
-        if not self.wires.plastic[found].any():
+        if not self.finder.wires.plastic[found].any():
             message = f"nothing learns at '{shown(name.value)}'"
             self.findings.error("no-rule", name.span, message, "name a connection that has a 'plasticity'")
         return [(found, on)]
-
-    def _connections(self, text: Located[str]) -> IntArray | None:
-        """The connections between two ends; None, and a finding, where there is none."""
-        if text.value not in self.known:
-            ends = resolve_ends(text, self.directory, self.findings)
-            if ends is None or self.wires is None:
-                return None
-            found = self.wires.between(*ends)
-            if not len(found):
-                message = f"there is no connection '{shown(text.value)}'"
-                self.findings.error("no-connection", text.span, message, self._other(text, ends))
-                return None
-            self._know(text, found)
-        return self.known[text.value]
-
-    def _other(self, text: Located[str], ends: tuple[tuple[int, ...], tuple[int, ...]]) -> str | None:
-        """Which connection may be meant: the one the other way, those that are called alike, those of either end."""
-        assert self.wires is not None
-        source, target = (part.strip() for part in text.value.split("->", 1))
-        if len(self.wires.between(ends[1], ends[0])):
-            return f"there is '{shown(target)} -> {shown(source)}', the other way"
-        names = self.wires.names
-        near = [name for name in names if source in name.split(" -> ")[0] or target in name.split(" -> ")[-1]]
-        return suggest(f"{source} -> {target}", few(text.value, near or names), "connections")

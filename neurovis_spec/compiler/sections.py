@@ -1,6 +1,6 @@
 """The sections ``layout`` and ``render``: references resolved, values checked.
 
-In: the sections as written and the Directory. Out: LayoutSettings, RenderSettings.
+In: the sections as written, who finds what they name. Out: LayoutSettings, RenderSettings.
 """
 
 from __future__ import annotations
@@ -10,12 +10,14 @@ from typing import Literal, cast
 
 from neurovis_spec import plugins
 from neurovis_spec.compiler.constants import Constants
+from neurovis_spec.compiler.gains import stated_gains
 from neurovis_spec.compiler.mirrors import check_pins, lines_of, mirrors_of
 from neurovis_spec.compiler.pins import DIAMETER, FARTHEST, pins_of
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import Directory, key_of, look_at_keys, resolve, resolve_end
 from neurovis_spec.compiler.unit import Unit
-from neurovis_spec.compiler.wishes import LayoutSettings, RenderSettings, StatedGain
+from neurovis_spec.compiler.wires import Finder
+from neurovis_spec.compiler.wishes import LayoutSettings, RenderSettings
 from neurovis_spec.diagnostics import Findings, Span, shown, suggest
 from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel, RenderModel
 from neurovis_spec.language.located import Formula, Located
@@ -113,18 +115,11 @@ def _check_engine(engine: Located[str], findings: Findings) -> None:
     findings.error("unknown-engine", engine.span, f"there is no layout engine '{shown(name)}' here", hint)
 
 
-def render_settings(model: RenderModel | None, constants: Constants) -> RenderSettings:
-    """The ``render`` section."""
+def render_settings(model: RenderModel | None, finder: Finder, constants: Constants) -> RenderSettings:
+    """The ``render`` section; ``finder`` knows what references in it name."""
     if model is None:
         return RenderSettings()
     gain = model.gain
-
-    def factor(formula: Formula | None) -> tuple[StatedGain, ...]:
-        value = None if formula is None else constants.scalar(formula)
-        if formula is not None and value is not None and value < 0:
-            constants.findings.error("out-of-range", formula.span, f"a gain is not negative, this is {value:g}")
-        return () if value is None else (StatedGain(value),)
-
     size = None
     if model.size is not None:
         width, height = (_side(side, constants) for side in model.size)
@@ -134,10 +129,10 @@ def render_settings(model: RenderModel | None, constants: Constants) -> RenderSe
             hint = "an '.svg' can be shown as large as one likes"
             constants.findings.error("out-of-range", model.size[1].span, message, hint)
     return RenderSettings(
-        activity=() if gain is None else factor(gain.activity),
-        signal=() if gain is None else factor(gain.signal),
-        thickness=() if gain is None else factor(gain.thickness),
-        change=() if gain is None else factor(gain.change),
+        activity=() if gain is None else stated_gains(gain.activity, "activity", finder, constants),
+        signal=() if gain is None else stated_gains(gain.signal, "signal", finder, constants),
+        thickness=() if gain is None else stated_gains(gain.thickness, "thickness", finder, constants),
+        change=() if gain is None else stated_gains(gain.change, "change", finder, constants),
         theme="default" if model.theme is None else model.theme.value,
         size=size,
         labels=model.labels is None or model.labels.value,

@@ -5,24 +5,31 @@ In: nodes. Out: frozen models whose leaves know their places.
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Annotated, ClassVar, NamedTuple
 
 from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import PydanticCustomError
 
+from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.located import (
     FORMULA,
     BoolField,
+    Formula,
     FormulaField,
     Leaf,
     Located,
     TextField,
+    as_formula,
     findings_of,
     give_up,
     refuse,
     words,
 )
 from neurovis_spec.language.model import Keyed, Model
-from neurovis_spec.language.source import Node, Packed, Sequence
+from neurovis_spec.language.source import Mapping, Node, Packed, Sequence
 from neurovis_spec.language.values import PointField, Reference, ReferenceField, TitleField, as_reference
 
 
@@ -118,15 +125,87 @@ class ModuleLayoutModel(Model):
     align: AlignField
 
 
+class Range(NamedTuple):
+    """What is drawn as −1, and as +1."""
+
+    low: Formula
+    high: Formula
+
+
+class GainValue(NamedTuple):
+    """A gain as written: for what ``key`` refers to (None: for all) a factor, or a range; None where it is invalid."""
+
+    key: Located[str] | None
+    value: Formula | Range | None
+    span: Span
+
+
+def _factor(node: Node, info: ValidationInfo) -> Formula:
+    if isinstance(node, (Sequence, Packed)):
+        refuse(info, node, "a number or an expression", "a range [low, high] is for 'activity' alone")
+    return as_formula(node, info)
+
+
+def _factor_or_range(node: Node, info: ValidationInfo) -> Formula | Range:
+    if not isinstance(node, (Sequence, Packed)):
+        return as_formula(node, info)
+    if len(node.items) != 2:
+        refuse(info, node, "a gain, or a range [low, high]")
+    return Range(*(as_formula(item, info) for item in node.items))
+
+
+def _gains(
+    node: Node, info: ValidationInfo, read: Callable[[Node, ValidationInfo], Formula | Range]
+) -> tuple[GainValue, ...]:
+    """One gain for all, or a mapping from references to gains, each of which is looked at."""
+    if not isinstance(node, Mapping):
+        return (GainValue(None, read(node, info), node.span),)
+    if not node.entries:
+        hint = "leave the key out, or give it a value"
+        findings_of(info).error("no-value", node.span, "expected {reference: gain}, found nothing", hint)
+        give_up()
+    found = []
+    for entry in node.entries:
+        value = None
+        with suppress(PydanticCustomError):
+            value = read(entry.value, info)
+        found.append(GainValue(Located(entry.name, entry.key), value, entry.value.span))
+    return tuple(found)
+
+
+_RANGE = {"type": "array", "items": FORMULA, "minItems": 2, "maxItems": 2}
+_GAIN = FORMULA["anyOf"]
+_GAIN_OR_RANGE = [*_GAIN, _RANGE]
+
+
+def _by_reference(values: list[JsonSchemaValue]) -> JsonSchemaValue:
+    """The schema of a gain, or of a mapping of references to gains."""
+    mapping = {"type": "object", "additionalProperties": {"anyOf": values}, "minProperties": 1}
+    return {"anyOf": [*values, mapping]}
+
+
+GainField = Annotated[tuple[GainValue, ...], Leaf(lambda node, info: _gains(node, info, _factor), _by_reference(_GAIN))]
+ActivityGainField = Annotated[
+    tuple[GainValue, ...],
+    Leaf(lambda node, info: _gains(node, info, _factor_or_range), _by_reference(_GAIN_OR_RANGE)),
+]
+
+
 class Gain(Model):
-    """The scaling factors γ of Eqs. 2–5; those not given suit the network's range."""
+    """The scaling factors γ of Eqs. 2–5; those not given suit what each group and each entry reaches."""
 
     PLACE: ClassVar[str] = "'render: gain'"
 
-    activity: FormulaField | None = Field(None, description="γ_NC, Eq. 2: colour of neurons.")
-    signal: FormulaField | None = Field(None, description="γ_CC, Eq. 3: colour of connections.")
-    thickness: FormulaField | None = Field(None, description="γ_CT, Eq. 4: thickness of connections, pixels a unit.")
-    change: FormulaField | None = Field(None, description="γ_LI, Eq. 5: glow of connections whose weight changes.")
+    activity: ActivityGainField = Field(
+        (), description="γ_NC, Eq. 2: colour of neurons; also a range [low, high], and {neurons: gain or range}."
+    )
+    signal: GainField = Field((), description="γ_CC, Eq. 3: colour of connections; also {FROM -> TO: gain}.")
+    thickness: GainField = Field(
+        (), description="γ_CT, Eq. 4: thickness of connections, pixels a unit; also {FROM -> TO: gain}."
+    )
+    change: GainField = Field(
+        (), description="γ_LI, Eq. 5: glow of connections whose weight changes; also {FROM -> TO: gain}."
+    )
 
 
 class RenderModel(Model):

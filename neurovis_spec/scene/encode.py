@@ -46,7 +46,7 @@ def encode(network: Network, layout: Layout, snapshot: Snapshot, gains: Gains, s
     """The picture of one step. Raises KeyError for an unknown theme or a neuron without a position."""
     planned = plan(network, layout, gains, settings)
     seen = looks(network, snapshot, gains, planned.frame.widest)
-    words = tooltips(network, snapshot.activity[None], snapshot.weights[None])
+    words = tooltips(network, gains, snapshot.activity[None], snapshot.weights[None])
     said = caption(network, snapshot.step, snapshot.activity)
     return paint(planned, seen, seen.glows > 0, said, words, snapshot.step)
 
@@ -161,9 +161,9 @@ def data_attributes(network: Network) -> list[dict[str, str]]:
     return result
 
 
-def tooltips(network: Network, activity: FloatArray, weights: FloatArray) -> tuple[list[str], list[str]]:
+def tooltips(network: Network, gains: Gains, activity: FloatArray, weights: FloatArray) -> tuple[list[str], list[str]]:
     """What a pointer shows of neurons and connections: name, activity or weight (from … to where there are several
-    steps), rule. ``activity`` (steps, n), ``weights`` (steps, m)."""
+    steps), rule, gains. ``activity`` (steps, n), ``weights`` (steps, m)."""
     neurons, connections = network.neurons, network.connections
     of_neurons = [""] * len(neurons)
     lows, highs = activity.min(axis=0).tolist(), activity.max(axis=0).tolist()
@@ -172,9 +172,11 @@ def tooltips(network: Network, activity: FloatArray, weights: FloatArray) -> tup
         for index in group.indices:
             name, label = neurons.names[index], neurons.labels[index]
             first = name if label in (name, name.rsplit(".", 1)[-1]) else f"{name}: {label}"
-            parts = [first, f"activity {_range(lows[index], highs[index])}", kind, group.description or ""]
+            seen = _gain_of(float(gains.activity[index]), float(gains.centre[index]))
+            parts = [first, f"activity {_range(lows[index], highs[index])}", kind, group.description or "", seen]
             of_neurons[index] = "\n".join(part for part in parts if part)
     of_connections = []
+    learns = np.isin(np.arange(len(connections)), network.changing).tolist()
     lows, highs = weights.min(axis=0).tolist(), weights.max(axis=0).tolist()
     rows = zip(connections.delays.tolist(), connections.entry.tolist(), strict=True)
     for index, (delay, entry) in enumerate(rows):
@@ -184,9 +186,23 @@ def tooltips(network: Network, activity: FloatArray, weights: FloatArray) -> tup
             connections.learns[entry] or "",
             f"delay {delay}" if delay != 1 else "",
             connections.descriptions[entry] or "",
+            _gains_of(gains, index, learns[index]),
         ]
         of_connections.append("\n".join(part for part in parts if part))
     return of_neurons, of_connections
+
+
+def _gain_of(gain: float, centre: float) -> str:
+    """The gain of a neuron, in words."""
+    if centre and gain:
+        return f"colours from {texts.number(centre - 1 / gain)} to {texts.number(centre + 1 / gain)}"
+    return f"gain {texts.number(gain)}"
+
+
+def _gains_of(gains: Gains, index: int, learns: bool) -> str:
+    """The gains of a connection, in words; that of changes where its weight can change."""
+    told = [("signal", gains.signal), ("thickness", gains.thickness), *([("change", gains.change)] if learns else [])]
+    return "gain: " + ", ".join(f"{what} {texts.number(float(values[index]))}" for what, values in told)
 
 
 def _range(low: float, high: float) -> str:

@@ -73,7 +73,7 @@ def film(
     assert high is not None
     glowing: npt.NDArray[np.bool_] = glows.max(axis=0) > 0
     first = Looks(fill_values[0], line_values[0], widths[0], glows[0], bars[0])
-    titles = tooltips(network, np.stack([low[0], high[0]]), np.stack([low[1], high[1]]))
+    titles = tooltips(network, gains, np.stack([low[0], high[0]]), np.stack([low[1], high[1]]))
     return Film(
         scene=paint(planned, first, glowing, captions[0], titles, steps[0]),
         fps=fps,

@@ -86,7 +86,9 @@ def choose_gains(network: Network, settings: RenderSettings, run: Reached) -> Ga
     learns = np.zeros(len(network.connections), bool)
     learns[network.changing] = True
     range_ = np.minimum(run.activity, 2 * run.typical)
-    activity = _chosen(groups, [_full(range_[m]) for m in groups.members], run.activity, settings.activity)
+    activity = _chosen(
+        groups, [_full(range_[m]) for m in groups.members], run.highest, settings.activity, lowest=run.lowest
+    )
     signal = _chosen(
         entries, [_full(run.signals[m]) for m in entries.members], run.signals, settings.signal, least=True
     )
@@ -161,7 +163,13 @@ def _units(names: tuple[str, ...], numbers: IntArray) -> _Units:
 
 
 def _chosen(
-    units: _Units, full: Sequence[float], reach: FloatArray, stated: Sequence[StatedGain], *, least: bool = False
+    units: _Units,
+    full: Sequence[float],
+    highest: FloatArray,
+    stated: Sequence[StatedGain],
+    *,
+    lowest: FloatArray | None = None,
+    least: bool = False,
 ) -> _Chosen:
     """Gains for all members. ``full`` is the value that is to be full colour (or a pixel, …) in each unit, 0 where
     nothing is reached; of units that share a scale the middle counts, or the ``least``."""
@@ -191,7 +199,9 @@ def _chosen(
         names = scale.names
         if number < len(scales) - len(stated):
             names = tuple(name for name in names if name in left)
-        reaches = float(np.abs(reach[mine] - 0.0).max(initial=0.0))
+        reaches = float((highest[mine] - scale.centre).max(initial=0.0))
+        if lowest is not None:
+            reaches = max(reaches, float((scale.centre - lowest[mine]).max()))
         same = kept.get((scale.gain, scale.centre))
         if same is not None:
             names = () if not names or not same.names else (*same.names, *names)

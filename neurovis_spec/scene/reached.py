@@ -23,15 +23,22 @@ REST = 1 / 200
 
 @dataclass(frozen=True, eq=False)
 class Reached:
-    """Of n neurons the largest |a| (``activity``) and the geometric mean of |a| while they are not at rest
+    """Of n neurons the ``lowest`` and the ``highest`` a, and the geometric mean of |a| while they are not at rest
     (``typical``); of m connections the largest |w| (``weights``), |w·a| (``signals``) and |w[t] − w[t−1]|
     (``changes``). 0 where there is nothing."""
 
-    activity: FloatArray
+    lowest: FloatArray
+    highest: FloatArray
     typical: FloatArray
     weights: FloatArray
     signals: FloatArray
     changes: FloatArray
+
+    @property
+    def activity(self) -> FloatArray:
+        """The largest |a| (n,)."""
+        result: FloatArray = np.maximum(np.abs(self.lowest), np.abs(self.highest))
+        return result
 
 
 def reached(network: Network, recording: Recording) -> Reached:
@@ -46,7 +53,7 @@ def reached(network: Network, recording: Recording) -> Reached:
 def nothing(network: Network) -> Reached:
     """What is reached where nothing is run."""
     neurons, connections = np.zeros(len(network.neurons)), np.zeros(len(network.connections))
-    return Reached(neurons, neurons, connections, connections, connections)
+    return Reached(neurons, neurons, neurons, connections, connections, connections)
 
 
 def reached_by(
@@ -61,9 +68,13 @@ def reached_by(
     those of all others in ``fixed`` (m,). ``follows`` (rows − 1,) says which row is the step after the one before;
     without it all are."""
     with np.errstate(over="ignore", invalid="ignore"):
-        peaks = np.zeros(activity.shape[1])
+        low, high = np.full((2, activity.shape[1]), [[np.inf], [-np.inf]])
         for rows in _chunks(len(activity)):
-            peaks = np.maximum(peaks, _largest(activity[rows]))
+            known = np.isfinite(activity[rows])
+            low = np.minimum(low, np.where(known, activity[rows], np.inf).min(axis=0))
+            high = np.maximum(high, np.where(known, activity[rows], -np.inf).max(axis=0))
+        low, high = (np.where(np.isfinite(end), end, 0.0) for end in (low, high))
+        peaks = np.maximum(np.abs(low), np.abs(high))
         logs, awake = np.zeros((2, len(peaks)))
         reach, signals, changes = np.zeros((3, len(changing)))
         for rows in _chunks(len(activity)):
@@ -82,7 +93,7 @@ def reached_by(
     weight_peaks[changing], signal_peaks[changing], change_peaks[changing] = reach, signals, changes
     typical = np.where(awake > 0, np.exp(logs / np.maximum(awake, 1)), 0.0)
     signal_peaks = np.where(np.isfinite(signal_peaks), signal_peaks, 0.0)
-    return Reached(peaks, typical, weight_peaks, signal_peaks, change_peaks)
+    return Reached(low, high, typical, weight_peaks, signal_peaks, change_peaks)
 
 
 def _chunks(rows: int) -> Iterator[slice]:
