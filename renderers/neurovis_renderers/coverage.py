@@ -1,8 +1,7 @@
-"""Coverage: how much of each pixel a shape covers, computed from distances rather than by supersampling.
+"""Coverage: which pixels shapes touch, and how much of each they cover, for many shapes at a time.
 
-In: discs, strokes, polygons and rectangles in pixels. Out: a Mask: the pixels that a shape touches and the share of
-each that it covers. A Field keeps the distances of a stroke's pixels, so that another width costs no geometry.
-NumPy alone.
+In: strokes, heads, discs and rectangles in pixels, as arrays. Out: Fragments: a shape, a pixel, and the share of the
+pixel that the shape covers. Shares are computed from where edges run, never by supersampling. NumPy alone.
 """
 
 from __future__ import annotations
@@ -14,260 +13,352 @@ import numpy as np
 import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
+Numbers = npt.NDArray[np.float32]
 IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
 Point = tuple[float, float]
 Size = tuple[int, int]  # width, height
 
-#: Powers of two, so that a pixel (up to 2^28 of them), a distance and a dot fit into 62 bits.
-_LEVELS, _MOST_DOTS = 1 << 16, 1 << 18
-#: Pairs of a pixel and a dot that are compared at once: they take some 16 MB.
-_MOST_PAIRS = 1 << 18
-#: A stroke wider than this (in pixels) is drawn from dots that are further apart; the same as how far it reaches.
-WIDE = 62.5
-_FAR = WIDE / 2 + 0.75
+#: A share below this is no fragment.
+LEAST = 1 / 512
+#: Within a pixel a stroke is sampled at these places across it (Gauss's two, by which a straight edge comes out right).
+_SAMPLE = np.float32(0.5 / 3**0.5)
+#: A curve is drawn as straight pieces that deviate from it by at most this many pixels, none longer than ``_PIECE``.
+_DEVIATION, _PIECE, _MOST_PIECES = 0.05, 32.0, 4096
+#: Two pieces that meet at an angle with a cosine below this form a corner.
+_CORNER = 0.9
 
 
 @dataclass(frozen=True, slots=True)
-class Mask:
-    """``pixels``: indices into the picture, row by row; ``share`` of each, 0…1."""
+class Fragments:
+    """``owners[k]`` covers ``shares[k]`` of pixel ``pixels[k]`` (numbered row by row)."""
 
+    owners: IntArray
     pixels: IntArray
-    share: FloatArray
+    shares: Numbers
 
-    @property
-    def nbytes(self) -> int:
-        """What it takes of memory."""
-        return self.pixels.nbytes + self.share.nbytes
+    def __len__(self) -> int:
+        return len(self.pixels)
 
-    def onto(self, picture: FloatArray, colour: tuple[int, int, int], opacity: float = 1.0) -> None:
-        """Blend a colour over a picture (height · width, 3), in sRGB as browsers do."""
-        behind = picture[self.pixels]
-        picture[self.pixels] = behind + (self.share * opacity)[:, None] * (np.array(colour, float) - behind)
+    def only(self, chosen: BoolArray) -> Fragments:
+        """Some of them."""
+        return Fragments(self.owners[chosen], self.pixels[chosen], self.shares[chosen])
+
+
+NOTHING = Fragments(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0, np.float32))
+
+
+def joined(parts: Sequence[Fragments]) -> Fragments:
+    """All of several."""
+    if len(parts) < 2:
+        return parts[0] if parts else NOTHING
+    return Fragments(
+        np.concatenate([part.owners for part in parts]),
+        np.concatenate([part.pixels for part in parts]),
+        np.concatenate([part.shares for part in parts]),
+    )
 
 
 @dataclass(frozen=True, slots=True)
-class Field:
-    """The pixels near a curve: how far each is to its side, and what share of it lies before the curve's ends."""
+class Pieces:
+    """Straight pieces of curves: ends (n, 2), the number of the curve, by how much each is longer at its ends than its
+    neighbours need (in half widths where ``corner``, else by its slope), and whether it is its curve's first or last."""
 
-    pixels: IntArray
-    across: FloatArray
+    starts: FloatArray
     ends: FloatArray
+    owners: IntArray
+    first: BoolArray
+    last: BoolArray
+    #: before and after: 0 where the next piece goes on, 1 where the direction of columns changes, 2 at a corner
+    before: npt.NDArray[np.int8]
+    after: npt.NDArray[np.int8]
 
-    @property
-    def nbytes(self) -> int:
-        """What it takes of memory."""
-        return self.pixels.nbytes + self.across.nbytes + self.ends.nbytes
+    def __len__(self) -> int:
+        return len(self.owners)
 
-    def mask(self, width: float) -> Mask:
-        """The stroke of this width."""
-        half = width / 2
-        share = np.minimum(half, self.across + 0.5) - np.maximum(-half, self.across - 0.5)
-        share = np.clip(share, 0.0, 1.0) * self.ends
-        touched = share > 1e-3
-        return Mask(self.pixels[touched], share[touched])
-
-
-def flatten(points: Sequence[Point], spacing: float = 1.0) -> FloatArray:
-    """A cubic spline as points that are about ``spacing`` apart along it, both ends included."""
-    control = np.asarray(points, float)
-    coarse = [control[:1]]
-    for start in range(0, len(control) - 1, 3):
-        p = control[start : start + 4]
-        steps = max(8, int(np.abs(np.diff(p, axis=0)).sum() / 2))
-        t = (np.arange(1, steps + 1) / steps)[:, None]
-        s = 1 - t
-        coarse.append(s**3 * p[0] + 3 * s * s * t * p[1] + 3 * s * t * t * p[2] + t**3 * p[3])
-    dots = np.concatenate(coarse)
-    lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(dots, axis=0).T))])
-    count = min(max(2, int(np.ceil(lengths[-1] / spacing)) + 1), _MOST_DOTS)
-    at = np.linspace(0.0, lengths[-1], count)
-    return np.stack([np.interp(at, lengths, dots[:, 0]), np.interp(at, lengths, dots[:, 1])], axis=1)
-
-
-def stroke_field(points: Sequence[Point], widest: float, size: Size) -> Field:
-    """The field of a spline for strokes up to ``widest``, with butt caps.
-
-    Where the stroke is wide, so are the steps along the curve: at a dot the curve is taken for straight, and a bend as
-    narrow as its stroke is wide cannot be seen beneath it.
-    """
-    reach = widest / 2 + 0.75
-    dots = flatten(points)
-    tangents = np.gradient(dots, axis=0)
-    lengths = np.hypot(*tangents.T)[:, None]
-    tangents = np.divide(tangents, lengths, out=np.tile([1.0, 0.0], (len(dots), 1)), where=lengths > 1e-12)
-    if reach > _FAR:
-        some = (
-            np.linspace(0, len(dots) - 1, min(len(dots), max(2, int(2 * len(dots) * _FAR / reach))))
-            .round()
-            .astype(np.int64)
+    def only(self, chosen: BoolArray | slice) -> Pieces:
+        """Some of them."""
+        return Pieces(
+            self.starts[chosen],
+            self.ends[chosen],
+            self.owners[chosen],
+            self.first[chosen],
+            self.last[chosen],
+            self.before[chosen],
+            self.after[chosen],
         )
-        dots, tangents = dots[some], tangents[some]
-    pixels, centres, nearest = _near(dots, reach, size)
-    away = centres - dots[nearest]
-    along = (away * tangents[nearest]).sum(axis=1)
-    across = np.abs(away[:, 0] * tangents[nearest, 1] - away[:, 1] * tangents[nearest, 0])
-    beyond = np.where(nearest == 0, -along, np.where(nearest == len(dots) - 1, along, -1.0))
-    return Field(pixels, across, np.clip(0.5 - beyond, 0.0, 1.0))
 
 
-def dashed(points: Sequence[Point], width: float, dash: Sequence[float], size: Size) -> Mask:
-    """A dashed stroke with round caps."""
-    spacing = 0.25
-    dots = flatten(points, spacing)
-    at = np.arange(len(dots)) * spacing
-    period, on = sum(dash), dash[0]
-    place = np.mod(at, period)
-    drawn = dots[(place <= on) | (place < spacing / 2) | (place > period - spacing / 2)]
-    pixels, centres, nearest = _near(drawn, width / 2 + 0.75, size)
-    share = np.clip(width / 2 + 0.5 - np.hypot(*(centres - drawn[nearest]).T), 0.0, 1.0)
-    return Mask(pixels, share)
+def flatten(points: FloatArray, begins: IntArray) -> Pieces:
+    """Cubic splines as straight pieces: ``points`` are those of all splines, of which number k has ``points[begins[k] :
+    begins[k + 1]]``, 1 + 3·pieces of them."""
+    counts = (np.diff(begins) - 1) // 3
+    owners = np.repeat(np.arange(len(counts)), counts)
+    within = np.arange(len(owners)) - np.repeat(np.cumsum(counts) - counts, counts)
+    at = begins[:-1][owners] + 3 * within
+    control = points[at[:, None] + np.arange(4)]
+    bend = np.maximum(
+        np.hypot(*(control[:, 0] - 2 * control[:, 1] + control[:, 2]).T),
+        np.hypot(*(control[:, 1] - 2 * control[:, 2] + control[:, 3]).T),
+    )
+    length = np.hypot(*np.diff(control, axis=1).reshape(-1, 2).T).reshape(-1, 3).sum(axis=1)
+    steps = np.maximum(np.sqrt(0.75 * bend / _DEVIATION), length / _PIECE)
+    number = np.clip(np.ceil(steps), 1, _MOST_PIECES).astype(np.int64)
+    curve = np.repeat(np.arange(len(number)), number)
+    begin = np.cumsum(number) - number
+    t0 = (np.arange(len(curve)) - begin[curve]) / number[curve]
+    control = control[curve]
+    starts = _bezier(control, t0)
+    ends = np.empty_like(starts)
+    ends[:-1] = starts[1:]
+    closing = begin + number - 1
+    ends[closing] = control[closing, 3]
+    owner = owners[curve]
+    there = np.abs(ends - starts).sum(axis=1) > 1e-6
+    return _met(starts[there], ends[there], owner[there])
 
 
-def _near(dots: FloatArray, reach: float, size: Size) -> tuple[IntArray, FloatArray, IntArray]:
-    """The pixels within ``reach`` of dots: their indices, their centres, and the dot that is nearest to each."""
-    pixels, nearest = (_near_far if reach > _FAR else _near_close)(dots, reach, size)
-    centres: FloatArray = np.stack([pixels % size[0] + 0.5, pixels // size[0] + 0.5], axis=1)
-    return pixels, centres, nearest
+def _bezier(control: FloatArray, t: FloatArray) -> FloatArray:
+    t = t[:, None]
+    s = 1 - t
+    result: FloatArray = s**3 * control[:, 0] + 3 * s * t * (s * control[:, 1] + t * control[:, 2])
+    result += t**3 * control[:, 3]
+    return result
 
 
-def _near_close(dots: FloatArray, reach: float, size: Size) -> tuple[IntArray, IntArray]:
-    """``_near`` by all pairs of a dot and a pixel in the square around it, so many at a time."""
-    wide, high = size
-    most = int(np.ceil(reach - 0.5))
-    steps = np.arange(-most, most + 1)
-    together = max(1, _MOST_PAIRS // len(steps) ** 2)
-    found = [np.empty(0, np.int64)]
-    for start in range(0, len(dots), together):
-        some = dots[start : start + together]
-        x = np.floor(some[:, 0]).astype(np.int64)[:, None, None] + steps[None, None, :]
-        y = np.floor(some[:, 1]).astype(np.int64)[:, None, None] + steps[None, :, None]
-        distance = (x + 0.5 - some[:, 0, None, None]) ** 2 + (y + 0.5 - some[:, 1, None, None]) ** 2
-        kept = (x >= 0) & (x < wide) & (y >= 0) & (y < high) & (distance <= reach**2)
-        # one number for pixel, distance and dot, so that one sort finds the nearest dot of each pixel
-        level = (distance[kept] * ((_LEVELS - 1) / reach**2)).astype(np.int64)
-        which = np.broadcast_to(np.arange(start, start + len(some))[:, None, None], kept.shape)[kept]
-        found.append(_least(((y * wide + x)[kept] * _LEVELS + level) * _MOST_DOTS + which))
-    keys = _least(np.concatenate(found))
-    return keys // (_LEVELS * _MOST_DOTS), keys % _MOST_DOTS
+def _met(starts: FloatArray, ends: FloatArray, owners: IntArray) -> Pieces:
+    """Pieces that know how they meet their neighbours."""
+    way = ends - starts
+    way /= np.hypot(way[:, 0], way[:, 1])[:, None]
+    steep = np.abs(way[:, 1]) > np.abs(way[:, 0])
+    forward = np.where(steep, way[:, 1], way[:, 0]) > 0
+    same = owners[1:] == owners[:-1]
+    turns = (steep[1:] != steep[:-1]) | (forward[1:] != forward[:-1])
+    corner = (way[1:] * way[:-1]).sum(axis=1) < _CORNER
+    how = np.where(corner, 2, np.where(turns, 1, 0)).astype(np.int8) * same
+    first, last = np.ones(len(owners), bool), np.ones(len(owners), bool)
+    first[1:], last[:-1] = ~same, ~same
+    before, after = np.zeros(len(owners), np.int8), np.zeros(len(owners), np.int8)
+    before[1:], after[:-1] = how, how
+    return Pieces(starts, ends, owners, first, last, before, after)
 
 
-def _least(keys: IntArray) -> IntArray:
-    """The least key of each pixel, by pixel."""
-    keys = np.sort(keys)
-    owner = keys // (_LEVELS * _MOST_DOTS)
-    first = np.ones(len(keys), bool)
-    first[1:] = owner[1:] != owner[:-1]
-    return keys[first]
+@dataclass(frozen=True, slots=True)
+class Strokes:
+    """Where strokes run over pixels: the curve, the pixel, how far its centre lies beside the middle of the stroke,
+    counted along its column (or row, where the stroke is steep); by the piece: how fast that changes from column to
+    column, and how much longer a way across is along the column; and what share of the pixel lies before the ends."""
+
+    owners: IntArray
+    pixels: IntArray
+    beside: Numbers
+    slopes: Numbers
+    secants: Numbers
+    within: Numbers
+
+    def __len__(self) -> int:
+        return len(self.pixels)
+
+    def only(self, chosen: BoolArray | IntArray) -> Strokes:
+        """Some of them."""
+        return Strokes(
+            self.owners[chosen],
+            self.pixels[chosen],
+            self.beside[chosen],
+            self.slopes[chosen],
+            self.secants[chosen],
+            self.within[chosen],
+        )
+
+    def shares(self, halves: Numbers) -> Numbers:
+        """What strokes cover of their pixels if they are so wide, (n,) half widths."""
+        reach = halves * self.secants
+        aside = self.slopes * _SAMPLE
+        both = _band(self.beside + aside, reach)
+        both += _band(self.beside - aside, reach)
+        both *= 0.5 * self.within
+        return both
 
 
-def _near_far(dots: FloatArray, reach: float, size: Size) -> tuple[IntArray, IntArray]:
-    """``_near`` dot by dot, for a reach that covers much of the picture: memory for its pixels, not for pairs."""
-    wide, high = size
-    best, which = np.full((high, wide), reach**2), np.full((high, wide), -1, np.int32)
-    for number, (x, y) in enumerate(dots.tolist()):
-        rows, columns = _span(y, reach, high), _span(x, reach, wide)
-        across, down = np.arange(wide)[columns] + 0.5 - x, np.arange(high)[rows] + 0.5 - y
-        distance = across[None, :] ** 2 + down[:, None] ** 2
-        closer = distance < best[rows, columns]
-        best[rows, columns][closer] = distance[closer]
-        which[rows, columns][closer] = number
-    pixels = np.flatnonzero(which >= 0)
-    return pixels, which.reshape(-1)[pixels].astype(np.int64)
+def _band(away: Numbers, reach: Numbers) -> Numbers:
+    """What a band of half width ``reach`` covers of a pixel whose centre is ``away`` from its middle."""
+    share: Numbers = np.minimum(reach, away + np.float32(0.5))
+    share -= np.maximum(-reach, away - np.float32(0.5))
+    return np.clip(share, 0, 1, out=share)
 
 
-def _span(centre: float, reach: float, end: int) -> slice:
-    """The pixels of a side of ``end`` pixels that lie within ``reach`` of a place."""
-    return slice(max(0, int(centre - reach)), max(0, min(end, int(centre + reach) + 1)))
+def extent(pieces: Pieces, halves: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """A box around each piece as drawn with half widths (n,): its least and its greatest corner, in pixels."""
+    reach = (1.5 * halves + 1.5)[:, None]
+    return np.minimum(pieces.starts, pieces.ends) - reach, np.maximum(pieces.starts, pieces.ends) + reach
 
 
-def _window(x0: float, y0: float, x1: float, y1: float, size: Size) -> tuple[IntArray, FloatArray, FloatArray]:
-    """The pixels of a rectangle: indices and the coordinates of their centres."""
-    xs = np.arange(max(0, int(np.floor(x0)) - 1), min(size[0], int(np.ceil(x1)) + 2))
-    ys = np.arange(max(0, int(np.floor(y0)) - 1), min(size[1], int(np.ceil(y1)) + 2))
-    x, y = np.meshgrid(xs, ys)
-    pixels: IntArray = np.asarray(y * size[0] + x, np.int64).ravel()
-    return pixels, x.ravel().astype(float) + 0.5, y.ravel().astype(float) + 0.5
+def strokes(pieces: Pieces, halves: FloatArray, size: Size, hidden: BoolArray | None = None) -> Strokes:
+    """The pixels that strokes touch, of pieces with half widths (n,); not those that are ``hidden``.
+
+    Each piece is drawn column by column (row by row where it is steep), so that no pixel is counted twice but where
+    the direction of columns changes and at corners: there pieces overlap.
+    """
+    steep = np.abs(pieces.ends - pieces.starts)
+    steep = steep[:, 1] > steep[:, 0]
+    u0, v0 = _turned(pieces.starts, steep)
+    u1, v1 = _turned(pieces.ends, steep)
+    back = u1 < u0
+    before, after = np.where(back, pieces.after, pieces.before), np.where(back, pieces.before, pieces.after)
+    opens, closes = np.where(back, pieces.last, pieces.first), np.where(back, pieces.first, pieces.last)
+    u0, u1, v0, v1 = np.where(back, u1, u0), np.where(back, u0, u1), np.where(back, v1, v0), np.where(back, v0, v1)
+    slope = (v1 - v0) / (u1 - u0)
+    secant = np.hypot(1.0, slope)
+    sideways = halves * np.abs(slope) / secant  # how far the corners of a butt end reach along the columns
+    low = u0 - np.where(opens, sideways + 1, np.where(before == 2, halves, sideways * before))
+    high = u1 + np.where(closes, sideways + 1, np.where(after == 2, halves, sideways * after))
+    wide, tall = np.where(steep, size[1], size[0]), np.where(steep, size[0], size[1])
+    first = np.clip(np.ceil(low - 0.5), 0, wide).astype(np.int64)
+    columns = np.clip(np.ceil(high - 0.5), 0, wide).astype(np.int64) - first
+    piece, place = _ranges(np.maximum(columns, 0))
+    u = place + first[piece]
+    middle = v0[piece] + slope[piece] * (u + 0.5 - u0[piece])
+    around = (halves * secant + np.abs(slope) / 2)[piece]
+    most = tall[piece]
+    top = np.clip(np.floor(middle - around), 0, most).astype(np.int64)
+    rows = np.clip(np.floor(middle + around) + 1, 0, most).astype(np.int64) - top
+    column, place = _ranges(np.maximum(rows, 0))
+    stride = np.where(steep, 1, size[0])
+    start = u * np.where(steep, size[0], 1)[piece] + top * stride[piece]
+    pixels = start[column] + place * stride[piece][column]
+    if hidden is not None:
+        seen = np.flatnonzero(~hidden[pixels])
+        column, place, pixels = column[seen], place[seen], pixels[seen]
+    origin = piece[column]
+    beside = ((top - middle).astype(np.float32) + np.float32(0.5))[column] + place
+    within = np.ones(len(pixels), np.float32)
+    for end, is_end, sign in ((u0, opens, -1.0), (u1, closes, 1.0)):
+        near = np.flatnonzero(is_end[origin])
+        at = origin[near]
+        # along the piece, from its end outwards
+        beyond = (sign * (u[column[near]] + 0.5 - end[at])) * secant[at] + sign * slope[at] / secant[at] * beside[near]
+        within[near] *= np.clip(0.5 - beyond, 0, 1)
+    return Strokes(
+        pieces.owners[origin],
+        pixels,
+        beside.astype(np.float32),
+        slope.astype(np.float32)[origin],
+        secant.astype(np.float32)[origin],
+        within,
+    )
 
 
-def _mask(pixels: IntArray, share: FloatArray) -> Mask:
-    touched = share > 1e-3
-    return Mask(pixels[touched], share[touched])
+def _turned(points: FloatArray, steep: BoolArray) -> tuple[FloatArray, FloatArray]:
+    return np.where(steep, points[:, 1], points[:, 0]), np.where(steep, points[:, 0], points[:, 1])
 
 
-def disc(centre: Point, radius: float, size: Size) -> Mask:
-    """A filled circle."""
-    pixels, x, y = _window(centre[0] - radius, centre[1] - radius, centre[0] + radius, centre[1] + radius, size)
-    return _mask(pixels, np.clip(radius + 0.5 - np.hypot(x - centre[0], y - centre[1]), 0.0, 1.0))
+def _ranges(counts: IntArray) -> tuple[IntArray, IntArray]:
+    """0…count-1 for each count, one after the other: which count, and the number."""
+    which = np.repeat(np.arange(len(counts)), counts)
+    return which, np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
-def ring(centre: Point, radius: float, width: float, size: Size) -> Mask:
-    """A circle's outline."""
-    outer = radius + width / 2
-    pixels, x, y = _window(centre[0] - outer, centre[1] - outer, centre[0] + outer, centre[1] + outer, size)
-    away = np.abs(np.hypot(x - centre[0], y - centre[1]) - radius)
-    return _mask(pixels, _band(away, width))
+def _boxes(low: FloatArray, high: FloatArray, size: Size) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    """The pixels of boxes (n, 2) to (n, 2): which box, the pixel, and where its centre is."""
+    first = np.clip(np.floor(low), 0, size).astype(np.int64)
+    count = np.maximum(np.clip(np.ceil(high), 0, size).astype(np.int64) - first, 0)
+    line, place = _ranges(count[:, 1] * (count[:, 0] > 0))
+    y = place + first[line, 1]
+    row, place = _ranges(count[line, 0])
+    x = place + first[line, 0][row]
+    y = y[row]
+    return line[row], y * size[0] + x, x + 0.5, y + 0.5
 
 
-def _band(away: FloatArray, width: float) -> FloatArray:
-    share: FloatArray = np.clip(np.minimum(width / 2, away + 0.5) - np.maximum(-width / 2, away - 0.5), 0.0, 1.0)
-    return share
+def _fragments(owners: IntArray, pixels: IntArray, shares: FloatArray) -> Fragments:
+    there = shares > LEAST
+    return Fragments(owners[there], pixels[there], shares[there].astype(np.float32))
+
+
+def discs(centres: FloatArray, radii: FloatArray, size: Size) -> Fragments:
+    """Filled circles."""
+    which, pixels, x, y = _boxes(centres - radii[:, None] - 1, centres + radii[:, None] + 1, size)
+    away = np.hypot(x - centres[which, 0], y - centres[which, 1])
+    return _fragments(which, pixels, np.clip(radii[which] + 0.5 - away, 0, 1))
+
+
+def rings(centres: FloatArray, radii: FloatArray, widths: FloatArray, size: Size) -> Fragments:
+    """Outlines of circles."""
+    reach = (radii + widths / 2)[:, None] + 1
+    which, pixels, x, y = _boxes(centres - reach, centres + reach, size)
+    away = np.abs(np.hypot(x - centres[which, 0], y - centres[which, 1]) - radii[which])
+    return _fragments(which, pixels, _line(away, widths[which] / 2))
+
+
+def _line(away: FloatArray, half: FloatArray | float) -> FloatArray:
+    result: FloatArray = np.clip(np.minimum(half, away + 0.5) - np.maximum(-half, away - 0.5), 0, 1)
+    return result
+
+
+def heads(
+    tips: FloatArray, ways: FloatArray, lengths: FloatArray, halves: FloatArray, notch: float, size: Size
+) -> Fragments:
+    """Arrowheads: at ``tips``, pointing along the unit vectors ``ways``, with a notch at a share of the length."""
+    backs = tips - lengths[:, None] * ways
+    across = halves[:, None] * np.stack([-ways[:, 1], ways[:, 0]], axis=1)
+    corners = np.stack([tips, backs + across, backs - across])
+    which, pixels, x, y = _boxes(corners.min(axis=0) - 1, corners.max(axis=0) + 1, size)
+    x, y = x - tips[which, 0], y - tips[which, 1]
+    dx, dy, long, half = ways[which, 0], ways[which, 1], lengths[which], halves[which]
+    along, aside = -(x * dx + y * dy), np.abs(x * dy - y * dx)
+    cosine = long / np.hypot(long, half)  # of half the angle at the tip
+    share = _line(aside * cosine, half * along / np.where(long > 0, long, 1) * cosine)
+    back = (1 - notch) * long
+    inside = (notch * long * half + back * aside - half * along) / np.hypot(half, back)
+    return _fragments(which, pixels, share * np.clip(inside + 0.5, 0, 1))
+
+
+def rectangle(corner: Point, extent: Point, radius: float, size: Size) -> Fragments:
+    """A filled rectangle with round corners."""
+    which, pixels, away = _beyond_rounded(corner, extent, radius, 1, size)
+    return _fragments(which, pixels, np.clip(0.5 - away, 0, 1))
+
+
+def outline(corner: Point, extent: Point, radius: float, width: float, size: Size) -> Fragments:
+    """The outline of a rectangle with round corners."""
+    which, pixels, away = _beyond_rounded(corner, extent, radius, 1 + width, size)
+    return _fragments(which, pixels, _line(np.abs(away), width / 2))
 
 
 def _beyond_rounded(
     corner: Point, extent: Point, radius: float, reach: float, size: Size
-) -> tuple[IntArray, FloatArray]:
+) -> tuple[IntArray, IntArray, FloatArray]:
     """Signed distances to a rectangle with round corners, negative inside."""
-    (x0, y0), (wide, high) = corner, extent
-    pixels, x, y = _window(x0 - reach, y0 - reach, x0 + wide + reach, y0 + high + reach, size)
+    low, (wide, high) = np.array([corner]), extent
+    which, pixels, x, y = _boxes(low - reach, low + extent + reach, size)
     radius = min(radius, wide / 2, high / 2)
-    over_x = np.abs(x - x0 - wide / 2) - wide / 2 + radius
-    over_y = np.abs(y - y0 - high / 2) - high / 2 + radius
+    over_x = np.abs(x - corner[0] - wide / 2) - wide / 2 + radius
+    over_y = np.abs(y - corner[1] - high / 2) - high / 2 + radius
     outside = np.hypot(np.maximum(over_x, 0), np.maximum(over_y, 0))
-    return pixels, outside + np.minimum(np.maximum(over_x, over_y), 0) - radius
+    return which, pixels, outside + np.minimum(np.maximum(over_x, over_y), 0) - radius
 
 
-def rectangle(corner: Point, extent: Point, radius: float, size: Size) -> Mask:
-    """A filled rectangle with round corners."""
-    pixels, away = _beyond_rounded(corner, extent, radius, 1, size)
-    return _mask(pixels, np.clip(0.5 - away, 0.0, 1.0))
+def dashed(points: Sequence[Point], width: float, dash: Sequence[float], size: Size) -> Fragments:
+    """A dashed stroke with round caps: dots along its dashes, a quarter of a pixel apart or less than a tenth of the
+    width, of which the nearest to a pixel counts."""
+    spacing = max(0.25, width / 32)
+    control = np.asarray(points, float)
+    pieces = flatten(control, np.array([0, len(control)]))
+    corners = np.concatenate([pieces.starts, pieces.ends[-1:]])
+    lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
+    at = np.arange(0, lengths[-1], spacing)
+    place = np.mod(at, sum(dash))
+    at = at[(place <= dash[0]) | (place > sum(dash) - spacing / 2)]
+    dots = np.stack([np.interp(at, lengths, corners[:, 0]), np.interp(at, lengths, corners[:, 1])], axis=1)
+    radii = np.full(len(dots), width / 2)
+    many = max(1, int(_MOST_DOTTED / (width + 3) ** 2))
+    shares = np.zeros(size[0] * size[1], np.float32)
+    for start in range(0, len(dots), many):
+        found = discs(dots[start : start + many], radii[start : start + many], size)
+        np.maximum.at(shares, found.pixels, found.shares)
+    pixels = np.flatnonzero(shares)
+    return Fragments(np.zeros(len(pixels), np.int64), pixels, shares[pixels])
 
 
-def outline(corner: Point, extent: Point, radius: float, width: float, size: Size) -> Mask:
-    """The outline of a rectangle with round corners."""
-    pixels, away = _beyond_rounded(corner, extent, radius, 1 + width, size)
-    return _mask(pixels, _band(np.abs(away), width))
-
-
-def polygon(points: Sequence[Point], size: Size, grid: int = 8) -> Mask:
-    """A filled polygon, by the even-odd rule, where its edges run on a grid of ``grid`` by ``grid`` points a pixel."""
-    corners = np.asarray(points, float)
-    (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
-    pixels, x, y = _window(x0, y0, x1, y1, size)
-    share = _inside(corners, x, y).astype(float)
-    steps = (np.arange(grid) + 0.5) / grid - 0.5
-    dx, dy = (a.ravel() for a in np.meshgrid(steps, steps))
-    edge = np.flatnonzero(_at_an_edge(corners, x, y))
-    together = max(1, _MOST_PAIRS // grid**2)
-    for start in range(0, len(edge), together):
-        some = edge[start : start + together]
-        share[some] = _inside(corners, x[some, None] + dx, y[some, None] + dy).mean(axis=1)
-    return _mask(pixels, share)
-
-
-def _inside(corners: FloatArray, x: FloatArray, y: FloatArray) -> npt.NDArray[np.bool_]:
-    """Which points lie within a polygon."""
-    inside = np.zeros(x.shape, bool)
-    for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        if ay != by:
-            inside ^= ((ay > y) != (by > y)) & (x < ax + (y - ay) * (bx - ax) / (by - ay))
-    return inside
-
-
-def _at_an_edge(corners: FloatArray, x: FloatArray, y: FloatArray) -> npt.NDArray[np.bool_]:
-    """Which pixels, by their centres, an edge of a polygon may run through."""
-    found = np.zeros(x.shape, bool)
-    for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        dx, dy = bx - ax, by - ay
-        along = np.clip(((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy or 1.0), 0.0, 1.0)
-        found |= (x - ax - along * dx) ** 2 + (y - ay - along * dy) ** 2 < 0.75**2
-    return found
+#: Pixels of dots that are drawn at once.
+_MOST_DOTTED = 1 << 20

@@ -1,6 +1,6 @@
-"""Lettering: texts as masks, by Pillow.
+"""Lettering: texts as fragments, by Pillow.
 
-In: a Text of a Scene. Out: a Mask. The font is Liberation Sans or Arial (what browsers on Linux take for ``Arial``),
+In: a Text of a Scene. Out: Fragments. The font is Liberation Sans or Arial (what browsers on Linux take for ``Arial``),
 else DejaVu Sans, else the scalable font that is part of Pillow: pictures are the same wherever the same font is found.
 """
 
@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from neurovis_renderers.coverage import Mask, Size
+from neurovis_renderers.coverage import Fragments, Size
 from neurovis_spec.scene import HALO, SUBSCRIPT_DROP, SUBSCRIPT_SIZE, Text
 
 #: (regular, bold), the first pair found is taken
@@ -39,8 +39,8 @@ def font(size: float, bold: bool) -> Font:
     return ImageFont.load_default(size)
 
 
-def lettering(text: Text, size: Size, halo: bool = False) -> Mask:
-    """The mask of a text with its subscript, or of its ``halo``, in a picture of this size."""
+def lettering(text: Text, size: Size, halo: bool = False) -> Fragments:
+    """The fragments of a text with its subscript, or of its ``halo``, in a picture of this size."""
     bold = text.weight >= 600
     runs = [(text.text, text.size, 0.0)]
     if text.subscript:
@@ -58,8 +58,9 @@ def lettering(text: Text, size: Size, halo: bool = False) -> Mask:
         at = ((x - left) * _FINER, (text.point[1] + drop - top) * _FINER)
         pen.text(at, words, fill=255, font=made, anchor="ls", stroke_width=stroke)
         x += length
-    share = np.asarray(tile.reduce(_FINER), float) / 255
+    share = np.asarray(tile.reduce(_FINER), np.float32) / 255
     rows, columns = np.nonzero(share)
     rows, columns, share = rows + top, columns + left, share[rows, columns]
     kept = (rows >= 0) & (rows < size[1]) & (columns >= 0) & (columns < size[0])
-    return Mask((rows * size[0] + columns)[kept].astype(np.int64), share[kept])
+    pixels = (rows * size[0] + columns)[kept].astype(np.int64)
+    return Fragments(np.zeros(len(pixels), np.int64), pixels, share[kept])

@@ -1,0 +1,144 @@
+"""A canvas: a Scene as pixels, drawn from the front to the back, so that what others hide costs next to nothing.
+
+In: a Scene. Out: its pixels. A big picture is drawn in bands, one after the other, and the shapes of a band in
+portions: what it takes of memory grows with the picture only by its bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_renderers import coverage
+from neurovis_renderers.coverage import LEAST, BoolArray, FloatArray, Fragments, IntArray, Pieces, Size, Strokes
+from neurovis_renderers.sheet import Sheet, packed, unpacked
+from neurovis_renderers.stack import ORDER_BITS, PIXEL_BITS, Stack
+from neurovis_spec.scene import Scene
+
+Pixels = npt.NDArray[np.uint8]
+
+#: Pixels that are drawn at a time: a picture that has more is drawn in bands, one after the other.
+MOST_AT_ONCE = 1 << PIXEL_BITS
+#: Shapes, pieces of lines, and pixels that may be touched, that are drawn at a time.
+_MOST_SHAPES, _MOST_PIECES, _MOST_TOUCHED = 1 << ORDER_BITS - 1, 1 << 16, 1 << 20
+#: Pixels along the side of a block: a piece of which all blocks are covered is not looked at.
+_BLOCK = 8
+#: So few pieces are drawn without looking whether they are covered.
+_FEW = 256
+
+
+def paint(scene: Scene) -> Pixels:
+    """The picture, (height, width, 3)."""
+    wide, high = scene.pixels
+    sheet, background = Sheet(scene.groups, scene.density), packed(scene.theme.background)
+    colours = np.array(sheet.colours, np.int64)
+    picture = np.empty((high, wide, 3), np.uint8)
+    for top, size in bands((wide, high)):
+        stack = Stack(size[0] * size[1])
+        for low, above, opacity in reversed(sheet.parts()):
+            if opacity == 1:
+                for fragments, front in portions(sheet, low, above, top, size, stack.covered):
+                    stack.add(fragments, colours, front)
+            else:
+                stack.add(*veiled(sheet, colours, low, above, top, size, opacity))
+        picture[top : top + size[1]] = unpacked(stack.over(background)).reshape(size[1], wide, 3)
+    return picture
+
+
+def veiled(
+    sheet: Sheet, colours: IntArray, low: int, above: int, top: int, size: Size, opacity: float
+) -> tuple[Fragments, IntArray, int]:
+    """Shapes ``low`` to ``above`` drawn by themselves and then in part: a fragment a pixel, each of its own colour, and
+    the place above them."""
+    inner = Stack(size[0] * size[1])
+    for fragments, front in portions(sheet, low, above, top, size, inner.covered):
+        inner.add(fragments, colours, front)
+    return inner.veil(opacity)
+
+
+def bands(size: Size) -> Iterator[tuple[int, Size]]:
+    """The bands of a picture: the row that each begins with, and its size."""
+    rows = max(1, MOST_AT_ONCE // size[0])
+    for top in range(0, size[1], rows):
+        yield top, (size[0], min(rows, size[1] - top))
+
+
+def portions(
+    sheet: Sheet, low: int, high: int, top: int, size: Size, covered: BoolArray
+) -> Iterator[tuple[Fragments, int]]:
+    """The fragments of shapes ``low`` to ``high`` in a band, from the front to the back in portions, each with the
+    place above its shapes. Pixels that are ``covered`` by then get none."""
+    while high > low:
+        least, pieces = _portion(sheet, low, high, top, size, covered)
+        solid = sheet.solid(least, high, top, size)
+        parts = [solid.only(~covered[solid.pixels])]
+        for some in _in_parts(pieces, _touched(sheet, pieces, size)):
+            parts.append(stroked(sheet, sheet.strokes(some, top, size, covered)))
+            yield coverage.joined(parts), high
+            parts = []
+        if parts:
+            yield parts[0], high
+        high = least
+
+
+def stroked(sheet: Sheet, made: Strokes) -> Fragments:
+    """Strokes of the widths that their shapes have."""
+    shares = made.shares(sheet.halves[made.owners]) * sheet.opacities[made.owners]
+    return Fragments(made.owners, made.pixels, shares).only(shares > LEAST)
+
+
+def _portion(
+    sheet: Sheet, low: int, high: int, top: int, size: Size, covered: BoolArray
+) -> tuple[int, Pieces]:
+    """The next shapes from ``high`` down that are drawn at once: the first of them, and their pieces that are seen."""
+    area = np.minimum(np.cumsum(sheet.areas[low:high][::-1]), np.inf)
+    least = max(low, high - _MOST_SHAPES, high - max(1, int(np.searchsorted(area, _MOST_TOUCHED, side="right"))))
+    owners = sheet.pieces.owners
+    begin, end = np.searchsorted(owners, (least, high))
+    if end - begin > _MOST_PIECES:
+        begin = end - _MOST_PIECES
+        least = min(int(owners[begin - 1]) + 1, high - 1)
+        begin = int(np.searchsorted(owners, least))
+    pieces = _seen(sheet, sheet.pieces.only(slice(begin, end)), top, size, covered)
+    total = np.cumsum(_touched(sheet, pieces, size)[::-1])[::-1]
+    if len(total) and total[0] > _MOST_TOUCHED:
+        beyond = int(np.searchsorted(-total, -_MOST_TOUCHED))
+        least = max(least, min(int(pieces.owners[beyond - 1]) + 1, high - 1))
+        pieces = pieces.only(pieces.owners >= least)
+    return least, pieces
+
+
+def _touched(sheet: Sheet, pieces: Pieces, size: Size) -> FloatArray:
+    """How many pixels pieces touch, about."""
+    halves = sheet.halves[pieces.owners]
+    length = np.abs(pieces.ends - pieces.starts).max(axis=1) + 1 + halves * (pieces.before + pieces.after)
+    result: FloatArray = np.minimum(length, max(size)) * np.minimum(2.9 * halves + 2, max(size))
+    return result
+
+
+def _in_parts(pieces: Pieces, touched: FloatArray) -> Iterator[Pieces]:
+    """Pieces, from the last to the first, as many at a time as touch no more pixels than are drawn at once."""
+    part = (np.cumsum(touched[::-1])[::-1] / _MOST_TOUCHED).astype(np.int64)
+    for number in np.unique(part).tolist():
+        yield pieces.only(part == number)
+
+
+def _seen(sheet: Sheet, pieces: Pieces, top: int, size: Size, covered: BoolArray) -> Pieces:
+    """Pieces without those that lie outside the band, or behind what is covered."""
+    low, high = coverage.extent(pieces, sheet.halves[pieces.owners].astype(float))
+    shift = np.array([0, top])
+    low, high = low - shift, high - shift
+    inside = ((low < size) & (high > 0)).all(axis=1)
+    if len(pieces) < _FEW:
+        return pieces.only(inside)
+    across, down = -(-size[0] // _BLOCK), -(-size[1] // _BLOCK)
+    padded = np.ones((down * _BLOCK, across * _BLOCK), bool)
+    padded[: size[1], : size[0]] = covered.reshape(size[1], size[0])
+    open_blocks = ~padded.reshape(down, _BLOCK, across, _BLOCK).all(axis=(1, 3))
+    sums = np.zeros((down + 1, across + 1), np.int32)
+    sums[1:, 1:] = open_blocks.cumsum(axis=0).cumsum(axis=1)
+    x0, y0 = np.clip(low // _BLOCK, 0, (across, down)).astype(np.int64).T
+    x1, y1 = np.clip(high // _BLOCK + 1, 0, (across, down)).astype(np.int64).T
+    return pieces.only(inside & (sums[y1, x1] - sums[y0, x1] - sums[y1, x0] + sums[y0, x0] > 0))

@@ -1,0 +1,250 @@
+"""A sheet: the shapes of a scene as arrays in pixels, from which fragments are made for any part of its order.
+
+In: a Scene. Out: for shapes ``low`` to ``high`` of its order from back to front their fragments. A shape of a scene is
+one or two things here: a disc is its filling and its ring, a text its halo and its letters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from itertools import chain
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_renderers import coverage
+from neurovis_renderers.coverage import BoolArray, FloatArray, Fragments, IntArray, Numbers, Pieces, Size, Strokes
+from neurovis_renderers.lettering import lettering
+from neurovis_spec.scene import Arrowhead, Disc, Group, Point, Ramp, Rectangle, Scene, Shape, Spline, Text, channels
+
+#: A colour and its weight are whole numbers: red, green and blue times a weight of at most ``WHOLE`` stand side by side
+#: in one integer of 64 bits, ``LANE`` bits each, and are added at once.
+WHOLE, LANE = 1 << 13, 21
+
+
+def packed(colour: str) -> int:
+    """A colour as an integer of three lanes."""
+    red, green, blue = channels(colour)
+    return red | green << LANE | blue << 2 * LANE
+
+
+def packed_all(colours: npt.NDArray[np.uint8]) -> IntArray:
+    """Colours (n, 3) as integers of three lanes."""
+    wide = colours.astype(np.int64)
+    result: IntArray = wide[:, 0] | wide[:, 1] << LANE | wide[:, 2] << 2 * LANE
+    return result
+
+
+def unpacked(sums: IntArray) -> npt.NDArray[np.uint8]:
+    """Sums of colours times weights that add up to ``WHOLE``, as colours (n, 3)."""
+    result = np.empty((len(sums), 3), np.uint8)
+    for lane in range(3):
+        value = sums >> (lane * LANE)
+        value &= (1 << LANE) - 1
+        value += WHOLE // 2
+        value >>= 13
+        result[:, lane] = value
+    return result
+
+
+class Sheet:
+    """The shapes of groups, each with its place in the order (0 is the furthest back), its colour and its opacity."""
+
+    def __init__(self, groups: Sequence[Group], density: float) -> None:
+        self.density = density
+        self.colours: list[int] = []
+        #: where each shape of a group begins in the order: ``places[group][shape]``
+        self.places: list[list[int]] = []
+        #: groups with an opacity of their own: first and last place, opacity
+        self.veiled: list[tuple[int, int, float]] = []
+        self._splines: list[tuple[int, Spline]] = []
+        self._heads: list[tuple[int, Arrowhead]] = []
+        self._discs: list[tuple[int, Disc]] = []
+        self._others: list[tuple[int, Shape]] = []
+        for group in groups:
+            begin = len(self.colours)
+            self.places.append([self._add(shape) for shape in group.shapes])
+            if group.opacity != 1:
+                self.veiled.append((begin, len(self.colours), group.opacity))
+
+    def __len__(self) -> int:
+        return len(self.colours)
+
+    def _add(self, shape: Shape) -> int:
+        place = len(self.colours)
+        match shape:
+            case Spline() if not shape.dash:
+                self._splines.append((place, shape))
+                self.colours.append(packed(shape.stroke))
+            case Arrowhead():
+                self._heads.append((place, shape))
+                self.colours.append(packed(shape.fill))
+            case Disc():
+                self._discs.append((place, shape))
+                self.colours += [packed(shape.fill), packed(shape.stroke)]
+            case Spline():
+                self._others.append((place, shape))
+                self.colours.append(packed(shape.stroke))
+            case Rectangle():
+                self._others.append((place, shape))
+                self.colours += [packed(shape.fill), packed(shape.stroke)]
+            case Ramp():
+                self._others.append((place, shape))
+                self.colours += [packed(colour) for colour in shape.colours]
+            case Text():
+                self._others.append((place, shape))
+                self.colours += [packed(colour) for colour in (shape.halo, shape.fill) if colour]
+        return place
+
+    def parts(self) -> list[tuple[int, int, float]]:
+        """The order in parts that are drawn each as one: first place, the place above the last, opacity."""
+        result, low = [], 0
+        for begin, end, opacity in (*self.veiled, (len(self), len(self), 1.0)):
+            if begin > low:
+                result.append((low, begin, 1.0))
+            if end > begin:
+                result.append((begin, end, opacity))
+            low = end
+        return result
+
+    @cached_property
+    def areas(self) -> FloatArray:
+        """How many pixels each shape may touch, by its place; without solid splines."""
+        result = np.zeros(len(self))
+        places, table = self._head_arrays
+        result[places] = (table[:, 4] + 2 * table[:, 5] + 2) ** 2
+        places, table = self._disc_arrays
+        result[places] = (2 * table[:, 2] + 2) ** 2
+        for place, shape in self._others:
+            if isinstance(shape, Rectangle | Ramp):
+                result[place] = shape.width * shape.height * self.density**2
+        return result
+
+    @cached_property
+    def pieces(self) -> Pieces:
+        """All solid splines as straight pieces, by the order of their shapes; a piece's owner is its place."""
+        points = np.array(list(chain.from_iterable(shape.points for _, shape in self._splines)), float).reshape(-1, 2)
+        begins = np.concatenate([[0], np.cumsum([len(shape.points) for _, shape in self._splines])]).astype(np.int64)
+        found = coverage.flatten(points * self.density, begins)
+        places = np.array([place for place, _ in self._splines], np.int64)
+        return replace(found, owners=places[found.owners])
+
+    @cached_property
+    def halves(self) -> Numbers:
+        """Half the width of each solid spline in pixels, by its place."""
+        result = np.zeros(len(self), np.float32)
+        result[[place for place, _ in self._splines]] = [shape.width * self.density / 2 for _, shape in self._splines]
+        return result
+
+    @cached_property
+    def opacities(self) -> Numbers:
+        """The opacity of each shape by itself, by its place."""
+        result = np.ones(len(self), np.float32)
+        result[[place for place, _ in self._splines]] = [shape.opacity for _, shape in self._splines]
+        for place, shape in self._others:
+            if isinstance(shape, Spline):
+                result[place] = shape.opacity
+        return result
+
+    @cached_property
+    def _head_arrays(self) -> tuple[IntArray, FloatArray]:
+        rows = [(*head.tip, *head.direction, head.length, head.half_width) for _, head in self._heads]
+        table = np.array(rows, float).reshape(-1, 6)
+        table[:, [0, 1, 4, 5]] *= self.density
+        return np.array([place for place, _ in self._heads], np.int64), table
+
+    @cached_property
+    def _disc_arrays(self) -> tuple[IntArray, FloatArray]:
+        rows = [(*disc.centre, disc.radius, disc.stroke_width) for _, disc in self._discs]
+        table = np.array(rows, float).reshape(-1, 4) * self.density
+        return np.array([place for place, _ in self._discs], np.int64), table
+
+    def solid(self, low: int, high: int, top: int, size: Size) -> Fragments:
+        """The fragments of all but solid splines, of shapes ``low`` to ``high``, in rows from ``top`` on."""
+        found = []
+        places, table = _between(*self._head_arrays, low, high)
+        if len(places):
+            tips = table[:, :2] - (0, top)
+            near = _reaches(tips[:, 1], table[:, 4] + table[:, 5], size)
+            made = coverage.heads(
+                tips[near], table[near, 2:4], table[near, 4], table[near, 5], Arrowhead.NOTCH, size
+            )
+            found.append(_owned(made, places[near]))
+        places, table = _between(*self._disc_arrays, low, high)
+        if len(places):
+            near = _reaches(table[:, 1] - top, table[:, 2] + table[:, 3], size)
+            places, table = places[near], table[near]
+            centres = table[:, :2] - (0, top)
+            found.append(_owned(coverage.discs(centres, table[:, 2], size), places))
+            found.append(_owned(coverage.rings(centres, table[:, 2], table[:, 3], size), places + 1))
+        for place, shape in self._others:
+            if low <= place < high:
+                found += [_owned(part, place + number) for number, part in enumerate(self._other(shape, top, size))]
+        return coverage.joined(found)
+
+    def _other(self, shape: Shape, top: int, size: Size) -> list[Fragments]:
+        density = self.density
+
+        def pixels(point: Point) -> Point:
+            return point[0] * density, point[1] * density - top
+
+        match shape:
+            case Spline():
+                dash = [part * density for part in shape.dash]
+                return [coverage.dashed([pixels(p) for p in shape.points], shape.width * density, dash, size)]
+            case Rectangle():
+                corner, extent = pixels(shape.corner), (shape.width * density, shape.height * density)
+                radius, width = shape.radius * density, shape.stroke_width * density
+                return [
+                    coverage.rectangle(corner, extent, radius, size),
+                    coverage.outline(corner, extent, radius, width, size),
+                ]
+            case Ramp():
+                return self._ramp(shape, pixels(shape.corner), size)
+            case Text():
+                text = replace(shape, point=pixels(shape.point), size=shape.size * density)
+                if not _reaches(np.array([text.point[1]]), np.array([3 * text.size]), size).any():
+                    return []
+                return [lettering(text, size, halo=halo) for halo in (True, False) if shape.halo or not halo]
+            case _:
+                return []
+
+    def _ramp(self, shape: Ramp, near: Point, size: Size) -> list[Fragments]:
+        """Stripes without seams: each is drawn to the end of the ramp, over the one before."""
+        far = near[0] + shape.width * self.density, near[1] + shape.height * self.density
+        step = (far[0] - near[0]) / len(shape.colours)
+        result = []
+        for number in range(len(shape.colours)):
+            corner = (round(near[0] + number * step), round(near[1]))
+            extent = (round(far[0]) - corner[0], round(far[1]) - corner[1])
+            result.append(coverage.rectangle(corner, extent, 0, size))
+        return result
+
+    def strokes(self, pieces: Pieces, top: int, size: Size, hidden: BoolArray | None) -> Strokes:
+        """The solid splines of these pieces, as they run over rows from ``top`` on."""
+        shift = (0, top)
+        pieces = replace(pieces, starts=pieces.starts - shift, ends=pieces.ends - shift)
+        return coverage.strokes(pieces, self.halves[pieces.owners].astype(float), size, hidden)
+
+
+Table = TypeVar("Table", bound=FloatArray)
+
+
+def _between(places: IntArray, table: FloatArray, low: int, high: int) -> tuple[IntArray, FloatArray]:
+    """The rows of shapes ``low`` to ``high``."""
+    some = slice(*np.searchsorted(places, (low, high)))
+    return places[some], table[some]
+
+
+def _reaches(rows: FloatArray, reach: FloatArray, size: Size) -> BoolArray:
+    """Which may reach into the picture, from the row that they are in."""
+    result: BoolArray = (rows + reach > -2) & (rows - reach < size[1] + 2)
+    return result
+
+
+def _owned(part: Fragments, places: IntArray | int) -> Fragments:
+    owners = part.owners + places if isinstance(places, int) else places[part.owners]
+    return replace(part, owners=owners)
