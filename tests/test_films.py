@@ -9,8 +9,9 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 from neurovis_renderers.animated_svg import AnimatedSvgRenderer
+from neurovis_renderers.canvas import paint
 from neurovis_renderers.png import png
-from neurovis_renderers.raster import Canvas, PillowRenderer
+from neurovis_renderers.raster import PillowRenderer
 from neurovis_renderers.svg import SvgRenderer
 from PIL import Image as Pillow
 
@@ -145,7 +146,7 @@ def test_the_animated_svg_fills_and_moves_the_same() -> None:
 
 def test_a_still_of_the_film_has_its_frames_pixels() -> None:
     for frame in range(3):
-        pixels = Canvas(SCENE).paint(still(FILM, frame))
+        pixels = paint(still(FILM, frame))
         x = int(20 + FILM.shift_values[frame, 0, 0])
         assert tuple(pixels[45, x]) == channels(INK)
         for at, value in ((52, 0), (117, 1)):
@@ -171,7 +172,7 @@ def test_cells_are_the_same_in_the_svgs_png_and_in_pixels(shades: int) -> None:
         assert np.array_equal(np.asarray(picture.convert("RGB")), cells)
     image = Image((20, 10), 150, 60, 50, 30, cells.tobytes())
     scene = Scene(200, 100, THEME, "cells", (Group((image,)),))
-    pixels = Canvas(scene).paint(scene)
+    pixels = paint(scene)
     assert np.array_equal(pixels[10:70, 20:170], cells.repeat(2, axis=0).repeat(3, axis=1))
     assert (pixels[:10] == 255).all()
     assert (pixels[:, 170:] == 255).all()

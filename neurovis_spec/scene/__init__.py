@@ -4,7 +4,7 @@ Renderers use what stands here; ``encode``, ``film`` and ``choose_gains`` are in
 """
 
 from neurovis_spec.progress import Progress
-from neurovis_spec.scene.film import filled_shape, still
+from neurovis_spec.scene.film import filled_shape, part, still
 from neurovis_spec.scene.model import (
     HALO,
     HEAD_MORE,
@@ -61,6 +61,7 @@ __all__ = [
     "colours",
     "filled_shape",
     "head_half_width",
+    "part",
     "readable",
     "shifted",
     "still",

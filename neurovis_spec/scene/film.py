@@ -147,3 +147,24 @@ def still(film: Film, frame: int) -> Scene:
         return replace(group, shapes=tuple(shapes), opacity=film.faintness if faint else 1.0)
 
     return replace(film.scene, groups=tuple(repaint(group) for group in film.scene.groups))
+
+
+def part(film: Film, names: Collection[str]) -> Film:
+    """Some groups of a film, by their ids, and how they change."""
+    scene = replace(film.scene, groups=tuple(group for group in film.scene.groups if group.id in names))
+    fills, lines, shifts = (
+        [number for number, name in enumerate(every) if name in names]
+        for every in (film.fills, film.lines, film.shifts)
+    )
+    return replace(
+        film,
+        scene=scene,
+        fills=tuple(film.fills[number] for number in fills),
+        fill_values=film.fill_values[:, fills],
+        lines=tuple(film.lines[number] for number in lines),
+        line_values=film.line_values[:, lines],
+        line_widths=film.line_widths[:, lines],
+        glow_widths=film.glow_widths[:, lines],
+        shifts=tuple(film.shifts[number] for number in shifts),
+        shift_values=film.shift_values[:, shifts] if shifts else film.shift_values[:, :0],
+    )

@@ -7,22 +7,23 @@ portions: what it takes of memory grows with the picture only by its bytes.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from neurovis_renderers import coverage
-from neurovis_renderers.coverage import LEAST, BoolArray, FloatArray, Fragments, IntArray, Pieces, Size, Strokes
+from neurovis_renderers.coverage import LEAST, BoolArray, FloatArray, Fragments, Heads, IntArray, Pieces, Size, Strokes
 from neurovis_renderers.sheet import Sheet, packed, unpacked
-from neurovis_renderers.stack import ORDER_BITS, PIXEL_BITS, Stack
+from neurovis_renderers.stack import Stack
 from neurovis_spec.scene import Scene
 
 Pixels = npt.NDArray[np.uint8]
 
 #: Pixels that are drawn at a time: a picture that has more is drawn in bands, one after the other.
-MOST_AT_ONCE = 1 << PIXEL_BITS
+MOST_AT_ONCE = 1 << 21
 #: Shapes, pieces of lines, and pixels that may be touched, that are drawn at a time.
-_MOST_SHAPES, _MOST_PIECES, _MOST_TOUCHED = 1 << ORDER_BITS - 1, 1 << 16, 1 << 20
+_MOST_SHAPES, _MOST_PIECES, _MOST_TOUCHED = 1 << 18, 1 << 16, 1 << 20
 #: Pixels along the side of a block: a piece of which all blocks are covered is not looked at.
 _BLOCK = 8
 #: So few pieces are drawn without looking whether they are covered.
@@ -33,28 +34,30 @@ def paint(scene: Scene) -> Pixels:
     """The picture, (height, width, 3)."""
     wide, high = scene.pixels
     sheet, background = Sheet(scene.groups, scene.density), packed(scene.theme.background)
-    colours = np.array(sheet.colours, np.int64)
     picture = np.empty((high, wide, 3), np.uint8)
     for top, size in bands((wide, high)):
         stack = Stack(size[0] * size[1])
         for low, above, opacity in reversed(sheet.parts()):
             if opacity == 1:
-                for fragments, front in portions(sheet, low, above, top, size, stack.covered):
-                    stack.add(fragments, colours, front)
+                for portion in portions(sheet, low, above, top, size, stack.covered):
+                    _put(stack, sheet, portion)
             else:
-                stack.add(*veiled(sheet, colours, low, above, top, size, opacity))
+                stack.add(*veiled(sheet, low, above, top, size, opacity))
         picture[top : top + size[1]] = unpacked(stack.over(background)).reshape(size[1], wide, 3)
     return picture
 
 
-def veiled(
-    sheet: Sheet, colours: IntArray, low: int, above: int, top: int, size: Size, opacity: float
-) -> tuple[Fragments, IntArray, int]:
+def _put(stack: Stack, sheet: Sheet, portion: Portion) -> None:
+    fragments = portion.fragments(sheet)
+    stack.add(fragments, sheet.paints[fragments.owners], portion.front)
+
+
+def veiled(sheet: Sheet, low: int, above: int, top: int, size: Size, opacity: float) -> tuple[Fragments, IntArray, int]:
     """Shapes ``low`` to ``above`` drawn by themselves and then in part: a fragment a pixel, each of its own colour, and
     the place above them."""
     inner = Stack(size[0] * size[1])
-    for fragments, front in portions(sheet, low, above, top, size, inner.covered):
-        inner.add(fragments, colours, front)
+    for portion in portions(sheet, low, above, top, size, inner.covered):
+        _put(inner, sheet, portion)
     return inner.veil(opacity)
 
 
@@ -65,33 +68,45 @@ def bands(size: Size) -> Iterator[tuple[int, Size]]:
         yield top, (size[0], min(rows, size[1] - top))
 
 
-def portions(
-    sheet: Sheet, low: int, high: int, top: int, size: Size, covered: BoolArray
-) -> Iterator[tuple[Fragments, int]]:
-    """The fragments of shapes ``low`` to ``high`` in a band, from the front to the back in portions, each with the
-    place above its shapes. Pixels that are ``covered`` by then get none."""
+@dataclass(frozen=True, slots=True)
+class Portion:
+    """Some shapes of a band, those before ``front`` in the order: what they touch of pixels that are not covered."""
+
+    front: int
+    solid: Fragments
+    strokes: Strokes
+    heads: Heads
+
+    def fragments(self, sheet: Sheet) -> Fragments:
+        """All of it, with lines and heads as wide as the sheet says."""
+        widths, wedges = sheet.stroke_shares(self.strokes), sheet.head_shares(self.heads)
+        parts = [
+            self.solid,
+            Fragments(self.strokes.owners, self.strokes.pixels, widths),
+            Fragments(self.heads.owners, self.heads.pixels, wedges),
+        ]
+        found = coverage.joined(parts)
+        return found.only(found.shares > LEAST)
+
+
+def portions(sheet: Sheet, low: int, high: int, top: int, size: Size, covered: BoolArray) -> Iterator[Portion]:
+    """Shapes ``low`` to ``high`` in a band, from the front to the back in portions. Whoever reads them marks the pixels
+    that are ``covered`` by then: these get no more."""
     while high > low:
         least, pieces = _portion(sheet, low, high, top, size, covered)
         solid = sheet.solid(least, high, top, size)
-        parts = [solid.only(~covered[solid.pixels])]
-        for some in _in_parts(pieces, _touched(sheet, pieces, size)):
-            parts.append(stroked(sheet, sheet.strokes(some, top, size, covered)))
-            yield coverage.joined(parts), high
-            parts = []
-        if parts:
-            yield parts[0], high
+        solid = solid.only(~covered[solid.pixels])
+        heads = sheet.heads(least, high, top, size)
+        heads = heads.only(~covered[heads.pixels])
+        first, *others = _in_parts(pieces, _touched(sheet, pieces, size))
+        yield Portion(high, solid, sheet.strokes(first, top, size, covered), heads)
+        for some in others:  # of one shape that is larger than what is drawn at once
+            strokes = sheet.strokes(some, top, size, covered)
+            yield Portion(high, coverage.NOTHING, strokes, heads.only(np.zeros(len(heads), bool)))
         high = least
 
 
-def stroked(sheet: Sheet, made: Strokes) -> Fragments:
-    """Strokes of the widths that their shapes have."""
-    shares = made.shares(sheet.halves[made.owners]) * sheet.opacities[made.owners]
-    return Fragments(made.owners, made.pixels, shares).only(shares > LEAST)
-
-
-def _portion(
-    sheet: Sheet, low: int, high: int, top: int, size: Size, covered: BoolArray
-) -> tuple[int, Pieces]:
+def _portion(sheet: Sheet, low: int, high: int, top: int, size: Size, covered: BoolArray) -> tuple[int, Pieces]:
     """The next shapes from ``high`` down that are drawn at once: the first of them, and their pieces that are seen."""
     area = np.minimum(np.cumsum(sheet.areas[low:high][::-1]), np.inf)
     least = max(low, high - _MOST_SHAPES, high - max(1, int(np.searchsorted(area, _MOST_TOUCHED, side="right"))))
@@ -118,11 +133,10 @@ def _touched(sheet: Sheet, pieces: Pieces, size: Size) -> FloatArray:
     return result
 
 
-def _in_parts(pieces: Pieces, touched: FloatArray) -> Iterator[Pieces]:
+def _in_parts(pieces: Pieces, touched: FloatArray) -> list[Pieces]:
     """Pieces, from the last to the first, as many at a time as touch no more pixels than are drawn at once."""
     part = (np.cumsum(touched[::-1])[::-1] / _MOST_TOUCHED).astype(np.int64)
-    for number in np.unique(part).tolist():
-        yield pieces.only(part == number)
+    return [pieces.only(part == number) for number in np.unique(part).tolist()] or [pieces]
 
 
 def _seen(sheet: Sheet, pieces: Pieces, top: int, size: Size, covered: BoolArray) -> Pieces:

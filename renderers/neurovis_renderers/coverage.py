@@ -40,12 +40,14 @@ class Fragments:
     def __len__(self) -> int:
         return len(self.pixels)
 
-    def only(self, chosen: BoolArray) -> Fragments:
+    def only(self, chosen: BoolArray | IntArray) -> Fragments:
         """Some of them."""
         return Fragments(self.owners[chosen], self.pixels[chosen], self.shares[chosen])
 
 
-NOTHING = Fragments(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0, np.float32))
+_NOWHERE: IntArray = np.empty(0, np.int64)
+_NO_NUMBERS: Numbers = np.empty(0, np.float32)
+NOTHING = Fragments(_NOWHERE, _NOWHERE, _NO_NUMBERS)
 
 
 def joined(parts: Sequence[Fragments]) -> Fragments:
@@ -61,15 +63,15 @@ def joined(parts: Sequence[Fragments]) -> Fragments:
 
 @dataclass(frozen=True, slots=True)
 class Pieces:
-    """Straight pieces of curves: ends (n, 2), the number of the curve, by how much each is longer at its ends than its
-    neighbours need (in half widths where ``corner``, else by its slope), and whether it is its curve's first or last."""
+    """Straight pieces of curves: where each starts and ends (n, 2), the number of its curve, whether it is the first or
+    the last of it, and how it meets the pieces before and after it."""
 
     starts: FloatArray
     ends: FloatArray
     owners: IntArray
     first: BoolArray
     last: BoolArray
-    #: before and after: 0 where the next piece goes on, 1 where the direction of columns changes, 2 at a corner
+    #: 0 where the next piece goes on, 1 where it is drawn by rows rather than columns or the other way, 2 at a corner
     before: npt.NDArray[np.int8]
     after: npt.NDArray[np.int8]
 
@@ -147,7 +149,8 @@ def _met(starts: FloatArray, ends: FloatArray, owners: IntArray) -> Pieces:
 class Strokes:
     """Where strokes run over pixels: the curve, the pixel, how far its centre lies beside the middle of the stroke,
     counted along its column (or row, where the stroke is steep); by the piece: how fast that changes from column to
-    column, and how much longer a way across is along the column; and what share of the pixel lies before the ends."""
+    column, and how much longer a way across is along the column; what share of the pixel lies before the ends; and the
+    half width from which on the piece reaches so far where it overlaps another."""
 
     owners: IntArray
     pixels: IntArray
@@ -155,6 +158,7 @@ class Strokes:
     slopes: Numbers
     secants: Numbers
     within: Numbers
+    least: Numbers
 
     def __len__(self) -> int:
         return len(self.pixels)
@@ -168,6 +172,7 @@ class Strokes:
             self.slopes[chosen],
             self.secants[chosen],
             self.within[chosen],
+            self.least[chosen],
         )
 
     def shares(self, halves: Numbers) -> Numbers:
@@ -177,6 +182,7 @@ class Strokes:
         both = _band(self.beside + aside, reach)
         both += _band(self.beside - aside, reach)
         both *= 0.5 * self.within
+        both *= halves >= self.least
         return both
 
 
@@ -210,8 +216,10 @@ def strokes(pieces: Pieces, halves: FloatArray, size: Size, hidden: BoolArray | 
     slope = (v1 - v0) / (u1 - u0)
     secant = np.hypot(1.0, slope)
     sideways = halves * np.abs(slope) / secant  # how far the corners of a butt end reach along the columns
-    low = u0 - np.where(opens, sideways + 1, np.where(before == 2, halves, sideways * before))
-    high = u1 + np.where(closes, sideways + 1, np.where(after == 2, halves, sideways * after))
+    share = sideways / np.maximum(halves, 1e-9)
+    ahead, behind = np.where(before == 2, 1.0, share * before), np.where(after == 2, 1.0, share * after)
+    low = u0 - np.where(opens, sideways + 1, halves * ahead)
+    high = u1 + np.where(closes, sideways + 1, halves * behind)
     wide, tall = np.where(steep, size[1], size[0]), np.where(steep, size[0], size[1])
     first = np.clip(np.ceil(low - 0.5), 0, wide).astype(np.int64)
     columns = np.clip(np.ceil(high - 0.5), 0, wide).astype(np.int64) - first
@@ -231,6 +239,11 @@ def strokes(pieces: Pieces, halves: FloatArray, size: Size, hidden: BoolArray | 
         column, place, pixels = column[seen], place[seen], pixels[seen]
     origin = piece[column]
     beside = ((top - middle).astype(np.float32) + np.float32(0.5))[column] + place
+    least = np.zeros(len(u))
+    for end, is_end, reach, sign in ((u0, opens, ahead, -1.0), (u1, closes, behind, 1.0)):
+        over = np.flatnonzero(~is_end[piece] & (sign * (u + 0.5 - end[piece]) > 0))
+        at = piece[over]
+        least[over] = sign * (u[over] + 0.5 - end[at]) / np.maximum(reach[at], 1e-9)
     within = np.ones(len(pixels), np.float32)
     for end, is_end, sign in ((u0, opens, -1.0), (u1, closes, 1.0)):
         near = np.flatnonzero(is_end[origin])
@@ -245,6 +258,7 @@ def strokes(pieces: Pieces, halves: FloatArray, size: Size, hidden: BoolArray | 
         slope.astype(np.float32)[origin],
         secant.astype(np.float32)[origin],
         within,
+        np.minimum(least, 1e30).astype(np.float32)[column],
     )
 
 
@@ -295,22 +309,68 @@ def _line(away: FloatArray, half: FloatArray | float) -> FloatArray:
     return result
 
 
-def heads(
-    tips: FloatArray, ways: FloatArray, lengths: FloatArray, halves: FloatArray, notch: float, size: Size
-) -> Fragments:
-    """Arrowheads: at ``tips``, pointing along the unit vectors ``ways``, with a notch at a share of the length."""
+@dataclass(frozen=True, slots=True)
+class Heads:
+    """Where heads of lines lie over pixels: the head, the pixel, and how far its centre lies behind the tip and beside
+    the middle."""
+
+    owners: IntArray
+    pixels: IntArray
+    behind: Numbers
+    beside: Numbers
+
+    def __len__(self) -> int:
+        return len(self.pixels)
+
+    def only(self, chosen: BoolArray | IntArray) -> Heads:
+        """Some of them."""
+        return Heads(self.owners[chosen], self.pixels[chosen], self.behind[chosen], self.beside[chosen])
+
+    def shares(self, lengths: Numbers, halves: Numbers, notch: float) -> Numbers:
+        """What heads cover of their pixels if they are so long and so wide, (n,) half widths, with a notch at a share
+        of the length."""
+        cosine = np.divide(lengths, np.hypot(lengths, halves), dtype=np.float32)  # of half the angle at the tip
+        reach = np.divide(halves * self.behind, np.maximum(lengths, np.float32(1e-6)), dtype=np.float32)
+        share = _band(self.beside * cosine, reach * cosine)
+        back = np.float32(1 - notch) * lengths
+        inside = np.float32(notch) * lengths * halves + back * self.beside - halves * self.behind
+        inside /= np.maximum(np.hypot(halves, back), np.float32(1e-6))
+        share *= np.clip(inside + np.float32(0.5), 0, 1)
+        return share
+
+
+def heads(tips: FloatArray, ways: FloatArray, lengths: FloatArray, halves: FloatArray, size: Size) -> Heads:
+    """The pixels of heads: at ``tips``, along the unit vectors ``ways``, (n,) long and half as wide."""
     backs = tips - lengths[:, None] * ways
     across = halves[:, None] * np.stack([-ways[:, 1], ways[:, 0]], axis=1)
-    corners = np.stack([tips, backs + across, backs - across])
+    corners = np.stack([tips + across, tips - across, backs + across, backs - across])
     which, pixels, x, y = _boxes(corners.min(axis=0) - 1, corners.max(axis=0) + 1, size)
     x, y = x - tips[which, 0], y - tips[which, 1]
-    dx, dy, long, half = ways[which, 0], ways[which, 1], lengths[which], halves[which]
-    along, aside = -(x * dx + y * dy), np.abs(x * dy - y * dx)
-    cosine = long / np.hypot(long, half)  # of half the angle at the tip
-    share = _line(aside * cosine, half * along / np.where(long > 0, long, 1) * cosine)
-    back = (1 - notch) * long
-    inside = (notch * long * half + back * aside - half * along) / np.hypot(half, back)
-    return _fragments(which, pixels, share * np.clip(inside + 0.5, 0, 1))
+    dx, dy = ways[which, 0], ways[which, 1]
+    return Heads(which, pixels, -(x * dx + y * dy).astype(np.float32), np.abs(x * dy - y * dx).astype(np.float32))
+
+
+def all_heads(parts: Sequence[Heads]) -> Heads:
+    """Those of several."""
+    return Heads(
+        np.concatenate([_NOWHERE, *(part.owners for part in parts)]),
+        np.concatenate([_NOWHERE, *(part.pixels for part in parts)]),
+        np.concatenate([_NO_NUMBERS, *(part.behind for part in parts)]),
+        np.concatenate([_NO_NUMBERS, *(part.beside for part in parts)]),
+    )
+
+
+def all_strokes(parts: Sequence[Strokes]) -> Strokes:
+    """Those of several."""
+    return Strokes(
+        np.concatenate([_NOWHERE, *(part.owners for part in parts)]),
+        np.concatenate([_NOWHERE, *(part.pixels for part in parts)]),
+        np.concatenate([_NO_NUMBERS, *(part.beside for part in parts)]),
+        np.concatenate([_NO_NUMBERS, *(part.slopes for part in parts)]),
+        np.concatenate([_NO_NUMBERS, *(part.secants for part in parts)]),
+        np.concatenate([_NO_NUMBERS, *(part.within for part in parts)]),
+        np.concatenate([_NO_NUMBERS, *(part.least for part in parts)]),
+    )
 
 
 def rectangle(corner: Point, extent: Point, radius: float, size: Size) -> Fragments:
@@ -336,6 +396,20 @@ def _beyond_rounded(
     over_y = np.abs(y - corner[1] - high / 2) - high / 2 + radius
     outside = np.hypot(np.maximum(over_x, 0), np.maximum(over_y, 0))
     return which, pixels, outside + np.minimum(np.maximum(over_x, over_y), 0) - radius
+
+
+def cells(corner: Point, extent: Point, columns: int, rows: int, size: Size) -> tuple[IntArray, IntArray]:
+    """The pixels of an image of cells, and the cell in which the centre of each lies."""
+    across, x = _cells(corner[0], corner[0] + extent[0], columns, size[0])
+    down, y = _cells(corner[1], corner[1] + extent[1], rows, size[1])
+    return (y[:, None] * size[0] + x).ravel(), (down[:, None] * columns + across).ravel()
+
+
+def _cells(near: float, far: float, count: int, end: int) -> tuple[IntArray, IntArray]:
+    """Of ``count`` cells from ``near`` to ``far`` the one at each pixel of a side of ``end`` pixels, and these."""
+    pixels = np.arange(max(0, round(near)), min(end, round(far)))
+    which = np.floor((pixels + 0.5 - near) / max(far - near, 1e-9) * count).astype(np.int64)
+    return np.clip(which, 0, count - 1), pixels
 
 
 def dashed(points: Sequence[Point], width: float, dash: Sequence[float], size: Size) -> Fragments:

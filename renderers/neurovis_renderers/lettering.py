@@ -58,7 +58,7 @@ def lettering(text: Text, size: Size, halo: bool = False) -> Fragments:
         at = ((x - left) * _FINER, (text.point[1] + drop - top) * _FINER)
         pen.text(at, words, fill=255, font=made, anchor="ls", stroke_width=stroke)
         x += length
-    share = np.asarray(tile.reduce(_FINER), np.float32) / 255
+    share = np.asarray(tile.reduce(_FINER), np.float32) / np.float32(255)
     rows, columns = np.nonzero(share)
     rows, columns, share = rows + top, columns + left, share[rows, columns]
     kept = (rows >= 0) & (rows < size[1]) & (columns >= 0) & (columns < size[0])

@@ -1,24 +1,34 @@
 """A sheet: the shapes of a scene as arrays in pixels, from which fragments are made for any part of its order.
 
-In: a Scene. Out: for shapes ``low`` to ``high`` of its order from back to front their fragments. A shape of a scene is
-one or two things here: a disc is its filling and its ring, a text its halo and its letters.
+In: groups of a Scene. Out: for shapes ``low`` to ``high`` of their order from back to front the fragments. A shape of
+a scene may have several places in the order: a disc has one for its filling and one for its ring.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from itertools import chain
-from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from neurovis_renderers import coverage
-from neurovis_renderers.coverage import BoolArray, FloatArray, Fragments, IntArray, Numbers, Pieces, Size, Strokes
+from neurovis_renderers.coverage import (
+    BoolArray,
+    FloatArray,
+    Fragments,
+    Heads,
+    IntArray,
+    Numbers,
+    Pieces,
+    Size,
+    Strokes,
+)
 from neurovis_renderers.lettering import lettering
-from neurovis_spec.scene import Arrowhead, Disc, Group, Point, Ramp, Rectangle, Scene, Shape, Spline, Text, channels
+from neurovis_spec.scene import Arrowhead, Disc, Group, Image, Point, Ramp, Rectangle, Shape, Spline, Text
 
 #: A colour and its weight are whole numbers: red, green and blue times a weight of at most ``WHOLE`` stand side by side
 #: in one integer of 64 bits, ``LANE`` bits each, and are added at once.
@@ -27,8 +37,8 @@ WHOLE, LANE = 1 << 13, 21
 
 def packed(colour: str) -> int:
     """A colour as an integer of three lanes."""
-    red, green, blue = channels(colour)
-    return red | green << LANE | blue << 2 * LANE
+    number = int(colour[1:], 16)
+    return number >> 16 | (number >> 8 & 255) << LANE | (number & 255) << 2 * LANE
 
 
 def packed_all(colours: npt.NDArray[np.uint8]) -> IntArray:
@@ -53,7 +63,8 @@ def unpacked(sums: IntArray) -> npt.NDArray[np.uint8]:
 class Sheet:
     """The shapes of groups, each with its place in the order (0 is the furthest back), its colour and its opacity."""
 
-    def __init__(self, groups: Sequence[Group], density: float) -> None:
+    def __init__(self, groups: Sequence[Group], density: float, left_out: Collection[str] = ()) -> None:
+        """Groups whose id is in ``left_out`` have their places, but nothing is drawn there."""
         self.density = density
         self.colours: list[int] = []
         #: where each shape of a group begins in the order: ``places[group][shape]``
@@ -63,9 +74,14 @@ class Sheet:
         self._splines: list[tuple[int, Spline]] = []
         self._heads: list[tuple[int, Arrowhead]] = []
         self._discs: list[tuple[int, Disc]] = []
-        self._others: list[tuple[int, Shape]] = []
+        #: first place, the place above the last
+        self._others: list[tuple[int, int, Shape]] = []
         for group in groups:
             begin = len(self.colours)
+            if group.id in left_out:
+                self.places.append([begin])
+                self.colours.append(0)
+                continue
             self.places.append([self._add(shape) for shape in group.shapes])
             if group.opacity != 1:
                 self.veiled.append((begin, len(self.colours), group.opacity))
@@ -75,29 +91,37 @@ class Sheet:
 
     def _add(self, shape: Shape) -> int:
         place = len(self.colours)
+        if self._colour(place, shape):
+            self._others.append((place, len(self.colours), shape))
+        return place
+
+    def _colour(self, place: int, shape: Shape) -> bool:
+        """Give a shape its places with their colours, and say whether it is one of the few that are drawn singly."""
         match shape:
             case Spline() if not shape.dash:
                 self._splines.append((place, shape))
                 self.colours.append(packed(shape.stroke))
+                return False
             case Arrowhead():
                 self._heads.append((place, shape))
                 self.colours.append(packed(shape.fill))
+                return False
             case Disc():
                 self._discs.append((place, shape))
                 self.colours += [packed(shape.fill), packed(shape.stroke)]
+                return False
             case Spline():
-                self._others.append((place, shape))
                 self.colours.append(packed(shape.stroke))
             case Rectangle():
-                self._others.append((place, shape))
                 self.colours += [packed(shape.fill), packed(shape.stroke)]
             case Ramp():
-                self._others.append((place, shape))
                 self.colours += [packed(colour) for colour in shape.colours]
+            case Image():
+                cells = np.frombuffer(shape.pixels, np.uint8).reshape(-1, 3)
+                self.colours += np.unique(packed_all(cells)).tolist()
             case Text():
-                self._others.append((place, shape))
                 self.colours += [packed(colour) for colour in (shape.halo, shape.fill) if colour]
-        return place
+        return True
 
     def parts(self) -> list[tuple[int, int, float]]:
         """The order in parts that are drawn each as one: first place, the place above the last, opacity."""
@@ -118,8 +142,8 @@ class Sheet:
         result[places] = (table[:, 4] + 2 * table[:, 5] + 2) ** 2
         places, table = self._disc_arrays
         result[places] = (2 * table[:, 2] + 2) ** 2
-        for place, shape in self._others:
-            if isinstance(shape, Rectangle | Ramp):
+        for place, _, shape in self._others:
+            if isinstance(shape, Rectangle | Ramp | Image):
                 result[place] = shape.width * shape.height * self.density**2
         return result
 
@@ -140,13 +164,52 @@ class Sheet:
         return result
 
     @cached_property
+    def paints(self) -> IntArray:
+        """The colour of each shape, by its place."""
+        return np.array(self.colours, np.int64)
+
+    def with_halves(self, halves: Numbers) -> Sheet:
+        """The same with lines and heads of other half widths, by their place."""
+        shared = self.pieces, self.opacities, self.head_lengths  # worked out once
+        result = copy(self)
+        places, table = self._head_arrays
+        table = table.copy()
+        table[:, 5] = halves[places]
+        result.__dict__.update(_head_arrays=(places, table), halves=halves, head_halves=halves)
+        assert result.pieces is shared[0]
+        return result
+
+    def stroke_shares(self, made: Strokes) -> Numbers:
+        """What strokes cover, as wide as their shapes are."""
+        shares: Numbers = made.shares(self.halves[made.owners]) * self.opacities[made.owners]
+        return shares
+
+    def head_shares(self, made: Heads) -> Numbers:
+        """What heads cover, as wide as they are."""
+        return made.shares(self.head_lengths[made.owners], self.head_halves[made.owners], Arrowhead.NOTCH)
+
+    @cached_property
     def opacities(self) -> Numbers:
         """The opacity of each shape by itself, by its place."""
         result = np.ones(len(self), np.float32)
         result[[place for place, _ in self._splines]] = [shape.opacity for _, shape in self._splines]
-        for place, shape in self._others:
+        for place, _, shape in self._others:
             if isinstance(shape, Spline):
                 result[place] = shape.opacity
+        return result
+
+    @cached_property
+    def head_lengths(self) -> Numbers:
+        """The length of each head in pixels, by its place."""
+        result = np.zeros(len(self), np.float32)
+        result[self._head_arrays[0]] = self._head_arrays[1][:, 4]
+        return result
+
+    @cached_property
+    def head_halves(self) -> Numbers:
+        """Half the width of each head in pixels, by its place."""
+        result = np.zeros(len(self), np.float32)
+        result[self._head_arrays[0]] = self._head_arrays[1][:, 5]
         return result
 
     @cached_property
@@ -162,28 +225,27 @@ class Sheet:
         table = np.array(rows, float).reshape(-1, 4) * self.density
         return np.array([place for place, _ in self._discs], np.int64), table
 
-    def solid(self, low: int, high: int, top: int, size: Size) -> Fragments:
-        """The fragments of all but solid splines, of shapes ``low`` to ``high``, in rows from ``top`` on."""
-        found = []
+    def heads(self, low: int, high: int, top: int, size: Size) -> Heads:
+        """The heads of lines among shapes ``low`` to ``high``, as they lie over rows from ``top`` on."""
         places, table = _between(*self._head_arrays, low, high)
-        if len(places):
-            tips = table[:, :2] - (0, top)
-            near = _reaches(tips[:, 1], table[:, 4] + table[:, 5], size)
-            made = coverage.heads(
-                tips[near], table[near, 2:4], table[near, 4], table[near, 5], Arrowhead.NOTCH, size
-            )
-            found.append(_owned(made, places[near]))
-        places, table = _between(*self._disc_arrays, low, high)
-        if len(places):
-            near = _reaches(table[:, 1] - top, table[:, 2] + table[:, 3], size)
-            places, table = places[near], table[near]
-            centres = table[:, :2] - (0, top)
-            found.append(_owned(coverage.discs(centres, table[:, 2], size), places))
-            found.append(_owned(coverage.rings(centres, table[:, 2], table[:, 3], size), places + 1))
-        for place, shape in self._others:
-            if low <= place < high:
+        tips = table[:, :2] - (0, top)
+        near = _reaches(tips[:, 1], table[:, 4] + table[:, 5], size)
+        found = coverage.heads(tips[near], table[near, 2:4], table[near, 4], table[near, 5], size)
+        return replace(found, owners=places[near][found.owners])
+
+    def solid(self, low: int, high: int, top: int, size: Size) -> Fragments:
+        """The fragments of all but solid splines and heads, of shapes ``low`` to ``high``, in rows from ``top`` on."""
+        found = []
+        places, table = _between(*self._disc_arrays, low - 1, high)
+        near = _reaches(table[:, 1] - top, table[:, 2] + table[:, 3], size)
+        places, centres, radii, widths = places[near], table[near, :2] - (0, top), table[near, 2], table[near, 3]
+        found.append(_owned(coverage.discs(centres, radii, size), places))
+        found.append(_owned(coverage.rings(centres, radii, widths, size), places + 1))
+        for place, end, shape in self._others:
+            if place < high and end > low:
                 found += [_owned(part, place + number) for number, part in enumerate(self._other(shape, top, size))]
-        return coverage.joined(found)
+        made = coverage.joined(found)
+        return made.only((made.owners >= low) & (made.owners < high))
 
     def _other(self, shape: Shape, top: int, size: Size) -> list[Fragments]:
         density = self.density
@@ -204,6 +266,12 @@ class Sheet:
                 ]
             case Ramp():
                 return self._ramp(shape, pixels(shape.corner), size)
+            case Image():
+                extent = (shape.width * density, shape.height * density)
+                where, cells = coverage.cells(pixels(shape.corner), extent, shape.columns, shape.rows, size)
+                shades = packed_all(np.frombuffer(shape.pixels, np.uint8).reshape(-1, 3))
+                shade = np.unique(shades, return_inverse=True)[1][cells]
+                return [Fragments(shade, where, np.ones(len(where), np.float32))]
             case Text():
                 text = replace(shape, point=pixels(shape.point), size=shape.size * density)
                 if not _reaches(np.array([text.point[1]]), np.array([3 * text.size]), size).any():
@@ -228,9 +296,6 @@ class Sheet:
         shift = (0, top)
         pieces = replace(pieces, starts=pieces.starts - shift, ends=pieces.ends - shift)
         return coverage.strokes(pieces, self.halves[pieces.owners].astype(float), size, hidden)
-
-
-Table = TypeVar("Table", bound=FloatArray)
 
 
 def _between(places: IntArray, table: FloatArray, low: int, high: int) -> tuple[IntArray, FloatArray]:

@@ -10,15 +10,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from neurovis_renderers.coverage import BoolArray, Fragments, IntArray, Numbers
 from neurovis_renderers.sheet import LANE, WHOLE
 
 #: A pixel of whose weight no more than this is left shows nothing further back.
-_COVERED = WHOLE // 512
-#: Bits of a key: pixels of a stack, shapes and fragments that are composed at once.
-PIXEL_BITS, ORDER_BITS, INDEX_BITS = 21, 20, 22
+COVERED = WHOLE // 512
+#: Bits of a key: what a whole number of 64 bits holds beside its sign.
+_BITS = 63
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,33 +39,40 @@ class Slots:
             yield end, self.order[self.begins[:end] + depth]
 
 
-def slots(fragments: Fragments, front: int) -> Slots:
+def slots(fragments: Fragments, front: int, rank: Numbers | None = None) -> Slots:
     """Sort fragments by their pixels, in each from the front to the back: ``front`` is above every owner. Of several
-    that one shape has in a pixel, the one that covers most is taken."""
-    number = np.arange(len(fragments))
-    key = ((fragments.pixels << ORDER_BITS) + (front - fragments.owners) << INDEX_BITS) + number
-    key.sort()
-    order = key & ((1 << INDEX_BITS) - 1)
-    key >>= INDEX_BITS
+    that one shape has in a pixel, the one of the highest rank is taken, which is what covers most."""
+    depth = front - fragments.owners
+    deep, many = int(depth.max(initial=0)).bit_length(), len(fragments).bit_length()
+    key = (fragments.pixels << deep) + depth
+    if int(fragments.pixels.max(initial=0)).bit_length() + deep + many > _BITS:
+        order = np.argsort(key)
+        key = key[order]
+    else:  # sorting numbers that say where they were is quicker than sorting where they were
+        key <<= many
+        key += np.arange(len(key))
+        key.sort()
+        order = key & ((1 << many) - 1)
+        key >>= many
     again = key[1:] == key[:-1]
     if again.any():
-        kept = _most(order, key, again, fragments.shares)
+        kept = _highest(order, key, again, fragments.shares if rank is None else rank)
         order, key = order[kept], key[kept]
-    key >>= ORDER_BITS
+    key >>= deep
     begins = np.flatnonzero(np.concatenate([np.ones(min(1, len(key)), bool), key[1:] != key[:-1]]))
     counts = np.diff(begins, append=len(key))
     deepest = np.argsort(np.minimum(65535, counts).astype(np.uint16) ^ np.uint16(65535), kind="stable")
     return Slots(key[begins][deepest], counts[deepest], begins[deepest], order)
 
 
-def _most(order: IntArray, key: IntArray, again: BoolArray, shares: Numbers) -> BoolArray:
-    """Which to keep where of several with the same key the one with the greatest share stays; ``again`` says of all
+def _highest(order: IntArray, key: IntArray, again: BoolArray, rank: Numbers) -> BoolArray:
+    """Which to keep where of several with the same key the one of the highest rank stays; ``again`` says of all
     but the first whether its key is that of the one before."""
     several = np.zeros(len(key), bool)
     several[1:] |= again
     several[:-1] |= again
     kept, some = ~several, np.flatnonzero(several)
-    ranked = some[np.lexsort((-shares[order[some]], key[some]))]
+    ranked = some[np.lexsort((-rank[order[some]], key[some]))]
     kept[ranked[np.concatenate([[True], key[ranked[1:]] != key[ranked[:-1]]])]] = True
     return kept
 
@@ -80,15 +86,15 @@ class Stack:
         self.covered: BoolArray = np.zeros(pixels, bool)
 
     def add(self, fragments: Fragments, colours: IntArray, front: int) -> None:
-        """Put fragments behind all that is there; ``colours`` are those of their owners."""
+        """Put fragments of these colours behind all that is there."""
         by_pixel = slots(fragments, front)
         left, sums = self.left[by_pixel.pixels], self.sums[by_pixel.pixels]
         for end, which in by_pixel.each():
             weight = np.rint(left[:end] * fragments.shares[which])
             left[:end] -= weight
-            sums[:end] += weight.astype(np.int64) * colours[fragments.owners[which]]
+            sums[:end] += weight.astype(np.int64) * colours[which]
         self.left[by_pixel.pixels], self.sums[by_pixel.pixels] = left, sums
-        self.covered[by_pixel.pixels] = left <= _COVERED
+        self.covered[by_pixel.pixels] = left <= COVERED
 
     def veil(self, opacity: float) -> tuple[Fragments, IntArray, int]:
         """What has been composed as one, seen in part: a fragment for each pixel, their colours, and the place above
