@@ -13,6 +13,7 @@ import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.runtime.c_backend import CStepper
 from neurovis_spec.runtime.checkpoint import load_state
+from neurovis_spec.runtime.recording import Recording
 
 SPEC = """\
 neurovis: 1
@@ -182,7 +183,12 @@ events: [{at: 515, set: {gain: 0.5}}]
 """
     network, calls, files = nv.compile_text(spec), [], []
     run = CStepper.run
-    monkeypatch.setattr(CStepper, "run", lambda *given: calls.append(len(given[2])) or run(*given))
+
+    def counted(stepper: CStepper, *given: object) -> object:
+        calls.append(1)
+        return run(stepper, *given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(CStepper, "run", counted)
     monkeypatch.setattr(CStepper, "step", lambda *_: pytest.fail("step by step")) if "exp" not in measure else None
     runs, ends = [], []
     for backend in ("reference", "c"):
@@ -199,7 +205,7 @@ events: [{at: 515, set: {gain: 0.5}}]
     assert ("exp" in measure) == (not calls)
 
 
-def rows_of(recording: nv.Recording) -> tuple[np.ndarray, ...]:
+def rows_of(recording: Recording) -> tuple[np.ndarray, ...]:
     return recording.activity, recording.weights, recording.weights_after
 
 
