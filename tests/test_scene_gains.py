@@ -107,6 +107,29 @@ def test_where_the_spread_is_too_wide_the_many_count() -> None:
     assert gains.signal[0] <= 1 / 0.6 + 0.1
 
 
+def thick(weights: list[list[float]], learning: set[int]) -> list[float]:
+    """The widths that the strongest of some entries reach."""
+    lines = [C("A1", "A2", w, entry=e, rule=0 if e in learning else -1) for e, some in enumerate(weights) for w in some]
+    rules = [("hebbian", dict[str, str]())]
+    made = network([numbered("A", 2)], lines, entries=[f"E{e}" for e in range(len(weights))], rules=rules)
+    reached = np.array([w for some in weights for w in some])
+    gains = choose_gains(made, RenderSettings(), reaches([1.0, 1.0], reached.tolist()))
+    return [float((gains.thickness * reached)[made.connections.entry == e].max()) for e in range(len(weights))]
+
+
+def test_weights_that_are_alike_can_be_compared_learned_or_not() -> None:
+    one, other, learned = thick([[1.0], [2.0], [1.5]], {2})
+    assert other == 2 * one
+    assert learned == 1.5 * one
+    assert one >= 1
+
+
+def test_what_learns_is_seen_to_grow_beside_heavier_weights_that_stay() -> None:
+    fixed, learned = thick([[1.0] * 16, [0.5, 0.1]], {1})
+    assert learned >= 4
+    assert 1 <= fixed <= 2.2
+
+
 def test_there_are_few_scales_however_many_entries() -> None:
     lines = [C(f"A{i}", f"A{i + 1}", 1.0, entry=i - 1) for i in range(1, 21)]
     made = network([numbered("A", 21)], lines, entries=[f"A{i} -> A{i + 1}" for i in range(1, 21)])

@@ -23,18 +23,22 @@ from neurovis_spec.scene.reached import Reached, nothing
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 IntArray: TypeAlias = npt.NDArray[np.int64]
 
-#: a colour of this value can surely be told from grey, in every theme; one of ``_JUST`` beside others
-_TOLD, _JUST = 0.9, 0.25
-#: one that cannot be told weighs as much as so many doublings of others beyond what a colour shows
-_LOST = 5.0
-#: where the strongest is more than so many times the weakest, no scale shows both
-_SPREAD = 32.0
+#: what reaches so many times the full colour can be told from grey for most of a period, in every theme; at its height
+#: alone; or what reaches nearly as much as the strongest
+_TOLD, _LOST, _NEARLY = 1.3, 0.5, 0.75
+#: what reaches so many times the full colour is far beyond it; and how much rather it is that than lost in grey
+_FAR, _RATHER = 1.5, 1.3
+#: a colour of this value can just be told; a strongest that is more than so many times the weakest has no scale with it
+_JUST, _SPREAD = 0.25, 32.0
 #: of a group with many members: the share of them that a scale goes by
 _MOST = 0.9
 #: ranges that differ by less than this factor are alike; there are at most so many scales
 _ALIKE, _SCALES = 2.0, 4
-#: how wide, in user units, the strongest line is to be, one that learns, and a typical one, in a small network
-_WIDEST, _LEARNED, _TYPICAL = 6.5, 5.0, 2.6
+#: weights are compared by eye: those that differ by less than this factor share a scale
+_ALIKE_WEIGHTS = 3.0
+#: how wide, in user units, the strongest line is to be, one that learns, and a typical one, in a small network; and how
+#: wide one must become to be seen to grow
+_WIDEST, _LEARNED, _TYPICAL, _SEEN = 5.0, 5.0, 2.2, 2.0
 #: with more lines than this they get thinner
 _CROWD = 10
 
@@ -83,22 +87,15 @@ def choose_gains(network: Network, settings: RenderSettings, run: Reached) -> Ga
     """Gains that use the range of each group and entry well; those that ``settings`` states win. All that are chosen
     are finite and positive."""
     groups, entries = _groups(network), _entries(network)
-    learns = np.zeros(len(network.connections), bool)
-    learns[network.changing] = True
     range_ = np.minimum(run.activity, 2 * run.typical)
-    activity = _chosen(
-        groups, [_full(range_[m]) for m in groups.members], run.highest, settings.activity, lowest=run.lowest
-    )
-    signal = _chosen(
-        entries, [_full(run.signals[m]) for m in entries.members], run.signals, settings.signal, least=True
-    )
-    widths = [
-        _learning(run.weights[m], len(network.changing)) if learns[m].any() else _fixed(run.weights[m], len(learns))
-        for m in entries.members
-    ]
-    thickness = _chosen(entries, widths, run.weights, settings.thickness)
-    changes = [_typical(run.changes[m]) for m in entries.members]
-    change = _chosen(entries, changes, run.changes, settings.change)
+    colours = _shared([_full(range_[m]) for m in groups.members])
+    activity = _chosen(groups, colours, settings.activity, run.highest, run.lowest)
+    signals = _shared([_full(run.signals[m]) for m in entries.members], least=True)
+    signal = _chosen(entries, signals, settings.signal, run.signals)
+    widths = _widths(entries, run.weights, network.changing)
+    thickness = _chosen(entries, widths, settings.thickness, run.weights)
+    changes = _shared([_middle(_known(run.changes[m])) for m in entries.members])
+    change = _chosen(entries, changes, settings.change, run.changes)
     return Gains(
         activity=activity.gains,
         centre=activity.centres,
@@ -162,26 +159,30 @@ def _units(names: tuple[str, ...], numbers: IntArray) -> _Units:
     return _Units(names, members, len(numbers))
 
 
+@dataclass(frozen=True, slots=True)
+class _Share:
+    """Units that have a gain together."""
+
+    units: list[int]
+    gain: float
+
+
 def _chosen(
     units: _Units,
-    full: Sequence[float],
-    highest: FloatArray,
+    chosen: Sequence[_Share],
     stated: Sequence[StatedGain],
-    *,
+    highest: FloatArray,
     lowest: FloatArray | None = None,
-    least: bool = False,
 ) -> _Chosen:
-    """Gains for all members. ``full`` is the value that is to be full colour (or a pixel, …) in each unit, 0 where
-    nothing is reached; of units that share a scale the middle counts, or the ``least``."""
+    """Gains for all members: those that are chosen, under those that are stated. ``highest`` and ``lowest`` say how far
+    the values of the members go."""
     gains, centres = np.ones(units.count), np.zeros(units.count)
     owner = np.full(units.count, -1, np.int64)  # the number of the scale that each member has
     scales: list[Scale] = []
-    for together in _alike(full):
-        low, high = (end(full[unit] for unit in together) for end in (min, max))
-        value = _nice(low if least else float(np.sqrt(low * high)))
-        for unit in together:
-            gains[units.members[unit]], owner[units.members[unit]] = 1 / value, len(scales)
-        scales.append(Scale(1 / value, tuple(units.names[unit] for unit in together)))
+    for share in chosen:
+        for unit in share.units:
+            gains[units.members[unit]], owner[units.members[unit]] = share.gain, len(scales)
+        scales.append(Scale(share.gain, tuple(units.names[unit] for unit in share.units)))
     if scales:
         gains[owner < 0] = scales[0].gain
     free = owner >= 0
@@ -197,7 +198,7 @@ def _chosen(
         if not len(mine):
             continue
         names = scale.names
-        if number < len(scales) - len(stated):
+        if number < len(chosen):
             names = tuple(name for name in names if name in left)
         reaches = float((highest[mine] - scale.centre).max(initial=0.0))
         if lowest is not None:
@@ -210,15 +211,51 @@ def _chosen(
     return _Chosen(gains, centres, tuple(kept.values()))
 
 
-def _alike(full: Sequence[float]) -> list[list[int]]:
+def _shared(full: Sequence[float], *, least: bool = False) -> list[_Share]:
+    """Gains at which ``full`` is 1; 0 in a unit that reaches nothing. Where units share a scale the middle of theirs
+    counts, or the ``least``."""
+    result = []
+    for units in _alike(full, _ALIKE, _SCALES):
+        low, high = (end(full[unit] for unit in units) for end in (min, max))
+        result.append(_Share(units, 1 / _nice(low if least else float(np.sqrt(low * high)))))
+    return result
+
+
+def _widths(entries: _Units, weights: FloatArray, changing: IntArray) -> list[_Share]:
+    """Gains of thickness. Entries whose strongest weights are alike share one, so that these can be compared. One that
+    learns has that of others if it is seen to grow there, else by what it reaches."""
+    peaks = [_known(weights[members]) for members in entries.members]
+    tops = [float(values.max(initial=0.0)) for values in peaks]
+    learns = np.isin(np.arange(entries.count), changing)
+    learning = {unit for unit, members in enumerate(entries.members) if learns[members].any()}
+    fixed = [0.0 if unit in learning else top for unit, top in enumerate(tops)]
+    shares = []
+    for units in _alike(fixed, _ALIKE_WEIGHTS, _SCALES - 1):
+        every = np.concatenate([peaks[unit] for unit in units])
+        gain = min(_WIDEST / float(every.max()), _TYPICAL / _middle(every)) * _crowd(entries.count)
+        shares.append(_Share(units, gain))
+    for unit in learning:
+        for share in shares:
+            ends = [tops[unit], *(fixed[other] for other in share.units if fixed[other])]
+            if tops[unit] * share.gain >= _SEEN and max(ends) <= _ALIKE_WEIGHTS * min(ends):
+                share.units.append(unit)
+                tops[unit] = 0.0
+                break
+    own = [top if unit in learning else 0.0 for unit, top in enumerate(tops)]
+    for units in _alike(own, _LEARNED / _SEEN, _SCALES - 1):
+        shares.append(_Share(units, _LEARNED / max(own[unit] for unit in units) * _crowd(len(changing))))
+    nice = [_Share(sorted(share.units), 1 / _nice(1 / share.gain)) for share in shares]
+    return sorted(nice, key=lambda share: share.units)
+
+
+def _alike(values: Sequence[float], factor: float, most: int) -> list[list[int]]:
     """Units by the scale that they share, each in order, the scales by their first unit: as few as there can be with no
-    two values in one that differ by more than ``_ALIKE``, or ``_SCALES`` where that would be more."""
-    order = sorted((unit for unit, value in enumerate(full) if value > 0), key=lambda unit: full[unit])
-    parts = [[unit] for unit in order]
+    two values in one that differ by more than ``factor``, or ``most`` where that would be more. 0 has none."""
+    parts = [[unit] for unit in sorted(range(len(values)), key=values.__getitem__) if values[unit] > 0]
     while len(parts) > 1:
-        ratios = [full[high[-1]] / full[low[0]] for low, high in pairwise(parts)]
+        ratios = [values[high[-1]] / values[low[0]] for low, high in pairwise(parts)]
         place = min(range(len(ratios)), key=ratios.__getitem__)
-        if ratios[place] > _ALIKE and len(parts) <= _SCALES:
+        if ratios[place] > factor and len(parts) <= most:
             break
         parts[place : place + 2] = [parts[place] + parts[place + 1]]
     return sorted(sorted(part) for part in parts)
@@ -227,49 +264,40 @@ def _alike(full: Sequence[float]) -> list[list[int]]:
 def _full(peaks: FloatArray) -> float:
     """The value at which the colour is full, for members that reach so much; 0 where none reaches anything.
 
-    It is a balance: each member that cannot be told from grey weighs as much as some doublings of others beyond what a
-    colour shows; where the weakest and the strongest are not too far apart, none is lost.
+    It is a balance of those that then can hardly be told from grey and those that are far beyond what a colour shows; a
+    little rather the latter. Where the weakest and the strongest are not too far apart, none is quite lost.
     """
-    peaks = np.sort(peaks[(peaks > 1e-12) & (peaks < 1e12)])
+    peaks = np.sort(_known(peaks))
     if not len(peaks):
         return 0.0
     top = float(peaks[int(np.ceil(_MOST * (len(peaks) - 1)))])
-    tried = np.unique(np.minimum(peaks / _TOLD, top))
-    lost = np.searchsorted(peaks, _TOLD * tried * (1 - 1e-9))
-    above = np.searchsorted(peaks, tried, side="right")
-    logs = np.log2(peaks)
-    sums = np.concatenate([np.cumsum(logs[::-1])[::-1], [0.0]])
-    beyond = sums[above] - (len(peaks) - above) * np.log2(tried)
-    best = float(tried[int(np.argmin(_LOST * lost + beyond))])
+    tried = np.unique(np.append(peaks[peaks < _NEARLY * top] / _TOLD, top))
+    sums = np.concatenate([[0.0], np.cumsum(peaks)])
+    enough = np.minimum(_TOLD * tried, _NEARLY * top) * (1 - 1e-9)
+    lost = np.searchsorted(peaks, np.minimum(_LOST * tried, enough))
+    hard = np.searchsorted(peaks, enough)
+    missing = lost + ((hard - lost) * _TOLD - (sums[hard] - sums[lost]) / tried) / (_TOLD - _LOST)
+    beyond = len(peaks) - np.searchsorted(peaks, _FAR * tried, side="right")
+    best = float(tried[int(np.argmin(_RATHER * missing + beyond))])
     if peaks[-1] <= _SPREAD * peaks[0]:
         best = min(best, float(peaks[0]) / _JUST)
     return best
 
 
-def _fixed(peaks: FloatArray, lines: int) -> float:
-    """The weight that is one user unit wide among so many ``lines``; 0 where there is none."""
-    peaks = peaks[(peaks > 1e-12) & (peaks < 1e12)]
-    if not len(peaks):
-        return 0.0
-    return max(float(peaks.max()) / _WIDEST, float(np.median(peaks)) / _TYPICAL) / _crowd(lines)
+def _known(values: FloatArray) -> FloatArray:
+    """Those that are neither next to nothing nor beyond all bounds."""
+    result: FloatArray = values[(values > 1e-12) & (values < 1e12)]
+    return result
 
 
-def _learning(peaks: FloatArray, lines: int) -> float:
-    """The same for weights that change, of which there are so many: by what the strongest reaches, so that it is seen
-    to grow."""
-    peaks = peaks[(peaks > 1e-12) & (peaks < 1e12)]
-    return float(peaks.max()) / _LEARNED / _crowd(lines) if len(peaks) else 0.0
+def _middle(values: FloatArray) -> float:
+    """The median; 0 of nothing."""
+    return float(np.median(values)) if len(values) else 0.0
 
 
 def _crowd(lines: int) -> float:
     """By how much lines are thinner where there are many of them: half as wide at 160 as at 10."""
     return float(min(1.0, (_CROWD / max(lines, 1)) ** 0.25))
-
-
-def _typical(peaks: FloatArray) -> float:
-    """The median of what is reached; 0 where nothing is."""
-    peaks = peaks[(peaks > 1e-12) & (peaks < 1e12)]
-    return float(np.median(peaks)) if len(peaks) else 0.0
 
 
 def _nice(value: float) -> float:

@@ -60,6 +60,11 @@ def row_width(items: Sequence[Entry]) -> float:
     return sum(item.width for item in items) + _ENTRY_GAP * max(len(items) - 1, 0)
 
 
+def widest_row(items: Sequence[Entry], width: float) -> float:
+    """How wide the longest row is when they flow into rows of this width."""
+    return max((row_width(row) for row in _rows(items, width)), default=0.0)
+
+
 def height(items: Sequence[Entry], width: float) -> float:
     """How high the entries are when they flow into rows of this width; 0 without entries."""
     rows = _rows(items, width)

@@ -21,8 +21,10 @@ from neurovis_spec.scene.themes import colours
 
 _RAMP, _STRIPES = 150.0, 75
 _STROKE, _STROKE_GAP, _WIDEST = 36.0, 10.0, 8.6
-#: in a table of scales: the length of a stroke and the room for its number
-_SHORT, _NUMBER = 22.0, 30.0
+#: in a table of scales: the length of a stroke, and the gaps beside its number
+_SHORT, _NEAR, _APART, _PITCH = 22.0, 4.0, 9.0, 15.0
+#: the baseline of its first line
+_TABLE_Y = 26.0
 #: how wide the names of a scale may be
 _NAMES = 132.0
 #: what goes less than this beyond a scale is not worth a word
@@ -46,8 +48,8 @@ def thickness(gains: Gains, theme: Theme) -> list[Entry]:
     shown = [
         (scale, weights)
         for scale in gains.thickness_scales
-        if scale.gain and math.isfinite(_WIDEST / scale.gain)
-        for weights in [nice_weights(scale.gain, scale.reaches or math.inf)]
+        if scale.gain and scale.reaches and math.isfinite(_WIDEST / scale.gain)
+        for weights in [nice_weights(scale.gain, scale.reaches)]
     ]
     if not shown:
         return []
@@ -55,16 +57,24 @@ def thickness(gains: Gains, theme: Theme) -> list[Entry]:
         return [_strokes(*shown[0], theme)]
     shapes: list[Shape] = [heading("Thickness: weight |w|", theme)]
     across = texts.width("Thickness: weight |w|", 11.5, 600)
+    columns = max(len(weights) for _, weights in shown)
+    number = max(texts.width(texts.number(weight), SMALL) for _, weights in shown for weight in weights)
+    step = _SHORT + _NEAR + number + _APART
     for row, (scale, weights) in enumerate(shown):
-        y = 26.0 + 15.0 * row
+        y = _TABLE_Y + _PITCH * row
         for place, weight in enumerate(weights):
-            x = place * (_SHORT + _NUMBER)
-            shapes.append(stroke(x, _SHORT, theme.muted, abs(scale.gain) * weight, y - 4))
-            shapes.append(Text((x + _SHORT + 4, y), texts.number(weight), SMALL, theme.muted))
-        words, x = named(scale), 3 * (_SHORT + _NUMBER) + 6
+            x = place * step
+            shapes.append(stroke(x, _SHORT, theme.muted, _wide(scale, weight), y - 4))
+            shapes.append(Text((x + _SHORT + _NEAR, y), texts.number(weight), SMALL, theme.muted))
+        words, x = named(scale), columns * step
         shapes.append(Text((x, y), words, SMALL, theme.muted))
         across = max(across, x + texts.width(words, SMALL))
-    return [Entry(tuple(shapes), across, max(high(1), 26.0 + 15.0 * (len(shown) - 1) + 3.0))]
+    return [Entry(tuple(shapes), across, max(high(1), _TABLE_Y + _PITCH * (len(shown) - 1) + 3.0))]
+
+
+def _wide(scale: Scale, weight: float) -> float:
+    """How wide a line of this weight is."""
+    return max(THINNEST, abs(scale.gain) * weight)
 
 
 def glow(gains: Gains, theme: Theme) -> list[Entry]:
@@ -99,13 +109,12 @@ def named(scale: Scale) -> str:
 
 def nice_weights(gain: float, heaviest: float = math.inf) -> list[float]:
     """Up to three weights that are 1, 2 or 5 times a power of ten, the largest at most ``heaviest`` and drawn no wider
-    than a legend has room for, the smallest no thinner than a line can be.
+    than a legend has room for, the others no thinner than a line can be.
 
-    >>> nice_weights(4.0), nice_weights(4.0, 1.01), nice_weights(15.0, 0.1)
-    ([0.5, 1.0, 2.0], [0.2, 0.5, 1.0], [0.05, 0.1])
+    >>> nice_weights(4.0), nice_weights(4.0, 1.01), nice_weights(15.0, 0.1), nice_weights(1.0, 0.03)
+    ([0.5, 1.0, 2.0], [0.2, 0.5, 1.0], [0.05, 0.1], [0.02])
     """
-    widest = _WIDEST / abs(gain)
-    value = _nice_below(min(widest, heaviest) if heaviest * abs(gain) >= THINNEST else widest)
+    value = _nice_below(min(_WIDEST / abs(gain), heaviest))
     values = [value]
     while len(values) < 3:
         value = _nice_below(value * 0.6)
@@ -172,7 +181,7 @@ def _strokes(scale: Scale, weights: Sequence[float], theme: Theme) -> Entry:
     across = max(strokes, texts.width(words, SMALL))
     for place, value in enumerate(weights):
         x = (across - strokes) / 2 + place * (_STROKE + _STROKE_GAP)
-        shapes.append(stroke(x, _STROKE, theme.muted, abs(scale.gain) * value))
+        shapes.append(stroke(x, _STROKE, theme.muted, _wide(scale, value)))
         shapes.append(Text((x + _STROKE / 2, FIRST_Y), texts.number(value), SMALL, theme.muted, "middle"))
     shapes.append(Text((across / 2, SECOND_Y), words, SMALL, theme.muted, "middle"))
     return Entry(tuple(shapes), across)

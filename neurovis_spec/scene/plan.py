@@ -32,7 +32,7 @@ from neurovis_spec.scene.titles import Titled, outline, titles_of
 
 _TITLE, _CAPTION = 17.0, 11.5
 _TITLE_Y, _CAPTION_Y, _HEADER = 35.0, 54.0, 58.0
-#: a picture is made so wide at most to have its legend in one row, and its whole title
+#: a picture is made so wide at most to have its legend in few rows, and its whole title
 _ROOM = 840.0
 #: more dotted lines than this would not be quiet
 _MOST_TEACHERS = 200
@@ -180,7 +180,7 @@ def _frame(
     def footer(width: float) -> float:
         return legend.height(items, width - 2 * MARGIN) + (0.9 * MARGIN if items else 0.0)
 
-    narrowest = min(max(legend.row_width(items) + 2 * MARGIN, 120.0), _ROOM)
+    narrowest = min(max(legend.widest_row(items, _ROOM - 2 * MARGIN) + 2 * MARGIN, 120.0), _ROOM)
     wishes = Wishes((min(header[0], _ROOM - 2 * MARGIN), header[1]), footer, narrowest)
     return title, items, fit(extent, wishes, settings.size)
 

@@ -51,9 +51,11 @@ def reached(network: Network, recording: Recording) -> Reached:
 
 
 def nothing(network: Network) -> Reached:
-    """What is reached where nothing is run."""
+    """What is known where nothing is run: the weights that stay as they are; the others may reach anything."""
     neurons, connections = np.zeros(len(network.neurons)), np.zeros(len(network.connections))
-    return Reached(neurons, neurons, neurons, connections, connections, connections)
+    weights = _largest(network.connections.weights[None].astype(np.float64))
+    weights[network.changing] = np.inf
+    return Reached(neurons, neurons, neurons, weights, connections, connections)
 
 
 def reached_by(
