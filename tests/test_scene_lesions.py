@@ -88,7 +88,8 @@ def test_a_lesioned_connection_keeps_its_width_and_says_its_colour() -> None:
         root = ET.fromstring(SvgRenderer().draw(scene_at(step), ".svg"))
         (group,) = [g for g in root.iter() if g.get("data-connection") == "A1 -> B2"]
         path = next(e for e in group if e.tag.endswith("path"))
-        assert float(path.attrib["stroke-width"]) == NETWORK.gains.thickness * 1
+        place = NETWORK.network.connection_index["A1 -> B2"]
+        assert float(path.attrib["stroke-width"]) == NETWORK.gains.thickness[place] * 1
         assert path.attrib["stroke"].startswith("#")
         assert group.get("opacity") == (None if step < 4 else f"{FAINT:.1f}".lstrip("0"))
 

@@ -87,7 +87,7 @@ def choose_gains(network: Network, settings: RenderSettings, run: Reached) -> Ga
     """Gains that use the range of each group and entry well; those that ``settings`` states win. All that are chosen
     are finite and positive."""
     groups, entries = _groups(network), _entries(network)
-    range_ = np.minimum(run.activity, 2 * run.typical)
+    range_ = 2 * np.minimum(run.activity / 2, run.typical)  # so that nothing overflows
     colours = _shared([_full(range_[m]) for m in groups.members])
     activity = _chosen(groups, colours, settings.activity, run.highest, run.lowest)
     signals = _shared([_full(run.signals[m]) for m in entries.members], least=True)
