@@ -208,6 +208,10 @@ def _chosen(
             names = () if not names or not same.names else (*same.names, *names)
             reaches = max(reaches, same.reaches)
         kept[scale.gain, scale.centre] = replace(scale, names=names, reaches=reaches)
+    if not kept and units.count:
+        kept[1.0, 0.0] = Scale(1.0)
+    if len(kept) == 1 and not stated:  # it is that of all which have one
+        kept = {key: replace(scale, names=()) for key, scale in kept.items()}
     return _Chosen(gains, centres, tuple(kept.values()))
 
 

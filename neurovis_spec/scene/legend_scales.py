@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from neurovis_spec.scene import texts
-from neurovis_spec.scene.encoding import THINNEST, glow_width
+from neurovis_spec.scene.encoding import FAINTEST, THINNEST, glow_width
 from neurovis_spec.scene.gains import Gains, Scale
 from neurovis_spec.scene.legend_entry import FIRST_Y, LINE, SAMPLE_Y, SECOND_Y, SMALL, Entry, heading, high, stroke
 from neurovis_spec.scene.model import Ramp, Shape, Text, Theme
@@ -78,8 +78,8 @@ def _wide(scale: Scale, weight: float) -> float:
 
 
 def glow(gains: Gains, theme: Theme) -> list[Entry]:
-    """How far what changes glows: a sample at full intensity."""
-    shown = [scale for scale in gains.change_scales if scale.gain]
+    """How far what changes glows, if anything does: a sample at full intensity."""
+    shown = [scale for scale in gains.change_scales if scale.gain * scale.reaches >= FAINTEST]
     if not shown:
         return []
     alone = len(shown) == 1 and len(gains.change_scales) == 1
@@ -135,7 +135,7 @@ def _rows(words: str, scales: Sequence[Scale]) -> list[tuple[str, str, str]]:
     rows = []
     for scale in scales:
         low, high = _ends(scale)
-        parts = (words, named(scale) if len(scales) > 1 else "", _beyond(scale))
+        parts = (words, named(scale) if len(scales) > 1 or scale.names else "", _beyond(scale))
         rows.append((low, " ".join(part for part in parts if part), high))
     return rows
 

@@ -52,10 +52,10 @@ def reached(network: Network, recording: Recording) -> Reached:
 
 def nothing(network: Network) -> Reached:
     """What is known where nothing is run: the weights that stay as they are; the others may reach anything."""
-    neurons, connections = np.zeros(len(network.neurons)), np.zeros(len(network.connections))
+    neurons, signals, changes = np.zeros(len(network.neurons)), *np.zeros((2, len(network.connections)))
     weights = _largest(network.connections.weights[None].astype(np.float64))
-    weights[network.changing] = np.inf
-    return Reached(neurons, neurons, neurons, weights, connections, connections)
+    weights[network.changing] = changes[network.changing] = np.inf
+    return Reached(neurons, neurons, neurons, weights, signals, changes)
 
 
 def reached_by(
