@@ -283,6 +283,15 @@ def test_the_legend_states_the_gains() -> None:
         assert texts.number(width / 5.0) in words
 
 
+def test_a_small_picture_has_a_brief_legend_and_a_smaller_one_has_none() -> None:
+    brief, none = (
+        {t.text for t in all_texts(picture(settings=RenderSettings(size=size)))} for size in ((560, 420), (200, 150))
+    )
+    assert "Colour" in brief
+    assert any("C → C, …" in words for words in brief)
+    assert not {"Colour", "Lines: signal w·a"} & none
+
+
 def test_the_caption_says_step_time_and_error() -> None:
     (caption,) = next(g for g in picture().groups if g.id == "caption").shapes
     assert isinstance(caption, Text)

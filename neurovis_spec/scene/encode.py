@@ -176,7 +176,7 @@ def tooltips(network: Network, gains: Gains, activity: FloatArray, weights: Floa
             parts = [first, f"activity {_range(lows[index], highs[index])}", kind, group.description or "", seen]
             of_neurons[index] = "\n".join(part for part in parts if part)
     of_connections = []
-    learns = np.isin(np.arange(len(connections)), network.changing).tolist()
+    scaled = _gains_of(network, gains)
     lows, highs = weights.min(axis=0).tolist(), weights.max(axis=0).tolist()
     rows = zip(connections.delays.tolist(), connections.entry.tolist(), strict=True)
     for index, (delay, entry) in enumerate(rows):
@@ -186,7 +186,7 @@ def tooltips(network: Network, gains: Gains, activity: FloatArray, weights: Floa
             connections.learns[entry] or "",
             f"delay {delay}" if delay != 1 else "",
             connections.descriptions[entry] or "",
-            _gains_of(gains, index, learns[index]),
+            scaled[index],
         ]
         of_connections.append("\n".join(part for part in parts if part))
     return of_neurons, of_connections
@@ -199,10 +199,17 @@ def _gain_of(gain: float, centre: float) -> str:
     return f"gain {texts.number(gain)}"
 
 
-def _gains_of(gains: Gains, index: int, learns: bool) -> str:
-    """The gains of a connection, in words; that of changes where its weight can change."""
-    told = [("signal", gains.signal), ("thickness", gains.thickness), *([("change", gains.change)] if learns else [])]
-    return "gain: " + ", ".join(f"{what} {texts.number(float(values[index]))}" for what, values in told)
+def _gains_of(network: Network, gains: Gains) -> list[str]:
+    """The gains of each connection, in words; that of changes where its weight can change. Most are said of many."""
+    learns = np.isin(np.arange(len(network.connections)), network.changing).tolist()
+    said: dict[tuple[float, float, float, bool], str] = {}
+    result = []
+    for key in zip(gains.signal.tolist(), gains.thickness.tolist(), gains.change.tolist(), learns, strict=True):
+        if key not in said:
+            told = [f"signal {texts.number(key[0])}", f"thickness {texts.number(key[1])}"]
+            said[key] = "gain: " + ", ".join([*told, f"change {texts.number(key[2])}"] if key[3] else told)
+        result.append(said[key])
+    return result
 
 
 def _range(low: float, high: float) -> str:

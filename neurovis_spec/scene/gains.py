@@ -71,6 +71,23 @@ class Gains:
     thickness_scales: tuple[Scale, ...]
     change_scales: tuple[Scale, ...]
 
+    @property
+    def brief(self) -> Gains:
+        """The same with one scale of each sort; that there are others is said beside its names."""
+
+        def cut(scales: tuple[Scale, ...]) -> tuple[Scale, ...]:
+            if len(scales) <= 1:
+                return scales
+            return (replace(scales[0], names=(*(scales[0].names[:1] or ("others",)), "…")),)
+
+        return replace(
+            self,
+            activity_scales=cut(self.activity_scales),
+            signal_scales=cut(self.signal_scales),
+            thickness_scales=cut(self.thickness_scales),
+            change_scales=cut(self.change_scales),
+        )
+
 
 def plain_gains(network: Network, activity: float, signal: float, thickness: float, change: float) -> Gains:
     """One gain of each sort for all."""
@@ -253,16 +270,20 @@ def _widths(entries: _Units, weights: FloatArray, changing: IntArray) -> list[_S
 
 
 def _alike(values: Sequence[float], factor: float, most: int) -> list[list[int]]:
-    """Units by the scale that they share, each in order, the scales by their first unit: as few as there can be with no
-    two values in one that differ by more than ``factor``, or ``most`` where that would be more. 0 has none."""
-    parts = [[unit] for unit in sorted(range(len(values)), key=values.__getitem__) if values[unit] > 0]
-    while len(parts) > 1:
-        ratios = [values[high[-1]] / values[low[0]] for low, high in pairwise(parts)]
-        place = min(range(len(ratios)), key=ratios.__getitem__)
-        if ratios[place] > factor and len(parts) <= most:
+    """Units by the scale that they share, each in order, the scales by their first unit: neighbours are put together,
+    the nearest first, as long as no two values in one differ by more than ``factor``, and until there are at most
+    ``most``. A value of 0 has none."""
+    rounded = np.array([_nice(value) for value in values])
+    lows = np.unique(rounded[rounded > 0])  # of each part the least value, and the greatest
+    highs = lows.copy()
+    while len(lows) > 1:
+        ratios = highs[1:] / lows[:-1]
+        place = int(np.argmin(ratios))
+        if ratios[place] > factor and len(lows) <= most:
             break
-        parts[place : place + 2] = [parts[place] + parts[place + 1]]
-    return sorted(sorted(part) for part in parts)
+        lows, highs = np.delete(lows, place + 1), np.delete(highs, place)
+    part = np.searchsorted(lows, rounded, side="right") - 1
+    return sorted([np.flatnonzero((part == number) & (rounded > 0)).tolist() for number in range(len(lows))])
 
 
 def _full(peaks: FloatArray) -> float:

@@ -37,8 +37,10 @@ class Contents:
     inhibits: bool = False
 
 
-def entries(contents: Contents, gains: Gains, theme: Theme) -> list[Entry]:
-    """The entries that this picture needs."""
+def entries(contents: Contents, gains: Gains, theme: Theme, *, brief: bool = False) -> list[Entry]:
+    """The entries that this picture needs; a ``brief`` legend has the first scale of each sort alone."""
+    if brief:
+        gains = gains.brief
     result = legend_scales.colour(gains, contents.lines, theme)
     if contents.lines:
         result += legend_scales.thickness(gains, theme)

@@ -82,7 +82,7 @@ def glow(gains: Gains, theme: Theme) -> list[Entry]:
     shown = [scale for scale in gains.change_scales if scale.gain * scale.reaches >= FAINTEST]
     if not shown:
         return []
-    alone = len(shown) == 1 and len(gains.change_scales) == 1
+    alone = len(gains.change_scales) == 1 and not shown[0].names
     told = [f"|Δw| {texts.number(1 / abs(scale.gain))} a step" for scale in shown]
     lines = ["weight is changing", *(told if alone else map("{}: {}".format, told, map(named, shown)))]
     width = 3.0
@@ -178,6 +178,8 @@ def _ramp(words: str, rows: Sequence[tuple[str, str, str]], theme: Theme) -> Ent
 def _strokes(scale: Scale, weights: Sequence[float], theme: Theme) -> Entry:
     shapes: list[Shape] = [heading("Thickness", theme)]
     strokes, words = len(weights) * (_STROKE + _STROKE_GAP) - _STROKE_GAP, "line: weight |w|"
+    if scale.names:
+        words = f"|w| of {named(scale)}"
     across = max(strokes, texts.width(words, SMALL))
     for place, value in enumerate(weights):
         x = (across - strokes) / 2 + place * (_STROKE + _STROKE_GAP)

@@ -169,9 +169,12 @@ def _frame(
             lesions=bool(lesions_of(network)),
             inhibits=_inhibits(network),
         )
-        items = legend.entries(contents, gains, theme)
-        widest = max(item.width for item in items)
-        if widest > wide - 2 * MARGIN or legend.height(items, wide - 2 * MARGIN) > 0.4 * high:
+        for brief in (False, True):
+            items = legend.entries(contents, gains, theme, brief=brief)
+            widest = max(item.width for item in items)
+            if widest <= wide - 2 * MARGIN and legend.height(items, wide - 2 * MARGIN) <= 0.4 * high:
+                break
+        else:
             items = []
     if title is not None and high < 4 * _HEADER:
         title = None
