@@ -71,8 +71,9 @@ PICTURES = (
         90,
         "Use case 1, in the midst of learning",
         "The paper's Figure 5A. C1 is weakly negative, C2 strongly positive: K1 to K4 and K8 are active. O is too high "
-        "by 0.41 (the caption says so), so the connections of K2 and K3, which are the most active, glow: they turn "
-        "to inhibition.",
+        "by 0.41 (the caption says so), so the connections of these kernels glow, most of all those of K2 and K3, which "
+        "are the most active: they turn to inhibition. The lines between C1 and C2 have a scale of their own; they "
+        "would be grey beside the others.",
     ),
     Picture(
         "cpg_rbf_dark",
@@ -90,7 +91,7 @@ PICTURES = (
         2020,
         "The oscillator alone, with the weights that the paper prints",
         "Both neurons excite themselves with weight 1; what turns the rhythm are the two thin lines between them, of "
-        "opposite sign. The legend shows how small the activities are: the colours are full at 0.13.",
+        "opposite sign. The legend shows how small the activities and the signals are at which the colours are full.",
     ),
     Picture(
         "short_term_memory",

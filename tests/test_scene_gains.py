@@ -151,6 +151,33 @@ def test_what_a_kernel_does_while_it_sleeps_does_not_count() -> None:
     assert 2 * one.typical[0] >= 0.98
 
 
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(
+        st.tuples(st.floats(-3, 3), st.lists(st.floats(-1.4, 1.4), min_size=1, max_size=12), st.booleans()),
+        min_size=1,
+        max_size=9,
+    )
+)
+def test_whatever_entries_there_are_the_weak_are_told_and_none_is_too_wide(
+    made: list[tuple[float, list[float], bool]],
+) -> None:
+    """Of entries of any magnitude, with weights that are a few hundred apart at most."""
+    weights = [[10 ** (base + offset / 2) for offset in some] for base, some, _ in made]
+    rules = [("hebbian", dict[str, str]())]
+    lines = [C("A1", "A2", w, entry=e, rule=-1 + made[e][2]) for e, some in enumerate(weights) for w in some]
+    net = network([numbered("A", 2)], lines, entries=[f"E{e}" for e in range(len(weights))], rules=rules)
+    peaks = np.array([w for some in weights for w in some])
+    gains = choose_gains(net, RenderSettings(), reaches([1.0, 1.0], peaks.tolist()))
+    assert len(gains.signal_scales) <= 4
+    assert len(gains.thickness_scales) <= 6
+    for entry in range(len(weights)):
+        mine = net.connections.entry == entry
+        assert len(set(gains.signal[mine])) == 1
+        assert (gains.signal[mine] * peaks[mine]).min() >= 0.23
+        assert (gains.thickness[mine] * peaks[mine]).max() <= 5.3
+
+
 peak = st.one_of(st.floats(0, 1e300), st.sampled_from([float("nan"), float("inf"), 0.0, 5e-324]))
 
 

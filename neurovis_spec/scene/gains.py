@@ -258,7 +258,7 @@ def _widths(entries: _Units, weights: FloatArray, changing: IntArray) -> list[_S
     for unit in learning:
         for share in shares:
             ends = [tops[unit], *(fixed[other] for other in share.units if fixed[other])]
-            if tops[unit] * share.gain >= _SEEN and max(ends) <= _ALIKE_WEIGHTS * min(ends):
+            if _SEEN <= tops[unit] * share.gain <= _WIDEST and max(ends) <= _ALIKE_WEIGHTS * min(ends):
                 share.units.append(unit)
                 tops[unit] = 0.0
                 break
