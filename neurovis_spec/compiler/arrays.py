@@ -1,6 +1,6 @@
 """The types of a network's arrays, which are read-only.
 
-In: an array. Out: the same, which nobody can write to any more.
+In: an array. Out: the same, which nobody can write to any more; or what reads the elements that it names.
 """
 
 from __future__ import annotations
@@ -17,3 +17,11 @@ IntArray: TypeAlias = npt.NDArray[np.int64]
 def frozen(array: npt.NDArray[np.generic]) -> None:
     """Make an array read-only."""
     array.flags.writeable = False
+
+
+def subscript(indices: IntArray) -> slice | IntArray | None:
+    """A slice where the indices lie in a row, which is quicker; None without any."""
+    if not len(indices):
+        return None
+    first, count = int(indices[0]), len(indices)
+    return slice(first, first + count) if np.array_equal(indices, np.arange(first, first + count)) else indices

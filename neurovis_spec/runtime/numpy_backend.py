@@ -1,14 +1,15 @@
 """The NumPy backend: the update program as one function of array code, made for one network.
 
-In: a Network. Out: a Stepper whose ``step`` is that function. It is as quick as array code written by
-hand, and needs nothing but NumPy.
+In: a Network. Out: a Runner that calls that function. It is as quick as array code written by hand, and needs nothing
+but NumPy.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.arrays import FloatArray, subscript
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Block, Gather, Learn, ReadInputs, Send, Update
 from neurovis_spec.runtime.backend import Availability, Capabilities
@@ -18,6 +19,11 @@ from neurovis_spec.runtime.numpy_code import Code
 from neurovis_spec.runtime.numpy_learn import emit_history, emit_learn
 from neurovis_spec.runtime.signals import signal_layout
 from neurovis_spec.runtime.state import State, history_depth
+from neurovis_spec.runtime.watch import all_finite, carried_by
+
+#: neurons, connections and steps of one call together, and how many of these an operation takes the time of: some tens
+#: of milliseconds
+_AT_ONCE, _OPERATION = 1 << 22, 1 << 10
 
 
 class NumpyStepper:
@@ -26,13 +32,40 @@ class NumpyStepper:
     def __init__(self, network: Network) -> None:
         self.network = network
         self._structure: Structure | None = None
+        self._changing = subscript(network.changing)
+        operations = len(network.blocks) + len(network.plasticity)
+        size = len(network.neurons) + len(network.connections) + _OPERATION * operations
+        self.at_once = max(1, _AT_ONCE // (size + 1))
 
     def step(self, state: State, inputs: FloatArray, /) -> None:
         """Advance the state by a step."""
+        for _ in self._steps(state, (inputs,)):
+            pass
+
+    def run(
+        self, state: State, vectors: FloatArray, activity: FloatArray, weights: FloatArray, every: int, look: bool
+    ) -> int:
+        """Advance the state by a step for each row of ``vectors``, as a Runner does."""
+        own, learned, changing = state.activity, state.weights, self._changing
+        carried, first, row = carried_by(self.network, state), state.k, 0
+        steps = self._steps(state, vectors)
+        for k in range(first, first + len(vectors)):
+            kept = k % every == 0
+            if kept and changing is not None:
+                weights[row] = learned[changing]
+            next(steps)
+            if kept:
+                activity[row] = own
+                row += 1
+            if look and not all_finite(carried):
+                break
+        return state.k - first
+
+    def _steps(self, state: State, vectors: Iterable[FloatArray]) -> Iterator[None]:
         if state.conditions.structure is not self._structure:
             self._structure = state.conditions.structure
             self._made = step_code(self.network, self._structure).compiled()
-        self._made(state, inputs)
+        return self._made(state, vectors)
 
 
 class NumpyBackend:

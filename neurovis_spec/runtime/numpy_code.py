@@ -1,12 +1,13 @@
 """NumPy code in the making: lines with identifiers of our own, and the arrays that they refer to by name.
 
-In: typed trees and index arrays. Out: the text of one Python function and its namespace. Names of the author never
-reach the text: every one of them is replaced by an identifier made here.
+In: typed trees and index arrays. Out: the text of one Python function and its namespace: a generator, which makes a
+step each time that it is asked. Names of the author never reach the text: every one of them is replaced by an
+identifier made here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TypeAlias
 
 import numpy as np
@@ -16,10 +17,12 @@ from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.settable import Variable
 from neurovis_spec.language.expressions.emit import emit
 from neurovis_spec.language.expressions.tree import Name, Tree, Unary, names
-from neurovis_spec.runtime.state import constants
+from neurovis_spec.runtime.state import State, constants
 
 _NONE: Mapping[str, Variable] = {}
 Functions: TypeAlias = Mapping[str, Callable[[str], str]]
+#: makes steps from a state on, one for each vector of inputs; while it does, the arrays of the state stay the same ones
+Steps: TypeAlias = Callable[[State, Iterable[FloatArray]], Iterator[None]]
 
 
 _PARTS = ("activity", "weights", "signals", "history", "cells", "traces")
@@ -28,7 +31,7 @@ _VARIABLES = "variables"
 
 
 class Code:
-    """Lines of the step function, one level deep, and what they need."""
+    """Lines of a step, one level deep, and what they need."""
 
     def __init__(self, dt: float, variables: Mapping[str, Variable] = _NONE) -> None:
         self._variables = variables
@@ -97,7 +100,7 @@ class Code:
         return f"{array}[{self.constant(np.ascontiguousarray(indices, dtype=np.intp))}]"
 
     def view(self, array: str, part: str) -> str:
-        """A slice. Slices of the state's own arrays are taken once a step, at its head: they follow all changes."""
+        """A slice. Slices of the state's own arrays are taken once, before the steps: they follow all changes."""
         if array not in (*_PARTS, _VARIABLES):
             return f"{array}[{part}]"
         return self._views.setdefault(f"{array}[{part}]", f"{array[0]}{len(self._views)}_")
@@ -127,23 +130,23 @@ class Code:
         return self.let(prefix, f"np.array({code})" if _may_alias(tree) else code)
 
     def text(self) -> str:
-        """The functions as Python text."""
+        """The steps as Python text. What stays the same over all of them is looked up before the first."""
         views = [f"    {name} = {code}" for code, name in self._views.items()]
-        body = [*views, *self.lines, "    state.k = k + 1", ""]
-        taken = [f"    {name} = state.{name}" for name in _PARTS if any(name in line for line in body)]
+        body = [*(f"    {text}" for text in sorted(self.used)), *self.lines, "    state.k = k + 1", "    yield"]
+        taken = [f"    {name} = state.{name}" for name in _PARTS if any(name in line for line in [*views, *body])]
         taken += [
             f"    {name} = state.conditions.{name}"
             for name in (_VARIABLES, "holds")
-            if any(name in line for line in body)
+            if any(name in line for line in [*views, *body])
         ]
-        used = [f"    {text}" for text in sorted(self.used)]
-        return "\n".join(["def step(state, s):", "    k = state.k", *taken, *used, *body])
+        loop = ["    for k, s in enumerate(vectors, state.k):", *(f"    {line}" for line in body), ""]
+        return "\n".join(["def steps(state, vectors):", *taken, *views, *loop])
 
-    def compiled(self) -> Callable[..., None]:
-        """The step function. The text holds our own identifiers only."""
+    def compiled(self) -> Steps:
+        """The steps as a function. The text holds our own identifiers only."""
         namespace = {**self.namespace, "float64": np.float64}
-        exec(compile(self.text(), "<step of a network>", "exec"), namespace)
-        made = namespace["step"]
+        exec(compile(self.text(), "<steps of a network>", "exec"), namespace)
+        made = namespace["steps"]
         assert callable(made)
         return made
 

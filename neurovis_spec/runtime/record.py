@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.arrays import FloatArray, subscript
 from neurovis_spec.compiler.changes import Change
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.patch import PatchError
@@ -269,7 +269,7 @@ class _OneByOne:
         self, state: State, first: int, stop: int, every: int, rows: Rows, reader: InputReader, watch: Watch
     ) -> bool:
         step, look, due, columns = self.stepper.step, watch.look, rows.due, self.columns
-        changing, chosen = _subscript(columns.weights), columns.neurons
+        changing, chosen = subscript(columns.weights), columns.neurons
         probe = columns.probe if columns.probe.names else None
         wanted = _kept(first, stop, every)
         activity, weights, states = rows.begin(wanted)
@@ -379,11 +379,3 @@ def _stretches(begin: int, end: int) -> Iterator[tuple[int, int]]:
         stop = min(first - first % STRETCH + STRETCH, end)
         yield first, stop
         first = stop
-
-
-def _subscript(indices: npt.NDArray[np.int64]) -> slice | npt.NDArray[np.int64] | None:
-    """A slice where the indices lie in a row, which is quicker; None without any."""
-    if not len(indices):
-        return None
-    first, count = int(indices[0]), len(indices)
-    return slice(first, first + count) if np.array_equal(indices, np.arange(first, first + count)) else indices

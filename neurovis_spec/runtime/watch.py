@@ -6,9 +6,10 @@ the step and the neuron or the connection whose activity, weight, state or input
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Iterator
+from itertools import chain
+from math import isfinite
 
 import numpy as np
 
@@ -28,10 +29,6 @@ class Watch:
 
     def __init__(self, network: Network) -> None:
         self._network = network
-        self._learns = bool(network.plasticity)
-        self._remembers = any(block.model.state for block in network.blocks) or any(
-            plasticity.rule.state for plasticity in network.plasticity
-        )
         #: the first of the steps to come whose inputs are not all finite, and these inputs
         self._step = _NEVER
         self._vector: FloatArray = np.zeros(0)
@@ -53,14 +50,7 @@ class Watch:
         """Warn if something of the step just made is NaN or infinite."""
         if self.warned:
             return
-        # A sum of squares is finite only if all terms are: one cheap product instead of a test each. Where those of
-        # activities and weights are, the signals that leave, products of both, are finite as well.
-        if (
-            _finite(state.activity)
-            and (not self._learns or _finite(state.weights))
-            and (not self._remembers or (_all_finite(state.cells) and _all_finite(state.traces)))
-            and state.k - 1 != self._step
-        ):
+        if all_finite(carried_by(self._network, state)) and state.k - 1 != self._step:
             return
         message = next(self._found(state), None)
         if message is not None:
@@ -101,17 +91,29 @@ class Watch:
         return f"input '{entry.name}'" + (f" of {names[takers[0]]}" if len(takers) else "")
 
 
-def _finite(values: FloatArray) -> bool:
-    """Whether all of these surely are: their squares, too."""
+def carried_by(network: Network, state: State) -> list[FloatArray]:
+    """What a state carries to the next step and may not be finite, in pieces. Where activities and weights are, the
+    signals that leave, products of both, are as well."""
+    learned = [state.weights] if network.plasticity else []
+    arrays = [state.activity, *learned, *chain.from_iterable(state.cells), *chain.from_iterable(state.traces)]
+    return [piece for values in arrays for piece in _pieces(values)]
+
+
+def _pieces(values: FloatArray) -> list[FloatArray]:
     if len(values) <= _PIECE:
-        return math.isfinite(values.dot(values))
-    pieces = (values[first : first + _PIECE] for first in range(0, len(values), _PIECE))
-    return all(math.isfinite(piece.dot(piece)) for piece in pieces)
+        return [values]
+    return [values[first : first + _PIECE] for first in range(0, len(values), _PIECE)]
 
 
-def _all_finite(states: tuple[tuple[FloatArray, ...], ...]) -> bool:
-    """The same of states."""
-    return all(_finite(values) for group in states for values in group)
+def all_finite(pieces: list[FloatArray]) -> bool:
+    """Whether all numbers of all of these are finite."""
+    # A sum of squares is finite only if all terms are: one cheap product instead of a test each.
+    for values in pieces:
+        if isfinite(values.dot(values)):
+            continue
+        if _wrong(values):
+            return False
+    return True
 
 
 def _wrong(values: FloatArray) -> list[int]:
