@@ -10,9 +10,11 @@ import threading
 from pathlib import Path
 
 import pytest
+from networks_by_hand import cpg_rbf
 
 from neurovis_spec.runtime import c_library
 from neurovis_spec.runtime.backend import available, listing, prepare
+from neurovis_spec.runtime.c_choice import pays, seconds_saved
 from neurovis_spec.runtime.c_library import CompilerError, folder, load, place
 from neurovis_spec.runtime.numpy_backend import NumpyStepper
 
@@ -82,12 +84,25 @@ def test_without_a_compiler_the_listing_says_why(monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_compiler_that_fails_says_so_and_auto_does_without(monkeypatch: pytest.MonkeyPatch, cache: Path) -> None:
-    from networks_by_hand import cpg_rbf
-
     monkeypatch.setenv("CC", "false")
     with pytest.raises(CompilerError, match="'false' fails"):
         load(TEXT % 46)
     assert isinstance(prepare(cpg_rbf(), None, 10**9), NumpyStepper)
+
+
+@pytest.mark.parametrize(
+    ("command", "least"), [(("/usr/bin/cc",), 0), (("/opt/zig/zig", "cc"), 5), (("python", "-m", "ziglang", "cc"), 5)]
+)
+def test_what_a_compiler_takes_counts_where_c_is_chosen(
+    command: tuple[str, ...], least: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Zig takes five seconds when it is first used: C pays where a run in array code takes longer than that."""
+    monkeypatch.setattr(c_library, "compiler", lambda: c_library.Compiler(command, "it", ""))
+    network = cpg_rbf()
+    within_a_second = next(steps for steps in range(0, 10**6, 1000) if seconds_saved(network, steps) > 1)
+    assert pays(network, within_a_second)[0] == (least == 0)
+    assert pays(network, 6 * within_a_second)[0]
+    assert not pays(network, 100)[0]
 
 
 def test_a_library_that_somebody_else_may_have_put_there_is_not_loaded(
