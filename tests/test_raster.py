@@ -9,6 +9,7 @@ import sys
 import tracemalloc
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +21,7 @@ from neurovis_renderers import canvas, coverage, films, moving
 from neurovis_renderers.canvas import paint
 from neurovis_renderers.coverage import Fragments
 from neurovis_renderers.frames import frames
-from neurovis_renderers.lettering import lettering
+from neurovis_renderers.lettering import font, lettering
 from neurovis_renderers.moving import Moving, Painter
 from neurovis_renderers.raster import PillowRenderer
 from neurovis_renderers.stack import slots
@@ -393,3 +394,18 @@ def test_texts_are_no_wider_than_the_table_says() -> None:
             found = lettering(Text((10, 80), words, 12, "#000000", weight=weight), SIZE)
             columns = found.pixels % SIZE[0]
             assert columns.max() - 10 <= texts.width(words, 12, weight) + 1
+
+
+def test_the_font_is_the_shipped_one_and_the_first_that_an_svg_asks_for() -> None:
+    for bold in (False, True):
+        made = font(40, bold)
+        assert made.getname() == (texts.FAMILIES[0], "Bold" if bold else "Book")
+        assert Path(str(made.path)).parent == Path(canvas.__file__).parent / "fonts"
+        weight = 700 if bold else 400
+        for character in "Kx0→−₁·…ΔWi ":
+            assert made.getlength(character) / 40 <= texts.width(character, 1, weight) + 0.02
+
+
+def test_a_text_stands_on_a_whole_pixel_as_in_browsers() -> None:
+    rows = [lettering(Text((10, y), "H", 20, "#000000"), SIZE).pixels // SIZE[0] for y in (80.0, 80.4, 80.5, 81.0)]
+    assert [int(row.max()) for row in rows] == [79, 79, 80, 80]

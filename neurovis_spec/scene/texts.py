@@ -1,7 +1,7 @@
 """Texts: how wide they are at most, shortened to a width, names with subscripts, numbers for people.
 
-In: strings. Out: widths in user units, shorter strings. The widths are those of DejaVu Sans, among the widest of the
-fonts in ``FAMILIES``, so that a text that fits here fits with any of them, and no font file is needed.
+In: strings. Out: widths in user units, shorter strings. The widths are those of DejaVu Sans, in which pictures in pixels
+are set; among the widest of the fonts in ``FAMILIES``, so that a text that fits here fits with any of them.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import re
 import unicodedata
 
 #: What a picture's text is set in: the first of these that the reader has.
-FAMILIES = ("Inter", "Helvetica Neue", "Arial", "DejaVu Sans", "sans-serif")
+FAMILIES = ("DejaVu Sans", "Verdana", "Helvetica Neue", "Arial", "sans-serif")
 
 # Hundredths of the size, from the blank to the tilde.
 _REGULAR = (

@@ -1,13 +1,14 @@
 """Lettering: texts as fragments, by Pillow.
 
-In: a Text of a Scene. Out: Fragments. The font is Liberation Sans or Arial (what browsers on Linux take for ``Arial``),
-else DejaVu Sans, else the scalable font that is part of Pillow: pictures are the same wherever the same font is found.
+In: a Text of a Scene. Out: Fragments. The font is DejaVu Sans, which is part of this package, so that pictures have the
+same pixels everywhere; it is also the first that an SVG asks for.
 """
 
 from __future__ import annotations
 
 import math
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
@@ -15,33 +16,23 @@ from PIL import Image, ImageDraw, ImageFont
 from neurovis_renderers.coverage import Fragments, Size
 from neurovis_spec.scene import HALO, SUBSCRIPT_DROP, SUBSCRIPT_SIZE, Text
 
-#: (regular, bold), the first pair found is taken
-_FILES = (
-    ("LiberationSans-Regular.ttf", "LiberationSans-Bold.ttf"),
-    ("Arial.ttf", "Arial_Bold.ttf"),
-    ("arial.ttf", "arialbd.ttf"),
-    ("DejaVuSans.ttf", "DejaVuSans-Bold.ttf"),
-)
+#: Regular and bold.
+FONTS = tuple(Path(__file__).parent / "fonts" / name for name in ("DejaVuSans.ttf", "DejaVuSans-Bold.ttf"))
+#: the weight from which on a text is bold
+BOLD = 600
 #: texts are drawn so much larger, then reduced: glyphs stand where they should, to a fraction of a pixel
 _FINER = 8
 
-Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
-
 
 @lru_cache(maxsize=64)
-def font(size: float, bold: bool) -> Font:
+def font(size: float, bold: bool) -> ImageFont.FreeTypeFont:
     """The font of this size in pixels."""
-    for names in _FILES:
-        try:
-            return ImageFont.truetype(names[bold], size, layout_engine=ImageFont.Layout.BASIC)
-        except OSError:
-            continue
-    return ImageFont.load_default(size)
+    return ImageFont.truetype(FONTS[bold], size, layout_engine=ImageFont.Layout.BASIC)
 
 
 def lettering(text: Text, size: Size, halo: bool = False) -> Fragments:
     """The fragments of a text with its subscript, or of its ``halo``, in a picture of this size."""
-    bold = text.weight >= 600
+    bold = text.weight >= BOLD
     runs = [(text.text, text.size, 0.0)]
     if text.subscript:
         runs.append((text.subscript, SUBSCRIPT_SIZE * text.size, SUBSCRIPT_DROP * text.size))
@@ -55,7 +46,8 @@ def lettering(text: Text, size: Size, halo: bool = False) -> Fragments:
     pen = ImageDraw.Draw(tile)
     stroke = round(HALO * text.size * _FINER) if halo else 0
     for made, (words, _, drop), length in zip(fonts, runs, lengths, strict=True):
-        at = ((x - left) * _FINER, (text.point[1] + drop - top) * _FINER)
+        baseline = math.floor(text.point[1] + drop + 0.5)  # on a whole pixel, as browsers have it
+        at = ((x - left) * _FINER, (baseline - top) * _FINER)
         pen.text(at, words, fill=255, font=made, anchor="ls", stroke_width=stroke)
         x += length
     share = np.asarray(tile.reduce(_FINER), np.float32) / np.float32(255)

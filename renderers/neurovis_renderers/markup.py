@@ -184,7 +184,7 @@ def document(scene: Scene, body: str, style: str = "", attributes: Mapping[str, 
     more = "".join(f" {key}={quoted(value)}" for key, value in (attributes or {}).items())
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{across}" height="{down}" '
-        f'role="img" fill="none" font-family="{families}"{more}>\n'
+        f'role="img" fill="none" font-family="{families}" text-rendering="geometricPrecision"{more}>\n'
         f"<title>{escape(scene.title)}</title>\n{style}"
         f'<rect width="{width}" height="{height}" fill="{scene.theme.background}"/>\n{body}</svg>\n'
     ).encode()
