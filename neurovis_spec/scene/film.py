@@ -165,6 +165,7 @@ def part(film: Film, names: Collection[str]) -> Film:
         line_values=film.line_values[:, lines],
         line_widths=film.line_widths[:, lines],
         glow_widths=film.glow_widths[:, lines],
+        line_bars=film.line_bars[:, lines],
         shifts=tuple(film.shifts[number] for number in shifts),
         shift_values=film.shift_values[:, shifts] if shifts else film.shift_values[:, :0],
     )

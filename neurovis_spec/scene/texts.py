@@ -1,7 +1,7 @@
 """Texts: how wide they are at most, shortened to a width, names with subscripts, numbers for people.
 
-In: strings. Out: widths in user units, shorter strings. The widths are those of DejaVu Sans, in which pictures in pixels
-are set; among the widest of the fonts in ``FAMILIES``, so that a text that fits here fits with any of them.
+In: strings. Out: widths in user units, shorter strings. The widths are those of DejaVu Sans, which pictures in pixels
+are set in; among the widest of the fonts in ``FAMILIES``, so that a text that fits here fits with any of them.
 """
 
 from __future__ import annotations

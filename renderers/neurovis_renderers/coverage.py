@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec.scene import Arrowhead
+
 FloatArray = npt.NDArray[np.float64]
 Numbers = npt.NDArray[np.float32]
 IntArray = npt.NDArray[np.int64]
@@ -326,17 +328,36 @@ class Heads:
         """Some of them."""
         return Heads(self.owners[chosen], self.pixels[chosen], self.behind[chosen], self.beside[chosen])
 
-    def shares(self, lengths: Numbers, halves: Numbers, notch: float) -> Numbers:
-        """What heads cover of their pixels if they are so long and so wide, (n,) half widths, with a notch at a share
-        of the length."""
-        cosine = np.divide(lengths, np.hypot(lengths, halves), dtype=np.float32)  # of half the angle at the tip
-        reach = np.divide(halves * self.behind, np.maximum(lengths, np.float32(1e-6)), dtype=np.float32)
-        share = _band(self.beside * cosine, reach * cosine)
-        back = np.float32(1 - notch) * lengths
-        inside = np.float32(notch) * lengths * halves + back * self.beside - halves * self.behind
-        inside /= np.maximum(np.hypot(halves, back), np.float32(1e-6))
-        share *= np.clip(inside + np.float32(0.5), 0, 1)
-        return share
+    def shares(self, lengths: Numbers, halves: Numbers, stems: Numbers) -> Numbers:
+        """What heads cover of their pixels if they are so long and so wide, (n,) half widths: arrows, and where
+        ``stems`` are not below 0 bars with stems of these half widths."""
+        shares = _arrows(self.behind, self.beside, lengths, halves)
+        bars = np.flatnonzero(stems >= 0)
+        if len(bars):
+            behind, beside, lengths = self.behind[bars], self.beside[bars], lengths[bars]
+            back, end = np.float32(Arrowhead.BAR) * lengths, np.float32(Arrowhead.NOTCH + Arrowhead.LAP) * lengths
+            across = _between(behind, np.zeros_like(back), back) * _band(beside, halves[bars])
+            shares[bars] = across + _between(behind, back, end) * _band(beside, stems[bars])
+        return shares
+
+
+def _arrows(behind: Numbers, beside: Numbers, lengths: Numbers, halves: Numbers) -> Numbers:
+    """What arrows cover: what lies between the sides and before the notched back."""
+    cosine = np.divide(lengths, np.hypot(lengths, halves), dtype=np.float32)  # of half the angle at the tip
+    reach = np.divide(halves * behind, np.maximum(lengths, np.float32(1e-6)), dtype=np.float32)
+    share = _band(beside * cosine, reach * cosine)
+    back = np.float32(1 - Arrowhead.NOTCH) * lengths
+    inside = np.float32(Arrowhead.NOTCH) * lengths * halves + back * beside - halves * behind
+    inside /= np.maximum(np.hypot(halves, back), np.float32(1e-6))
+    share *= np.clip(inside + np.float32(0.5), 0, 1)
+    return share
+
+
+def _between(place: Numbers, begin: Numbers, end: Numbers) -> Numbers:
+    """What of a pixel's length lies between two places."""
+    share: Numbers = np.minimum(end, place + np.float32(0.5))
+    share -= np.maximum(begin, place - np.float32(0.5))
+    return np.clip(share, 0, 1, out=share)
 
 
 def heads(tips: FloatArray, ways: FloatArray, lengths: FloatArray, halves: FloatArray, size: Size) -> Heads:

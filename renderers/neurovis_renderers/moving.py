@@ -100,12 +100,19 @@ class Moving:
             turns = (values != values[:1]).any(axis=0)
             for place, number in (pair for pairs in parts for pair in pairs):
                 self.coloured[place] = turns[number]
-        self.least = self._halves(film.line_widths.min(axis=0), film.glow_widths.min(axis=0))
-        self.most = self._halves(film.line_widths.max(axis=0), film.glow_widths.max(axis=0))
-        self.shaped = self.least != self.most
+        #: half widths and stems, at least and at most
+        self.least = self._halves(film.line_widths.min(axis=0), film.glow_widths.min(axis=0), film.line_bars[0])
+        self.most = self._halves(film.line_widths.max(axis=0), film.glow_widths.max(axis=0), film.line_bars[0])
+        self.shaped = self.least[0] != self.most[0]
+        heads, whose = self._ends
+        turning = heads[(film.line_bars != film.line_bars[:1]).any(axis=0)[whose]]
+        self.shaped[turning] = True
+        self.least[0][turning] = 0  # what is now an arrow and now a bar hides nothing for certain
+        self.least[1][turning] = -1
 
-    def _halves(self, widths: FloatArray, glows: FloatArray) -> Numbers:
-        """Half the width of every line, glow and head in pixels, by place, of lines of such widths (in user units)."""
+    def _halves(self, widths: FloatArray, glows: FloatArray, bars: BoolArray) -> tuple[Numbers, Numbers]:
+        """Half the width of every line, glow and head in pixels, by place, of lines of such widths (in user units); and
+        of the stem of what ends in a bar, −1 elsewhere."""
         density = self.film.scene.density
         halves: Numbers = self.sheet.halves + self.sheet.head_halves
         (lines, which), (shining, whose), (ends, of) = self._lines, self._glows, self._ends
@@ -115,12 +122,14 @@ class Moving:
         halves[ends] = density * np.maximum(
             HEAD_OF_LENGTH * long + HEAD_OF_WIDTH * wide, 0.5 / Arrowhead.NOTCH * wide + HEAD_MORE
         )
+        stems = np.full(len(halves), -1, np.float32)
+        stems[ends] = np.where(bars[of], wide * (density / 2), -1)
         result: Numbers = np.rint(halves / _STEP) * _STEP
-        return result
+        return result, stems
 
-    def halves(self, frame: int) -> Numbers:
-        """Half the width of every line, glow and head at a frame, by place."""
-        return self._halves(self.film.line_widths[frame], self.film.glow_widths[frame])
+    def halves(self, frame: int) -> tuple[Numbers, Numbers]:
+        """Half the width of every line, glow and head at a frame, by place, and of the stems."""
+        return self._halves(self.film.line_widths[frame], self.film.glow_widths[frame], self.film.line_bars[frame])
 
     def colours(self, frame: int) -> IntArray:
         """The colours of all shapes at a frame, by place."""
@@ -200,7 +209,7 @@ class Band:
 def _gathered(moving: Moving, top: int, size: Size) -> tuple[Fragments, Strokes, Heads, Numbers]:
     """What may be seen in any frame, as wide as it gets: the fragments of strokes that get another width, of such
     heads, and of all else; and the shares of all when lines are narrowest."""
-    widest, narrowest = moving.sheet.with_halves(moving.most), moving.sheet.with_halves(moving.least)
+    widest, narrowest = moving.sheet.with_halves(*moving.most), moving.sheet.with_halves(*moving.least)
     stack, nothing = Stack(size[0] * size[1]), np.zeros(1, np.int64)
     still, strokes, heads, count = list[Fragments](), list[Strokes](), list[Heads](), 0
     for portion in portions(widest, 0, len(widest), top, size, stack.covered):
@@ -270,14 +279,14 @@ class Painter:
         self._moving = moving
         self._bands = [_Painted(moving, band) for band in moving.bands]
         self._colours = np.full(len(moving.sheet), -1, np.int64)
-        self._halves = np.full(len(moving.sheet), -1, np.float32)
+        self._halves = np.full((2, len(moving.sheet)), -2, np.float32)
 
     def paint(self, frame: int) -> Pixels:
         """The picture, (height, width, 3)."""
         moving = self._moving
         colours = moving.colours(frame)
-        halves = moving.halves(frame) if moving.shaped.any() else self._halves
-        recoloured, reshaped = colours != self._colours, moving.shaped & (halves != self._halves)
+        halves = np.stack(moving.halves(frame)) if moving.shaped.any() else self._halves
+        recoloured, reshaped = colours != self._colours, moving.shaped & (halves != self._halves).any(axis=0)
         apart = still(moving.apart, frame).groups if moving.apart_places else ()
         rows = []
         for band in self._bands:
@@ -325,7 +334,7 @@ class _Painted:
 
     def _reshape(self, halves: Numbers, reshaped: BoolArray) -> IntArray:
         """Give what is ``reshaped`` its width; where its fragments lie."""
-        band, sheet = self._band, self._moving.sheet.with_halves(halves)
+        band, sheet = self._band, self._moving.sheet.with_halves(*halves)
         chosen = np.flatnonzero(reshaped[band.strokes.owners])
         lines = band.stroke_at[chosen]
         self._shares[lines] = sheet.stroke_shares(band.strokes.only(chosen))

@@ -168,14 +168,14 @@ class Sheet:
         """The colour of each shape, by its place."""
         return np.array(self.colours, np.int64)
 
-    def with_halves(self, halves: Numbers) -> Sheet:
-        """The same with lines and heads of other half widths, by their place."""
+    def with_halves(self, halves: Numbers, stems: Numbers) -> Sheet:
+        """The same with lines, heads and stems of other half widths, by their place."""
         shared = self.pieces, self.opacities, self.head_lengths  # worked out once
         result = copy(self)
         places, table = self._head_arrays
         table = table.copy()
         table[:, 5] = halves[places]
-        result.__dict__.update(_head_arrays=(places, table), halves=halves, head_halves=halves)
+        result.__dict__.update(_head_arrays=(places, table), halves=halves, head_halves=halves, head_stems=stems)
         assert result.pieces is shared[0]
         return result
 
@@ -186,7 +186,8 @@ class Sheet:
 
     def head_shares(self, made: Heads) -> Numbers:
         """What heads cover, as wide as they are."""
-        return made.shares(self.head_lengths[made.owners], self.head_halves[made.owners], Arrowhead.NOTCH)
+        owners = made.owners
+        return made.shares(self.head_lengths[owners], self.head_halves[owners], self.head_stems[owners])
 
     @cached_property
     def opacities(self) -> Numbers:
@@ -210,6 +211,15 @@ class Sheet:
         """Half the width of each head in pixels, by its place."""
         result = np.zeros(len(self), np.float32)
         result[self._head_arrays[0]] = self._head_arrays[1][:, 5]
+        return result
+
+    @cached_property
+    def head_stems(self) -> Numbers:
+        """Half the width of the stem of each bar in pixels, by its place; −1 for arrows."""
+        result = np.full(len(self), -1, np.float32)
+        for place, head in self._heads:
+            if head.kind == "bar":
+                result[place] = head.width * self.density / 2
         return result
 
     @cached_property
