@@ -294,6 +294,7 @@ class CompiledNetwork:
         *,
         step: int | None = None,
         recording: Recording | None = None,
+        inputs: Mapping[str, npt.ArrayLike] | None = None,
         theme: str | None = None,
         engine: str | None = None,
         progress: Progress | None = None,
@@ -301,16 +302,16 @@ class CompiledNetwork:
         """Draw one step into a file whose suffix says what kind.
 
         Without ``step`` it is the last of the recording, or of a default run. Without ``recording`` the network runs
-        as far as the step. Raises OutputError for a kind that nobody draws, before anything is run.
+        as far as the step; ``inputs`` replace the sources of inputs, as in ``run``, and the gains are those of this
+        run. Raises OutputError for a kind that nobody draws, before anything is run.
         """
         from neurovis_spec.scene.renderers import renderer_for
 
-        _check(recording=recording, theme=theme, engine=engine, progress=progress)
+        _check(recording=recording, inputs=inputs, theme=theme, engine=engine, progress=progress)
         place, wanted = arguments.path("path", path), None if step is None else arguments.integer("step", step)
         renderer_for(suffix := place.suffix, moving=False)
         layout = self.drawn(engine).value
-        snapshot = self._snapshot(wanted, recording, progress)
-        gains = self._gains_for(recording)
+        snapshot, gains = self._snapshot(wanted, recording, progress, inputs)
         scene = pipeline.picture(self.network, layout, snapshot, gains, self._settings(theme))
         content = pipeline.draw(scene, suffix)
         with replacing(place) as file:
@@ -324,19 +325,21 @@ class CompiledNetwork:
         start: int = 0,
         fps: float | None = None,
         recording: Recording | None = None,
+        inputs: Mapping[str, npt.ArrayLike] | None = None,
         theme: str | None = None,
+        engine: str | None = None,
         progress: Progress | None = None,
     ) -> None:
         """Draw ``steps`` steps from step ``start`` on, one a frame, into a file whose suffix says what kind.
 
-        ``fps`` defaults to 1/dt, at most 60, and to 25 where the spec writes no dt. Raises OutputError for a kind that
-        nobody makes and for a film that is too long, before anything is run.
+        ``fps`` defaults to 1/dt, at most 60, and to 25 where the spec writes no dt. ``inputs`` as in ``render``. Raises
+        OutputError for a kind that nobody makes and for a film that is too long, before anything is run.
         """
         from neurovis_spec.scene.film_size import check_film
         from neurovis_spec.scene.renderers import renderer_for
         from neurovis_spec.snapshots import frames_of, snapshots_from
 
-        _check(recording=recording, theme=theme, progress=progress)
+        _check(recording=recording, inputs=inputs, theme=theme, engine=engine, progress=progress)
         place, first = arguments.path("path", path), arguments.integer("start", start, most=_MOST_STEPS)
         count = None if steps is None else arguments.integer("steps", steps, most=_MOST_STEPS)
         renderer = renderer_for(suffix := place.suffix, moving=True)
@@ -345,10 +348,11 @@ class CompiledNetwork:
         if not (math.isfinite(arguments.number("fps", fps)) and fps > 0):
             raise ValueError(f"frames a second are above 0, not {fps}")
         check_film(self.network, frames_of(self.network, first, count, recording), suffix, renderer.capabilities)
-        run = partial(self.run, progress=progress)
+        layout = self.drawn(engine).value
+        run = partial(self.run, inputs=inputs, progress=progress)
         snapshots = snapshots_from(self.network, first, count, recording, run)
-        gains = self._gains_for(recording)
-        film = pipeline.moving(self.network, self._layout, snapshots, gains, self._settings(theme), fps)
+        gains = self._gains_for(recording, inputs)
+        film = pipeline.moving(self.network, layout, snapshots, gains, self._settings(theme), fps)
         content = pipeline.animate(film, suffix, progress)
         with replacing(place) as file:
             file.write(content)
@@ -361,20 +365,32 @@ class CompiledNetwork:
             raise RendererError(f"there is no theme '{theme}'", suggest(theme, THEMES, "there are"))
         return self.network.render if theme is None else replace(self.network.render, theme=theme)
 
-    def _snapshot(self, step: int | None, recording: Recording | None, progress: Progress | None) -> Snapshot:
+    def _snapshot(
+        self,
+        step: int | None = None,
+        recording: Recording | None = None,
+        progress: Progress | None = None,
+        inputs: Mapping[str, npt.ArrayLike] | None = None,
+    ) -> tuple[Snapshot, Gains]:
         from neurovis_spec.snapshots import snapshot_at
 
-        if recording is None and (step is None or step >= 0):
-            # one run serves the step and the gains
-            wanted = self.network.steps if step is None else step + 1
-            recording = self.run(self.steps_to_draw(step), progress=progress)
+        if recording is not None or (step is not None and step < 0):
+            return snapshot_at(self.network, step, recording, self.run), self._gains_for(recording)
+        # one run serves the step and the gains
+        wanted = self.network.steps if step is None else step + 1
+        made = self.run(self.steps_to_draw(step, inputs=inputs), inputs, progress=progress)
+        if inputs is not None:
+            gains = pipeline.measure(self.network, made=made)
+        else:
             if self._gain_steps:
-                self.__dict__["gains"] = pipeline.measure(self.network, made=recording)
-            step = wanted - 1
-        return snapshot_at(self.network, step, recording, self.run)
+                self.__dict__["gains"] = pipeline.measure(self.network, made=made)
+            gains = self.gains
+        return snapshot_at(self.network, wanted - 1, made, self.run), gains
 
-    def _gains_for(self, recording: Recording | None) -> Gains:
-        """The gains of pictures of a recording, or of runs of its own."""
+    def _gains_for(self, recording: Recording | None, inputs: Mapping[str, npt.ArrayLike] | None = None) -> Gains:
+        """The gains of pictures of a recording, or of runs of its own, perhaps with other inputs."""
+        if inputs is not None:
+            return pipeline.measure(self.network, made=self.run(self._probe_steps, inputs))
         if recording is None:
             return self.gains
         from neurovis_spec.snapshots import fitted
@@ -382,27 +398,40 @@ class CompiledNetwork:
         return pipeline.measure_recording(self.network, fitted(recording, self.network))
 
     @property
-    def _gain_steps(self) -> int:
-        """The steps to run for the gains: 0 where these are known."""
+    def _probe_steps(self) -> int:
+        """The steps to run for gains."""
         from neurovis_spec.scene.probe import probe_steps
 
-        return 0 if "gains" in self.__dict__ else probe_steps(self.network)
+        return probe_steps(self.network)
 
-    def steps_to_draw(self, step: int | None = None, recording: Recording | None = None) -> int:
+    @property
+    def _gain_steps(self) -> int:
+        """The steps to run for the gains: 0 where these are known."""
+        return 0 if "gains" in self.__dict__ else self._probe_steps
+
+    def steps_to_draw(
+        self,
+        step: int | None = None,
+        recording: Recording | None = None,
+        inputs: Mapping[str, npt.ArrayLike] | None = None,
+    ) -> int:
         """How many steps ``render`` will run: none with a recording, else those up to the step and those that the gains
         take, in one run."""
         wanted = self.network.steps if step is None else step + 1
-        return 0 if recording is not None else max(wanted, self._gain_steps)
+        return 0 if recording is not None else max(wanted, self._gain_steps if inputs is None else self._probe_steps)
 
     def _repr_svg_(self) -> str:
         """The network at the last step of its default run, for a notebook."""
-        snapshot = self._snapshot(None, None, None)
-        scene = pipeline.picture(self.network, self._layout, snapshot, self.gains, self.network.render)
+        snapshot, gains = self._snapshot()
+        scene = pipeline.picture(self.network, self._layout, snapshot, gains, self.network.render)
         return pipeline.draw(scene, ".svg").decode()
 
 
 def _check(**given: object) -> None:
-    """Refuse arguments of wrong types, by what they are called; None is the default of each. Raises TypeError."""
+    """Refuse arguments of wrong types, by what they are called; None is the default of each. Raises TypeError, and
+    ValueError for a recording with inputs: nothing is run that could take them."""
+    if given.get("recording") is not None and given.get("inputs") is not None:
+        raise ValueError("'inputs' are for a run, and with a 'recording' nothing is run: give one of the two")
     for name, value in given.items():
         if value is None:
             continue
@@ -416,6 +445,8 @@ def _check(**given: object) -> None:
             arguments.instance(name, value, Layout, "a layout")
         elif name == "progress":
             arguments.function(name, value)
+        elif name == "inputs":
+            arguments.mapping(name, value)
         else:
             arguments.text(name, value)
 

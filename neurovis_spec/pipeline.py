@@ -212,11 +212,11 @@ def draw(scene: Scene, suffix: str) -> bytes:
     """A scene as the content of a file of this kind. Raises RendererError where nobody draws such files."""
     from neurovis_spec.scene.renderers import renderer_for
 
-    return renderer_for(suffix, moving=False).draw(scene, suffix)
+    return renderer_for(suffix, moving=False).draw(scene, suffix.lower())
 
 
 def animate(moving_scene: Film, suffix: str, progress: Progress | None = None) -> bytes:
     """A film as the content of a file of this kind. Raises RendererError where nobody makes such films."""
     from neurovis_spec.scene.renderers import renderer_for
 
-    return renderer_for(suffix, moving=True).animate(moving_scene, suffix, progress)
+    return renderer_for(suffix, moving=True).animate(moving_scene, suffix.lower(), progress)

@@ -48,10 +48,11 @@ READS = {
 }  # fmt: skip
 OPTIONS = {
     "new": "--from", "validate": "--format --strict --limit --root", "fmt": "--check --diff", "inspect": "--format",
-    "layout": "--output --engine --update --metrics", "render": "--output --step --recording --theme",
+    "layout": "--output --engine --update --metrics", "render": "--output --step --recording --input --theme --engine",
     "run": "--steps --set --input --backend --every --from --until --output",
     "sweep": "--over --metric --steps --set --input --backend --jobs --scheduler --output",
-    "animate": "--output --steps --from --fps --recording", "export": "--to --output --float --from --set",
+    "animate": "--output --steps --from --fps --recording --input --theme --engine",
+    "export": "--to --output --float --from --set",
     "explain": "", "docs": "", "lsp": "", "schema": "",
 }  # fmt: skip
 
@@ -353,6 +354,46 @@ def test_an_input_is_a_csv_with_a_row_a_step_or_an_npy(folder: Path) -> None:
     for suffix in ("csv", "npy"):
         good(f"run small.yaml --steps 5 --input pull=p.{suffix} -o {suffix}.npz")
         np.testing.assert_array_equal(nv.load(f"{suffix}.npz").activity, expected.activity)
+
+
+def test_pictures_and_films_take_inputs_and_are_those_of_a_run_with_them(folder: Path) -> None:
+    """The same as of its recording, gains included; and with a recording there is no run that could take them."""
+    (folder / "p.csv").write_text("1,2\n3,4\n5,6\n", encoding="utf-8")
+    good("run small.yaml --input pull=p.csv -o x.npz")
+    for words in ("render small.yaml --step 4", "animate small.yaml"):
+        good(f"{words} -o a.svg --input pull=p.csv")
+        good(f"{words} -o b.svg --recording x.npz")
+        good(f"{words} -o c.svg")
+        a, b, c = ((folder / f"{name}.svg").read_bytes() for name in "abc")
+        assert a == b != c
+        assert call(f"{words} -o a.svg --input pul=p.csv").exit_code == 1
+        lost = call(f"{words} -o p.csv --input pull=p.csv")
+        assert (lost.exit_code, "the file of the input 'pull'" in lost.stderr) == (2, True)
+        both = call(f"{words} -o a.svg --input pull=p.csv --recording x.npz")
+        assert (both.exit_code, "nothing is run" in both.stderr) == (2, True)
+    with pytest.raises(ValueError, match="nothing is run"):
+        nv.compile("small.yaml").render("a.svg", recording=nv.load("x.npz"), inputs={"pull": [1, 2]})
+
+
+def test_pictures_and_films_are_laid_out_by_the_engine_that_is_asked_for(folder: Path) -> None:
+    for words in ("render small.yaml --step 4", "animate small.yaml"):
+        made = set()
+        for engine in ("layered", "circular"):
+            good(f"{words} -o {engine}.svg --engine {engine}")
+            made.add((folder / f"{engine}.svg").read_bytes())
+        assert len(made) == 2
+        assert call(f"{words} -o x.svg --engine circle").exit_code == 2
+
+
+def test_the_suffix_of_a_file_may_be_written_in_capitals(folder: Path) -> None:
+    """And gives the same bytes as in small letters."""
+    for words, suffixes in (("render --step 4", "svg png gif webp"), ("animate --steps 3", "svg gif webp")):
+        command, *options = words.split()
+        for suffix in suffixes.split():
+            for name in (suffix, suffix.upper(), suffix.title()):
+                good(f"{command} small.yaml -o x.{name} {' '.join(options)}")
+            made = {(folder / f"x.{name}").read_bytes() for name in (suffix, suffix.upper(), suffix.title())}
+            assert len(made) == 1, suffix
 
 
 def test_what_cannot_be_read_is_the_inputs_fault(folder: Path) -> None:

@@ -7,9 +7,12 @@ from pathlib import Path
 
 import click
 
-from neurovis_spec.cli.files import network_of, recording_of, show_warnings, writing
+from neurovis_spec.cli.files import network_of, recording_of, show_warnings, tables, writing
 from neurovis_spec.cli.options import (
+    engine_option,
     examples,
+    input_option,
+    need_run,
     output_option,
     recording_option,
     set_option,
@@ -17,7 +20,7 @@ from neurovis_spec.cli.options import (
     theme_option,
 )
 from neurovis_spec.cli.progress import progress
-from neurovis_spec.cli.targets import check_files, check_target
+from neurovis_spec.cli.targets import check_files, check_target, files_of
 
 
 def _finite(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
@@ -48,7 +51,9 @@ def _finite(ctx: click.Context, param: click.Parameter, value: float | None) -> 
     help="Frames a second; default 1/dt, at most 60, and 25 where the spec writes no dt.",
 )
 @recording_option
+@input_option
 @theme_option
+@engine_option
 @set_option
 def command(
     spec: str,
@@ -57,15 +62,29 @@ def command(
     start: int,
     fps: float | None,
     recording: str | None,
+    inputs: dict[str, str],
     theme: str | None,
+    engine: str | None,
     settings: dict[str, float],
 ) -> None:
     """Draw a run as a moving picture, one frame a step."""
-    check_target(output, [("the spec itself", spec), ("the recording that is drawn", recording)])
+    need_run(inputs, recording)
+    read = [("the recording that is drawn", recording), *files_of(inputs)]
+    check_target(output, [("the spec itself", spec), *read])
     network = network_of(spec, settings)
     check_files(output, network)
-    record = recording_of(recording)
+    record, arrays = recording_of(recording), tables(inputs, network.network) or None
     with progress("drawing") as bar, writing(output):
-        network.animate(output, steps=steps, start=start, fps=fps, recording=record, theme=theme, progress=bar)
-    show_warnings(network.drawn())
+        network.animate(
+            output,
+            steps=steps,
+            start=start,
+            fps=fps,
+            recording=record,
+            inputs=arrays,
+            theme=theme,
+            engine=engine,
+            progress=bar,
+        )
+    show_warnings(network.drawn(engine))
     click.echo(str(output))

@@ -7,7 +7,7 @@ known names where a name is wanted.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TypeVar
 
@@ -143,6 +143,14 @@ input_option = click.option(
     shell_complete=input_files,
     help="Replace the source of an input by a .csv or .npy file, one row a step. Repeatable, once for each.",
 )
+
+
+def need_run(inputs: Mapping[str, str], recording: str | None) -> None:
+    """Refuse inputs where a recording is drawn: nothing is run that could take them."""
+    if inputs and recording is not None:
+        raise click.UsageError("--input is for a run, and with --recording nothing is run: give one of the two")
+
+
 backend_option = click.option(
     "--backend",
     metavar="B",

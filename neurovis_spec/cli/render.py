@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from neurovis_spec.cli.files import count, network_of, recording_of, show_warnings, writing
+from neurovis_spec.cli.files import count, network_of, recording_of, show_warnings, tables, writing
 from neurovis_spec.cli.options import (
     engine_option,
     examples,
+    input_option,
+    need_run,
     output_option,
     recording_option,
     set_option,
@@ -18,7 +20,7 @@ from neurovis_spec.cli.options import (
     theme_option,
 )
 from neurovis_spec.cli.progress import on_terminal, progress
-from neurovis_spec.cli.targets import check_files, check_target
+from neurovis_spec.cli.targets import check_files, check_target, files_of
 
 if TYPE_CHECKING:
     from neurovis_spec.compiled import CompiledNetwork
@@ -38,9 +40,10 @@ def _why(network: CompiledNetwork, step: int | None, steps: int) -> str:
     )
 )
 @spec_argument
-@output_option("The picture; the suffix says what kind, .svg or .png.", required=True)
+@output_option("The picture; the suffix says what kind, such as .svg or .png.", required=True)
 @click.option("--step", type=click.IntRange(min=0), metavar="N", help="The step to show; default: the last.")
 @recording_option
+@input_option
 @theme_option
 @engine_option
 @set_option
@@ -49,6 +52,7 @@ def command(
     output: Path,
     step: int | None,
     recording: str | None,
+    inputs: dict[str, str],
     theme: str | None,
     engine: str | None,
     settings: dict[str, float],
@@ -58,14 +62,16 @@ def command(
     Colours show activities and signals, thickness shows weights, glow shows how weights change (the legend gives the
     scales).
     """
-    check_target(output, [("the spec itself", spec), ("the recording that is drawn", recording)])
+    need_run(inputs, recording)
+    read = [("the recording that is drawn", recording), *files_of(inputs)]
+    check_target(output, [("the spec itself", spec), *read])
     network = network_of(spec, settings)
     check_files(output, network)
-    record = recording_of(recording)
-    steps = network.steps_to_draw(step, record)
+    record, arrays = recording_of(recording), tables(inputs, network.network) or None
+    steps = network.steps_to_draw(step, record, arrays)
     if steps and on_terminal():
         click.echo(f"running {count(steps, 'step')}{_why(network, step, steps)}", err=True)
     with progress("drawing") as bar, writing(output):
-        network.render(output, step=step, recording=record, theme=theme, engine=engine, progress=bar)
+        network.render(output, step=step, recording=record, inputs=arrays, theme=theme, engine=engine, progress=bar)
     show_warnings(network.drawn(engine))
     click.echo(str(output))

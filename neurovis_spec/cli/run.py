@@ -12,7 +12,7 @@ from neurovis_spec.cli.completion import paths
 from neurovis_spec.cli.files import count, network_of, recording_of, tables, writing
 from neurovis_spec.cli.options import backend_option, compile_options, examples, input_option, output_option, set_option
 from neurovis_spec.cli.progress import progress
-from neurovis_spec.cli.targets import check_files, check_target
+from neurovis_spec.cli.targets import check_files, check_target, files_of
 
 if TYPE_CHECKING:
     from neurovis_spec.compiled import CompiledNetwork
@@ -124,7 +124,7 @@ def command(
         return
     if spec is None:
         raise click.UsageError("Missing argument 'SPEC'.")
-    read = [(f"the file of the input '{name}'", path) for name, path in inputs.items()]
+    read = files_of(inputs)
     check_target(output, [("the spec itself", spec), ("the recording that the run goes on from", start), *read])
     others = [("the spec itself", spec), ("the recording that the run goes on from", start), *read]
     check_target(checkpoint, [*others, ("the recording", None if output is None else str(output))], "--checkpoint")

@@ -21,7 +21,7 @@ from neurovis_spec.cli.options import (
     set_option,
 )
 from neurovis_spec.cli.progress import progress
-from neurovis_spec.cli.targets import check_files, check_target
+from neurovis_spec.cli.targets import check_files, check_target, files_of
 
 
 @click.command(
@@ -80,7 +80,7 @@ def command(
     not run again: what was ended, by Ctrl-C or otherwise, goes on where it was when it is called again. It goes by the
     columns and the values of the grid: where the spec has changed, name another file.
     """
-    read = [(f"the file of the input '{name}'", path) for name, path in inputs.items()]
+    read = files_of(inputs)
     check_target(output, [("the spec itself", spec), *read])
     both = next((name for name in over if name in settings), None)
     if both is not None:

@@ -6,7 +6,7 @@ In: the path of an output, those of the inputs, a compiled network. Out: nothing
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,6 +31,11 @@ def check_target(path: Path | None, inputs: Iterable[tuple[str, str | None]] = (
         raise fault(f"{path} is a folder, not a file")
     if not path.parent.is_dir():
         raise fault(f"{path}: there is no folder '{path.parent}'", f"make it: mkdir -p {path.parent}")
+
+
+def files_of(inputs: Mapping[str, str]) -> list[tuple[str, str | None]]:
+    """What the files of inputs are, in words, and their paths."""
+    return [(f"the file of the input '{name}'", path) for name, path in inputs.items()]
 
 
 def check_files(path: Path | None, network: CompiledNetwork, option: str = "-o", *, layout: bool = False) -> None:

@@ -286,8 +286,8 @@ class Film:
 
 @dataclass(frozen=True, slots=True)
 class RendererCapabilities:
-    """File suffixes (with the dot) of the stills and of the films that a renderer makes; of a film the most ``pixels``,
-    those of all frames together (None: it does not depend on them)."""
+    """File suffixes (with the dot, in small letters) of the stills and of the films that a renderer makes; of a film
+    the most ``pixels``, those of all frames together (None: it does not depend on them)."""
 
     stills: frozenset[str] = frozenset()
     films: frozenset[str] = frozenset()
@@ -296,7 +296,8 @@ class RendererCapabilities:
 
 class Renderer(Protocol):
     """A renderer, found through the entry point group ``neurovis.renderers`` (the entry point names a class that is
-    called without arguments). The method for which it declares no suffix is never called."""
+    called without arguments). The method for which it declares no suffix is never called; a suffix is given as it is
+    declared, however the file's is written (``.PNG``)."""
 
     name: str
     capabilities: RendererCapabilities
