@@ -359,11 +359,11 @@ class CompiledNetwork:
 
     def _settings(self, theme: str | None) -> RenderSettings:
         from neurovis_spec.scene.renderers import RendererError
-        from neurovis_spec.scene.themes import THEMES
+        from neurovis_spec.themes import THEMES
 
         if theme is not None and theme not in THEMES:
             raise RendererError(f"there is no theme '{theme}'", suggest(theme, THEMES, "there are"))
-        return self.network.render if theme is None else replace(self.network.render, theme=theme)
+        return self.network.render if theme is None else replace(self.network.render, theme=theme, colours=())
 
     def _snapshot(
         self,

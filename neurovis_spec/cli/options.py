@@ -85,7 +85,7 @@ def _engines() -> Iterable[str]:
 
 
 def _themes() -> Iterable[str]:
-    from neurovis_spec.scene.themes import THEMES
+    from neurovis_spec.themes import THEMES
 
     return THEMES
 

@@ -22,6 +22,8 @@ from neurovis_spec.diagnostics import Findings, Span, shown, suggest
 from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel, RenderModel
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.source import Mapping as SourceMapping
+from neurovis_spec.language.theme import ThemeModel
+from neurovis_spec.themes import COLOURS
 
 #: The most pixels of a picture: 8K is a little less. Its bytes take some 250 MB of memory.
 _MOST_PIXELS = 1 << 25
@@ -119,7 +121,7 @@ def render_settings(model: RenderModel | None, finder: Finder, constants: Consta
     """The ``render`` section; ``finder`` knows what references in it name."""
     if model is None:
         return RenderSettings()
-    gain = model.gain
+    gain, theme = model.gain, model.theme
     size = None
     if model.size is not None:
         width, height = (_side(side, constants) for side in model.size)
@@ -133,12 +135,23 @@ def render_settings(model: RenderModel | None, finder: Finder, constants: Consta
         signal=() if gain is None else stated_gains(gain.signal, "signal", finder, constants),
         thickness=() if gain is None else stated_gains(gain.thickness, "thickness", finder, constants),
         change=() if gain is None else stated_gains(gain.change, "change", finder, constants),
-        theme="default" if model.theme is None else model.theme.value,
+        theme="default" if theme is None or theme.base is None else theme.base.value,
+        colours=() if theme is None else _changes(theme),
         size=size,
         labels=model.labels is None or model.labels.value,
         legend=model.legend is None or model.legend.value,
         title=True if model.title is None else model.title.value,
     )
+
+
+def _changes(theme: ThemeModel) -> tuple[tuple[str, str], ...]:
+    """What a spec changes of a theme."""
+    result: list[tuple[str, str]] = []
+    for name in (*COLOURS, "ends"):
+        found: Located[str] | None = getattr(theme, name)
+        if found is not None:
+            result.append((name, found.value))
+    return tuple(result)
 
 
 def _side(formula: Formula, constants: Constants) -> int | None:

@@ -42,6 +42,7 @@ def warn(compiled: Compiled, findings: Findings) -> None:
     look_for_replaced_weights(compiled, findings)
     look_beyond(compiled, findings)
     _events(compiled, findings)
+    _theme(compiled, findings)
     _definitions(compiled, findings)
     _modules(compiled, findings)
     _neurons(compiled, findings)
@@ -49,6 +50,15 @@ def warn(compiled: Compiled, findings: Findings) -> None:
     _rates(compiled, findings)
     _episodes(compiled, findings)
     _vain(compiled, findings)
+
+
+def _theme(compiled: Compiled, findings: Findings) -> None:
+    """A theme of the spec's own. Most specs have none: nothing is imported then."""
+    render = compiled.spec.render
+    if render is not None and render.theme is not None and compiled.network.render.colours:
+        from neurovis_spec.compiler.like_colours import look_for_like_colours
+
+        look_for_like_colours(render.theme, findings)
 
 
 def _events(compiled: Compiled, findings: Findings) -> None:

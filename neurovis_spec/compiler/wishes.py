@@ -67,6 +67,8 @@ class RenderSettings:
     thickness: tuple[StatedGain, ...] = ()
     change: tuple[StatedGain, ...] = ()
     theme: str = "default"
+    #: what the spec changes of it: colours by their names, and ``ends``
+    colours: tuple[tuple[str, str], ...] = ()
     size: tuple[int, int] | None = None
     labels: bool = True
     legend: bool = True

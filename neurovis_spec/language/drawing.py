@@ -30,6 +30,7 @@ from neurovis_spec.language.located import (
 )
 from neurovis_spec.language.model import Keyed, Model
 from neurovis_spec.language.source import Mapping, Node, Packed, Sequence
+from neurovis_spec.language.theme import ThemeField
 from neurovis_spec.language.values import PointField, Reference, ReferenceField, TitleField, as_reference
 
 
@@ -214,8 +215,8 @@ class RenderModel(Model):
     PLACE: ClassVar[str] = "'render'"
 
     gain: Gain | None = Field(None, description="The scaling factors γ of Eqs. 2–5.")
-    theme: Annotated[Located[str], words("default", "dark", "print", "paper")] | None = Field(
-        None, description="The colours: default, dark, print or paper (default default)."
+    theme: ThemeField | None = Field(
+        None, description="The colours: default, dark, print, paper, or other ones (default default)."
     )
     size: Annotated[
         tuple[FormulaField, FormulaField] | None,

@@ -52,6 +52,8 @@ class Model(BaseModel):
     #: what a mapping of this kind is called in a finding, for keys that are written elsewhere
     PLACE: ClassVar[str] = ""
     STAND_INS: ClassVar[StandIns] = {}
+    #: what is said of a key without a value
+    UNSAID: ClassVar[str] = "leave the key out, or give it a value"
 
     source: SkipJsonSchema[Annotated[Mapping, Leaf(_as_it_is, {})]] = Field(alias="$", exclude=True, repr=False)
 
@@ -102,7 +104,7 @@ class Model(BaseModel):
             if isinstance(entry.value, Scalar) and entry.value.value is None and not field.is_required():
                 if not findings.at_fault(entry.value.span):  # such as an alias, which is refused and read as nothing
                     message = f"'{entry.name}' has no value"
-                    findings.error("no-value", entry.key.span, message, "leave the key out, or give it a value")
+                    findings.error("no-value", entry.key.span, message, cls.UNSAID)
             else:
                 result[entry.name] = entry.value
         hopeless = False

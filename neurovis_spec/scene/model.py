@@ -15,32 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.progress import Progress
+from neurovis_spec.themes import Theme as Theme
 
 Point: TypeAlias = tuple[float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class Theme:
-    """A theme is data: the anchors of the colours (−1, 0, +1), the glow, an opaque background, ink."""
-
-    name: str
-    negative: str
-    zero: str
-    positive: str
-    glow: str
-    background: str
-    ink: str
-    #: second text, box and line colours
-    muted: str
-    box_fill: str
-    box_line: str
-    #: ring around a disc
-    ring: str
-    #: text on a disc: the one that is easier to read on the disc's colour
-    light: str
-    dark: str
-    #: how lines end: as the sign of the weight says (an arrowhead for w ≥ 0, a bar for w < 0), or all with arrowheads
-    ends: Literal["signs", "arrows"] = "signs"
 
 
 @dataclass(frozen=True, slots=True)

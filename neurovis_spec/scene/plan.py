@@ -27,7 +27,7 @@ from neurovis_spec.scene.lines import Line, routes_of, trimmed
 from neurovis_spec.scene.model import Arrowhead, Group, Rectangle, Spline, Text, Theme, head_half_width
 from neurovis_spec.scene.obstacles import Obstacles
 from neurovis_spec.scene.teachers import Teacher, dash, dotted, label_of, teachers_of
-from neurovis_spec.scene.themes import THEMES
+from neurovis_spec.scene.themes import theme_of
 from neurovis_spec.scene.titles import Titled, outline, titles_of
 
 _TITLE, _CAPTION = 17.0, 11.5
@@ -72,7 +72,7 @@ class Plan:
 
 def plan(network: Network, layout: Layout, gains: Gains, settings: RenderSettings) -> Plan:
     """Arrange everything that stays the same. Raises KeyError for a theme that does not exist."""
-    theme = THEMES[settings.theme]
+    theme = theme_of(settings)
     positions, routes = _in_units(network, layout)
     boxes = boxes_of(network, positions, routes)
     teachers = teachers_of(network)[:_MOST_TEACHERS]

@@ -1,8 +1,6 @@
-"""The four themes, and colours: a value in −1…1 between a theme's anchors, and text that can be read on it.
+"""Colours: a value in −1…1 between a theme's anchors, and text that can be read on it.
 
-In: a theme's name; values. Out: a Theme; colours as ``#rrggbb``. ``default`` can be told apart with any common colour
-deficiency; ``paper`` has the anchors of the NeuroVis paper; ``print`` is for white paper and survives greyscale: its
-lightness falls from −1 over 0 to +1, and discs have dark rings.
+In: what a spec says of its theme; values. Out: a Theme; colours as ``#rrggbb``.
 """
 
 from __future__ import annotations
@@ -12,77 +10,17 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.scene.model import Theme
+from neurovis_spec.compiler.wishes import RenderSettings
+from neurovis_spec.themes import THEMES as THEMES
+from neurovis_spec.themes import Theme, changed
 
 FloatArray = npt.NDArray[np.float64]
 
-_WHITE, _NIGHT = "#ffffff", "#15191e"
 
-THEMES: dict[str, Theme] = {
-    theme.name: theme
-    for theme in (
-        Theme(
-            name="default",
-            negative="#d55e00",
-            zero="#969696",
-            positive="#0072b2",
-            glow="#f2c200",
-            background="#ffffff",
-            ink="#1f2328",
-            muted="#59636e",
-            box_fill="#f6f8fa",
-            box_line="#d8dee4",
-            ring="#ffffff",
-            light=_WHITE,
-            dark=_NIGHT,
-        ),
-        Theme(
-            name="dark",
-            negative="#ff8c42",
-            zero="#6e7681",
-            positive="#58a6ff",
-            glow="#fff5cc",
-            background="#0d1117",
-            ink="#f0f6fc",
-            muted="#9198a1",
-            box_fill="#151b23",
-            box_line="#30363d",
-            ring="#0d1117",
-            light=_WHITE,
-            dark="#0d1117",
-        ),
-        Theme(
-            name="print",
-            negative="#e8a33d",
-            zero="#868686",
-            positive="#0a2a66",
-            glow="#ecbfff",
-            background="#ffffff",
-            ink="#000000",
-            muted="#444444",
-            box_fill="#fafafa",
-            box_line="#bdbdbd",
-            ring="#222222",
-            light=_WHITE,
-            dark="#000000",
-        ),
-        Theme(
-            name="paper",
-            negative="#d62728",
-            zero="#969696",
-            positive="#2ca02c",
-            glow="#f7d038",
-            background="#ffffff",
-            ink="#1f2328",
-            muted="#59636e",
-            box_fill="#f7f7f7",
-            box_line="#dcdcdc",
-            ring="#ffffff",
-            light=_WHITE,
-            dark=_NIGHT,
-        ),
-    )
-}
+def theme_of(settings: RenderSettings) -> Theme:
+    """The theme of a picture: one of ours, or the spec's own. Raises KeyError for a name that none has."""
+    base = THEMES[settings.theme]
+    return changed(base, dict(settings.colours)) if settings.colours else base
 
 
 def channels(colour: str) -> tuple[int, int, int]:

@@ -1,0 +1,82 @@
+"""The theme of a picture: a name, or a mapping of colours; the shape as written.
+
+In: nodes. Out: a frozen model whose leaves know their places.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, ClassVar
+
+from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, ValidationInfo, WithJsonSchema
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import core_schema
+
+from neurovis_spec.diagnostics import shown
+from neurovis_spec.language.located import Leaf, Located, as_text, findings_of, give_up, refuse, words
+from neurovis_spec.language.model import Model
+from neurovis_spec.language.source import Entry, Mapping, Node, Scalar
+
+_COLOUR = re.compile(r"#[0-9A-Fa-f]{6}")
+THEME_NAMES = ("default", "dark", "print", "paper")
+
+
+def _colour(node: Node, info: ValidationInfo) -> Located[str]:
+    """``#rrggbb``."""
+    text = as_text(node, info)
+    if not _COLOUR.fullmatch(text.value):
+        message = f"'{shown(text.value)}' is not a colour"
+        findings_of(info).error("bad-colour", node.span, message, "write six hexadecimal digits, '#d55e00', in quotes")
+        give_up()
+    return Located(text.value.lower(), text.node)
+
+
+ColourField = Annotated[Located[str], Leaf(_colour, {"type": "string", "pattern": f"^{_COLOUR.pattern}$"})]
+
+
+class ThemeModel(Model):
+    """A theme of one's own: another one with other colours."""
+
+    PLACE: ClassVar[str] = "'render: theme'"
+    UNSAID: ClassVar[str] = "leave the key out, or write a colour in quotes, '#d55e00': # begins a comment"
+
+    base: Annotated[Located[str], words(*THEME_NAMES)] | None = Field(
+        None, description="The theme whose colours hold where no other is given: default, dark, print or paper."
+    )
+    negative: ColourField | None = Field(None, description="The colour of −1, in quotes: '#d55e00'.")
+    zero: ColourField | None = Field(None, description="The colour of 0.")
+    positive: ColourField | None = Field(None, description="The colour of 1.")
+    glow: ColourField | None = Field(None, description="Around connections whose weight changes.")
+    background: ColourField | None = Field(None, description="Behind all.")
+    ink: ColourField | None = Field(None, description="Titles, and labels beside discs.")
+    muted: ColourField | None = Field(None, description="Other texts, and the lines of the legend.")
+    box_fill: ColourField | None = Field(None, description="Within boxes.")
+    box_line: ColourField | None = Field(None, description="Around boxes.")
+    ring: ColourField | None = Field(None, description="Around discs.")
+    light: ColourField | None = Field(None, description="Texts on dark discs.")
+    dark: ColourField | None = Field(None, description="Texts on light discs.")
+    ends: Annotated[Located[str], words("signs", "arrows")] | None = Field(
+        None,
+        description="Lines end as the sign of their weight says, or all in arrowheads: signs, arrows (default signs).",
+    )
+
+
+class _OrName(WithJsonSchema):
+    """Says in the schema that a name may stand in place of a mapping."""
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        return {"anyOf": [dict(self.json_schema or {}), handler(schema)]}
+
+
+def _theme(node: Node, info: ValidationInfo) -> Node:
+    """A name alone is the base of a theme."""
+    if isinstance(node, Mapping):
+        return node
+    if not isinstance(node, Scalar):
+        refuse(info, node, "the name of a theme, or a mapping of its colours")
+    return Mapping((Entry(Scalar("base", node.span), node),), node.span)
+
+
+ThemeField = Annotated[ThemeModel, BeforeValidator(_theme), _OrName({"enum": list(THEME_NAMES)})]
