@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import re
 from dataclasses import replace
+from typing import Literal
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -22,6 +24,7 @@ from neurovis_spec.scene import (
     Film,
     Group,
     Image,
+    Polyline,
     Ramp,
     Rectangle,
     Scene,
@@ -104,6 +107,7 @@ def test_a_group_that_is_shifted_moves_as_a_whole(frame: int) -> None:
     [
         Disc((1, 2), 3, INK, EDGE, 1),
         Spline(((1, 2), (2, 3), (3, 4), (4, 5)), INK, 1),
+        Polyline(((1, 2), (2, 3)), INK, 1),
         Arrowhead((1, 2), (0, 1), 8, 3, INK),
         Rectangle((1, 2), 3, 4, 0, INK, EDGE, 1),
         Ramp((1, 2), 3, 4, (INK, EDGE)),
@@ -182,3 +186,38 @@ def test_cells_are_the_same_in_the_svgs_png_and_in_pixels(shades: int) -> None:
     assert element.attrib["href"].startswith("data:image/png;base64,")
     assert (element.attrib["x"], element.attrib["width"]) == ("20", "150")
     assert element.attrib["image-rendering"] == "pixelated"
+
+
+def alone(*drawn: Shape) -> Scene:
+    return Scene(200, 100, THEME, "alone", (Group(drawn),))
+
+
+def dark(scene: Scene) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    """How dark each pixel is, 0 … 1."""
+    result: np.ndarray[tuple[int, ...], np.dtype[np.float64]] = 1 - paint(scene).mean(axis=2) / 255
+    return result
+
+
+def test_a_polyline_is_drawn_straight_in_pixels_and_reads_back_from_the_svg() -> None:
+    corners = ((10.0, 50.04), (10.44, 20.0), (11.3, 80.0), (60.0, 80.0))
+    scene = alone(Polyline(corners, "#000000", 2.0))
+    seen = dark(scene)
+    assert seen[80, 20:59].min() > 0.4
+    assert seen[78:82, 30].sum() == pytest.approx(2, abs=0.05)
+    assert seen[:18].max() == 0
+    root = ET.fromstring(SvgRenderer().draw(scene, ".svg"))
+    path = root.find(NS + "path")
+    assert path is not None
+    start, steps = path.attrib["d"][1:].split("l")
+    numbers = [float(word) for word in re.findall(r"-?(?:\d+\.?\d*|\.\d+)", start + " " + steps)]
+    places = np.cumsum(np.array(numbers).reshape(-1, 2), axis=0)
+    assert np.abs(places - corners).max() <= 0.051
+
+
+@pytest.mark.parametrize("anchor", ["start", "middle", "end"])
+def test_a_text_that_reads_upward_is_the_level_one_turned(anchor: Literal["start", "middle", "end"]) -> None:
+    level = dark(alone(Text((50.25, 60.5), "Ky", 20, "#000000", anchor, subscript="2")))
+    turned = dark(alone(Text((60.5, 49.75), "Ky", 20, "#000000", anchor, subscript="2", upward=True)))
+    assert level.sum() > 50
+    # about (0, 100): (x, y) goes to (y, 100 - x)
+    assert np.abs(np.rot90(level)[100:200, 0:100] - turned[:, 0:100]).max() < 1e-9

@@ -1,7 +1,7 @@
 """The Scene: a flat drawing in plain units, and the Film: a scene whose colours and widths change.
 
 In: nothing; these are the values that ``scene.encode`` makes and that renderers read. A renderer knows nothing of
-networks: items are discs, splines, texts, rectangles and images of cells, in groups that carry an opaque id, data
+networks: items are discs, lines, texts, rectangles and images of cells, in groups that carry an opaque id, data
 attributes and a tooltip. Lengths are user units (``Scene.density`` pixels), x right, y down. Colours are ``#rrggbb``.
 """
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import ClassVar, Literal, Protocol, TypeAlias
 
 import numpy as np
@@ -43,6 +44,25 @@ class Spline:
     #: drawn beneath the line of its group; renderers mark it with the class ``glow``
     glow: bool = False
     opacity: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Polyline:
+    """Points joined by straight lines, stroked with round joins and butt caps."""
+
+    points: tuple[Point, ...]
+    stroke: str
+    width: float
+    opacity: float = 1.0
+
+    @property
+    def spline(self) -> Spline:
+        """The same line as a spline, whose control points lie on it."""
+        points = [self.points[0]]
+        for (x0, y0), (x1, y1) in pairwise(self.points):
+            a, b = (x1 - x0) / 3, (y1 - y0) / 3
+            points += [(x0 + a, y0 + b), (x1 - a, y1 - b), (x1, y1)]
+        return Spline(tuple(points), self.stroke, self.width, opacity=self.opacity)
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,6 +175,8 @@ class Text:
     on_disc: bool = False
     #: a colour around the letters, ``HALO`` wide, that keeps lines beneath away from them ('' for none)
     halo: str = ""
+    #: it reads upward: turned by a quarter about its point
+    upward: bool = False
 
 
 def shifted(shape: Shape, by: Point) -> Shape:
@@ -166,7 +188,7 @@ def shifted(shape: Shape, by: Point) -> Shape:
     match shape:
         case Disc():
             return replace(shape, centre=move(shape.centre))
-        case Spline():
+        case Spline() | Polyline():
             return replace(shape, points=tuple(move(point) for point in shape.points))
         case Arrowhead():
             return replace(shape, tip=move(shape.tip))
@@ -176,7 +198,7 @@ def shifted(shape: Shape, by: Point) -> Shape:
             return replace(shape, point=move(shape.point))
 
 
-Shape: TypeAlias = Disc | Spline | Arrowhead | Rectangle | Ramp | Image | Text
+Shape: TypeAlias = Disc | Spline | Polyline | Arrowhead | Rectangle | Ramp | Image | Text
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,19 +38,23 @@ def lettering(text: Text, size: Size, halo: bool = False) -> Fragments:
         runs.append((text.subscript, SUBSCRIPT_SIZE * text.size, SUBSCRIPT_DROP * text.size))
     fonts = [font(_FINER * points, bold) for _, points, _ in runs]
     lengths = [made.getlength(words) / _FINER for made, (words, _, _) in zip(fonts, runs, strict=True)]
-    x = text.point[0] - {"start": 0.0, "middle": sum(lengths) / 2, "end": sum(lengths)}[text.anchor]
+    # what reads upward is drawn where it stands before it is turned by a quarter about the picture's corner
+    x, baseline = (-text.point[1], text.point[0]) if text.upward else text.point
+    x -= {"start": 0.0, "middle": sum(lengths) / 2, "end": sum(lengths)}[text.anchor]
     reach = math.ceil(HALO * text.size) if halo else 0
-    left, top = int(np.floor(x)) - 2 - reach, int(np.floor(text.point[1] - 1.2 * text.size)) - 1 - reach
+    left, top = int(np.floor(x)) - 2 - reach, int(np.floor(baseline - 1.2 * text.size)) - 1 - reach
     wide, high = int(sum(lengths)) + 6 + 2 * reach, int(2 * text.size) + 4 + 2 * reach
     tile = Image.new("L", (wide * _FINER, high * _FINER))
     pen = ImageDraw.Draw(tile)
     stroke = round(HALO * text.size * _FINER) if halo else 0
     for made, (words, _, drop), length in zip(fonts, runs, lengths, strict=True):
-        baseline = math.floor(text.point[1] + drop + 0.5)  # on a whole pixel, as browsers have it
-        at = ((x - left) * _FINER, (baseline - top) * _FINER)
+        row = math.floor(baseline + drop + 0.5)  # on a whole pixel, as browsers have it
+        at = ((x - left) * _FINER, (row - top) * _FINER)
         pen.text(at, words, fill=255, font=made, anchor="ls", stroke_width=stroke)
         x += length
     share = np.asarray(tile.reduce(_FINER), np.float32) / np.float32(255)
+    if text.upward:
+        share, left, top = np.rot90(share), top, -left - share.shape[1]
     rows, columns = np.nonzero(share)
     rows, columns, share = rows + top, columns + left, share[rows, columns]
     kept = (rows >= 0) & (rows < size[1]) & (columns >= 0) & (columns < size[0])

@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import re
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 from neurovis_renderers.png import png
 from neurovis_spec.scene import (
@@ -21,6 +22,7 @@ from neurovis_spec.scene import (
     Group,
     Image,
     Point,
+    Polyline,
     Ramp,
     Rectangle,
     Scene,
@@ -92,6 +94,8 @@ def element(shape: Shape, attributes: str = "", content: str = "") -> str:
             )
         case Spline():
             return _close(f"<path{_spline(shape)}{attributes}", "path", content)
+        case Polyline():
+            return _close(f"<path{_polyline(shape)}{attributes}", "path", content)
         case Arrowhead():
             kind = ' class="bar"' if shape.kind == "bar" and "class=" not in attributes else ""
             return _close(
@@ -125,6 +129,17 @@ def _spline(shape: Spline) -> str:
     opacity = f' stroke-opacity="{num(shape.opacity)}"' if shape.opacity != 1 else ""
     width = exact(shape.width)
     return f'{kind} d="{path(shape.points)}" stroke="{shape.stroke}" stroke-width="{width}"{dash}{opacity}'
+
+
+def _polyline(shape: Polyline) -> str:
+    """Each point as its distance from the one before, in tenths of a unit, which add up without error."""
+    places = [(round(10 * x), round(10 * y)) for x, y in shape.points]
+    steps = [(x - a, y - b) for (a, b), (x, y) in pairwise(places)]
+    start = pairs([(places[0][0] / 10, places[0][1] / 10)])
+    line = "l" + pairs([(x / 10, y / 10) for x, y in steps]) if steps else ""
+    opacity = f' stroke-opacity="{num(shape.opacity)}"' if shape.opacity != 1 else ""
+    width = exact(shape.width)
+    return f' d="M{start}{line}" stroke="{shape.stroke}" stroke-width="{width}" stroke-linejoin="round"{opacity}'
 
 
 def _ramp(shape: Ramp) -> str:
@@ -162,9 +177,11 @@ def _text(shape: Text, attributes: str, content: str) -> str:
     if shape.subscript:
         drop, size = num(SUBSCRIPT_DROP * shape.size), num(SUBSCRIPT_SIZE * shape.size)
         inner += f'<tspan dy="{drop}" font-size="{size}">{escape(shape.subscript)}</tspan>'
+    x, y = num(shape.point[0]), num(shape.point[1])
+    turn = f' transform="rotate(-90 {x} {y})"' if shape.upward else ""
     return (
-        f'<text x="{num(shape.point[0])}" y="{num(shape.point[1])}" font-size="{num(shape.size)}" '
-        f'fill="{shape.fill}"{weight}{anchor}{halo}{attributes}>{inner}{content}</text>'
+        f'<text x="{x}" y="{y}" font-size="{num(shape.size)}" '
+        f'fill="{shape.fill}"{weight}{anchor}{halo}{turn}{attributes}>{inner}{content}</text>'
     )
 
 

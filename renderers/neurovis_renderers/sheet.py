@@ -28,7 +28,7 @@ from neurovis_renderers.coverage import (
     Strokes,
 )
 from neurovis_renderers.lettering import lettering
-from neurovis_spec.scene import Arrowhead, Disc, Group, Image, Point, Ramp, Rectangle, Shape, Spline, Text
+from neurovis_spec.scene import Arrowhead, Disc, Group, Image, Point, Polyline, Ramp, Rectangle, Shape, Spline, Text
 
 #: A colour and its weight are whole numbers: red, green and blue times a weight of at most ``WHOLE`` stand side by side
 #: in one integer of 64 bits, ``LANE`` bits each, and are added at once.
@@ -100,6 +100,10 @@ class Sheet:
         match shape:
             case Spline() if not shape.dash:
                 self._splines.append((place, shape))
+                self.colours.append(packed(shape.stroke))
+                return False
+            case Polyline():
+                self._splines.append((place, shape.spline))
                 self.colours.append(packed(shape.stroke))
                 return False
             case Arrowhead():
@@ -284,7 +288,7 @@ class Sheet:
                 return [Fragments(shade, where, np.ones(len(where), np.float32))]
             case Text():
                 text = replace(shape, point=pixels(shape.point), size=shape.size * density)
-                if not _reaches(np.array([text.point[1]]), np.array([3 * text.size]), size).any():
+                if not (text.upward or _reaches(np.array([text.point[1]]), np.array([3 * text.size]), size).any()):
                     return []
                 return [lettering(text, size, halo=halo) for halo in (True, False) if shape.halo or not halo]
             case _:
