@@ -71,8 +71,8 @@ PICTURES = (
         90,
         "Use case 1, in the midst of learning",
         "The paper's Figure 5A. C1 is weakly negative, C2 strongly positive: K1 to K4 and K8 are active. O is too high "
-        "by 0.41 (the caption says so), so the connections of these kernels glow, most of all those of K2 and K3, which "
-        "are the most active: they turn to inhibition. The lines between C1 and C2 have a scale of their own; they "
+        "by 0.41 (the caption says so), so the connections of these kernels glow, most of all those of K2 and K3, "
+        "the most active: they turn to inhibition. The lines between C1 and C2 have a scale of their own; they "
         "would be grey beside the others.",
     ),
     Picture(

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from neurovis_spec import arguments, pipeline
 from neurovis_spec.compiler.compile import Request
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.wishes import RenderSettings
+from neurovis_spec.compiler.wishes import Panel, RenderSettings
 from neurovis_spec.diagnostics import Diagnostic, suggest
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.progress import Progress
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from neurovis_spec.runtime.simulation import Simulation
     from neurovis_spec.runtime.until import Until
     from neurovis_spec.scene.gains import Gains
+    from neurovis_spec.scene.panels import View
 
 #: Frames a second where the spec writes no dt, and the most there are.
 DEFAULT_FPS, MOST_FPS = 25.0, 60.0
@@ -297,22 +298,40 @@ class CompiledNetwork:
         inputs: Mapping[str, npt.ArrayLike] | None = None,
         theme: str | None = None,
         engine: str | None = None,
+        view: View | Sequence[View] | None = None,
+        window: int | None = None,
         progress: Progress | None = None,
     ) -> None:
         """Draw one step into a file whose suffix says what kind.
 
         Without ``step`` it is the last of the recording, or of a default run. Without ``recording`` the network runs
         as far as the step; ``inputs`` replace the sources of inputs, as in ``run``, and the gains are those of this
-        run. Raises OutputError for a kind that nobody draws, before anything is run.
+        run. ``view`` says what is shown, from top to bottom: ``network``, ``matrix``, ``traces``, ``raster``,
+        ``weights``, alone or with references (``traces: C1, C2`` or {"traces": ["C1", "C2"]}); by default it is the
+        spec's ``figure``. Views over time show the whole recording or run, or ``window`` steps around the one that is
+        drawn. Raises OutputError for a kind that nobody draws and a view that there is not, KeyError for an unknown
+        reference, before anything is run.
         """
         from neurovis_spec.scene.renderers import renderer_for
 
         _check(recording=recording, inputs=inputs, theme=theme, engine=engine, progress=progress)
         place, wanted = arguments.path("path", path), None if step is None else arguments.integer("step", step)
         renderer_for(suffix := place.suffix, moving=False)
-        layout = self.drawn(engine).value
-        snapshot, gains = self._snapshot(wanted, recording, progress, inputs)
-        scene = pipeline.picture(self.network, layout, snapshot, gains, self._settings(theme))
+        panels, settings = self._panels(view), self._settings(theme)
+        if window is not None:
+            settings = replace(settings, window=arguments.integer("window", window, 1))
+        layout = self._placed(panels, engine)
+        if panels:
+            if recording is not None:
+                shown, gains = recording, self._gains_of(panels, recording)
+            else:
+                shown, gains = self._ran(max(self.network.steps, (wanted or 0) + 1), inputs, panels, progress)
+            shots = pipeline.shot_of(self.network, shown, wanted, settings.window)
+            scene = pipeline.frame(pipeline.page(self.network, layout, panels, shots, gains, settings, 1.0), 0)
+        else:
+            assert layout is not None
+            snapshot, gains = self._snapshot(wanted, recording, progress, inputs)
+            scene = pipeline.picture(self.network, layout, snapshot, gains, settings)
         content = pipeline.draw(scene, suffix)
         with replacing(place) as file:
             file.write(content)
@@ -328,12 +347,14 @@ class CompiledNetwork:
         inputs: Mapping[str, npt.ArrayLike] | None = None,
         theme: str | None = None,
         engine: str | None = None,
+        view: View | Sequence[View] | None = None,
         progress: Progress | None = None,
     ) -> None:
         """Draw ``steps`` steps from step ``start`` on, one a frame, into a file whose suffix says what kind.
 
-        ``fps`` defaults to 1/dt, at most 60, and to 25 where the spec writes no dt. ``inputs`` as in ``render``. Raises
-        OutputError for a kind that nobody makes and for a film that is too long, before anything is run.
+        ``fps`` defaults to 1/dt, at most 60, and to 25 where the spec writes no dt. ``inputs`` and ``view`` as in
+        ``render``; views over time show the steps of the film. Raises OutputError for a kind that nobody makes, for a
+        film that is too long and a view that there is not, KeyError for an unknown reference, before anything is run.
         """
         from neurovis_spec.scene.film_size import check_film
         from neurovis_spec.scene.renderers import renderer_for
@@ -348,11 +369,17 @@ class CompiledNetwork:
         if not (math.isfinite(arguments.number("fps", fps)) and fps > 0):
             raise ValueError(f"frames a second are above 0, not {fps}")
         check_film(self.network, frames_of(self.network, first, count, recording), suffix, renderer.capabilities)
-        layout = self.drawn(engine).value
-        run = partial(self.run, inputs=inputs, progress=progress)
+        panels, settings = self._panels(view), self._settings(theme)
+        layout = self._placed(panels, engine)
+        run = partial(self.run, inputs=inputs, progress=progress, states=self._states(panels))
         snapshots = snapshots_from(self.network, first, count, recording, run)
-        gains = self._gains_for(recording, inputs)
-        film = pipeline.moving(self.network, layout, snapshots, gains, self._settings(theme), fps)
+        if panels:
+            shots = pipeline.shots_of(snapshots.recording, snapshots.steps)
+            gains = self._gains_of(panels, recording, inputs)
+            film = pipeline.page(self.network, layout, panels, shots, gains, settings, fps)
+        else:
+            assert layout is not None
+            film = pipeline.moving(self.network, layout, snapshots, self._gains_for(recording, inputs), settings, fps)
         content = pipeline.animate(film, suffix, progress)
         with replacing(place) as file:
             file.write(content)
@@ -365,6 +392,46 @@ class CompiledNetwork:
             raise RendererError(f"there is no theme '{theme}'", suggest(theme, THEMES, "there are"))
         return self.network.render if theme is None else replace(self.network.render, theme=theme, colours=())
 
+    def _panels(self, view: View | Sequence[View] | None) -> tuple[Panel, ...]:
+        """The views of a picture; none where it is the network alone."""
+        if view is None and not self.network.render.figure:
+            return ()
+        from neurovis_spec.scene.panels import panels_of
+
+        return panels_of(self.network, view)
+
+    def _states(self, panels: Sequence[Panel]) -> tuple[str, ...]:
+        """The states that views show."""
+        if not panels:
+            return ()
+        from neurovis_spec.scene.series import states_of
+
+        return states_of(panels, self.network)
+
+    def needs_layout(self, view: View | Sequence[View] | None = None) -> bool:
+        """Whether a picture of these views (default: the spec's ``figure``) needs the layout."""
+        return _shows(self._panels(view), "network", "matrix")
+
+    def _placed(self, panels: Sequence[Panel], engine: str | None) -> Layout | None:
+        """The layout, where one of the views needs it."""
+        return self.drawn(engine).value if _shows(panels, "network", "matrix") else None
+
+    def _ran(
+        self,
+        steps: int,
+        inputs: Mapping[str, npt.ArrayLike] | None,
+        panels: Sequence[Panel],
+        progress: Progress | None,
+    ) -> tuple[Recording, Gains]:
+        """One run of so many steps that serves a picture and its gains."""
+        steps = max(steps, self._gain_steps if inputs is None else self._probe_steps)
+        made = self.run(steps, inputs, progress=progress, states=self._states(panels))
+        if inputs is not None:
+            return made, pipeline.measure(self.network, made=made)
+        if self._gain_steps:
+            self.__dict__["gains"] = pipeline.measure(self.network, made=made)
+        return made, self.gains
+
     def _snapshot(
         self,
         step: int | None = None,
@@ -376,16 +443,15 @@ class CompiledNetwork:
 
         if recording is not None or (step is not None and step < 0):
             return snapshot_at(self.network, step, recording, self.run), self._gains_for(recording)
-        # one run serves the step and the gains
         wanted = self.network.steps if step is None else step + 1
-        made = self.run(self.steps_to_draw(step, inputs=inputs), inputs, progress=progress)
-        if inputs is not None:
-            gains = pipeline.measure(self.network, made=made)
-        else:
-            if self._gain_steps:
-                self.__dict__["gains"] = pipeline.measure(self.network, made=made)
-            gains = self.gains
+        made, gains = self._ran(wanted, inputs, (), progress)
         return snapshot_at(self.network, wanted - 1, made, self.run), gains
+
+    def _gains_of(
+        self, panels: Sequence[Panel], recording: Recording | None, inputs: Mapping[str, npt.ArrayLike] | None = None
+    ) -> Gains | None:
+        """The gains, where one of the views needs them: what was recorded in part serves the others."""
+        return self._gains_for(recording, inputs) if _shows(panels, "network", "matrix", "raster") else None
 
     def _gains_for(self, recording: Recording | None, inputs: Mapping[str, npt.ArrayLike] | None = None) -> Gains:
         """The gains of pictures of a recording, or of runs of its own, perhaps with other inputs."""
@@ -414,10 +480,13 @@ class CompiledNetwork:
         step: int | None = None,
         recording: Recording | None = None,
         inputs: Mapping[str, npt.ArrayLike] | None = None,
+        view: View | Sequence[View] | None = None,
     ) -> int:
         """How many steps ``render`` will run: none with a recording, else those up to the step and those that the gains
-        take, in one run."""
+        take, in one run; of several views the whole default run."""
         wanted = self.network.steps if step is None else step + 1
+        if self._panels(view):
+            wanted = max(wanted, self.network.steps)
         return 0 if recording is not None else max(wanted, self._gain_steps if inputs is None else self._probe_steps)
 
     def _repr_svg_(self) -> str:
@@ -505,3 +574,8 @@ class NetworkLayout:
         snapshot = Snapshot(0, np.zeros(len(network.neurons)), network.connections.weights, None)
         scene = pipeline.picture(network, self.value, snapshot, self.compiled.gains, network.render)
         return pipeline.draw(scene, ".svg").decode()
+
+
+def _shows(panels: Sequence[Panel], *views: str) -> bool:
+    """Whether one of these views is in a picture; without panels it is the network alone."""
+    return not panels or any(panel.view in views for panel in panels)

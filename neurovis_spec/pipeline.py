@@ -13,14 +13,14 @@ What the first four find at fault goes into Findings, all at once; ``Findings.ch
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from neurovis_spec.compiler.compile import Request, compile_spec
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.wishes import LayoutSettings, RenderSettings
+from neurovis_spec.compiler.wishes import LayoutSettings, Panel, RenderSettings
 from neurovis_spec.diagnostics import Diagnostic, Findings, Span
 from neurovis_spec.garbage import uncollected
 from neurovis_spec.language.includes import read_includes
@@ -37,6 +37,7 @@ if TYPE_CHECKING:  # what only some stages need is imported there: a spec is val
     from neurovis_spec.runtime.recording import Recording, Snapshot
     from neurovis_spec.scene import Film, Scene
     from neurovis_spec.scene.gains import Gains
+    from neurovis_spec.scene.shots import Shots
 
 
 def read(path: Path, name: str, findings: Findings) -> SourceDocument | None:
@@ -206,6 +207,42 @@ def moving(
     from neurovis_spec.scene.film import film
 
     return film(network, layout, snapshots, gains, settings, fps)
+
+
+def shot_of(network: Network, recording: Recording, step: int | None, window: int | None) -> Shots:
+    """A step, by default the last, and those around it that views over time show: ``window`` of them, or all."""
+    from neurovis_spec.scene.shots import shot_of
+
+    return shot_of(network, recording, step, window)
+
+
+def shots_of(recording: Recording, steps: Sequence[int]) -> Shots:
+    """The steps of a film, which views over time show."""
+    from neurovis_spec.scene.shots import shots_of
+
+    return shots_of(recording, steps)
+
+
+def page(
+    network: Network,
+    layout: Layout | None,
+    panels: Sequence[Panel],
+    shots: Shots,
+    gains: Gains | None,
+    settings: RenderSettings,
+    fps: float,
+) -> Film:
+    """Several views on one page, as a film; of one step a film of one frame."""
+    from neurovis_spec.scene.figure import figure
+
+    return figure(network, layout, panels, shots, gains, settings, fps)
+
+
+def frame(moving_scene: Film, number: int) -> Scene:
+    """A frame of a film as a scene."""
+    from neurovis_spec.scene.film import still
+
+    return still(moving_scene, number)
 
 
 def draw(scene: Scene, suffix: str) -> bytes:

@@ -18,6 +18,7 @@ from neurovis_spec.cli.options import (
     set_option,
     spec_argument,
     theme_option,
+    view_option,
 )
 from neurovis_spec.cli.progress import progress
 from neurovis_spec.cli.targets import check_files, check_target, files_of
@@ -35,6 +36,7 @@ def _finite(ctx: click.Context, param: click.Parameter, value: float | None) -> 
         "neurovis animate first.yaml -o first.svg --steps 200",
         "neurovis animate first.yaml -o first.svg --from 1000 --steps 128 --fps 25",
         "neurovis animate first.yaml -o first.svg --recording first.npz",
+        "neurovis animate first.yaml -o first.svg --view network --view 'traces: O' --steps 200",
     )
 )
 @spec_argument
@@ -53,6 +55,7 @@ def _finite(ctx: click.Context, param: click.Parameter, value: float | None) -> 
 @recording_option
 @input_option
 @theme_option
+@view_option
 @engine_option
 @set_option
 def command(
@@ -64,6 +67,7 @@ def command(
     recording: str | None,
     inputs: dict[str, str],
     theme: str | None,
+    views: tuple[str, ...],
     engine: str | None,
     settings: dict[str, float],
 ) -> None:
@@ -73,7 +77,7 @@ def command(
     check_target(output, [("the spec itself", spec), *read])
     network = network_of(spec, settings)
     check_files(output, network)
-    record, arrays = recording_of(recording), tables(inputs, network.network) or None
+    record, arrays, view = recording_of(recording), tables(inputs, network.network) or None, views or None
     with progress("drawing") as bar, writing(output):
         network.animate(
             output,
@@ -84,7 +88,9 @@ def command(
             inputs=arrays,
             theme=theme,
             engine=engine,
+            view=view,
             progress=bar,
         )
-    show_warnings(network.drawn(engine))
+    if network.needs_layout(view):
+        show_warnings(network.drawn(engine))
     click.echo(str(output))

@@ -90,6 +90,12 @@ def _themes() -> Iterable[str]:
     return THEMES
 
 
+def _views() -> Iterable[str]:
+    from neurovis_spec.language.views import VIEWS
+
+    return VIEWS
+
+
 def _noted(ctx: click.Context, param: click.Parameter, value: object) -> object:
     """Keep how the spec is to be compiled with the command: ``files.compiled`` asks for it."""
     ctx.meta[f"neurovis.{param.name}"] = value
@@ -171,6 +177,15 @@ theme_option = click.option(
     callback=known("theme", _themes),
     shell_complete=one_of(_themes),
     help="default, dark, print or paper; else the spec's.",
+)
+view_option = click.option(
+    "--view",
+    "views",
+    metavar="V",
+    multiple=True,
+    shell_complete=one_of(_views),
+    help="network, matrix, traces, raster or weights; 'traces: C1, C2' or 'weights: K -> O' says of what. Repeatable, "
+    "from top to bottom; default: the spec's figure, else the network.",
 )
 recording_option = click.option(
     "--recording",

@@ -18,6 +18,7 @@ from neurovis_spec.cli.options import (
     set_option,
     spec_argument,
     theme_option,
+    view_option,
 )
 from neurovis_spec.cli.progress import on_terminal, progress
 from neurovis_spec.cli.targets import check_files, check_target, files_of
@@ -37,6 +38,7 @@ def _why(network: CompiledNetwork, step: int | None, steps: int) -> str:
         "neurovis render first.yaml -o first.svg",
         "neurovis render first.yaml -o first.png --step 120 --theme dark",
         "neurovis render first.yaml -o first.svg --recording first.npz",
+        "neurovis render first.yaml -o first.svg --view network --view traces --window 300",
     )
 )
 @spec_argument
@@ -45,6 +47,13 @@ def _why(network: CompiledNetwork, step: int | None, steps: int) -> str:
 @recording_option
 @input_option
 @theme_option
+@view_option
+@click.option(
+    "--window",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Views over time show N steps around the one that is drawn; default: the spec's, else all.",
+)
 @engine_option
 @set_option
 def command(
@@ -54,6 +63,8 @@ def command(
     recording: str | None,
     inputs: dict[str, str],
     theme: str | None,
+    views: tuple[str, ...],
+    window: int | None,
     engine: str | None,
     settings: dict[str, float],
 ) -> None:
@@ -67,11 +78,23 @@ def command(
     check_target(output, [("the spec itself", spec), *read])
     network = network_of(spec, settings)
     check_files(output, network)
-    record, arrays = recording_of(recording), tables(inputs, network.network) or None
-    steps = network.steps_to_draw(step, record, arrays)
+    record, arrays, view = recording_of(recording), tables(inputs, network.network) or None, views or None
+    steps = network.steps_to_draw(step, record, arrays, view)
     if steps and on_terminal():
-        click.echo(f"running {count(steps, 'step')}{_why(network, step, steps)}", err=True)
+        why = "" if view or network.network.render.figure else _why(network, step, steps)
+        click.echo(f"running {count(steps, 'step')}{why}", err=True)
     with progress("drawing") as bar, writing(output):
-        network.render(output, step=step, recording=record, inputs=arrays, theme=theme, engine=engine, progress=bar)
-    show_warnings(network.drawn(engine))
+        network.render(
+            output,
+            step=step,
+            recording=record,
+            inputs=arrays,
+            theme=theme,
+            engine=engine,
+            view=view,
+            window=window,
+            progress=bar,
+        )
+    if network.needs_layout(view):
+        show_warnings(network.drawn(engine))
     click.echo(str(output))

@@ -99,6 +99,10 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
     bundles = made.bundles
     render = render_settings(spec.render, Finder(wires_of(made), directory, findings), constants)
     outputs = make_outputs(spec, population, made, findings)
+    if spec.render is not None and spec.render.figure:
+        from neurovis_spec.compiler.figure import figure_of
+
+        render = replace(render, figure=figure_of(spec, population, made, outputs, findings))
     ros = _ros(spec, inputs, outputs, units[0].gaps, constants)
     noises = make_noises(units, population, sum(entry.size for entry in inputs))
     expansion.depend()

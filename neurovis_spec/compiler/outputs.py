@@ -36,15 +36,19 @@ from neurovis_spec.language.values import Reference
 
 def make_outputs(spec: Spec, population: Population, made: Connected, findings: Findings) -> tuple[Output, ...]:
     """The named outputs. Without any, nothing leaves the network but its record."""
-    reader = _Reader(population.directory, _models(population), _wiring(made), findings)
+    reader = _Reader(population.directory, state_reader(population, made, findings), findings)
     return tuple(reader.outputs(spec))
+
+
+def state_reader(population: Population, made: Connected, findings: Findings) -> StateReader:
+    """Who reads references to states."""
+    return StateReader(population.directory, _models(population), _wiring(made), findings)
 
 
 @dataclass(frozen=True)
 class _Reader:
     directory: Directory
-    models: tuple[Holder, ...]
-    wiring: Wiring
+    states: StateReader
     findings: Findings
 
     def outputs(self, spec: Spec) -> Iterator[Output]:
@@ -53,24 +57,13 @@ class _Reader:
                 self.findings.error("empty-reference", reference.span, f"the output '{name}' names no neuron")
                 continue
             pieces = [(part, span) for text in reference.parts for part, span in parts(text)]
-            named = [(part, span, self._state(part)) for part, span in pieces]
+            named = [(part, span, self.states.name(part)) for part, span in pieces]
             if any(state is not None for _, _, state in named):
                 output = self._of_states(name, named)
             else:
                 output = self._of_neurons(name, reference)
             if output is not None:
                 yield output
-
-    def _state(self, text: str) -> StateName | None:
-        """A reference that is to a state, and to no neuron or range of neurons."""
-        name = split_state(text)
-        if name is None or self.directory.find(text) is not None or self.directory.instance(text):
-            return None
-        if name.of_rule:
-            return name
-        head = name.owner.partition(".")[0]
-        inside = self.directory.instance(name.owner)
-        return None if inside or (head == name.owner and head in self.directory.instances) else name
 
     def _of_neurons(self, name: str, reference: Reference) -> Output | None:
         neurons = resolve(reference.parts, self.directory, self.findings)
@@ -93,7 +86,7 @@ class _Reader:
                 self.findings.error("mixed-output", span, message, "make an output of each kind")
                 failed = True
                 continue
-            one = self._found(state, span)
+            one = self.states.find(state, span)
             if one is None:
                 failed = True
                 continue
@@ -111,7 +104,29 @@ class _Reader:
         frozen(neurons)
         return Output(name, neurons, sum(one.size for one in found) == 1, tuple(found))
 
-    def _found(self, name: StateName, span: Span) -> StateOf | None:
+
+@dataclass(frozen=True)
+class StateReader:
+    """Reads references to states of models and rules."""
+
+    directory: Directory
+    models: tuple[Holder, ...]
+    wiring: Wiring
+    findings: Findings
+
+    def name(self, text: str) -> StateName | None:
+        """A reference that is to a state, and to no neuron or range of neurons."""
+        name = split_state(text)
+        if name is None or self.directory.find(text) is not None or self.directory.instance(text):
+            return None
+        if name.of_rule:
+            return name
+        head = name.owner.partition(".")[0]
+        inside = self.directory.instance(name.owner)
+        return None if inside or (head == name.owner and head in self.directory.instances) else name
+
+    def find(self, name: StateName, span: Span) -> StateOf | None:
+        """The state of a reference; None where there is none, which is reported."""
         one: StateOf | Refusal | None
         if name.of_rule:
             left, _, right = name.owner.partition("->")

@@ -141,6 +141,7 @@ def render_settings(model: RenderModel | None, finder: Finder, constants: Consta
         labels=model.labels is None or model.labels.value,
         legend=model.legend is None or model.legend.value,
         title=True if model.title is None else model.title.value,
+        window=None if model.window is None else constants.integer(model.window, "a window of steps", 1),
     )
 
 

@@ -47,6 +47,24 @@ class LayoutSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class Curve:
+    """A number of each step: the activity of a neuron, the weight of a connection, a ``state`` of the model of a neuron
+    or of the rule of a connection. ``index`` is that of the neuron or of the connection."""
+
+    of: Literal["neuron", "connection"]
+    index: int
+    state: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """A view, and what it shows; None where it shows what it chooses by itself."""
+
+    view: str
+    shown: tuple[Curve, ...] | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class StatedGain:
     """A gain that the author states: for the neurons or connections ``members``, which ``name`` refers to (None: for
     all). ``centre`` is what is drawn as 0: the middle of a range of activity."""
@@ -73,3 +91,7 @@ class RenderSettings:
     labels: bool = True
     legend: bool = True
     title: bool | str = True
+    #: the views of which the picture consists, from top to bottom; none: the network
+    figure: tuple[Panel, ...] = ()
+    #: how many steps the views over time show; None: all
+    window: int | None = None

@@ -25,13 +25,15 @@ from neurovis_spec.language.located import (
     as_formula,
     findings_of,
     give_up,
+    one_of,
     refuse,
     words,
 )
 from neurovis_spec.language.model import Keyed, Model
-from neurovis_spec.language.source import Mapping, Node, Packed, Sequence
+from neurovis_spec.language.source import Mapping, Node, Packed, Scalar, Sequence
 from neurovis_spec.language.theme import ThemeField
-from neurovis_spec.language.values import PointField, Reference, ReferenceField, TitleField, as_reference
+from neurovis_spec.language.values import REFERENCES, PointField, Reference, ReferenceField, TitleField, as_reference
+from neurovis_spec.language.views import VIEWS
 
 
 def _references(node: Node, info: ValidationInfo) -> tuple[Reference, ...]:
@@ -209,6 +211,61 @@ class Gain(Model):
     )
 
 
+class PanelModel(NamedTuple):
+    """A view, and what it shows; None where it shows what it chooses by itself."""
+
+    view: Located[str]
+    shown: Reference | None
+
+
+def _figure(node: Node, info: ValidationInfo) -> tuple[PanelModel, ...]:
+    """A view, or a list of them."""
+    items = node.items if isinstance(node, Sequence) else (node,)
+    panels = [_panel(item, info) for item in items]
+    return tuple(panel for panel in panels if panel is not None)
+
+
+def _panel(node: Node, info: ValidationInfo) -> PanelModel | None:
+    """``traces``, or ``{traces: [C1, C2]}``; None where it is invalid, which is reported."""
+    with suppress(PydanticCustomError):
+        view = one_of(*VIEWS)
+        if isinstance(node, Scalar) and isinstance(node.value, str):
+            return PanelModel(view(node, info), None)
+        if not isinstance(node, Mapping):
+            refuse(info, node, "a view, such as traces or {traces: [C1, C2]}")
+        if len(node.entries) != 1:
+            span = node.entries[1].key.span if node.entries else node.span
+            message = f"expected one view here, found {len(node.entries)}"
+            findings_of(info).error("one-key", span, message, "write a list: [network, {traces: [C1, C2]}]")
+            give_up()
+        entry = node.entries[0]
+        name = view(entry.key, info)
+        if isinstance(entry.value, Scalar) and entry.value.value is None:
+            return PanelModel(name, None)
+        if name.value == "network":
+            refuse(info, entry.value, "nothing here: the view 'network' shows the whole network", "write network alone")
+        return PanelModel(name, as_reference(entry.value, info))
+    return None
+
+
+_PANEL = {
+    "anyOf": [
+        {"enum": list(VIEWS)},
+        {
+            "type": "object",
+            "properties": {"network": {"type": "null"}, **dict.fromkeys(VIEWS[1:], REFERENCES)},
+            "minProperties": 1,
+            "maxProperties": 1,
+            "additionalProperties": False,
+        },
+    ]
+}
+FigureField = Annotated[
+    tuple[PanelModel, ...],
+    Leaf(_figure, {"anyOf": [*_PANEL["anyOf"], {"type": "array", "items": _PANEL}]}),
+]
+
+
 class RenderModel(Model):
     """How the network is drawn."""
 
@@ -227,6 +284,14 @@ class RenderModel(Model):
     legend: BoolField | None = Field(None, description="Whether there is a legend (default true).")
     title: TitleField | None = Field(
         None, description="Whether there is a title, or another text for it (default true)."
+    )
+    figure: FigureField = Field(
+        (),
+        description="The views that make up the picture, from top to bottom: network, matrix, traces, raster, weights, "
+        "or {traces: references} (default the network alone).",
+    )
+    window: FormulaField | None = Field(
+        None, description="How many steps around the one that is drawn the views over time show (default all)."
     )
 
 

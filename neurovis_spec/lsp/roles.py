@@ -151,6 +151,8 @@ _VALUES: Final[Mapping[str, Role]] = {
     "layout spacing *": _FORMULA,
     "render gain * #": _FORMULA,
     "render gain * * #": _FORMULA,
+    "render figure # * #": Role("ends"),
+    "render window": _FORMULA,
     "render size #": _FORMULA,
     "ros rate": _FORMULA,
     "ros qos depth": _FORMULA,

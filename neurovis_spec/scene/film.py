@@ -48,9 +48,11 @@ def film(
     gains: Gains,
     settings: RenderSettings,
     fps: float,
+    narrowest: float = 0.0,
 ) -> Film:
-    """One frame a snapshot, ``fps`` frames a second. Raises ValueError without a snapshot."""
-    planned = plan(network, layout, gains, settings)
+    """One frame a snapshot, ``fps`` frames a second, without a stated size at least ``narrowest`` wide (user units).
+    Raises ValueError without a snapshot."""
+    planned = plan(network, layout, gains, settings, narrowest)
     frames, neurons, connections = len(snapshots), len(network.neurons), len(network.connections)
     if not frames:
         raise ValueError("a film has at least one frame")

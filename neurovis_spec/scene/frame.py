@@ -20,9 +20,9 @@ MOST = (1280.0, 960.0)
 MARGIN = 26.0
 #: Pixels for a user unit: without a stated size the first with which the picture is small enough. Multiples of
 #: ``_WHOLE`` units are whole pixels with each.
-_DENSITIES, _WHOLE = (1.5, 1.25, 1.0), 4
+DENSITIES, _WHOLE = (1.5, 1.25, 1.0), 4
 #: With a stated size at most this, and layout units at most so much larger than ``UNIT``.
-_DENSEST, _LARGEST = 4.0, 1.4
+DENSEST, _LARGEST = 4.0, 1.4
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,13 +77,14 @@ def _natural(across: float, down: float, wishes: Wishes) -> tuple[float, float, 
     for _ in range(3):  # the footer's height depends on the width, the width on the scale, the scale on the height left
         scale = min(UNIT, _scale(across, down, wishes, (MOST[0], MOST[1]), wishes.footer(wide)))
         natural = max(across * scale + 2 * MARGIN, wishes.header[0] + 2 * MARGIN, wishes.narrowest)
-        wide = min(MOST[0], _whole(natural))
-    high = min(MOST[1], _whole(wishes.header[1] + down * scale + wishes.footer(wide) + 2 * MARGIN))
-    density = next(d for d in _DENSITIES if d == 1 or (wide * d <= MOST[0] and high * d <= MOST[1]))
+        wide = min(MOST[0], whole(natural))
+    high = min(MOST[1], whole(wishes.header[1] + down * scale + wishes.footer(wide) + 2 * MARGIN))
+    density = next(d for d in DENSITIES if d == 1 or (wide * d <= MOST[0] and high * d <= MOST[1]))
     return wide, high, scale, density
 
 
-def _whole(value: float) -> float:
+def whole(value: float) -> float:
+    """A length that is whole pixels with each of ``DENSITIES``."""
     return float(np.ceil(value / _WHOLE)) * _WHOLE
 
 
@@ -94,7 +95,7 @@ def _within(across: float, down: float, wishes: Wishes, size: tuple[float, float
         wide, high = size[0] / density, size[1] / density
         return _scale(across, down, wishes, (wide, high), wishes.footer(wide))
 
-    low, high = 1.0, max(1.0, min(_DENSEST, size[0] / wishes.narrowest))
+    low, high = 1.0, max(1.0, min(DENSEST, size[0] / wishes.narrowest))
     if at(high) >= UNIT:
         low = high
     for _ in range(24):

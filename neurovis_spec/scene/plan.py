@@ -20,6 +20,7 @@ from neurovis_spec.scene.boxes import Box, boxes_of
 from neurovis_spec.scene.frame import MARGIN, MOST, UNIT, Frame, Wishes, fit
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.geometry import FloatArray, Point, Rect, bounds, samples
+from neurovis_spec.scene.heading import HEADER, TITLE, caption_text, title_text
 from neurovis_spec.scene.labels import Label, labels_of, room_beside
 from neurovis_spec.scene.legend_entry import Entry
 from neurovis_spec.scene.lesions import Lesions, lesions_of
@@ -30,8 +31,6 @@ from neurovis_spec.scene.teachers import Teacher, dash, dotted, label_of, teache
 from neurovis_spec.scene.themes import theme_of
 from neurovis_spec.scene.titles import Titled, outline, titles_of
 
-_TITLE, _CAPTION = 17.0, 11.5
-_TITLE_Y, _CAPTION_Y, _HEADER = 35.0, 54.0, 58.0
 #: a picture is made so wide at most to have its legend in few rows, and its whole title
 _ROOM = 840.0
 #: more dotted lines than this would not be quiet
@@ -60,27 +59,26 @@ class Plan:
     #: beneath the lines, and above the discs
     back: tuple[Group, ...]
     front: tuple[Group, ...]
-    caption: Point | None
-    caption_room: float
+    captioned: bool
 
     def caption_shape(self, words: str) -> Text | None:
         """The line under the title, if there is one."""
-        if self.caption is None:
-            return None
-        return Text(self.caption, texts.shorten(words, _CAPTION, self.caption_room), _CAPTION, self.theme.muted)
+        return caption_text(words, self.frame.width, self.theme) if self.captioned else None
 
 
-def plan(network: Network, layout: Layout, gains: Gains, settings: RenderSettings) -> Plan:
-    """Arrange everything that stays the same. Raises KeyError for a theme that does not exist."""
+def plan(network: Network, layout: Layout, gains: Gains, settings: RenderSettings, narrowest: float = 0.0) -> Plan:
+    """Arrange everything that stays the same; without a stated size the picture is at least ``narrowest`` wide. Raises
+    KeyError for a theme that does not exist."""
     theme = theme_of(settings)
     positions, routes = _in_units(network, layout)
     boxes = boxes_of(network, positions, routes)
     teachers = teachers_of(network)[:_MOST_TEACHERS]
     beside = room_beside(network, RADIUS * UNIT) if settings.labels else []
     extent = _extent(positions, routes, boxes, beside)
-    title, items, frame = _frame(network, gains, settings, theme, teachers, extent, delays.label_of(network))
+    around = _Around(theme, teachers, extent, narrowest)
+    title, items, frame = _frame(network, gains, settings, around, delays.label_of(network))
     if not delays.visible(RADIUS * frame.scale):
-        title, items, frame = _frame(network, gains, settings, theme, teachers, extent, "")
+        title, items, frame = _frame(network, gains, settings, around, "")
     centres = frame.map(positions)
     radius = RADIUS * frame.scale
     gap, head = min(1.5, 0.1 * radius), _head(radius)
@@ -92,7 +90,7 @@ def plan(network: Network, layout: Layout, gains: Gains, settings: RenderSetting
     for box in boxes:
         obstacles.add_frame(outline(_mapped(box.rect, frame)))
     header = _header(title, frame, theme) if title is not None else None
-    top = _HEADER if header else 4.0
+    top = HEADER if header else 4.0
     bottom = frame.height - legend.height(items, frame.width - 2 * MARGIN) - (MARGIN if items else 4.0)
     picture = (6.0, top, frame.width - 6.0, bottom - (8.0 if items else 0.0))
     spots: list[Point] = [(x, y) for x, y in centres.tolist()]
@@ -118,8 +116,7 @@ def plan(network: Network, layout: Layout, gains: Gains, settings: RenderSetting
         labels=tuple(labels),
         back=(*_box_frames(boxes, frame, theme), *_dotted_groups(network, dots, theme)),
         front=tuple(front),
-        caption=(MARGIN, _CAPTION_Y) if header else None,
-        caption_room=frame.width - 2 * MARGIN,
+        captioned=header is not None,
     )
 
 
@@ -146,14 +143,18 @@ def _extent(
     return around if around is not None else (0.0, 0.0, 1.0, 1.0)
 
 
+@dataclass(frozen=True)
+class _Around:
+    """What the frame of a picture depends on."""
+
+    theme: Theme
+    teachers: list[Teacher]
+    extent: Rect
+    narrowest: float
+
+
 def _frame(
-    network: Network,
-    gains: Gains,
-    settings: RenderSettings,
-    theme: Theme,
-    teachers: list[Teacher],
-    extent: Rect,
-    delayed: str,
+    network: Network, gains: Gains, settings: RenderSettings, around: _Around, delayed: str
 ) -> tuple[str | None, list[Entry], Frame]:
     """The title (None: no header), the legend's entries, and the frame. In a picture too small for them both go."""
     words = settings.title if isinstance(settings.title, str) else network.title or network.name
@@ -164,28 +165,29 @@ def _frame(
         contents = legend.Contents(
             lines=len(network.connections) > 0,
             learns=len(network.changing) > 0,
-            teaches=label_of(teachers) if teachers else "",
+            teaches=label_of(around.teachers) if around.teachers else "",
             delays=delayed,
             lesions=bool(lesions_of(network)),
             inhibits=_inhibits(network),
         )
         for brief in (False, True):
-            items = legend.entries(contents, gains, theme, brief=brief)
+            items = legend.entries(contents, gains, around.theme, brief=brief)
             widest = max(item.width for item in items)
             if widest <= wide - 2 * MARGIN and legend.height(items, wide - 2 * MARGIN) <= 0.4 * high:
                 break
         else:
             items = []
-    if title is not None and high < 4 * _HEADER:
+    if title is not None and high < 4 * HEADER:
         title = None
-    header = (texts.width(title, _TITLE, 600), _HEADER) if title is not None else (0.0, 0.0)
+    header = (texts.width(title, TITLE, 600), HEADER) if title is not None else (0.0, 0.0)
 
     def footer(width: float) -> float:
         return legend.height(items, width - 2 * MARGIN) + (0.9 * MARGIN if items else 0.0)
 
-    narrowest = min(max(legend.widest_row(items, _ROOM - 2 * MARGIN) + 2 * MARGIN, 120.0), _ROOM)
+    fitting = min(max(legend.widest_row(items, _ROOM - 2 * MARGIN) + 2 * MARGIN, 120.0), _ROOM)
+    narrowest = max(fitting, around.narrowest)
     wishes = Wishes((min(header[0], _ROOM - 2 * MARGIN), header[1]), footer, narrowest)
-    return title, items, fit(extent, wishes, settings.size)
+    return title, items, fit(around.extent, wishes, settings.size)
 
 
 def _inhibits(network: Network) -> bool:
@@ -195,8 +197,7 @@ def _inhibits(network: Network) -> bool:
 
 
 def _header(title: str, frame: Frame, theme: Theme) -> Group:
-    text = texts.shorten(title, _TITLE, frame.width - 2 * MARGIN, 600)
-    return Group((Text((MARGIN, _TITLE_Y), text, _TITLE, theme.ink, weight=600),), id="title")
+    return Group((title_text(title, frame.width, theme),), id="title")
 
 
 def _order(network: Network) -> tuple[int, ...]:

@@ -1,0 +1,170 @@
+"""The figure: several views of a run on one page, as a Film; of one step, a film of one frame.
+
+In: a network, its layout (where a view needs it), the views, the rows of a recording that are shown. Out: a Film. What
+shares the page shares its time: the last of several views over time has the axis, and in all of them a cursor stands at
+the step of the frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.wishes import Panel, RenderSettings
+from neurovis_spec.layout.model import Layout
+from neurovis_spec.scene.caption import caption
+from neurovis_spec.scene.encode import CAPTION
+from neurovis_spec.scene.film import film
+from neurovis_spec.scene.frame import DENSEST, DENSITIES, MOST, whole
+from neurovis_spec.scene.gains import Gains
+from neurovis_spec.scene.heading import HEADER, caption_text, title_text
+from neurovis_spec.scene.model import Film, Group, shifted
+from neurovis_spec.scene.parts import Page, Part, stacked
+from neurovis_spec.scene.shots import Shots
+from neurovis_spec.scene.themes import THEMES
+from neurovis_spec.scene.views import AXIS, Block, Drawing, Maker, Place, span_of
+
+#: How wide a page without a picture of the network is, and the least with one (user units).
+_WIDTH = 760.0
+#: User units above the first view without a heading, between views, and beneath the last.
+_TOP, _GAP, _FOOT = 8.0, 14.0, 12.0
+#: Beside a network, other views take at most this share of a stated height.
+_SHARE = 0.6
+#: Plots are at least this share of what they are by themselves; what does not fit then is drawn smaller.
+_LEAST = 0.35
+
+
+@dataclass(frozen=True)
+class _Sheet:
+    """A page before anything stands on it: its width and, where it is stated, its height (user units)."""
+
+    width: float
+    height: float | None
+    density: float
+
+
+def figure(
+    network: Network,
+    layout: Layout | None,
+    panels: Sequence[Panel],
+    shots: Shots,
+    gains: Gains | None,
+    settings: RenderSettings,
+    fps: float,
+) -> Film:
+    """All views, one below the other, a frame for each of ``shots.frames``; ``gains`` are those of Eqs. 2–5, which
+    traces and weights do not need. Raises RecordingError where the recording
+    lacks what they show, KeyError for an unknown theme."""
+    drawn = any(panel.view == "network" for panel in panels)
+    maker = Maker(network, layout, shots, gains, drawn and settings.legend)
+    others = {number: maker.block(panel) for number, panel in enumerate(panels) if panel.view != "network"}
+    title = _title(network, settings)
+    head = HEADER + _TOP if title is not None else _TOP
+    picture: Film | None = None
+    if drawn:
+        assert layout is not None
+        assert gains is not None
+        size = None
+        if settings.size is not None:
+            size = settings.size[0], _height_left(list(others.values()), head, settings.size)
+        own = replace(settings, size=size, title=False)
+        picture = film(network, layout, maker.snapshots(), gains, own, fps, _WIDTH if others else 0.0)
+        blocks: list[Block] = [others.get(number, Drawing(picture)) for number in range(len(panels))]
+        scene = picture.scene
+        height = None if settings.size is None else settings.size[1] / scene.density
+        sheet = _Sheet(scene.width, height, scene.density)
+    else:
+        blocks = list(others.values())
+        sheet = _sheet(settings)
+    theme = THEMES[settings.theme]
+    share = 1.0 if sheet.height is None else _share(blocks, sheet.width, sheet.height - head - _FOOT)
+    span = span_of(blocks, shots, sheet.width, network.dt if network.dt_given else None)
+    parts: list[tuple[float, Part]] = []
+    top = head
+    for number, block in enumerate(blocks):
+        axis = block.timed and not (number + 1 < len(blocks) and blocks[number + 1].timed)
+        part = block.part(Place(sheet.width, span, share, axis, theme, f"p{number}:"))
+        parts.append((top, part))
+        top += part.height + _GAP
+    captions = _captions(network, shots)
+    if title is not None:
+        texts = title_text(title, sheet.width, theme), caption_text(captions[0], sheet.width, theme)
+        parts.insert(0, (0.0, Part((Group(texts[:1], id="title"), Group(texts[1:], id=CAPTION)), HEADER)))
+    said = tuple(caption_text(words, sheet.width, theme).text for words in captions)
+    sheet, parts = _fitted(sheet, parts, whole(top - _GAP + _FOOT), settings)
+    assert sheet.height is not None
+    name = f"{network.title or network.name}, {captions[0]}"
+    return stacked(Page(sheet.width, sheet.height, sheet.density, theme, name, fps, CAPTION, said), parts, picture)
+
+
+def _captions(network: Network, shots: Shots) -> list[str]:
+    """The line under the title in each frame; what was not recorded is not said."""
+    recording = shots.recording
+    whole_, steps = recording.recorded is None, recording.step
+    none = recording.activity[0, :0]
+    return [
+        caption(network, int(steps[row]), recording.activity[row] if whole_ else none) for row in shots.frames.tolist()
+    ]
+
+
+def _title(network: Network, settings: RenderSettings) -> str | None:
+    """What stands above all; nothing on a page that is too low."""
+    words = settings.title if isinstance(settings.title, str) else network.title or network.name
+    low = settings.size is not None and settings.size[1] < 4 * HEADER
+    return None if settings.title is False or not words or low else words
+
+
+def _sheet(settings: RenderSettings) -> _Sheet:
+    """A page without a picture of the network."""
+    if settings.size is None:
+        return _Sheet(_WIDTH, None, next(d for d in DENSITIES if d == 1 or d * _WIDTH <= MOST[0]))
+    density = min(max(1.0, settings.size[0] / _WIDTH), DENSEST)
+    return _Sheet(settings.size[0] / density, settings.size[1] / density, density)
+
+
+def _needed(blocks: Sequence[Block], width: float) -> tuple[float, float]:
+    """What of the height of all blocks cannot change, and what can."""
+    heights = [block.heights(width) for block in blocks]
+    axes = sum(
+        block.timed and not (number + 1 < len(blocks) and blocks[number + 1].timed)
+        for number, block in enumerate(blocks)
+    )
+    fixed = sum(one[0] for one in heights) + axes * AXIS + _GAP * max(len(blocks) - 1, 0)
+    return fixed, sum(one[1] for one in heights)
+
+
+def _height_left(others: Sequence[Block], head: float, size: tuple[int, int]) -> int:
+    """How many pixels of a page's height the picture of the network has."""
+    density = min(max(1.0, size[0] / _WIDTH), DENSEST)
+    fixed, free = _needed(others, size[0] / density)
+    taken = (fixed + free + head + _FOOT + _GAP) * density
+    return max(round(size[1] - min(taken, _SHARE * size[1])), 16)
+
+
+def _share(blocks: Sequence[Block], width: float, room: float) -> float:
+    """How much higher or lower than by themselves plots are, so that all blocks fill the room."""
+    fixed, free = _needed(blocks, width)
+    return max((room - fixed) / free, _LEAST) if free else 1.0
+
+
+def _fitted(
+    sheet: _Sheet, parts: list[tuple[float, Part]], needed: float, settings: RenderSettings
+) -> tuple[_Sheet, list[tuple[float, Part]]]:
+    """The page as high as it has to be, or of the size that is stated: what does not fit is drawn smaller."""
+    if settings.size is None or sheet.height is None:
+        return _Sheet(sheet.width, needed, sheet.density), parts
+    if needed <= sheet.height + 1:
+        return sheet, parts
+    density = settings.size[1] / needed
+    width = settings.size[0] / density
+    aside = (width - sheet.width) / 2
+    return _Sheet(width, needed, density), [(top, _aside(part, aside)) for top, part in parts]
+
+
+def _aside(part: Part, by: float) -> Part:
+    """A part, moved to the right."""
+    groups = tuple(
+        replace(group, shapes=tuple(shifted(shape, (by, 0.0)) for shape in group.shapes)) for group in part.groups
+    )
+    return replace(part, groups=groups)

@@ -1,0 +1,177 @@
+"""Raster: neurons × time as coloured cells, in the colours that they have in the picture of the network (Eq. 2).
+
+In: activities, colour values, a Span. Out: a Part. Where there are more steps or neurons than cells can be seen, a cell
+has the strongest colour of those it stands for, so that nothing is lost. A neuron whose activity is only ever 0 or 1
+and whose model has states spikes: its spikes are marks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.compiler.arrays import IntArray
+from neurovis_spec.scene import strips, texts
+from neurovis_spec.scene.geometry import FloatArray
+from neurovis_spec.scene.model import Group, Image, Polyline, Shape, Text, Theme
+from neurovis_spec.scene.parts import Changes, Part
+from neurovis_spec.scene.scales import Scale
+from neurovis_spec.scene.strips import SMALL, TITLE, Span
+from neurovis_spec.scene.themes import blend, channels
+
+#: How high a row is at most, and a raster.
+ROW, HIGHEST = 13.0, 300.0
+#: A row lower than this has no name of its own; a group as high as this has one.
+_NAMED, _GROUPED = 8.5, 11.0
+_LABEL = 120.0
+#: Rows whose numbers are held at a time.
+_TOGETHER = 256
+
+
+@dataclass(frozen=True)
+class Band:
+    """Neighbouring rows that are called the same: ``count`` of them from row ``start`` on."""
+
+    name: str
+    start: int
+    count: int
+
+
+def bands_of(names: Sequence[str]) -> tuple[Band, ...]:
+    """Neighbours of the same name.
+
+    >>> [(band.name, band.count) for band in bands_of(["C", "C", "K"])]
+    [('C', 2), ('K', 1)]
+    """
+    bands: list[Band] = []
+    for place, name in enumerate(names):
+        if bands and bands[-1].name == name:
+            bands[-1] = Band(name, bands[-1].start, bands[-1].count + 1)
+        else:
+            bands.append(Band(name, place, 1))
+    return tuple(bands)
+
+
+@dataclass(frozen=True)
+class Heat:
+    """``count`` rows: their activities, and their colour values in −1…1, for any of them by number (steps, rows); which
+    ``may_spike``; their names, and their groups."""
+
+    title: str
+    activity: Callable[[IntArray], FloatArray]
+    colour: Callable[[IntArray], FloatArray]
+    may_spike: npt.NDArray[np.bool_]
+    names: tuple[str, ...]
+    bands: tuple[Band, ...]
+    scale: Scale
+
+    @property
+    def natural(self) -> float:
+        """How high the cells are where nothing else is asked for."""
+        return min(HIGHEST, max(ROW * len(self.names), 2 * ROW))
+
+    @property
+    def left(self) -> float:
+        """How wide the names beside the rows are."""
+        named = self.names if self._named(self.natural) else [band.name for band in self.bands]
+        return min(_LABEL, max((_width(name) for name in named), default=0.0)) + 8
+
+    def _named(self, plot: float) -> bool:
+        return plot >= _NAMED * len(self.names)
+
+    def height(self, plot: float) -> float:
+        """How high it is with cells of this height, without the axis of the time."""
+        return TITLE + plot
+
+    def part(self, span: Span, plot: float, axis: bool, theme: Theme, prefix: str) -> Part:
+        """The cells, the names beside them, the cursor; with ``axis`` the time beneath."""
+        top, bottom = TITLE, TITLE + plot
+        image = Image((span.left, top), span.right - span.left, plot, *self._cells(span, plot, theme))
+        around = strips.frame(span, top, bottom, theme)
+        shapes: list[Shape] = [strips.title(self.title, span, theme), around, image]
+        room = span.right - span.left - texts.width(self.title, SMALL) - 16
+        shapes += self.scale.shapes(span.right, TITLE - 6.0, theme, room)
+        shapes += self._sides(span, top, plot, theme)
+        if axis:
+            shapes += strips.time_axis(span, bottom, theme)
+        line, moved = strips.cursor(span, top, bottom, theme, f"{prefix}cursor")
+        said = f"{len(self.names)} neurons, steps {span.steps[0]} … {span.steps[-1]}"
+        ground = Group(tuple(shapes), f"{prefix}ground", {"view": "raster"}, said)
+        height = bottom + (strips.AXIS if axis else 0.0)
+        return Part((ground, line), height, Changes(shifts=(line.id,), shift_values=moved))
+
+    def _cells(self, span: Span, plot: float, theme: Theme) -> tuple[int, int, bytes]:
+        """Columns, rows, and the colours of the cells."""
+        steps = strips.columns(span, int(span.right - span.left))
+        count = len(self.names)
+        rows = np.unique(np.linspace(0, count, min(count, max(1, int(2 * plot))) + 1).astype(np.int64))
+        shown, marked, spike = np.empty((len(steps) - 1, count)), np.empty((len(steps) - 1, count)), np.empty(count)
+        for first in range(0, count, _TOGETHER):
+            some = np.arange(first, min(first + _TOGETHER, count))
+            activity = self.activity(some)
+            shown[:, some] = strongest(self.colour(some), steps, 0)
+            marked[:, some] = strongest(activity, steps, 0)
+            spike[some] = spiking(activity) & self.may_spike[some]
+        colours = blend(theme, strongest(shown, rows, 1))
+        own = strongest(spike[None], rows, 1)[0] > 0
+        colours[:, own] = np.array(channels(theme.box_fill), np.uint8)
+        colours[(strongest(marked * spike, rows, 1) > 0) & own[None]] = np.array(channels(theme.ink), np.uint8)
+        cells = colours.transpose(1, 0, 2)
+        return cells.shape[1], cells.shape[0], np.ascontiguousarray(cells).tobytes()
+
+    def _sides(self, span: Span, top: float, plot: float, theme: Theme) -> list[Shape]:
+        """Names beside the rows, or of the groups; lines between groups."""
+        each = plot / max(len(self.names), 1)
+        shapes: list[Shape] = []
+        for band in self.bands[1:]:
+            y = top + band.start * each
+            shapes.append(Polyline(((span.left - 4, y), (span.right, y)), theme.background, 1.2))
+        if self._named(plot):
+            size = min(SMALL, 0.9 * each)
+            for row, name in enumerate(self.names):
+                shapes.append(_beside(name, span.left - 6, top + (row + 0.5) * each, size, theme))
+            return shapes
+        free = top
+        for band in self.bands:
+            middle = top + (band.start + band.count / 2) * each
+            if band.count * each >= _GROUPED and middle - SMALL / 2 >= free - 1:
+                shapes.append(_beside(band.name, span.left - 6, middle, SMALL, theme))
+                free = middle + SMALL / 2
+        return shapes
+
+
+def strongest(values: FloatArray, cuts: IntArray, axis: int) -> FloatArray:
+    """Of each stretch between cuts along an axis the value of largest magnitude; no number counts as 0.
+
+    >>> strongest(np.array([[0.1, -0.5, 0.2, 0.3]]), np.array([0, 2, 4]), 1)
+    array([[-0.5,  0.3]])
+    """
+    known = np.nan_to_num(values, nan=0.0, posinf=1.0, neginf=-1.0)
+    if known.shape[axis] == len(cuts) - 1:
+        return known
+    high = np.maximum.reduceat(known, cuts[:-1], axis=axis)
+    low = np.minimum.reduceat(known, cuts[:-1], axis=axis)
+    result: FloatArray = np.where(high >= -low, high, low)
+    return result
+
+
+def _beside(name: str, right: float, middle: float, size: float, theme: Theme) -> Text:
+    base, subscript = texts.with_subscript(name) if "." not in name else (name, "")
+    if texts.width(base, size, 400, subscript) > _LABEL:
+        base, subscript = texts.shorten(name, size, _LABEL), ""
+    return Text((right, middle + 0.36 * size), base, size, theme.ink, "end", subscript=subscript)
+
+
+def _width(name: str) -> float:
+    base, subscript = texts.with_subscript(name) if "." not in name else (name, "")
+    return texts.width(base, SMALL, 400, subscript)
+
+
+def spiking(activity: FloatArray) -> npt.NDArray[np.bool_]:
+    """Whose activities (steps, rows) are 0 or 1, and not always 1."""
+    only = ((activity == 0) | (activity == 1)).all(axis=0)
+    result: npt.NDArray[np.bool_] = only & (activity == 0).any(axis=0)
+    return result

@@ -1,0 +1,136 @@
+"""Panels: the views that a caller asks for by words: ``traces``, ``traces: C1, C2``, ``weights: K -> O``.
+
+In: a network, words. Out: Panels with what they name resolved. What the spec's own ``figure`` shows is resolved when it
+is compiled (``compiler/figure``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.states import split_state, split_sum
+from neurovis_spec.compiler.wishes import Curve, Panel
+from neurovis_spec.diagnostics import suggest
+from neurovis_spec.language.views import VIEWS
+from neurovis_spec.runtime.columns import find_states
+from neurovis_spec.runtime.names import Names, names_of
+from neurovis_spec.runtime.recording import UnknownNameError
+from neurovis_spec.scene.renderers import RendererError
+
+#: A view by its name, with ``: `` and references behind it; or {view: references}.
+View: TypeAlias = str | Mapping[str, str | Sequence[str]]
+
+
+class ViewError(RendererError):
+    """There is no such view, or it cannot show what is asked for."""
+
+
+def panels_of(network: Network, wanted: View | Sequence[View] | None) -> tuple[Panel, ...]:
+    """The views of a picture, none where it is the network alone. Without any wish they are those of the spec's
+    ``figure``; a view that names nothing shows what the figure has of its kind. Raises ViewError, KeyError."""
+    own = network.render.figure
+    if wanted is None:
+        panels = own
+    else:
+        views = [wanted] if isinstance(wanted, (str, Mapping)) else list(wanted)
+        panels = tuple(panel for view in views for panel in _one(network, own, view))
+    return () if [panel.view for panel in panels] == ["network"] else panels
+
+
+def timed(panels: Sequence[Panel]) -> bool:
+    """Whether one of them is over time."""
+    return any(panel.view in ("traces", "raster", "weights") for panel in panels)
+
+
+def laid_out(panels: Sequence[Panel]) -> bool:
+    """Whether one of them needs to know where the neurons are; the network alone does."""
+    return not panels or any(panel.view in ("network", "matrix") for panel in panels)
+
+
+def _one(network: Network, own: Sequence[Panel], wanted: View) -> Iterator[Panel]:
+    for name, references in _taken_apart(wanted):
+        if name not in VIEWS:
+            raise ViewError(f"there is no view '{name}'", suggest(name, VIEWS, "views"))
+        if references and name == "network":
+            raise ViewError("the view 'network' shows the whole network: it takes no references")
+        named = [panel for panel in own if panel.view == name and panel.shown is not None]
+        if references:
+            curves = [curve for reference in references for curve in curves_of(network, name, reference)]
+            yield Panel(name, tuple(dict.fromkeys(curves)))
+        else:
+            yield from named or [Panel(name)]
+
+
+def _taken_apart(wanted: View) -> Iterator[tuple[str, list[str]]]:
+    if isinstance(wanted, str):
+        name, _, rest = wanted.partition(":")
+        yield name.strip(), [part.strip() for part in rest.split(",") if part.strip()]
+        return
+    for name, references in wanted.items():
+        listed = [references] if isinstance(references, str) else list(references or ())
+        yield name, [part.strip() for reference in listed for part in reference.split(",")]
+
+
+def curves_of(network: Network, view: str, reference: str) -> list[Curve]:
+    """What a reference names. Raises ViewError where the view does not show its kind, KeyError for an unknown name."""
+    names = names_of(network)
+    state = split_state(reference)
+    if "->" in reference and not (state is not None and state.of_rule):
+        curves = _weights(network, reference, names)
+    else:
+        curves = [curve for _, part in split_sum(reference) for curve in _part(network, part.strip(), names)]
+    refused = refusal(view, reference, curves)
+    if refused is not None:
+        raise ViewError(*refused)
+    return curves
+
+
+def refusal(view: str, reference: str, curves: Sequence[Curve]) -> tuple[str, str] | None:
+    """Why a view does not show something: a raster has neurons, weights and a matrix have connections."""
+    if view == "raster" and any(curve.of != "neuron" or curve.state for curve in curves):
+        return f"a raster shows neurons, '{reference}' is none", "show it as traces"
+    if view in ("weights", "matrix") and any(curve.of != "connection" or curve.state for curve in curves):
+        return f"'{reference}' is no connection, and the view '{view}' shows connections", "write FROM -> TO"
+    return None
+
+
+def _weights(network: Network, reference: str, names: Names) -> list[Curve]:
+    if reference in network.connection_index:
+        return [Curve("connection", network.connection_index[reference])]
+    ends = network.connections
+    found = []
+    for end in reference.split("->", 1):
+        members = names.find(end.strip())
+        if isinstance(members, str):
+            raise UnknownNameError(members)
+        found.append(members.neurons)
+    between = np.flatnonzero(np.isin(ends.sources, found[0]) & np.isin(ends.targets, found[1]))
+    if not len(between):
+        entries = suggest(reference, ends.entries, "connections")
+        raise UnknownNameError(f"there is no connection '{reference}'" + (f"; {entries}" if entries else ""))
+    return [Curve("connection", index) for index in between.tolist()]
+
+
+def _part(network: Network, part: str, names: Names) -> Iterator[Curve]:
+    output = next((one for one in network.outputs if one.name == part), None)
+    neurons = names.find(part)
+    if output is not None and output.states:
+        states = output.states
+    elif isinstance(neurons, str) and part in network.input_index:
+        taking = [group for group in network.neurons.groups if group.input == part]
+        yield from (Curve("neuron", index) for group in taking for index in group.indices)
+        return
+    elif isinstance(neurons, str):
+        if split_state(part) is None:
+            raise UnknownNameError(neurons)
+        states = find_states(network, part, names)
+    else:
+        yield from (Curve("neuron", index) for index in neurons.neurons)
+        return
+    for one in states:
+        yield from (Curve("neuron", index, one.state) for index in one.neurons.tolist())
+        yield from (Curve("connection", index, one.state) for index in one.connections.tolist())

@@ -1,0 +1,89 @@
+"""Series: the numbers that views over time show, what they are called, and which a view shows by itself.
+
+In: a network, a Recording of it, Curves. Out: arrays, a value a row; names; the curves of a view that names none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.states import StateOf, names_of_states
+from neurovis_spec.compiler.wishes import Curve, Panel
+from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.scene.geometry import FloatArray
+
+_NONE: npt.NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+
+
+def values_of(curve: Curve, network: Network, recording: Recording) -> FloatArray:
+    """The numbers of a curve, (rows,). Raises RecordingError where they were not recorded."""
+    name = full_name(curve, network)
+    if curve.state:
+        if name not in recording.state_names:
+            hint = f"record it (neurovis run --states '{name}')"
+            raise RecordingError(f"the recording does not hold the state '{name}', which the figure shows: {hint}")
+        return recording.states[:, recording.state_names.index(name)]
+    try:
+        return recording[name] if curve.of == "neuron" else recording.weight(name)
+    except KeyError as error:
+        raise RecordingError(str(error)) from None
+
+
+def full_name(curve: Curve, network: Network) -> str:
+    """How the spec calls it: ``K1``, ``K1 -> O``, ``K1.v``, ``(K1 -> O).eligibility``."""
+    if curve.state:
+        index = np.array([curve.index], dtype=np.int64)
+        own = (index, _NONE) if curve.of == "neuron" else (_NONE, index)
+        return names_of_states(network, [StateOf(curve.state, *own)])[0]
+    return network.neurons.names[curve.index] if curve.of == "neuron" else network.connection_names[curve.index]
+
+
+def short_name(curve: Curve, network: Network) -> str:
+    """What a picture calls it: labels of neurons, an arrow for a connection."""
+    labels = network.neurons.labels
+    if curve.of == "neuron":
+        name = network.neurons.names[curve.index]
+        own = labels[curve.index] if "." not in name else name
+        return f"{own}.{curve.state}" if curve.state else own
+    name = network.connection_names[curve.index].replace("->", "→")
+    return f"({name}).{curve.state}" if curve.state else name
+
+
+def kind_of(curves: Sequence[Curve]) -> str:
+    """What they all are, in a word or two."""
+    kinds = {"state": any(c.state for c in curves), "weight": any(c.of == "connection" and not c.state for c in curves)}
+    kinds["activity"] = any(c.of == "neuron" and not c.state for c in curves)
+    return ", ".join(kind for kind in ("activity", "weight", "state") if kinds[kind])
+
+
+def states_of(panels: Sequence[Panel], network: Network) -> tuple[str, ...]:
+    """The states that have to be recorded for these views."""
+    curves = [curve for panel in panels for curve in (panel.shown or chosen(panel.view, network)) if curve.state]
+    return tuple(dict.fromkeys(full_name(curve, network) for curve in curves))
+
+
+def chosen(view: str, network: Network) -> tuple[Curve, ...]:
+    """What a view shows that names nothing: traces the outputs, then what takes in inputs, else all neurons; a raster
+    all neurons; weights those that can change."""
+    if view == "weights":
+        return tuple(Curve("connection", index) for index in network.changing.tolist())
+    neurons = len(network.neurons)
+    if view == "traces":
+        found: dict[Curve, None] = {}
+        for output in network.outputs:
+            for state in output.states:
+                found.update(dict.fromkeys(Curve("neuron", index, state.state) for index in state.neurons.tolist()))
+                rules = (Curve("connection", index, state.state) for index in state.connections.tolist())
+                found.update(dict.fromkeys(rules))
+            if not output.states:
+                found.update(dict.fromkeys(Curve("neuron", index) for index in output.neurons.tolist()))
+        taking = [index for group in network.neurons.groups if group.role == "output" for index in group.indices]
+        taking += [index for group in network.neurons.groups if group.input is not None for index in group.indices]
+        found.update(dict.fromkeys(Curve("neuron", index) for index in taking))
+        if found:
+            return tuple(found)
+    return tuple(Curve("neuron", index) for index in range(neurons)) if view in ("traces", "raster") else ()

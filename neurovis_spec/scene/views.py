@@ -1,0 +1,316 @@
+"""Views: what a page is made of: the network, its matrix, traces, a raster, weights, each as a Block.
+
+In: a network, its layout (where a view needs it), the rows of a recording that are shown, Panels. Out: Blocks, which
+say how high they are and draw themselves into a Part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.wishes import Curve, Panel
+from neurovis_spec.layout.model import Layout
+from neurovis_spec.runtime.recording import Snapshot
+from neurovis_spec.scene import encoding, strips
+from neurovis_spec.scene.encode import tooltips
+from neurovis_spec.scene.frame import MARGIN
+from neurovis_spec.scene.gains import Gains
+from neurovis_spec.scene.gains import Scale as Own
+from neurovis_spec.scene.heat import Heat, bands_of
+from neurovis_spec.scene.matrix import Cells, order_of
+from neurovis_spec.scene.model import Film, Group, Text, Theme
+from neurovis_spec.scene.palette import MOST as MOST_COLOURS
+from neurovis_spec.scene.parts import Part
+from neurovis_spec.scene.scales import Scale, scale_of
+from neurovis_spec.scene.series import chosen, full_name, kind_of, short_name, values_of
+from neurovis_spec.scene.shots import Shots
+from neurovis_spec.scene.strips import SMALL, Span
+from neurovis_spec.scene.traces import PLOT, Trace, Traces
+
+#: The most curves of a view that names them, and of one that chooses them.
+_MOST_NAMED, _MOST_CHOSEN = 4 * MOST_COLOURS, MOST_COLOURS
+#: The share of the weights of a scale that do not go beyond its full colour in a matrix.
+_MOST = 0.9
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a block is drawn: a page of this width, on it the time; plots ``share`` times as high as by themselves,
+    the axis of the time beneath them or not; ``prefix`` begins the ids of its groups."""
+
+    width: float
+    span: Span
+    share: float
+    axis: bool
+    theme: Theme
+    prefix: str
+
+
+class Block(Protocol):
+    """A view, ready to be drawn."""
+
+    @property
+    def timed(self) -> bool:
+        """Whether it is a view over time."""
+        ...
+
+    @property
+    def sides(self) -> tuple[float, float]:
+        """How much room it needs to the left and to the right of the time."""
+        ...
+
+    def heights(self, width: float) -> tuple[float, float]:
+        """What of its height cannot change, and what can."""
+        ...
+
+    def part(self, place: Place) -> Part:
+        """What it draws."""
+        ...
+
+
+@dataclass(frozen=True)
+class Note:
+    """A view that has nothing to show says so."""
+
+    words: str
+    timed = False
+    sides = (0.0, 0.0)
+
+    def heights(self, width: float) -> tuple[float, float]:
+        """A line of text."""
+        return 22.0, 0.0
+
+    def part(self, place: Place) -> Part:
+        """The words alone."""
+        return Part((Group((Text((MARGIN, 15.0), self.words, SMALL, place.theme.muted),)),), 22.0)
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Traces or weights."""
+
+    traces: Traces
+    timed = True
+
+    @property
+    def sides(self) -> tuple[float, float]:
+        """Ticks to the left, names to the right."""
+        return self.traces.left, self.traces.right
+
+    def heights(self, width: float) -> tuple[float, float]:
+        """Titles, and plots."""
+        count = len(self.traces.strips)
+        return self.traces.height(0.0), count * PLOT
+
+    def part(self, place: Place) -> Part:
+        """The strips."""
+        return self.traces.part(place.span, PLOT * place.share, place.axis, place.theme, place.prefix)
+
+
+@dataclass(frozen=True)
+class Raster:
+    """Neurons over time."""
+
+    heat: Heat
+    timed = True
+
+    @property
+    def sides(self) -> tuple[float, float]:
+        """Names to the left."""
+        return self.heat.left, 0.0
+
+    def heights(self, width: float) -> tuple[float, float]:
+        """A title, and the cells."""
+        return self.heat.height(0.0), self.heat.natural
+
+    def part(self, place: Place) -> Part:
+        """The strip."""
+        return self.heat.part(place.span, self.heat.natural * place.share, place.axis, place.theme, place.prefix)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The matrix."""
+
+    cells: Cells
+    timed = False
+    sides = (0.0, 0.0)
+
+    def heights(self, width: float) -> tuple[float, float]:
+        """Title and names, and the cells."""
+        return self.cells.heights(width - 2 * MARGIN)
+
+    def part(self, place: Place) -> Part:
+        """The cells, as large as there is room."""
+        width = place.width - 2 * MARGIN
+        fixed, free = self.cells.heights(width)
+        return self.cells.part(width, MARGIN, fixed + free * place.share, place.theme, place.prefix)
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """The picture of the network, which is as large as it was made."""
+
+    film: Film
+    timed = False
+    sides = (0.0, 0.0)
+
+    def heights(self, width: float) -> tuple[float, float]:
+        """None of it changes."""
+        return self.film.scene.height, 0.0
+
+    def part(self, place: Place) -> Part:
+        """Its groups; the film itself says how they change."""
+        return Part(self.film.scene.groups, self.film.scene.height)
+
+
+@dataclass(frozen=True)
+class Maker:
+    """Makes the blocks of a network's views."""
+
+    network: Network
+    layout: Layout | None
+    shots: Shots
+    #: None where no view needs them
+    gains: Gains | None
+    #: whether the page has a legend
+    explained: bool
+
+    def block(self, panel: Panel) -> Block:
+        """A view other than the network's picture. Raises RecordingError where the recording lacks what it shows."""
+        match panel.view:
+            case "matrix":
+                return self._matrix(panel.shown)
+            case "raster":
+                return self._raster(panel.shown)
+            case _:
+                return self._traces(panel)
+
+    def snapshots(self) -> Sequence[Snapshot]:
+        """Those of the frames."""
+        recording = self.shots.recording
+        return [recording.snapshot(int(recording.step[row])) for row in self.shots.frames.tolist()]
+
+    def _traces(self, panel: Panel) -> Block:
+        named = panel.shown is not None
+        curves = tuple(dict.fromkeys(panel.shown if panel.shown is not None else chosen(panel.view, self.network)))
+        if not curves:
+            return Note("no weight of this network changes" if panel.view == "weights" else "there is nothing to trace")
+        most = _MOST_NAMED if named else 2 * _MOST_CHOSEN if panel.view == "weights" else _MOST_CHOSEN
+        shown, how = curves[:most], ""
+        if len(curves) > most and panel.view == "weights":
+            shown, how = self._changing_most(curves, most), ", those that change most"
+        words = kind_of(shown)
+        if len(curves) > most:
+            words += f" · {most} of {len(curves):,}{how}"
+        rows, frames = self.shots.rows, self.shots.frames
+        traces = []
+        for curve in shown:
+            values = values_of(curve, self.network, self.shots.recording)
+            name = short_name(curve, self.network), full_name(curve, self.network)
+            traces.append(Trace(name[0], values[rows], values[frames], name[1]))
+        return Curves(Traces(panel.view, words, tuple(traces)))
+
+    def _changing_most(self, curves: Sequence[Curve], most: int) -> tuple[Curve, ...]:
+        recording = self.shots.recording
+        far = []
+        for curve in curves:
+            values = values_of(curve, self.network, recording)[self.shots.rows]
+            finite = values[np.isfinite(values)]
+            far.append(float(finite.max() / 2 - finite.min() / 2) if len(finite) else 0.0)
+        kept = sorted(sorted(range(len(curves)), key=lambda place: -far[place])[:most])
+        return tuple(curves[place] for place in kept)
+
+    def _raster(self, shown: tuple[Curve, ...] | None) -> Block:
+        network, recording = self.network, self.shots.recording
+        curves = chosen("raster", network) if shown is None else tuple(dict.fromkeys(shown))
+        neurons = np.array([curve.index for curve in curves if curve.of == "neuron"], np.int64)
+        if not len(neurons):
+            return Note("there is no neuron to show")
+        recording.check_whole("a raster cannot be drawn from")
+        stateful = np.zeros(len(network.neurons), np.bool_)
+        for block in network.blocks:
+            stateful[block.members] = bool(block.model.state)
+        group_of = {index: group.name for group in network.neurons.groups for index in group.indices}
+        bands = bands_of([group_of[index] for index in neurons.tolist()])
+        rows, gains = self.shots.rows, self.gains
+        assert gains is not None
+
+        def activity(some: IntArray) -> FloatArray:
+            result: FloatArray = recording.activity[rows][:, neurons[some]]
+            return result
+
+        def colour(some: IntArray) -> FloatArray:
+            own = neurons[some]
+            return encoding.neuron_colour(activity(some), gains.activity[own], gains.centre[own])
+
+        own = set(np.unique(gains.activity[neurons]).tolist())
+        used = [(one, 1 / abs(one.gain or 1e-9)) for one in gains.activity_scales if one.gain in own]
+        scale = Scale("") if self.explained else scale_of("activity", used)
+        names = tuple(short_name(curve, network) for curve in curves if curve.of == "neuron")
+        return Raster(Heat("activity", activity, colour, stateful[neurons], names, bands, scale))
+
+    def _matrix(self, shown: tuple[Curve, ...] | None) -> Block:
+        network = self.network
+        assert self.layout is not None
+        assert self.gains is not None
+        ends = network.connections
+        connections = np.arange(len(ends))
+        if shown is not None:
+            connections = np.unique(np.array([curve.index for curve in shown if curve.of == "connection"], np.int64))
+        if not len(connections):
+            return Note("there is no connection to show")
+        everyone = range(len(network.neurons))
+        sources = everyone if shown is None else np.unique(ends.sources[connections]).tolist()
+        targets = everyone if shown is None else np.unique(ends.targets[connections]).tolist()
+        snapshots = self.snapshots()
+        weights = np.stack([snapshot.weights[connections] for snapshot in snapshots])
+        full, used = _full_at(weights, self.gains.thickness[connections], self.gains.thickness_scales)
+        with np.errstate(over="ignore", invalid="ignore"):
+            values = np.clip(weights / full, -1.0, 1.0)
+        lows, highs = weights.min(axis=0), weights.max(axis=0)
+        activity = np.stack([snapshots[0].activity, snapshots[0].activity])
+        low, high = (np.array(ends.weights, float) for _ in range(2))
+        low[connections], high[connections] = lows, highs
+        titles = tooltips(network, self.gains, activity, np.stack([low, high]))[1]
+        scale = scale_of("weight", used)
+        title = f"source (rows) × target (columns) · {len(connections):,} connections"
+        rows, columns = (order_of(network, self.layout, some) for some in (sources, targets))
+        return Grid(Cells(network, rows, columns, connections, np.nan_to_num(values), scale, titles, title))
+
+
+def _full_at(
+    weights: FloatArray, gains: FloatArray, scales: Sequence[Own]
+) -> tuple[FloatArray, list[tuple[Own, float]]]:
+    """The weight at which a cell has its full colour, for each connection and for each scale that some have: what all
+    but the strongest of a scale stay below. Connections share a scale here as they do in their thickness."""
+    known = np.where(np.isfinite(weights), np.abs(weights), 0.0).max(axis=0)
+    full, used = np.ones(len(gains)), list[tuple[Own, float]]()
+    for scale in scales:
+        members = gains == scale.gain
+        own = known[members & (known > 0)]
+        if not members.any():
+            continue
+        reached = float(f"{np.quantile(own, _MOST, method='higher'):.2g}") if len(own) else 1.0
+        full[members] = reached
+        used.append((scale, reached))
+    return full, used
+
+
+def span_of(blocks: Sequence[Block], shots: Shots, width: float, dt: float | None) -> Span:
+    """Where the time lies on a page of this width, the same for all views over it."""
+    timed = [block.sides for block in blocks if block.timed]
+    left = MARGIN + max((one[0] for one in timed), default=0.0)
+    right = width - MARGIN - max((one[1] for one in timed), default=0.0)
+    steps = shots.recording.step
+    return Span(steps[shots.rows], steps[shots.frames], left, max(right, left + 8.0), dt)
+
+
+#: What the axis of the time adds to the last of several views over it.
+AXIS = strips.AXIS
