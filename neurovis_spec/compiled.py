@@ -7,7 +7,8 @@ does so: a spec is compiled, and thereby checked, without it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -33,11 +34,14 @@ if TYPE_CHECKING:
     from neurovis_spec.runtime.recording import Recording, Snapshot
     from neurovis_spec.runtime.simulation import Simulation
     from neurovis_spec.runtime.until import Until
+    from neurovis_spec.scene import Film, Scene
     from neurovis_spec.scene.gains import Gains
     from neurovis_spec.scene.panels import View
 
 #: Frames a second where the spec writes no dt, and the most there are.
 DEFAULT_FPS, MOST_FPS = 25.0, 60.0
+#: Frames of a film that are held at once, and how many numbers they are about.
+_FEWEST_AT_ONCE, _MOST_AT_ONCE, _NUMBERS_AT_ONCE = 16, 512, 4_000_000
 #: The most steps of a run: beyond it a step is no number that a double can hold.
 _MOST_STEPS = 1 << 53
 
@@ -300,6 +304,7 @@ class CompiledNetwork:
         engine: str | None = None,
         view: View | Sequence[View] | None = None,
         window: int | None = None,
+        dpi: float | None = None,
         progress: Progress | None = None,
     ) -> None:
         """Draw one step into a file whose suffix says what kind.
@@ -309,14 +314,16 @@ class CompiledNetwork:
         run. ``view`` says what is shown, from top to bottom: ``network``, ``matrix``, ``traces``, ``raster``,
         ``weights``, alone or with references (``traces: C1, C2`` or {"traces": ["C1", "C2"]}); by default it is the
         spec's ``figure``. Views over time show the whole recording or run, or ``window`` steps around the one that is
-        drawn. Raises OutputError for a kind that nobody draws and a view that there is not, KeyError for an unknown
-        reference, before anything is run.
+        drawn. ``dpi`` are the pixels of an inch, 96 of which are a picture's usual size on the screen. Raises
+        OutputError for a kind that nobody draws and a view that there is not, KeyError for an unknown reference, before
+        anything is run.
         """
         from neurovis_spec.scene.renderers import renderer_for
 
         _check(recording=recording, inputs=inputs, theme=theme, engine=engine, progress=progress)
         place, wanted = arguments.path("path", path), None if step is None else arguments.integer("step", step)
         renderer_for(suffix := place.suffix, moving=False)
+        density = None if dpi is None else _density(dpi)
         panels, settings = self._panels(view), self._settings(theme)
         if window is not None:
             settings = replace(settings, window=arguments.integer("window", window, 1))
@@ -332,7 +339,7 @@ class CompiledNetwork:
             assert layout is not None
             snapshot, gains = self._snapshot(wanted, recording, progress, inputs)
             scene = pipeline.picture(self.network, layout, snapshot, gains, settings)
-        content = pipeline.draw(scene, suffix)
+        content = pipeline.draw(scene if density is None else _denser(scene, density), suffix)
         with replacing(place) as file:
             file.write(content)
 
@@ -343,6 +350,8 @@ class CompiledNetwork:
         steps: int | None = None,
         start: int = 0,
         fps: float | None = None,
+        every: int | None = None,
+        frames: int | None = None,
         recording: Recording | None = None,
         inputs: Mapping[str, npt.ArrayLike] | None = None,
         theme: str | None = None,
@@ -350,39 +359,64 @@ class CompiledNetwork:
         view: View | Sequence[View] | None = None,
         progress: Progress | None = None,
     ) -> None:
-        """Draw ``steps`` steps from step ``start`` on, one a frame, into a file whose suffix says what kind.
+        """Draw ``steps`` steps from step ``start`` on, one in ``every`` a frame, into a file whose suffix says what
+        kind.
 
-        ``fps`` defaults to 1/dt, at most 60, and to 25 where the spec writes no dt. ``inputs`` and ``view`` as in
-        ``render``; views over time show the steps of the film. Raises OutputError for a kind that nobody makes, for a
-        film that is too long and a view that there is not, KeyError for an unknown reference, before anything is run.
+        ``fps`` defaults to 1/dt, at most 60, and to 25 where the spec writes no dt. Without ``every`` all steps are
+        drawn, of more than 3,000 (or ``frames``) one in so many that no more frames come out; a warning says which.
+        ``inputs`` and ``view`` as in ``render``; views over time show the steps of the film. Raises OutputError for a
+        kind that nobody makes, for a film that is too long and a view that there is not, KeyError for an unknown
+        reference, before anything is run.
         """
-        from neurovis_spec.scene.film_size import check_film
+        from neurovis_spec.runtime.simulation import Simulation
+        from neurovis_spec.scene.film_size import check_film, thinned
         from neurovis_spec.scene.renderers import renderer_for
-        from neurovis_spec.snapshots import frames_of, snapshots_from
+        from neurovis_spec.snapshots import in_parts, snapshots_from, snapshots_of_run, steps_from
 
         _check(recording=recording, inputs=inputs, theme=theme, engine=engine, progress=progress)
         place, first = arguments.path("path", path), arguments.integer("start", start, most=_MOST_STEPS)
         count = None if steps is None else arguments.integer("steps", steps, most=_MOST_STEPS)
-        renderer = renderer_for(suffix := place.suffix, moving=True)
+        each = None if every is None else arguments.integer("every", every, 1, _MOST_STEPS)
+        most = None if frames is None else arguments.integer("frames", frames, 1, _MOST_STEPS)
+        capabilities = renderer_for(suffix := place.suffix.lower(), moving=True).capabilities
         if fps is None:
             fps = min(1 / self.network.dt, MOST_FPS) if self.network.dt_given else DEFAULT_FPS
         if not (math.isfinite(arguments.number("fps", fps)) and fps > 0):
             raise ValueError(f"frames a second are above 0, not {fps}")
-        check_film(self.network, frames_of(self.network, first, count, recording), suffix, renderer.capabilities)
+        span = steps_from(self.network, first, count, recording)
+        stride = thinned(span, each, most)
+        shown = -(-span // stride)
+        check_film(self.network, shown, suffix, capabilities)
+        if stride > 1 and each is None and most is None:
+            warnings.warn(_thinned(span, stride, shown, fps), stacklevel=2)
         panels, settings = self._panels(view), self._settings(theme)
-        layout = self._placed(panels, engine)
-        run = partial(self.run, inputs=inputs, progress=progress, states=self._states(panels))
-        snapshots = snapshots_from(self.network, first, count, recording, run)
+        layout, streams = self._placed(panels, engine), suffix in capabilities.streams
+        made = recording
+        if recording is None and (panels or not streams):
+            made = self.run(first + span, inputs, progress=progress, states=self._states(panels))
+        films: Iterator[Film]
         if panels:
-            shots = pipeline.shots_of(snapshots.recording, snapshots.steps)
+            assert made is not None
+            chosen = snapshots_from(self.network, first, count, made, stride)
+            shots = pipeline.shots_of(chosen.recording, chosen.steps)
             gains = self._gains_of(panels, recording, inputs)
-            film = pipeline.page(self.network, layout, panels, shots, gains, settings, fps)
+            films = iter([pipeline.page(self.network, layout, panels, shots, gains, settings, fps)])
         else:
             assert layout is not None
-            film = pipeline.moving(self.network, layout, snapshots, self._gains_for(recording, inputs), settings, fps)
-        content = pipeline.animate(film, suffix, progress)
-        with replacing(place) as file:
-            file.write(content)
+            if made is None:
+                snapshots = snapshots_of_run(Simulation(self.network, inputs=inputs), first, span, stride)
+            else:
+                snapshots = iter(snapshots_from(self.network, first, count, made, stride))
+            wide = len(self.network.neurons) + 3 * len(self.network.connections)
+            many = max(_FEWEST_AT_ONCE, min(_MOST_AT_ONCE, _NUMBERS_AT_ONCE // wide)) if streams else shown
+            film = partial(pipeline.moving, self.network, layout, settings=settings, fps=fps)
+            film = partial(film, gains=self._gains_for(recording, inputs))
+            films = map(film, in_parts(snapshots, many))
+        with replacing(place, "part" if streams else "neurovis-new") as file:
+            if streams:
+                pipeline.stream(films, shown, suffix, file, progress)
+            else:
+                file.write(pipeline.animate(next(films), suffix, progress))
 
     def _settings(self, theme: str | None) -> RenderSettings:
         from neurovis_spec.scene.renderers import RendererError
@@ -494,6 +528,36 @@ class CompiledNetwork:
         snapshot, gains = self._snapshot()
         scene = pipeline.picture(self.network, self._layout, snapshot, gains, self.network.render)
         return pipeline.draw(scene, ".svg").decode()
+
+
+#: pixels of an inch where a user unit is one pixel, and the most that are drawn of a picture
+_CSS, _MOST_PIXELS = 96.0, 1 << 28
+
+
+def _density(dpi: float) -> float:
+    """Pixels of a user unit for so many dots an inch. Raises ValueError."""
+    if not (math.isfinite(arguments.number("dpi", dpi)) and dpi > 0):
+        raise ValueError(f"dots an inch are above 0, not {dpi}")
+    return dpi / _CSS
+
+
+def _denser(scene: Scene, density: float) -> Scene:
+    """A scene of another density. Raises OutputError for one that is too large."""
+    from neurovis_spec.scene.renderers import RendererError
+
+    result = replace(scene, density=density)
+    wide, high = result.pixels
+    if wide * high > _MOST_PIXELS:
+        most = int(_CSS * math.sqrt(_MOST_PIXELS / (scene.width * scene.height)))
+        raise RendererError(f"a picture of {wide:,} × {high:,} pixels is too large", f"take at most {most} an inch")
+    return result
+
+
+def _thinned(steps: int, every: int, frames: int, fps: float) -> str:
+    return (
+        f"of {steps:,} steps one in {every} is drawn: {frames:,} frames, {frames / fps:.4g} s at {fps:.4g} a second "
+        f"(every=1, on the command line --every 1, draws all)"
+    )
 
 
 def _check(**given: object) -> None:

@@ -13,10 +13,10 @@ What the first four find at fault goes into Findings, all at once; ``Findings.ch
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO
 
 from neurovis_spec.compiler.compile import Request, compile_spec
 from neurovis_spec.compiler.network import Network
@@ -257,3 +257,13 @@ def animate(moving_scene: Film, suffix: str, progress: Progress | None = None) -
     from neurovis_spec.scene.renderers import renderer_for
 
     return renderer_for(suffix, moving=True).animate(moving_scene, suffix.lower(), progress)
+
+
+def stream(films: Iterator[Film], frames: int, suffix: str, file: BinaryIO, progress: Progress | None = None) -> None:
+    """A film in parts as a file of this kind, written while it is made. Raises RendererError."""
+    from neurovis_spec.scene.model import StreamingRenderer
+    from neurovis_spec.scene.renderers import renderer_for
+
+    renderer = renderer_for(suffix, moving=True)
+    assert isinstance(renderer, StreamingRenderer)
+    renderer.stream(films, frames, suffix.lower(), file, progress)

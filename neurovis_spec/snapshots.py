@@ -6,15 +6,17 @@ In: a Network, the steps wanted, a Recording of it, or a function that runs so m
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.columns import columns_of
 from neurovis_spec.runtime.inputs import InputError
 from neurovis_spec.runtime.recording import After, Numbers, Recording, RecordingError, Snapshot, recording_of
+from neurovis_spec.runtime.simulation import Simulation
 
 
 def snapshot_at(
@@ -48,8 +50,8 @@ class Snapshots(Collection[Snapshot]):
         return isinstance(snapshot, Snapshot) and snapshot.step in self.steps
 
 
-def frames_of(network: Network, start: int, steps: int | None, recording: Recording | None) -> int:
-    """How many snapshots ``snapshots_from`` gives, known before anything is run. Raises InputError, RecordingError."""
+def steps_from(network: Network, start: int, steps: int | None, recording: Recording | None) -> int:
+    """How many steps ``snapshots_from`` chooses from, known before a run. Raises InputError, RecordingError."""
     if start < 0 or (steps is not None and steps < 1):
         raise InputError(f"{steps} frames from step {start}: at least one frame from step 0 on is wanted")
     if recording is None:
@@ -61,20 +63,45 @@ def frames_of(network: Network, start: int, steps: int | None, recording: Record
     return rows if steps is None else min(rows, steps)
 
 
-def snapshots_from(
-    network: Network, start: int, steps: int | None, recording: Recording | None, run: Callable[[int], Recording]
-) -> Snapshots:
-    """The snapshots of ``steps`` steps from ``start`` on, by default of all that follow; warns where a recording has
-    fewer. Raises InputError, RecordingError."""
-    count = frames_of(network, start, steps, recording)
-    if recording is None:
-        recording = run(start + count)
+def snapshots_from(network: Network, start: int, steps: int | None, recording: Recording, every: int = 1) -> Snapshots:
+    """The snapshots of ``steps`` steps of a recording from ``start`` on, by default of all that follow, of one in
+    ``every``; warns where there are fewer. Raises InputError, RecordingError."""
+    count = steps_from(network, start, steps, recording)
     recording = fitted(recording, network)
     rows = recording.step[recording.step >= start]
     if steps is not None and len(rows) < steps:
         frames = f"{len(rows):,} frame{'' if len(rows) == 1 else 's'} instead of {steps:,}"
         warnings.warn(f"the recording holds no more than {frames} from step {start} on", stacklevel=2)
-    return Snapshots(recording, tuple(rows[:count].tolist()))
+    return Snapshots(recording, tuple(rows[:count:every].tolist()))
+
+
+def snapshots_of_run(run: Simulation, start: int, steps: int, every: int) -> Iterator[Snapshot]:
+    """The same of a run that is made while they are asked for, so that there may be any number of them."""
+    network = run.network
+    before, weights = None, _weights(run)
+    for step in range(start + steps):
+        run.step()
+        if step >= start and (step - start) % every == 0:
+            yield Snapshot(step, run.activity, weights, before)
+        before, weights = weights, _weights(run) if len(network.changing) else weights
+
+
+def _weights(run: Simulation) -> FloatArray:
+    result = run.network.connections.weights.copy()
+    result[run.network.changing] = run.weights
+    return result
+
+
+def in_parts(snapshots: Iterable[Snapshot], many: int) -> Iterator[list[Snapshot]]:
+    """So many at a time."""
+    part = list[Snapshot]()
+    for snapshot in snapshots:
+        part.append(snapshot)
+        if len(part) == many:
+            yield part
+            part = []
+    if part:
+        yield part
 
 
 def fitted(recording: Recording, network: Network) -> Recording:

@@ -148,9 +148,8 @@ def test_a_command_that_is_not_there_yet_is_answered_with_those_that_are(name: s
     ("words", "kinds"),
     [
         ("run small.yaml -o x.parquet", (".csv", ".npz", ".mcap")),
-        ("render small.yaml -o x.pdf", (".svg", ".png")),
-        ("animate small.yaml -o x.mp4", (".svg", ".gif", ".webp")),
-        ("animate small.yaml -o x.webm", (".webp",)),
+        ("render small.yaml -o x.eps", (".svg", ".png")),
+        ("animate small.yaml -o x.avi", (".svg", ".gif", ".webp", ".mp4")),
     ],
 )
 def test_a_kind_of_file_that_is_not_made_yet_is_answered_with_those_that_are(

@@ -233,7 +233,9 @@ def test_films_show_their_frames(suffix: str) -> None:
 def test_a_gif_lasts_as_long_as_its_frames_also_where_nothing_changes_for_hours() -> None:
     first, second = np.zeros((8, 9, 3), np.uint8), np.zeros((8, 9, 3), np.uint8)
     second[3:5, 2:7] = 200
-    data = films.gif(iter([first, first, second, first]), [20, 2_000_000, 40, 30])
+    file = io.BytesIO()
+    films.gif(iter([first, first, second, first]), [20, 2_000_000, 40, 30], file)
+    data = file.getvalue()
     lasts, shown = [], []
     with Image.open(io.BytesIO(data)) as picture:
         for frame in range(picture.n_frames):  # type: ignore[attr-defined]
@@ -246,7 +248,7 @@ def test_a_gif_lasts_as_long_as_its_frames_also_where_nothing_changes_for_hours(
 
 
 _BOUNDED = """
-import resource, sys
+import io, resource, sys
 import numpy as np
 from neurovis_renderers import films
 
@@ -256,7 +258,11 @@ def frames(count):
         picture[frame : frame + 40, 20:220, frame % 3] = 250
         yield picture
 
-make = getattr(films, sys.argv[1])
+def make(pictures, lasts):
+    file = io.BytesIO()
+    getattr(films, sys.argv[1])(pictures, lasts, file)
+    return file.getvalue()
+
 make(frames(3), [40] * 3)
 pages = int(open("/proc/self/statm").read().split()[0])
 resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + (32 << 20), -1))

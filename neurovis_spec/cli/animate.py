@@ -36,15 +36,21 @@ def _finite(ctx: click.Context, param: click.Parameter, value: float | None) -> 
         "neurovis animate first.yaml -o first.svg --steps 200",
         "neurovis animate first.yaml -o first.svg --from 1000 --steps 128 --fps 25",
         "neurovis animate first.yaml -o first.svg --recording first.npz",
+        "neurovis animate first.yaml -o first.mp4 --steps 100000 --every 20",
         "neurovis animate first.yaml -o first.svg --view network --view 'traces: O' --steps 200",
     )
 )
 @spec_argument
-@output_option("The moving picture; the suffix says what kind, such as .svg.", required=True)
-@click.option(
-    "--steps", type=click.IntRange(min=1), metavar="N", help="Frames, one a step; default: to the end of the run."
-)
+@output_option("The moving picture; the suffix says what kind: .svg, .mp4, .webm, .gif or .webp.", required=True)
+@click.option("--steps", type=click.IntRange(min=1), metavar="N", help="Steps to show; default: to the end of the run.")
 @click.option("--from", "start", type=click.IntRange(min=0), default=0, metavar="N", help="The first step to show.")
+@click.option(
+    "--every",
+    type=click.IntRange(min=1),
+    metavar="K",
+    help="A frame for one step in K; default: each, of more than 3,000 one in so many that no more frames come out.",
+)
+@click.option("--frames", type=click.IntRange(min=1), metavar="N", help="At most so many frames, one step in so many.")
 @click.option(
     "--fps",
     type=click.FloatRange(min=0, min_open=True),
@@ -63,6 +69,8 @@ def command(
     output: Path,
     steps: int | None,
     start: int,
+    every: int | None,
+    frames: int | None,
     fps: float | None,
     recording: str | None,
     inputs: dict[str, str],
@@ -71,7 +79,13 @@ def command(
     engine: str | None,
     settings: dict[str, float],
 ) -> None:
-    """Draw a run as a moving picture, one frame a step."""
+    """Draw a run as a moving picture, a frame a step.
+
+    A video (.mp4, .webm) needs ffmpeg, that of the system or of the extra 'video'. It can be played while it is made,
+    from a part beside the file (.x.mp4.part), which stays if the command is killed.
+    """
+    if every is not None and frames is not None:
+        raise click.UsageError("--every and --frames say the same in two ways: give one of them")
     need_run(inputs, recording)
     read = [("the recording that is drawn", recording), *files_of(inputs)]
     check_target(output, [("the spec itself", spec), *read])
@@ -84,6 +98,8 @@ def command(
             steps=steps,
             start=start,
             fps=fps,
+            every=every,
+            frames=frames,
             recording=record,
             inputs=arrays,
             theme=theme,

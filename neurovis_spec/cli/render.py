@@ -42,7 +42,7 @@ def _why(network: CompiledNetwork, step: int | None, steps: int) -> str:
     )
 )
 @spec_argument
-@output_option("The picture; the suffix says what kind, such as .svg or .png.", required=True)
+@output_option("The picture; the suffix says what kind: .svg, .pdf, .png, .webp or .gif.", required=True)
 @click.option("--step", type=click.IntRange(min=0), metavar="N", help="The step to show; default: the last.")
 @recording_option
 @input_option
@@ -55,6 +55,12 @@ def _why(network: CompiledNetwork, step: int | None, steps: int) -> str:
     help="Views over time show N steps around the one that is drawn; default: the spec's, else all.",
 )
 @engine_option
+@click.option(
+    "--dpi",
+    type=click.FloatRange(1, 9600),
+    metavar="N",
+    help="Pixels of an inch, such as 300 for print; a picture has 96 to 384 by itself.",
+)
 @set_option
 def command(
     spec: str,
@@ -66,6 +72,7 @@ def command(
     views: tuple[str, ...],
     window: int | None,
     engine: str | None,
+    dpi: float | None,
     settings: dict[str, float],
 ) -> None:
     """Draw one step as a picture.
@@ -93,6 +100,7 @@ def command(
             engine=engine,
             view=view,
             window=window,
+            dpi=dpi,
             progress=bar,
         )
     if network.needs_layout(view):

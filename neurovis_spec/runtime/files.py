@@ -17,12 +17,13 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from neurovis_spec.runtime.parts import clear, open_beside
+from neurovis_spec.runtime.parts import Kind, clear, open_beside
 
 
 @contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
-    """A file to write (and to read) that replaces ``path`` at the end; after an exception nothing has changed.
+def replacing(path: str | os.PathLike[str], kind: Kind = "neurovis-new") -> Iterator[BinaryIO]:
+    """A file to write (and to read) that replaces ``path`` at the end; after an exception nothing has changed. Of which
+    ``kind`` it is until then says whether it is of use to somebody if its writer is killed.
 
     A link is followed. Permissions stay. Raises OSError where the folder cannot be written or the path is neither a
     regular file nor a character device.
@@ -33,8 +34,8 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
             yield file
             copy_to_device(file, target)
         return
-    clear(target, "neurovis-new")
-    beside, raw = open_beside(target, "neurovis-new")
+    clear(target, kind)
+    beside, raw = open_beside(target, kind)
     try:
         buffered = io.BufferedRandom(raw)
         yield buffered

@@ -43,15 +43,22 @@ class ParameterError(ValueError):
 
 
 class Simulation:
-    """A run in the making; ``start`` is a recording to go on from (see ``resume``). Events of the spec apply at their
+    """A run in the making; ``start`` is a recording to go on from (see ``resume``), ``inputs`` are whole arrays that
+    replace the sources of inputs. Events of the spec apply at their
     steps; what is done by hand between two steps comes after the events of the step to come. Raises BackendError,
     RecordingError, ParameterError (see ``step``).
     """
 
-    def __init__(self, network: Network, backend: str | Backend | None = None, start: Recording | None = None) -> None:
+    def __init__(
+        self,
+        network: Network,
+        backend: str | Backend | None = None,
+        start: Recording | None = None,
+        inputs: Mapping[str, npt.ArrayLike] | None = None,
+    ) -> None:
         self.network = network
         self._stepper = prepare(network, backend)
-        self._reader = InputReader(network, made=lambda first, rows: self._watch.given(first, rows))
+        self._reader = InputReader(network, inputs, lambda first, rows: self._watch.given(first, rows))
         self._controls = Controls(network)
         self._begin = initial_state(network) if start is None else resumed_state(network, start)
         self._apply(self._begin)

@@ -1,8 +1,8 @@
 """How long a film may be: known, and refused, before anything is run.
 
 In: a network, the number of frames, the kind of file. Out: nothing, or RendererError that says the limit and the way
-out. What a film takes of memory grows with its frames: all colours and widths, and of pixels what is left of them when
-they are compressed.
+out. What a film takes of memory grows with its frames where it is not written while it is made: all colours and widths,
+and of pixels what is left of them when they are compressed. A film that nobody asked to be long is thinned.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ MOST_COLOURS = 20_000_000
 def check_film(network: Network, frames: int, suffix: str, capabilities: RendererCapabilities) -> None:
     """Refuse a film that would take more memory than is reasonable. Raises RendererError."""
     parts = len(network.neurons) + len(network.connections)
-    if frames * parts > MOST_COLOURS:
+    if suffix not in capabilities.streams and frames * parts > MOST_COLOURS:
         most = max(1, MOST_COLOURS // parts)
         message = f"a film of {frames:,} frames of {parts:,} neurons and connections is too long: {most:,} is the most"
         raise RendererError(message, f"draw fewer steps (--steps {most}), or one by one (neurovis render --step N)")
@@ -31,3 +31,17 @@ def check_film(network: Network, frames: int, suffix: str, capabilities: Rendere
         message = f"a '{suffix}' of {frames:,} frames of {wide} × {high} pixels is too long: {most:,} is the most"
         hint = f"draw fewer steps (--steps {most}), a smaller picture (render: size), or an '.svg', which has no pixels"
         raise RendererError(message, hint)
+
+
+#: The most frames of a film where nobody has said how many.
+MOST_FRAMES = 3000
+
+
+def thinned(steps: int, every: int | None, frames: int | None) -> int:
+    """One step in so many is shown of so many: ``every`` where it is given, else such that there are at most so many
+    ``frames``.
+
+    >>> thinned(2000, None, None), thinned(40_000, None, None), thinned(40_000, 2, None), thinned(1000, None, 300)
+    (1, 14, 2, 4)
+    """
+    return every if every is not None else -(-steps // (frames or MOST_FRAMES))

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import ClassVar, Literal, Protocol, TypeAlias
+from typing import BinaryIO, ClassVar, Literal, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -285,12 +285,15 @@ class Film:
 
 @dataclass(frozen=True, slots=True)
 class RendererCapabilities:
-    """File suffixes (with the dot, in small letters) of the stills and of the films that a renderer makes; of a film
-    the most ``pixels``, those of all frames together (None: it does not depend on them)."""
+    """File suffixes (with the dot, in small letters) of the stills and of the films that a renderer makes; of which
+    films it takes in parts (``StreamingRenderer``); of a film the most ``pixels``, those of all frames together (None:
+    it does not depend on them); and for suffixes that need what is not installed, what to do about it."""
 
     stills: frozenset[str] = frozenset()
     films: frozenset[str] = frozenset()
+    streams: frozenset[str] = frozenset()
     pixels: int | None = None
+    missing: Mapping[str, str] = field(default_factory=dict)
 
 
 class Renderer(Protocol):
@@ -307,4 +310,16 @@ class Renderer(Protocol):
 
     def animate(self, film: Film, suffix: str, progress: Progress | None = None) -> bytes:
         """The film as the content of a file with this suffix."""
+        ...
+
+
+@runtime_checkable
+class StreamingRenderer(Renderer, Protocol):
+    """A renderer that writes films while they are made, so that they may be of any length: they come in parts, the
+    scenes of which differ only in what changes."""
+
+    def stream(
+        self, films: Iterator[Film], frames: int, suffix: str, file: BinaryIO, progress: Progress | None = None
+    ) -> None:
+        """Write a film of so many frames to a file."""
         ...

@@ -19,17 +19,22 @@ class RendererError(ValueError):
 
 
 def renderer_for(suffix: str, *, moving: bool) -> Renderer:
-    """The first renderer, by name, that declares this suffix for stills or for films."""
-    known: list[str] = []
+    """The first renderer, by name, that declares this suffix, in any case, for stills or for films, and that has what
+    it needs."""
+    suffix, missing, known = suffix.lower(), "", list[str]()
     for made in plugins.working(plugins.RENDERERS):
         capabilities = getattr(made, "capabilities", None)
         if not isinstance(capabilities, RendererCapabilities):
             raise RendererError(f"what is installed as renderer '{type(made).__name__}' is none")
         suffixes = capabilities.films if moving else capabilities.stills
-        if suffix.lower() in suffixes:
+        if suffix in suffixes and suffix in capabilities.missing:
+            missing = capabilities.missing[suffix]
+        elif suffix in suffixes:
             renderer: Renderer = made  # type: ignore[assignment]
             return renderer
         known += sorted(suffixes)
+    if missing:
+        raise RendererError(f"what makes files of the kind '{suffix}' is not installed", missing)
     what = "films" if moving else "pictures"
     message = f"no renderer makes {what} of the kind '{suffix}'" if suffix else f"the file of {what} needs a suffix"
     raise RendererError(message, suggest(suffix, known, f"kinds of {what}"))

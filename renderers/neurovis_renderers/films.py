@@ -1,14 +1,14 @@
 """Films as GIF and WebP, frame by frame: no picture is kept but the one before.
 
-In: the pictures of a film, one after the other, and how many milliseconds each lasts. Out: the bytes of a file that
-starts over at its end. Pillow quantises and compresses; its own way of writing many pictures holds them all at once.
+In: the pictures of a film, one after the other, and how many milliseconds each lasts. Out: a file that starts over at
+its end. Pillow quantises and compresses; its own way of writing many pictures holds them all at once.
 """
 
 from __future__ import annotations
 
-import io
 import struct
 from collections.abc import Iterator, Sequence
+from typing import BinaryIO
 
 import numpy as np
 import numpy.typing as npt
@@ -22,31 +22,29 @@ _COLOURS = 255
 _LONGEST = 655_350
 
 
-def gif(frames: Iterator[Pixels], lasts: Sequence[int]) -> bytes:
-    """A GIF: the first picture, then of each the rectangle in which it differs from the one before."""
+def gif(frames: Iterator[Pixels], lasts: Sequence[int], file: BinaryIO) -> None:
+    """Write a GIF: the first picture, then of each the rectangle in which it differs from the one before."""
     before = next(frames)
     high, wide = before.shape[:2]
-    buffer = io.BytesIO()
-    buffer.write(b"GIF89a" + struct.pack("<HHBBB", wide, high, 0x70, 0, 0))
-    buffer.write(b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")
+    file.write(b"GIF89a" + struct.pack("<HHBBB", wide, high, 0x70, 0, 0))
+    file.write(b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")
     changed, corner, picture, waiting = np.ones((high, wide), bool), (0, 0), before, lasts[0]
     for after, last in zip(frames, lasts[1:], strict=True):
         differs = (after != before).any(axis=2)
         if not differs.any():  # a picture that stays longer
             waiting += last
             continue
-        _write_picture(buffer, picture, changed, corner, waiting)
+        _write_picture(file, picture, changed, corner, waiting)
         rows, columns = np.flatnonzero(differs.any(axis=1)), np.flatnonzero(differs.any(axis=0))
         window = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
         changed, corner, picture = differs[window], (int(columns[0]), int(rows[0])), after[window]
         before, waiting = after, last
-    _write_picture(buffer, picture, changed, corner, waiting)
-    buffer.write(b";")
-    return buffer.getvalue()
+    _write_picture(file, picture, changed, corner, waiting)
+    file.write(b";")
 
 
 def _write_picture(
-    buffer: io.BytesIO, picture: Pixels, changed: npt.NDArray[np.bool_], corner: tuple[int, int], lasts: int
+    file: BinaryIO, picture: Pixels, changed: npt.NDArray[np.bool_], corner: tuple[int, int], lasts: int
 ) -> None:
     """A picture with a palette of its own, seen through where nothing has changed."""
     reduced = Image.fromarray(picture).convert("P", palette=Image.Palette.ADAPTIVE, colors=_COLOURS)
@@ -56,16 +54,14 @@ def _write_picture(
         part = Image.frombytes("P", indices.shape[::-1], indices.tobytes())
         part.putpalette(palette)
         how = {"duration": min(lasts - start, _LONGEST), "transparency": _COLOURS, "disposal": 1}
-        buffer.writelines(GifImagePlugin.getdata(part, corner, include_color_table=True, **how))
+        file.writelines(GifImagePlugin.getdata(part, corner, include_color_table=True, **how))
         indices = np.full((1, 1), _COLOURS, np.uint8)  # then nothing changes for as long again
 
 
-def webp(frames: Iterator[Pixels], lasts: Sequence[int]) -> bytes:
-    """A WebP; its encoder keeps compressed pictures only."""
-    buffer = io.BytesIO()
+def webp(frames: Iterator[Pixels], lasts: Sequence[int], file: BinaryIO) -> None:
+    """Write a WebP; its encoder keeps compressed pictures only."""
     film = _Film(frames, len(lasts))
-    film.save(buffer, "WEBP", save_all=True, duration=list(lasts), loop=0, quality=85, method=2)
-    return buffer.getvalue()
+    film.save(file, "WEBP", save_all=True, duration=list(lasts), loop=0, quality=85, method=2)
 
 
 class _Film(Image.Image):

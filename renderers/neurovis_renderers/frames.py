@@ -1,7 +1,7 @@
 """Frames: the pictures of a film, one after the other, painted by as many threads as there are processors.
 
-In: a Film. Out: its pictures in order; only a few are made before they are asked for. NumPy lets other threads run
-while it works, so threads do for painting what processes would do, and share what frames have in common.
+In: a Film, or one in parts. Out: its pictures in order; only a few are made before they are asked for. NumPy lets other
+threads run while it works, so threads do for painting what processes would do, and share what frames have in common.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from neurovis_spec.scene import Film, Progress, still
 _RUN = 4
 
 
-def frames(film: Film, progress: Progress | None = None) -> Iterator[Pixels]:
+def frames(film: Film) -> Iterator[Pixels]:
     """The pictures of a film, each made shortly before it is asked for."""
     painters: SimpleQueue[Callable[[int], Pixels]] = SimpleQueue()
     threads = max(1, min(_processors(), -(-film.frames // _RUN)))
@@ -34,12 +34,18 @@ def frames(film: Film, progress: Progress | None = None) -> Iterator[Pixels]:
         finally:
             painters.put(paint_frame)
 
-    done = 0
     for pictures in _in_order(run, range(0, film.frames, _RUN), threads):
-        for picture in pictures:
+        yield from pictures
+
+
+def all_frames(films: Iterator[Film], total: int, progress: Progress | None = None) -> Iterator[Pixels]:
+    """The pictures of a film of ``total`` frames that comes in parts."""
+    done = 0
+    for film in films:
+        for picture in frames(film):
             done += 1
             if progress is not None:
-                progress(done, film.frames)
+                progress(done, total)
             yield picture
 
 

@@ -7,18 +7,19 @@ In: a Scene or a Film. Out: the bytes of a file, with the pixels that the scene 
 from __future__ import annotations
 
 import io
-from itertools import pairwise
+from collections.abc import Iterator
+from itertools import chain, pairwise
+from typing import BinaryIO
 
 from PIL import Image
 
 from neurovis_renderers.canvas import paint
 from neurovis_renderers.films import gif, webp
-from neurovis_renderers.frames import frames
+from neurovis_renderers.frames import all_frames
 from neurovis_spec.scene import Film, Progress, RendererCapabilities, Scene
 
 #: pixels of all frames of a film: compressed they are kept until the end, some 50 MB for each 2^30
 MOST_PIXELS = 1 << 34
-_FORMATS = {".png": "PNG", ".gif": "GIF", ".webp": "WEBP"}
 
 
 class PillowRenderer:
@@ -26,7 +27,10 @@ class PillowRenderer:
 
     name = "pillow"
     capabilities = RendererCapabilities(
-        stills=frozenset({".png", ".gif", ".webp"}), films=frozenset({".gif", ".webp"}), pixels=MOST_PIXELS
+        stills=frozenset({".png", ".gif", ".webp"}),
+        films=frozenset({".gif", ".webp"}),
+        streams=frozenset({".gif", ".webp"}),
+        pixels=MOST_PIXELS,
     )
 
     def draw(self, scene: Scene, suffix: str) -> bytes:
@@ -35,15 +39,27 @@ class PillowRenderer:
         buffer = io.BytesIO()
         if suffix == ".webp":
             picture.save(buffer, "WEBP", lossless=True)
+        elif suffix == ".png":
+            dots = 96 * scene.density  # a user unit is a pixel of CSS, 96 of which are an inch
+            picture.save(buffer, "PNG", dpi=(dots, dots))
         else:
-            picture.save(buffer, _FORMATS[suffix])
+            picture.save(buffer, "GIF")
         return buffer.getvalue()
 
     def animate(self, film: Film, suffix: str, progress: Progress | None = None) -> bytes:
-        """The film as a file that starts over at its end. A frame lasts whole milliseconds, in a GIF hundredths of a
-        second and at least two, kept in step with the film by rounding the times of the frames."""
+        """The film as the content of a file."""
+        buffer = io.BytesIO()
+        self.stream(iter([film]), film.frames, suffix, buffer, progress)
+        return buffer.getvalue()
+
+    def stream(
+        self, films: Iterator[Film], frames: int, suffix: str, file: BinaryIO, progress: Progress | None = None
+    ) -> None:
+        """Write a film that comes in parts, which starts over at its end. A frame lasts whole milliseconds, in a GIF
+        hundredths of a second and at least two, kept in step with the film by rounding the times of the frames."""
+        first = next(films)
         unit = 10 if suffix == ".gif" else 1
-        times = [round(1000 * frame / film.fps / unit) * unit for frame in range(film.frames + 1)]
+        times = [round(1000 * frame / first.fps / unit) * unit for frame in range(frames + 1)]
         lasts = [max(end - start, 2 * unit) for start, end in pairwise(times)]
-        pictures = frames(film, progress)
-        return gif(pictures, lasts) if suffix == ".gif" else webp(pictures, lasts)
+        pictures = all_frames(chain([first], films), frames, progress)
+        (gif if suffix == ".gif" else webp)(pictures, lasts, file)

@@ -1,0 +1,252 @@
+"""Films as files that are written while they are made: their frames, colours and lengths, killed, without ffmpeg."""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from click.testing import CliRunner
+from neurovis_renderers import video
+from neurovis_renderers.canvas import paint
+from neurovis_renderers.video import VideoRenderer, ffmpeg
+from PIL import Image
+from test_raster import short_film
+
+from neurovis_spec import api, compiled, pipeline
+from neurovis_spec.cli.commands import neurovis
+from neurovis_spec.scene import still
+from neurovis_spec.scene.film_size import thinned
+from neurovis_spec.scene.renderers import RendererError
+
+SPEC = """neurovis: 1
+name: film
+time: {steps: 60, dt: 0.1}
+inputs: {touch: {expression: 0}}
+neurons: {A: {activation: tanh, initial: 0.5}, B: {activation: tanh, input: touch}}
+connections: {A -> B: {weight: 1, plasticity: hebbian}, B -> A: {weight: -1.5}, A -> A: {weight: 0.9}}
+render: {size: [241, 199]}
+"""
+
+
+@pytest.fixture
+def spec(tmp_path: Path) -> Path:
+    path = tmp_path / "film.yaml"
+    path.write_text(SPEC, encoding="utf-8")
+    return path
+
+
+def described(path: Path) -> str:
+    """What ffmpeg says of a file."""
+    program = ffmpeg()
+    assert program is not None
+    command = [program, "-hide_banner", "-i", str(path)]
+    return subprocess.run(command, capture_output=True, text=True, check=False).stderr
+
+
+def decoded(path: Path) -> npt.NDArray[np.uint8]:
+    """The frames of a video, (frames, height, width, 3); what is broken at its end is left out."""
+    program = ffmpeg()
+    assert program is not None
+    said = subprocess.run(
+        [program, "-hide_banner", "-i", str(path)], capture_output=True, text=True, check=False
+    ).stderr
+    found = re.search(r", (\d+)x(\d+)[, ]", said)
+    assert found, said
+    wide, high = int(found[1]), int(found[2])
+    command = [program, "-v", "quiet", "-i", str(path), "-f", "rawvideo", "-pix_fmt", "rgb24", "pipe:1"]
+    data = subprocess.run(command, capture_output=True, check=False).stdout
+    return np.frombuffer(data, np.uint8).reshape(-1, high, wide, 3)
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".webm"])
+def test_a_video_has_the_films_frames_in_their_colours(suffix: str, tmp_path: Path) -> None:
+    filmed, told = short_film(), list[int]()
+    path = tmp_path / f"film{suffix}"
+    path.write_bytes(VideoRenderer().animate(filmed, suffix, lambda done, total: told.append(done)))
+    seen = decoded(path)
+    assert told == [1, 2, 3, 4, 5, 6]
+    assert len(seen) == filmed.frames
+    for frame in (0, 3, 5):
+        meant = paint(still(filmed, frame)).astype(int)
+        shown = seen[frame, : meant.shape[0], : meant.shape[1]]
+        assert np.abs(shown - meant).mean() < 2
+        disc = next(s for g in filmed.scene.groups if g.id == filmed.fills[0] for s in g.shapes)
+        x, y = (round(filmed.scene.density * side) for side in (disc.centre[0], disc.centre[1] + 0.6 * disc.radius))  # type: ignore[union-attr]
+        assert np.abs(shown[y, x] - meant[y, x]).max() < 20
+
+
+def test_a_video_has_an_even_number_of_rows_and_columns(tmp_path: Path) -> None:
+    assert video._even(np.zeros((7, 9, 3), np.uint8)).shape == (8, 10, 3)
+    assert video._even(np.zeros((8, 10, 3), np.uint8)).shape == (8, 10, 3)
+
+
+def test_a_video_says_its_colours_and_its_fragments(spec: Path, tmp_path: Path) -> None:
+    path = tmp_path / "film.MP4"
+    api.compile(spec).animate(path, inputs={"touch": 0.2})
+    data = path.read_bytes()
+    assert data.count(b"moof") >= 3  # 6 s, two a fragment
+    assert data.index(b"moov") < data.index(b"moof")
+    program = ffmpeg()
+    assert program is not None
+    said = subprocess.run(
+        [program, "-hide_banner", "-i", str(path)], capture_output=True, text=True, check=False
+    ).stderr
+    assert "yuv420p(tv, bt709" in said
+    assert "10 fps" in said
+    assert len(decoded(path)) == 60
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no SIGKILL")
+def test_a_film_that_is_killed_can_be_played(spec: Path, tmp_path: Path) -> None:
+    (tmp_path / "touch.csv").write_text("touch\n0.1\n", encoding="utf-8")
+    command = [sys.executable, "-m", "neurovis_spec", "animate", str(spec), "-o", "film.mp4", "--steps", "100000"]
+    command += ["--every", "1", "--input", "touch=touch.csv"]
+    running = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    part, end = tmp_path / ".film.mp4.part", time.monotonic() + 60
+    while not (part.exists() and part.read_bytes().count(b"moof") >= 3):
+        assert running.poll() is None
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    os.kill(running.pid, signal.SIGKILL)
+    running.wait()
+    assert not (tmp_path / "film.mp4").exists()
+    shutil.copy(part, tmp_path / "left.mp4")
+    assert len(decoded(tmp_path / "left.mp4")) >= 2 * 20
+
+
+def test_without_ffmpeg_a_video_is_refused_before_anything_is_run(
+    spec: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(video, "find_spec", lambda name: None)
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    monkeypatch.setattr(compiled.CompiledNetwork, "run", lambda *_, **__: pytest.fail("a run"))
+    done = CliRunner().invoke(neurovis, ["animate", str(spec), "-o", str(tmp_path / "film.mp4")])
+    assert done.exit_code == 1
+    assert "'.mp4' is not installed" in done.stderr
+    assert 'pip install "neurovis-spec[video]"' in done.stderr
+    assert not list(tmp_path.glob("*film.mp4*"))
+
+
+def test_an_ffmpeg_that_fails_is_quoted_and_leaves_nothing(
+    spec: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fake = tmp_path / "ffmpeg"
+    fake.write_text("#!/bin/sh\necho 'Unknown encoder libx264' >&2\nexit 1\n", encoding="utf-8")
+    fake.chmod(0o755)
+    monkeypatch.setattr(video, "ffmpeg", lambda: str(fake))
+    with pytest.raises(RendererError, match="Unknown encoder"):
+        api.compile(spec).animate(tmp_path / "film.mp4")
+    assert not list(tmp_path.glob("*film.mp4*"))
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".gif", ".webp"])
+def test_a_film_is_made_of_parts_that_hold_few_frames(
+    suffix: str, spec: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """So memory does not grow with the frames; what is shown is the same, from a run and from a recording."""
+    network, held = api.compile(spec), list[int]()
+    network.animate(tmp_path / f"whole{suffix}", fps=50, steps=40)
+    moving = pipeline.moving
+
+    def counted(*arguments: object, **more: object) -> object:
+        held.append(len(arguments[2]))  # type: ignore[arg-type]
+        return moving(*arguments, **more)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(pipeline, "moving", counted)
+    monkeypatch.setattr(compiled, "_MOST_AT_ONCE", 25)
+    network.animate(tmp_path / f"parts{suffix}", fps=50, steps=40)
+    assert held == [25, 15]
+    whole, parts = ((tmp_path / f"{name}{suffix}").read_bytes() for name in ("whole", "parts"))
+    assert len(parts) == pytest.approx(len(whole), rel=0.03)
+    network.animate(tmp_path / f"recorded{suffix}", fps=50, recording=network.run(40))
+    assert (tmp_path / f"recorded{suffix}").stat().st_size == pytest.approx(len(whole), rel=0.03)
+
+
+def test_films_that_nobody_asked_to_be_long_are_thinned_and_it_is_said(spec: Path, tmp_path: Path) -> None:
+    network = api.compile(spec)
+    said = r"of 7,000 steps one in 3 is drawn: 2,334 frames, 233.4 s at 10 a second .*--every 1"
+    with pytest.warns(UserWarning, match=said):
+        network.animate(tmp_path / "film.svg", steps=7000)
+    assert 'dur="233.4s"' in (tmp_path / "film.svg").read_text(encoding="utf-8")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        network.animate(tmp_path / "film.gif", steps=70, frames=20)
+        network.animate(tmp_path / "film.webp", steps=70, every=30)
+    for name, frames in (("film.gif", 18), ("film.webp", 3)):
+        with Image.open(tmp_path / name) as film:
+            assert film.n_frames == frames  # type: ignore[attr-defined]
+    assert thinned(3000, None, None) == 1
+    assert thinned(3001, None, None) == 2
+    assert thinned(100_000, 1, None) == 1
+
+
+def test_the_command_thins_and_says_so(spec: Path, tmp_path: Path) -> None:
+    target = str(tmp_path / "film.svg")
+    done = CliRunner().invoke(neurovis, ["animate", str(spec), "-o", target, "--steps", "4000"])
+    assert done.exit_code == 0
+    assert "of 4,000 steps one in 2 is drawn" in done.stderr
+    done = CliRunner().invoke(neurovis, ["animate", str(spec), "-o", target, "--every", "2", "--frames", "9"])
+    assert done.exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [("a.PNG", "PNG"), ("a.Gif", "GIF"), ("a.WEBP", "WEBP"), ("film.GIF", "GIF"), ("film.WebP", "WEBP")],
+)
+def test_suffixes_count_in_any_case(name: str, kind: str, spec: Path, tmp_path: Path) -> None:
+    command = "animate" if name.startswith("film") else "render"
+    more = ["--steps", "3"] if command == "animate" else []
+    done = CliRunner().invoke(neurovis, [command, str(spec), "-o", str(tmp_path / name), *more])
+    assert done.exit_code == 0, done.output
+    with Image.open(tmp_path / name) as picture:
+        assert picture.format == kind
+
+
+def test_inputs_and_engines_are_those_of_a_run(spec: Path, tmp_path: Path) -> None:
+    """A picture with an input is that of the recording with it."""
+    (tmp_path / "touch.csv").write_text("touch\n" + "0.3\n" * 60, encoding="utf-8")
+    given = ["--input", f"touch={tmp_path / 'touch.csv'}"]
+    record = str(tmp_path / "run.npz")
+    assert CliRunner().invoke(neurovis, ["run", str(spec), "-o", record, *given]).exit_code == 0
+    for command in ("render", "animate"):
+        made = list[bytes]()
+        for more in (given, ["--recording", record], []):
+            target = tmp_path / f"{command}{len(made)}.svg"
+            done = CliRunner().invoke(neurovis, [command, str(spec), "-o", str(target), "--engine", "circular", *more])
+            assert done.exit_code == 0, done.output
+            made.append(target.read_bytes())
+        assert made[0] == made[1] != made[2]
+        both = CliRunner().invoke(neurovis, [command, str(spec), "-o", "x.svg", *given, "--recording", record])
+        assert both.exit_code == 2
+        assert "give one of the two" in both.stderr
+
+
+def test_a_png_states_its_dots_an_inch(spec: Path, tmp_path: Path) -> None:
+    network = api.compile(spec)
+    network.render(tmp_path / "a.png")
+    network.render(tmp_path / "b.png", dpi=300)
+    with Image.open(tmp_path / "a.png") as a, Image.open(tmp_path / "b.png") as b:
+        across = [picture.width / picture.info["dpi"][0] for picture in (a, b)]
+        assert b.info["dpi"][0] == pytest.approx(300, abs=0.1)
+        assert across[0] == pytest.approx(across[1], rel=0.01)  # as many inches
+    with pytest.raises(RendererError, match="too large"):
+        network.render(tmp_path / "c.png", dpi=9600)
+    with pytest.raises(ValueError, match="above 0"):
+        network.render(tmp_path / "c.png", dpi=0)
+
+
+def test_a_film_in_memory_is_the_one_in_a_file() -> None:
+    filmed, file = short_film(), io.BytesIO()
+    VideoRenderer().stream(iter([filmed]), filmed.frames, ".mp4", file)
+    assert len(file.getvalue()) == pytest.approx(len(VideoRenderer().animate(filmed, ".mp4")), rel=0.01)
