@@ -52,6 +52,9 @@ class Picture:
     theme: str | None = None
     #: of a film; a still has none
     frames: int = 0
+    #: what it shows beside the network or in its place, and of views over time how many steps
+    views: tuple[str, ...] = ()
+    window: int | None = None
 
 
 PICTURES = (
@@ -84,6 +87,17 @@ PICTURES = (
         "stayed: that is what has been learned so far. The connection of K2 is the thickest and inhibits O, which "
         "follows T: both have the same colour, and the error is 0.09.",
         theme="dark",
+    ),
+    Picture(
+        "cpg_rbf_figure",
+        "cpg_rbf",
+        250,
+        "Use case 1 as a figure: the network, and beneath it what it does in time",
+        "The paper's Figure 4. The rhythm of C1 and C2; the weights that K2 and K4 have to O, one of which becomes "
+        "inhibition and the other excitation; the ripple that runs through the kernels, in the colours of the network. "
+        "O comes to follow T. The line marks the step that the network above it shows.",
+        views=("network", "traces: C1, C2", "weights: K2 -> O, K4 -> O", "raster: K, O", "traces: O, T"),
+        window=500,
     ),
     Picture(
         "cpg_printed",
@@ -141,6 +155,16 @@ PICTURES = (
         "The rhythm enters the upper delay line at DL6 and passes over the right legs, from hind to front, then over "
         "the left ones. At this frequency every second neuron of DL6 to DL11 is active, and three legs are lifted: "
         "left2, right1 and right3. This is the tripod gait. The lower line swings them forward.",
+    ),
+    Picture(
+        "hexapod_matrix",
+        "hexapod/hexapod",
+        588,
+        "Use case 3 as a matrix: six legs of one make",
+        "A row is what a neuron sends, a column what it takes in. The six blocks on the diagonal are the legs, all "
+        "alike; above them the delay lines reach into each leg once or twice. What leads from leg to leg are the single cells "
+        "beside the diagonal: news of obstacles.",
+        views=("matrix",),
     ),
     Picture(
         "hexapod_obstacle",
@@ -214,7 +238,8 @@ def draw(picture: Picture, path: Path) -> None:
         if picture.frames:
             network.animate(path, steps=picture.frames, start=picture.step, theme=picture.theme)
         else:
-            network.render(path, step=picture.step, theme=picture.theme)
+            views = picture.views or None
+            network.render(path, step=picture.step, theme=picture.theme, view=views, window=picture.window)
     if alike(before.decode(), path.read_text(encoding="utf-8")):
         path.write_bytes(before)
     _say(path)
@@ -278,11 +303,13 @@ def page() -> str:
         what = f"--steps {picture.frames} --from {picture.step}" if picture.frames else f"--step {picture.step}"
         theme = f" --theme {picture.theme}" if picture.theme else ""
         verb = "animate" if picture.frames else "render"
+        views = "".join(f' --view "{view}"' if " " in view else f" --view {view}" for view in picture.views)
+        window = f" --window {picture.window}" if picture.window else ""
         parts += [
             f"## {picture.caption}",
             f"![{picture.caption}](pictures/{picture.name}.svg)",
             picture.words,
-            f"`neurovis {verb} specs/{picture.spec}.yaml {what}{theme} -o {picture.name}.svg`",
+            f"`neurovis {verb} specs/{picture.spec}.yaml {what}{theme}{views}{window} -o {picture.name}.svg`",
         ]
     parts += [
         "## Beside dot",

@@ -30,7 +30,7 @@ _WIDTH = 760.0
 #: User units above the first view without a heading, between views, and beneath the last.
 _TOP, _GAP, _FOOT = 8.0, 14.0, 12.0
 #: Beside a network, other views take at most this share of a stated height.
-_SHARE = 0.6
+_SHARE = 0.45
 #: Plots are at least this share of what they are by themselves; what does not fit then is drawn smaller.
 _LEAST = 0.35
 

@@ -35,6 +35,8 @@ from neurovis_spec.scene.traces import PLOT, Trace, Traces
 
 #: The most curves of a view that names them, and of one that chooses them.
 _MOST_NAMED, _MOST_CHOSEN = 4 * MOST_COLOURS, MOST_COLOURS
+#: Columns of a recording that are looked at together.
+_TOGETHER = 512
 #: The share of the weights of a scale that do not go beyond its full colour in a matrix.
 _MOST = 0.9
 
@@ -218,14 +220,20 @@ class Maker:
         return Curves(Traces(panel.view, words, tuple(traces)))
 
     def _changing_most(self, curves: Sequence[Curve], most: int) -> tuple[Curve, ...]:
-        recording = self.shots.recording
-        far = []
-        for curve in curves:
-            values = values_of(curve, self.network, recording)[self.shots.rows]
-            finite = values[np.isfinite(values)]
-            far.append(float(finite.max() / 2 - finite.min() / 2) if len(finite) else 0.0)
-        kept = sorted(sorted(range(len(curves)), key=lambda place: -far[place])[:most])
-        return tuple(curves[place] for place in kept)
+        """Of weights those that change most in what is shown, in the order given."""
+        recording, rows = self.shots.recording, self.shots.rows
+        wanted = np.array([curve.index for curve in curves], np.int64)
+        far = np.zeros(len(wanted))
+        columns = np.searchsorted(recording.plastic, wanted)
+        known = np.flatnonzero(columns < recording.weights.shape[1])
+        known = known[recording.plastic[columns[known]] == wanted[known]]
+        for first in range(0, len(known), _TOGETHER):
+            some = known[first : first + _TOGETHER]
+            values = recording.weights[rows][:, columns[some]]
+            finite = np.isfinite(values)
+            high, low = np.where(finite, values, -np.inf).max(axis=0), np.where(finite, values, np.inf).min(axis=0)
+            far[some] = np.where(finite.any(axis=0), high / 2 - low / 2, 0.0)
+        return tuple(curves[place] for place in sorted(np.argsort(-far, kind="stable")[:most].tolist()))
 
     def _raster(self, shown: tuple[Curve, ...] | None) -> Block:
         network, recording = self.network, self.shots.recording
