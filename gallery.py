@@ -162,8 +162,8 @@ PICTURES = (
         588,
         "Use case 3 as a matrix: six legs of one make",
         "A row is what a neuron sends, a column what it takes in. The six blocks on the diagonal are the legs, all "
-        "alike; above them the delay lines reach into each leg once or twice. What leads from leg to leg are the single cells "
-        "beside the diagonal: news of obstacles.",
+        "alike; above them the delay lines reach into each leg once or twice. What leads from leg to leg are the "
+        "single cells beside the diagonal: news of obstacles.",
         views=("matrix",),
     ),
     Picture(
