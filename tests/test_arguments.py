@@ -37,9 +37,10 @@ WRONG: dict[str, tuple[object, ...]] = {
     "a text or an Until": (5, b"x", ["x"]),
     "a text, several, or a mapping": (5, None, 1.5),
     "a range or numbers": (5, None, 1.5),
+    "a view, {view: references}, or several": (5, 1.5, True),
 }
 #: what may be left out: None stands for the default
-OPTIONAL = {"limit", "root", "steps", "step", "fps", "engine", "theme", "backend", "scheduler"}
+OPTIONAL = {"limit", "root", "steps", "step", "fps", "engine", "theme", "backend", "scheduler", "window"}
 OVER = {"seed": [1]}
 CALLS: dict[tuple[str, str, str], Callable[..., object]] = {
     ("compile", "source", "a path"): lambda v: nv.compile(v),
@@ -69,6 +70,9 @@ CALLS: dict[tuple[str, str, str], Callable[..., object]] = {
     ("render", "theme", "a text"): lambda v: NETWORK.render("x.svg", theme=v),
     ("render", "inputs", "a mapping"): lambda v: NETWORK.render("x.svg", inputs=v),
     ("animate", "engine", "a text"): lambda v: NETWORK.animate("x.svg", engine=v),
+    ("render", "view", "a view, {view: references}, or several"): lambda v: NETWORK.render("x.svg", view=v),
+    ("render", "window", "an integer"): lambda v: NETWORK.render("x.svg", window=v),
+    ("animate", "view", "a view, {view: references}, or several"): lambda v: NETWORK.animate("x.svg", view=v),
     ("animate", "start", "an integer"): lambda v: NETWORK.animate("x.svg", start=v),
     ("animate", "steps", "an integer"): lambda v: NETWORK.animate("x.svg", steps=v),
     ("animate", "fps", "a number"): lambda v: NETWORK.animate("x.svg", fps=v),

@@ -11,6 +11,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from neurovis_spec import arguments
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.states import split_state, split_sum
 from neurovis_spec.compiler.wishes import Curve, Panel
@@ -24,6 +25,8 @@ from neurovis_spec.scene.renderers import RendererError
 #: A view by its name, with ``: `` and references behind it; or {view: references}.
 View: TypeAlias = str | Mapping[str, str | Sequence[str]]
 
+_WANTED = "a view, {view: references}, or several"
+
 
 class ViewError(RendererError):
     """There is no such view, or it cannot show what is asked for."""
@@ -31,12 +34,13 @@ class ViewError(RendererError):
 
 def panels_of(network: Network, wanted: View | Sequence[View] | None) -> tuple[Panel, ...]:
     """The views of a picture, none where it is the network alone. Without any wish they are those of the spec's
-    ``figure``; a view that names nothing shows what the figure has of its kind. Raises ViewError, KeyError."""
+    ``figure``; a view that names nothing shows what the figure has of its kind. Raises ViewError, KeyError and
+    TypeError."""
     own = network.render.figure
     if wanted is None:
         panels = own
     else:
-        views = [wanted] if isinstance(wanted, (str, Mapping)) else list(wanted)
+        views = [wanted] if isinstance(wanted, (str, Mapping)) else arguments.several("view", wanted, _WANTED)
         panels = tuple(panel for view in views for panel in _one(network, own, view))
     return () if [panel.view for panel in panels] == ["network"] else panels
 
@@ -66,13 +70,16 @@ def _one(network: Network, own: Sequence[Panel], wanted: View) -> Iterator[Panel
 
 
 def _taken_apart(wanted: View) -> Iterator[tuple[str, list[str]]]:
+    """The name of a view, and its references."""
     if isinstance(wanted, str):
         name, _, rest = wanted.partition(":")
         yield name.strip(), [part.strip() for part in rest.split(",") if part.strip()]
         return
-    for name, references in wanted.items():
-        listed = [references] if isinstance(references, str) else list(references or ())
-        yield name, [part.strip() for reference in listed for part in reference.split(",")]
+    if not isinstance(wanted, Mapping):
+        arguments.instance("view", wanted, str, _WANTED)
+    for name, references in arguments.mapping("view", wanted).items():
+        listed = () if references is None else arguments.texts("view", references)
+        yield name, [part.strip() for reference in listed for part in reference.split(",") if part.strip()]
 
 
 def curves_of(network: Network, view: str, reference: str) -> list[Curve]:
