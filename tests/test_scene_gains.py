@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from hand_networks import C, G, network, numbered, use_case_1
@@ -192,3 +193,18 @@ def test_any_run_gives_finite_gains(activity: list[float], other: list[float]) -
     gains = choose_gains(CASE.network, RenderSettings(), run)
     for values in (gains.activity, gains.signal, gains.thickness, gains.change):
         assert all(math.isfinite(gain) and gain > 0 for gain in values.tolist())
+
+
+def test_scales_are_named_as_the_picture_shows_neurons() -> None:
+    groups = [
+        replace(numbered("DL", 3), labels=("d0", "d1", "d2")),
+        G("B", ("B",), labels=("bell",)),
+        G("S", ("S",), labels=("x1",)),
+        G("R", ("R",), labels=("x1",)),
+    ]
+    lines = [C("DL1", "B", 1.0, entry=0), C("B", "S", 0.01, entry=1)]
+    made = network(groups, lines, entries=["DL -> B", "B -> S"])
+    stated = RenderSettings(activity=(StatedGain(2.0, (0,), "DL1 + S"),))
+    gains = choose_gains(made, stated, reaches([1.0] * 6, [1.0, 0.01]))
+    assert [scale.names for scale in gains.signal_scales] == [("d -> bell",), ("bell -> S",)]
+    assert [scale.names for scale in gains.activity_scales] == [("d", "bell", "S", "R"), ("d0 + S",)]

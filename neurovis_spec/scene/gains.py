@@ -7,7 +7,6 @@ Those whose ranges are alike share a scale.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -18,6 +17,7 @@ import numpy.typing as npt
 
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.wishes import RenderSettings, StatedGain
+from neurovis_spec.scene.called import Names, names_of, unit_of
 from neurovis_spec.scene.reached import Reached, nothing
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
@@ -41,8 +41,6 @@ _ALIKE_WEIGHTS = 3.0
 _WIDEST, _LEARNED, _TYPICAL, _SEEN = 5.0, 5.0, 2.2, 2.0
 #: with more lines than this they get thinner
 _CROWD = 10
-
-_PATH = re.compile(r"[A-Za-z_]\w*(?:\.(?!\.)[A-Za-z_]\w*)+", re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,16 +101,17 @@ def plain_gains(network: Network, activity: float, signal: float, thickness: flo
 def choose_gains(network: Network, settings: RenderSettings, run: Reached) -> Gains:
     """Gains that use the range of each group and entry well; those that ``settings`` states win. All that are chosen
     are finite and positive."""
-    groups, entries = _groups(network), _entries(network)
+    names = names_of(network)
+    groups, entries = _groups(network, names), _entries(network, names)
     range_ = 2 * np.minimum(run.activity / 2, run.typical)  # so that nothing overflows
     colours = _shared([_full(range_[m]) for m in groups.members])
-    activity = _chosen(groups, colours, settings.activity, run.highest, run.lowest)
+    activity = _chosen(groups, colours, _named(settings.activity, names), run.highest, run.lowest)
     signals = _shared([_full(run.signals[m]) for m in entries.members], least=True)
-    signal = _chosen(entries, signals, settings.signal, run.signals)
+    signal = _chosen(entries, signals, _named(settings.signal, names), run.signals)
     widths = _widths(entries, run.weights, network.changing)
-    thickness = _chosen(entries, widths, settings.thickness, run.weights)
+    thickness = _chosen(entries, widths, _named(settings.thickness, names), run.weights)
     changes = _shared([_middle(_known(run.changes[m])) for m in entries.members])
-    change = _chosen(entries, changes, settings.change, run.changes)
+    change = _chosen(entries, changes, _named(settings.change, names), run.changes)
     return Gains(
         activity=activity.gains,
         centre=activity.centres,
@@ -143,30 +142,25 @@ class _Chosen:
     scales: tuple[Scale, ...]
 
 
-def _groups(network: Network) -> _Units:
+def _groups(network: Network, names: Names) -> _Units:
     of_neurons = np.zeros(len(network.neurons), np.int64)
-    names: dict[str, int] = {}
+    numbers: dict[str, int] = {}
     for group in network.neurons.groups:
-        name = group.name if group.module is None else f"{group.module}.{group.name.rpartition('.')[2]}"
-        of_neurons[group.start : group.start + group.count] = names.setdefault(name, len(names))
-    return _units(tuple(names), of_neurons)
+        number = numbers.setdefault(unit_of(group), len(numbers))
+        of_neurons[group.start : group.start + group.count] = number
+    return _units(tuple(names.called[name] for name in numbers), of_neurons)
 
 
-def _entries(network: Network) -> _Units:
-    """The entries of ``connections``; instances are called by their modules, so that an entry of a module is one."""
-    called = {instance.path: instance.module for instance in network.instances}
-    called |= {instance.declared: instance.module for instance in network.instances}
-
-    def by_module(match: re.Match[str]) -> str:
-        path, _, own = match[0].rpartition(".")
-        return f"{called[path]}.{own}" if path in called else match[0]
-
-    names: dict[str, int] = {}
-    numbers = [
-        names.setdefault(_PATH.sub(by_module, name) if called else name, len(names))
-        for name in network.connections.entries
-    ]
-    return _units(tuple(names), np.array(numbers, np.int64)[network.connections.entry])
+def _entries(network: Network, names: Names) -> _Units:
+    """The entries of ``connections``; an entry of a module is one."""
+    plain = replace(names, called={})
+    numbers: dict[str, int] = {}
+    of_entries, called = [], dict[int, str]()
+    for entry in network.connections.entries:
+        number = numbers.setdefault(plain.reference(entry), len(numbers))
+        called.setdefault(number, names.reference(entry))
+        of_entries.append(number)
+    return _units(tuple(called.values()), np.array(of_entries, np.int64)[network.connections.entry])
 
 
 def _units(names: tuple[str, ...], numbers: IntArray) -> _Units:
@@ -174,6 +168,11 @@ def _units(names: tuple[str, ...], numbers: IntArray) -> _Units:
     bounds = np.searchsorted(numbers[order], np.arange(len(names) + 1))
     members = tuple(order[low:high] for low, high in pairwise(bounds.tolist()))
     return _Units(names, members, len(numbers))
+
+
+def _named(stated: Sequence[StatedGain], names: Names) -> list[StatedGain]:
+    """The gains of the author in the words of the picture."""
+    return [replace(one, name=names.reference(one.name)) for one in stated]
 
 
 @dataclass(frozen=True, slots=True)
