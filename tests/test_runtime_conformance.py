@@ -22,6 +22,7 @@ from neurovis_spec.compiler.network import Input, Network
 from neurovis_spec.runtime import c_backend, c_library
 from neurovis_spec.runtime.backend import Backend, Stepper, load
 from neurovis_spec.runtime.c_backend import CBackend
+from neurovis_spec.runtime.c_code import Tables
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.numpy_backend import NumpyBackend
 from neurovis_spec.runtime.record import record
@@ -282,3 +283,14 @@ def test_a_weight_that_is_not_finite_for_one_step_is_told_in_whole_runs(place: i
     with pytest.warns(RuntimeWarning) as second:
         record(network, 90, backend="c")
     assert [str(w.message) for w in second] == [str(w.message) for w in first]
+
+
+@pytest.mark.parametrize(
+    ("indices", "kind"), [([0, 65_535], "uint16"), ([3, 65_536], "int32"), ([-1, 7], "int32"), ([0, 65_537], "int32")]
+)
+def test_tables_of_indices_are_as_narrow_as_can_be(indices: list[int], kind: str) -> None:
+    tables = Tables("double", longest=0)
+    name = tables.name(np.array(indices))
+    assert tables.given[0].dtype == kind
+    assert tables.given[0].tolist() == indices
+    assert tables.taken() == {name: f"const {kind}_t *const {name} = (const {kind}_t *)p->given[0];"}
