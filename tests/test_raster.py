@@ -417,3 +417,17 @@ def test_the_font_is_the_shipped_one_and_the_first_that_an_svg_asks_for() -> Non
 def test_a_text_stands_on_a_whole_pixel_as_in_browsers() -> None:
     rows = [lettering(Text((10, y), "H", 20, "#000000"), SIZE).pixels // SIZE[0] for y in (80.0, 80.4, 80.5, 81.0)]
     assert [int(row.max()) for row in rows] == [79, 79, 80, 80]
+
+
+@pytest.mark.parametrize("density", [1.0, 1.37, 2.0])
+def test_dots_of_a_dashed_line_are_evenly_spaced(density: float) -> None:
+    """Dots shorter than a pixel, as dotted lines have them: none is left out."""
+    line, period = [(5.0, 10.0), (40.0, 10.0), (70.0, 10.0), (105.0, 10.0)], 5.12 * density
+    found = coverage.dashed(line, 1.6, (0.01 * density, 5.11 * density), (120, 20))
+    shares = np.zeros(120 * 20)
+    shares[found.pixels] = found.shares
+    across = shares.reshape(20, 120).sum(axis=0)
+    dots = [5 + k * period for k in range(int(100 / period) + 1)]
+    around = [float(across[round(dot - 1.5) : round(dot + 1.5)].sum()) for dot in dots]
+    assert min(around) > 0.8 * math.pi * 0.8**2
+    assert float(across.sum()) == pytest.approx(len(dots) * math.pi * 0.8**2, rel=0.25)

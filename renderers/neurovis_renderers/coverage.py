@@ -441,9 +441,9 @@ def dashed(points: Sequence[Point], width: float, dash: Sequence[float], size: S
     pieces = flatten(control, np.array([0, len(control)]))
     corners = np.concatenate([pieces.starts, pieces.ends[-1:]])
     lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
-    at = np.arange(0, lengths[-1], spacing)
-    place = np.mod(at, sum(dash))
-    at = at[(place <= dash[0]) | (place > sum(dash) - spacing / 2)]
+    on = np.linspace(0.0, dash[0], 2 + int(dash[0] / spacing))
+    at = (np.arange(0.0, lengths[-1], sum(dash))[:, None] + on).ravel()
+    at = at[at <= lengths[-1]]
     dots = np.stack([np.interp(at, lengths, corners[:, 0]), np.interp(at, lengths, corners[:, 1])], axis=1)
     radii = np.full(len(dots), width / 2)
     many = max(1, int(_MOST_DOTTED / (width + 3) ** 2))
