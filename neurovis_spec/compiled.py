@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -493,9 +494,16 @@ class CompiledNetwork:
             return pipeline.measure(self.network, made=self.run(self._probe_steps, inputs))
         if recording is None:
             return self.gains
-        from neurovis_spec.snapshots import fitted
+        if recording not in self._recorded:
+            from neurovis_spec.snapshots import fitted
 
-        return pipeline.measure_recording(self.network, fitted(recording, self.network))
+            self._recorded[recording] = pipeline.measure_recording(self.network, fitted(recording, self.network))
+        return self._recorded[recording]
+
+    @cached_property
+    def _recorded(self) -> WeakKeyDictionary[Recording, Gains]:
+        """The gains of the recordings that were drawn, while these are in use."""
+        return WeakKeyDictionary()
 
     @property
     def _probe_steps(self) -> int:

@@ -256,6 +256,15 @@ def test_renaming_a_group_renames_its_neurons_and_ranges() -> None:
     assert renamed(result.replace("Leg: {count", "Le¦g: {count"), "K") == BASE + REST
 
 
+def test_renaming_a_group_renames_it_in_gains() -> None:
+    gains = "render: {gain: {activity: {K: 2, K3..K5: alpha}, signal: {K1 -> O: 4}, change: {K1 + K3 -> O: 1}}}\n"
+    assert check(Document(BASE + REST + gains)).network is not None
+    result = renamed((BASE + REST + gains).replace("activity: {K:", "activity: {K¦:"), "Leg")
+    assert "activity: {Leg: 2, Leg3..Leg5: alpha}" in result
+    assert "signal: {Leg1 -> O: 4}, change: {Leg1 + Leg3 -> O: 1}" in result
+    assert check(Document(result)).network is not None
+
+
 def test_weights_and_delays_of_edges_are_expressions() -> None:
     text = BASE.replace("  beta:", "  late: 2\n  beta:")
     text += "connections:\n  K -> K: {edges: [[K1, K2, alpha, late + 1], [K4, K5, 2*alpha]]}\n"

@@ -114,8 +114,8 @@ def test_kernels_that_are_awake_are_told_from_those_that_sleep(rhythm: Reader, t
 
 
 def test_what_learns_glows_and_what_has_learned_does_not(rhythm: Reader) -> None:
-    assert max(glows(rhythm.see(step)) for step in range(40, 140, 20)) >= 3
-    assert not any(glows(rhythm.see(step)) for step in range(11_000, 11_000 + PERIOD, 16))
+    assert max(glows(rhythm.see(step)) for step in range(60, 140, 30)) >= 3
+    assert not any(glows(rhythm.see(step)) for step in range(11_000, 11_000 + PERIOD, 32))
 
 
 def test_o_remembers(tmp_path: Path, theme: Theme) -> None:

@@ -93,6 +93,15 @@ def test_the_gains_of_a_recording_are_those_of_all_of_it(tmp_path: Path) -> None
     assert ">+21<" not in (tmp_path / "own.svg").read_text(encoding="utf-8")
 
 
+def test_a_film_of_a_recording_has_the_colours_of_its_pictures(tmp_path: Path) -> None:
+    network = nv.compile_text(LED)
+    recording = network.run(inputs={"push": np.array([[10.0 * (step % 4)] for step in range(40)])})
+    for step in (1, 2):  # one that is part of the other's film: the gains are those of all of the recording
+        network.render(tmp_path / "still.svg", step=step, recording=recording)
+        network.animate(tmp_path / "film.svg", start=step, steps=2, recording=recording)
+        assert fills(tmp_path / "film.svg") == fills(tmp_path / "still.svg")
+
+
 def test_a_recording_of_every_other_step_has_gains_but_no_glow(tmp_path: Path) -> None:
     """What a weight has changed in two steps is no change of one."""
     text = "neurovis: 1\nname: x\ntime: {steps: 60}\nneurons: {A: {bias: 1}, B: {bias: 0.5}}\n"
