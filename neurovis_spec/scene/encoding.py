@@ -17,9 +17,9 @@ Gain: TypeAlias = float | FloatArray
 
 #: The thinnest line, in user units.
 THINNEST = 0.6
-#: A change of less intensity than this is not drawn: its glow would be thinner than a pixel on either side of its line,
-#: and only tint it.
-FAINTEST = 1 / 7
+#: A change of less intensity than this is not drawn: its glow would be little wider than a pixel on either side of its
+#: line, and only tint it.
+FAINTEST = 1 / 5
 #: How far a glow can reach beyond its line, on either side, in user units.
 GLOW_REACH = 8.0
 
