@@ -228,3 +228,29 @@ def test_a_long_expression_of_windows_is_parsed_in_no_time() -> None:
     text = "max(" * 60 + "A" + ", 1)" * 60
     assert parse_measure(text).windows == ()
     assert len(parse_measure("+".join(["rms(A, last=9)"] * 60)).windows) == 60
+
+
+@pytest.mark.parametrize(
+    ("text", "together"),
+    [
+        ("1/min(A, B)", False),
+        ("1/max(A, B)", False),
+        ("1/clip(A, B, 1)", False),
+        ("1/min(A, last=2)", True),
+        ("1/max(A, last=5) + sqrt(B)", True),
+        ("abs(A)/B - sign(A)*B^2", True),
+    ],
+)
+def test_of_many_steps_at_once_the_bits_are_those_of_each(text: str, together: bool) -> None:
+    """Also where 0 meets −0, which are equal and of which NumPy's ``min`` and ``max`` take either."""
+    measure = measure_of(text, nv.compile_text("neurovis: 1\nname: x\nneurons: {A: {}, B: {}}").network, "<test>")
+    assert measure.together == together
+    values = [0.0, -0.0, 1.0, -0.0, 0.0, 0.0, -0.0, -1.0, math.inf, -0.0, math.nan, 0.0]
+    rows = np.array([(a, b) for a in values for b in values])
+    one, many, none = Meter(measure), Meter(measure), np.zeros(0)
+    with np.errstate(all="ignore"):
+        each = np.array([one.step(row, none, none) for row in rows])
+        if together:
+            made = many.rows(rows, none, np.zeros((len(rows), 0)))
+            np.testing.assert_array_equal(made, each)
+            np.testing.assert_array_equal(np.signbit(made[made == made]), np.signbit(each[each == each]))

@@ -80,10 +80,11 @@ class Measure:
 
 
 def _by_numpy(node: Tree) -> bool:
-    """Whether NumPy works out a part of a formula in its own way; a square is a product to both."""
+    """Whether NumPy works out a part of a formula in its own way: of 0 and −0, which are equal, its ``min`` takes
+    either. A square is a product to both."""
     if isinstance(node, Binary):
         return node.operator == "%" or (node.operator == "^" and is_square(node) is None)
-    return isinstance(node, Call) and node.function not in ("abs", "min", "max", "clip", "sign", "step", "sqrt")
+    return isinstance(node, Call) and node.function not in ("abs", "sign", "step", "sqrt")
 
 
 def findings_of(text: str, label: str) -> Findings:

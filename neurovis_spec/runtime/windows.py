@@ -141,12 +141,12 @@ def _put(summary: Summary, one: float, other: float) -> float:
 
 def _finished(summary: Summary, total: float, made: int) -> float:
     if summary in ("min", "max"):
-        return total
+        return total + 0.0  # of 0 and −0 NumPy takes either: −0 becomes 0
     mean = total / made
     return mean if summary == "mean" else math.sqrt(mean)
 
 
 def _all_finished(summary: Summary, totals: FloatArray, made: FloatArray) -> FloatArray:
     if summary in ("min", "max"):
-        return totals
+        return totals + 0.0
     return np.asarray(np.sqrt(totals / made) if summary == "rms" else totals / made, dtype=np.float64)
