@@ -26,6 +26,7 @@ from neurovis_renderers.raster import PillowRenderer
 from neurovis_renderers.svg import SvgRenderer
 from PIL import Image
 
+import neurovis_spec as nv
 from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.scene import THEMES, Disc, Film, Group, Scene, channels, colours, still
 from neurovis_spec.scene.encode import encode
@@ -134,6 +135,18 @@ def test_the_raster_shows_the_same_picture(browser: Browser, tmp_path: Path, the
     theirs = shot(browser, tmp_path, SvgRenderer().draw(drawn, ".svg"), size)
     ours = Image.open(io.BytesIO(PillowRenderer().draw(drawn, ".png"))).convert("RGB")
     assert ours.size == theirs.size == size
+    assert similarity(ours, theirs) >= 0.985
+
+
+@pytest.mark.parametrize("theme", ["default", "dark"])
+def test_views_are_the_same_picture_in_pixels(browser: Browser, tmp_path: Path, theme: str) -> None:
+    network = nv.compile(Path(__file__).parents[1] / "specs" / "cpg_rbf.yaml")
+    recording, view = network.run(400), ["traces: C, O", "weights: K -> O", "raster", "matrix"]
+    for suffix in (".svg", ".png"):
+        network.render(tmp_path / f"x{suffix}", step=250, recording=recording, view=view, theme=theme)
+    ours = Image.open(tmp_path / "x.png").convert("RGB")
+    theirs = shot(browser, tmp_path, (tmp_path / "x.svg").read_bytes(), ours.size)
+    assert ours.size == theirs.size
     assert similarity(ours, theirs) >= 0.985
 
 

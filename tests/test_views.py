@@ -494,6 +494,14 @@ def test_pixels_have_the_colours_of_the_scene(theme: str) -> None:
     assert made.theme.name == theme
 
 
+def test_a_theme_of_the_spec_is_that_of_its_views(tmp_path: Path) -> None:
+    own = nv.compile_text(SPEC + 'render: {theme: {base: dark, positive: "#00ffff"}}\n')
+    own.render(tmp_path / "x.svg", view=["raster: I", "matrix"])
+    text = (tmp_path / "x.svg").read_text()
+    assert f'fill="{THEMES["dark"].background}"' in text
+    assert 'fill="#00ffff"' in text  # a full cell of the matrix
+
+
 def test_a_window_shows_the_steps_around_the_one_that_is_drawn() -> None:
     for step, window, wanted in (
         (60, 20, range(50, 70)),

@@ -22,7 +22,7 @@ from neurovis_spec.scene.heading import HEADER, caption_text, title_text
 from neurovis_spec.scene.model import Film, Group, shifted
 from neurovis_spec.scene.parts import Page, Part, stacked
 from neurovis_spec.scene.shots import Shots
-from neurovis_spec.scene.themes import THEMES
+from neurovis_spec.scene.themes import theme_of
 from neurovis_spec.scene.views import AXIS, Block, Drawing, Maker, Place, span_of
 
 #: How wide a page without a picture of the network is, and the least with one (user units).
@@ -77,7 +77,7 @@ def figure(
     else:
         blocks = list(others.values())
         sheet = _sheet(settings)
-    theme = THEMES[settings.theme]
+    theme = theme_of(settings)
     share = 1.0 if sheet.height is None else _share(blocks, sheet.width, sheet.height - head - _FOOT)
     span = span_of(blocks, shots, sheet.width, network.dt if network.dt_given else None)
     parts: list[tuple[float, Part]] = []
