@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from neurovis_renderers.animated_svg import AnimatedSvgRenderer
 from neurovis_renderers.canvas import paint
+from neurovis_renderers.frames import frames
 from neurovis_renderers.png import png
 from neurovis_renderers.raster import PillowRenderer
 from neurovis_renderers.svg import SvgRenderer
@@ -156,6 +157,16 @@ def test_a_still_of_the_film_has_its_frames_pixels() -> None:
         for at, value in ((52, 0), (117, 1)):
             fill = colours(THEME, FILM.fill_values[frame])[value]
             assert tuple(pixels[50 if value == 0 else 57, at]) == channels(fill)
+
+
+def test_the_frames_of_what_moves_are_those_of_its_stills() -> None:
+    upward = Text((150, 90), "up", 12, INK, upward=True)
+    more = Group((Rectangle((10, 70), 9, 9, 2, EDGE, INK, 1), Arrowhead((40, 80), (0, 1), 8, 3, INK), upward), "more")
+    scene = replace(SCENE, groups=(*SCENE.groups, more))
+    shifts = np.concatenate([FILM.shift_values, -0.3 * FILM.shift_values], axis=1)
+    film = replace(FILM, scene=scene, shifts=("cursor", "more"), shift_values=shifts)
+    for frame, picture in enumerate(frames(film)):
+        assert np.abs(picture.astype(int) - paint(still(film, frame))).max() <= 1
 
 
 def test_a_film_in_which_only_a_group_moves_has_its_frames() -> None:

@@ -8,6 +8,7 @@ where a line is wider or narrower. What moves otherwise (a caption, a cursor) is
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import lru_cache
 
@@ -24,8 +25,13 @@ from neurovis_spec.scene import (
     HEAD_OF_LENGTH,
     HEAD_OF_WIDTH,
     Arrowhead,
+    Disc,
     Film,
     Group,
+    Image,
+    Polyline,
+    Ramp,
+    Rectangle,
     Spline,
     Text,
     Theme,
@@ -146,6 +152,30 @@ def _stands_apart(film: Film, group: Group) -> bool:
     """Whether a group changes in other ways than by a colour or a width, or is seen in part."""
     changes = group.id and (group.id == film.caption or group.id in film.shifts or group.id in film.faint)
     return bool(changes) or group.opacity != 1
+
+
+def _rows(group: Group, density: float) -> tuple[float, float]:
+    """The first and the last row of pixels that a group may touch."""
+    lows, highs = [math.inf], [-math.inf]
+    for shape in group.shapes:
+        match shape:
+            case Disc():
+                ys, reach = [shape.centre[1]], shape.radius + shape.stroke_width
+            case Spline() | Polyline():
+                ys, reach = [y for _, y in shape.points], shape.width
+            case Arrowhead():
+                ys, reach = [shape.tip[1]], shape.length + shape.half_width
+            case Text() if not shape.upward:
+                ys, reach = [shape.point[1]], 3 * shape.size
+            case Rectangle() | Ramp() | Image():
+                ys = [shape.corner[1], shape.corner[1] + shape.height]
+                reach = shape.stroke_width if isinstance(shape, Rectangle) else 0.0
+            case _:
+                return -1e9, 1e9
+        lows.append(min(ys) - reach)
+        highs.append(max(ys) + reach)
+    low, high = min(lows), max(highs)
+    return (low * density, high * density) if low <= high else (0.0, 0.0)
 
 
 @lru_cache(maxsize=4096)
@@ -391,9 +421,12 @@ class _Painted:
         if number < len(self._apart) and self._apart[number][0] == group:
             return self._apart[number]
         sheet, band = Sheet((replace(group, opacity=1.0),), self._moving.sheet.density), self._band
-        fragments, colours, _ = veiled(sheet, 0, len(sheet), band.top, band.size, group.opacity)
+        wide, high = band.size
+        low, above = _rows(group, sheet.density)
+        first, last = (int(np.clip(row - band.top, 0, high)) for row in (low - 2, above + 3))
+        fragments, colours, _ = veiled(sheet, 0, len(sheet), band.top + first, (wide, last - first), group.opacity)
         owners = np.full(len(fragments), self._moving.apart_places[number])
-        return group, Fragments(owners, fragments.pixels, fragments.shares), colours
+        return group, Fragments(owners, fragments.pixels + first * wide, fragments.shares), colours
 
     def _composed(self, pixels: IntArray, colours: IntArray) -> IntArray:
         """The sums of some pixels, with all that stands apart."""
