@@ -17,6 +17,7 @@ from neurovis_spec.runtime.columns import columns_of
 from neurovis_spec.runtime.inputs import InputError
 from neurovis_spec.runtime.recording import After, Numbers, Recording, RecordingError, Snapshot, recording_of
 from neurovis_spec.runtime.simulation import Simulation
+from neurovis_spec.scene.fading import Fading, snapshots_of
 
 
 def snapshot_at(
@@ -30,13 +31,14 @@ def snapshot_at(
     recording = fitted(recording, network)
     if not len(recording):
         raise RecordingError("the recording holds no step")
-    return recording.snapshot(int(recording.step[-1]) if step is None else step)
+    return next(iter(Snapshots(network, recording, (int(recording.step[-1]) if step is None else step,))))
 
 
 @dataclass(frozen=True)
 class Snapshots(Collection[Snapshot]):
-    """Snapshots of a recording, each made when it is its turn."""
+    """Snapshots of ascending steps of a recording, each made when it is its turn."""
 
+    network: Network
     recording: Recording
     steps: tuple[int, ...]
 
@@ -44,7 +46,7 @@ class Snapshots(Collection[Snapshot]):
         return len(self.steps)
 
     def __iter__(self) -> Iterator[Snapshot]:
-        return map(self.recording.snapshot, self.steps)
+        return snapshots_of(self.network, self.recording, self.steps)
 
     def __contains__(self, snapshot: object) -> bool:
         return isinstance(snapshot, Snapshot) and snapshot.step in self.steps
@@ -72,17 +74,20 @@ def snapshots_from(network: Network, start: int, steps: int | None, recording: R
     if steps is not None and len(rows) < steps:
         frames = f"{len(rows):,} frame{'' if len(rows) == 1 else 's'} instead of {steps:,}"
         warnings.warn(f"the recording holds no more than {frames} from step {start} on", stacklevel=2)
-    return Snapshots(recording, tuple(rows[:count:every].tolist()))
+    return Snapshots(network, recording, tuple(rows[:count:every].tolist()))
 
 
 def snapshots_of_run(run: Simulation, start: int, steps: int, every: int) -> Iterator[Snapshot]:
     """The same of a run that is made while they are asked for, so that there may be any number of them."""
     network = run.network
+    fading, seen = Fading(network), None
     before, weights = None, _weights(run)
     for step in range(start + steps):
         run.step()
+        if fading:
+            seen = fading.follow(np.array([step]), run.activity[None])
         if step >= start and (step - start) % every == 0:
-            yield Snapshot(step, run.activity, weights, before)
+            yield Snapshot(step, run.activity, weights, before, seen)
         before, weights = weights, _weights(run) if len(network.changing) else weights
 
 

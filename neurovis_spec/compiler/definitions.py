@@ -225,7 +225,8 @@ def _model(name: str, model: ModelModel, findings: Findings, dt: float) -> tuple
     state = checker.states(model.state, defaults)
     activity = checker.tree(model.activity, {"f": 1})
     names = tuple(default.name for default in defaults)
-    return Model(name, names, let, state, activity or Number(0.0)), defaults
+    spikes = model.spikes is not None and model.spikes.value
+    return Model(name, names, let, state, activity or Number(0.0), spikes), defaults
 
 
 def _rule(name: str, model: RuleModel, findings: Findings, dt: float) -> tuple[Rule, Defaults] | None:

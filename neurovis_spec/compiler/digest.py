@@ -36,6 +36,7 @@ _SHOWN = frozenset(
         "slots",
         "parts",
         "states",
+        "spikes",
         "widths",
     )
 )

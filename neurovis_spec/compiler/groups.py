@@ -26,6 +26,7 @@ from neurovis_spec.compiler.settable import Part
 from neurovis_spec.compiler.settings import check_initials, choose, look_at_settings, parameters, spread
 from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.diagnostics import meant, shown, suggest
+from neurovis_spec.language.expressions.tree import Call, walk
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, too_long
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.source import Scalar
@@ -135,6 +136,7 @@ class Builder:
             role=None if model.role is None else cast(Role, model.role.value),
             description=None if model.description is None else model.description.value,
             module=self.unit.module,
+            spikes=_spikes(kind),
         )
         return Built(
             name=name,
@@ -306,6 +308,12 @@ class Builder:
         message = f"'label' has {plural(len(model.label), 'text')} for {plural(len(names), 'neuron')}"
         self.constants.findings.error("wrong-size", model.label[0].span if model.label else node.span, message)
         return None
+
+
+def _spikes(kind: Kind) -> bool:
+    """Whether neurons spike: their model does, and what its activity is of is no graded activation."""
+    graded = any(isinstance(node, Call) and node.function == "f" for node in walk(kind.model.activity))
+    return kind.model.spikes and (kind.activation.name == "step" or not graded)
 
 
 def _default(name: str, model: GroupModel) -> Choice:

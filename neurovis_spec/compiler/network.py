@@ -46,6 +46,8 @@ class Group:
     description: str | None = None
     #: the module of whose instance it is a part, None where it is the spec's own
     module: str | None = None
+    #: whether an activity is a spike of one step, or silence
+    spikes: bool = False
 
     @property
     def indices(self) -> range:

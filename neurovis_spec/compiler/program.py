@@ -45,6 +45,8 @@ class Model:
     let: tuple[tuple[str, Tree], ...]
     state: tuple[Quantity, ...]
     activity: Tree
+    #: whether its activity, of a step as the activation where it depends on one, is a spike or nothing
+    spikes: bool = False
 
 
 @dataclass(frozen=True, slots=True)

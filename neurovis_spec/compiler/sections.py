@@ -17,7 +17,7 @@ from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import Directory, key_of, look_at_keys, resolve, resolve_end
 from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.compiler.wires import Finder
-from neurovis_spec.compiler.wishes import LayoutSettings, RenderSettings
+from neurovis_spec.compiler.wishes import LayoutSettings, RenderSettings, StatedTrace
 from neurovis_spec.diagnostics import Findings, Span, shown, suggest
 from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel, RenderModel
 from neurovis_spec.language.located import Formula, Located
@@ -135,6 +135,7 @@ def render_settings(model: RenderModel | None, finder: Finder, constants: Consta
         signal=() if gain is None else stated_gains(gain.signal, "signal", finder, constants),
         thickness=() if gain is None else stated_gains(gain.thickness, "thickness", finder, constants),
         change=() if gain is None else stated_gains(gain.change, "change", finder, constants),
+        traces=_traces(model, finder, constants),
         theme="default" if theme is None or theme.base is None else theme.base.value,
         colours=() if theme is None else _changes(theme),
         size=size,
@@ -143,6 +144,24 @@ def render_settings(model: RenderModel | None, finder: Finder, constants: Consta
         title=True if model.title is None else model.title.value,
         window=None if model.window is None else constants.integer(model.window, "a window of steps", 1),
     )
+
+
+def _traces(model: RenderModel, finder: Finder, constants: Constants) -> tuple[StatedTrace, ...]:
+    """The traces that a spec states, those that name the fewest last."""
+    found: list[StatedTrace] = []
+    for name, formula in model.trace.items():
+        seconds, key = constants.scalar(formula), key_of(model.source, "trace", name)
+        if "->" in name:
+            message = f"'{shown(name)}' is a connection; a trace is of neurons"
+            constants.findings.error("wrong-type", key.span, message, "lines show the traces of their sources")
+            continue
+        members = finder.neurons(key)
+        if seconds is not None and seconds < 0:
+            message = f"a trace lasts for 0 seconds or more, this is {seconds:g}"
+            constants.findings.error("out-of-range", formula.span, message)
+        elif seconds is not None and members is not None:
+            found.append(StatedTrace(seconds, tuple(members.tolist())))
+    return tuple(sorted(found, key=lambda one: -len(one.members)))
 
 
 def _changes(theme: ThemeModel) -> tuple[tuple[str, str], ...]:

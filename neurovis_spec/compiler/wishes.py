@@ -76,6 +76,14 @@ class StatedGain:
 
 
 @dataclass(frozen=True, slots=True)
+class StatedTrace:
+    """How long, in seconds, what neurons were is still seen; 0 where it is not."""
+
+    seconds: float
+    members: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class RenderSettings:
     """The ``render`` section. Of the gains a later one goes before an earlier one; what has none gets one from what a
     run reaches."""
@@ -84,6 +92,8 @@ class RenderSettings:
     signal: tuple[StatedGain, ...] = ()
     thickness: tuple[StatedGain, ...] = ()
     change: tuple[StatedGain, ...] = ()
+    #: a later one goes before an earlier one; of the others those that spike have one
+    traces: tuple[StatedTrace, ...] = ()
     theme: str = "default"
     #: what the spec changes of it: colours by their names, and ``ends``
     colours: tuple[tuple[str, str], ...] = ()

@@ -272,6 +272,10 @@ class RenderModel(Model):
     PLACE: ClassVar[str] = "'render'"
 
     gain: Gain | None = Field(None, description="The scaling factors γ of Eqs. 2–5.")
+    trace: Keyed[FormulaField] = Field(
+        default_factory=dict,
+        description="{neurons: seconds}: how long activity is still seen while it fades, to 1/e; 0: not at all.",
+    )
     theme: ThemeField | None = Field(
         None, description="The colours: default, dark, print, paper, or other ones (default default)."
     )

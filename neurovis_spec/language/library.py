@@ -10,6 +10,7 @@ from typing import Annotated, ClassVar
 from pydantic import ConfigDict, Field, ValidationInfo
 
 from neurovis_spec.language.located import (
+    BoolField,
     FormulaField,
     Leaf,
     Located,
@@ -67,6 +68,10 @@ class ModelModel(Model):
     let: Named[FormulaField] = Field(default_factory=dict, description="Intermediate values, in order.")
     state: Named[StateModel] = Field(default_factory=dict, description="States, updated together from old values.")
     activity: FormulaField = Field(description="The activity; f(…) is the neuron's activation, drive is u[t].")
+    spikes: BoolField | None = Field(
+        None,
+        description="Whether its activity is a spike, of one step, or silence; pictures show a trace (default false).",
+    )
     description: TextField | None = Field(None, description="What it is, its equation and its source.")
 
 

@@ -42,13 +42,15 @@ class UnknownNameError(KeyError):
 class Snapshot:
     """One step: ``activity`` (n,) is a[t], ``weights`` (m,) w[t] of all connections.
 
-    ``previous_weights`` (m,) is w[t−1], None at step 0 and where step t − 1 was not recorded.
+    ``previous_weights`` (m,) is w[t−1], None at step 0 and where step t − 1 was not recorded. ``seen`` (n,) is what a
+    picture shows in place of the activity, where neurons have a trace.
     """
 
     step: int
     activity: FloatArray
     weights: FloatArray
     previous_weights: FloatArray | None
+    seen: FloatArray | None = None
 
 
 def _no_indices() -> IntArray:

@@ -17,6 +17,7 @@ from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.scene import encoding, texts
 from neurovis_spec.scene.caption import caption
+from neurovis_spec.scene.fading import seconds_of
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.geometry import FloatArray
 from neurovis_spec.scene.lesions import FAINT
@@ -56,9 +57,10 @@ def looks(network: Network, snapshot: Snapshot, gains: Gains, widest: float) -> 
     connections = network.connections
     widths = encoding.line_width(snapshot.weights, gains.thickness, widest)
     changes = encoding.glow(snapshot.weights, snapshot.previous_weights, gains.change)
-    sent = snapshot.activity[connections.sources]
+    seen = snapshot.activity if snapshot.seen is None else snapshot.seen
+    sent = seen[connections.sources]
     return Looks(
-        discs=encoding.neuron_colour(snapshot.activity, gains.activity, gains.centre),
+        discs=encoding.neuron_colour(seen, gains.activity, gains.centre),
         lines=encoding.connection_colour(sent, snapshot.weights, gains.signal),
         widths=widths,
         glows=encoding.glow_width(widths, changes),
@@ -167,13 +169,15 @@ def tooltips(network: Network, gains: Gains, activity: FloatArray, weights: Floa
     neurons, connections = network.neurons, network.connections
     of_neurons = [""] * len(neurons)
     lows, highs = activity.min(axis=0).tolist(), activity.max(axis=0).tolist()
+    traces = seconds_of(network).tolist()
     for group in neurons.groups:
         kind = group.activation if group.model == "static" else f"{group.model}, {group.activation}"
         for index in group.indices:
             name, label = neurons.names[index], neurons.labels[index]
             first = name if label in (name, name.rsplit(".", 1)[-1]) else f"{name}: {label}"
             seen = _gain_of(float(gains.activity[index]), float(gains.centre[index]))
-            parts = [first, f"activity {_range(lows[index], highs[index])}", kind, group.description or "", seen]
+            fades = f"fades to 1/e in {texts.number(traces[index])} s" if traces[index] else ""
+            parts = [first, f"activity {_range(lows[index], highs[index])}", kind, group.description or "", seen, fades]
             of_neurons[index] = "\n".join(part for part in parts if part)
     of_connections = []
     scaled = _gains_of(network, gains)

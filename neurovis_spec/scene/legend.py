@@ -14,8 +14,9 @@ from neurovis_spec.scene.delays import bead
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.legend_entry import FIRST_Y, SAMPLE_Y, SECOND_Y, SMALL, Entry, heading, stroke
 from neurovis_spec.scene.lesions import FAINT
-from neurovis_spec.scene.model import Arrowhead, Group, Shape, Spline, Text, Theme, ended, shifted
+from neurovis_spec.scene.model import Arrowhead, Disc, Group, Shape, Spline, Text, Theme, ended, shifted
 from neurovis_spec.scene.teachers import dash
+from neurovis_spec.scene.themes import colours
 
 _ROW_GAP, _ENTRY_GAP = 10.0, 24.0
 _HEAD, _STROKE, _STROKE_GAP = 9.0, 36.0, 10.0
@@ -35,6 +36,8 @@ class Contents:
     lesions: bool = False
     #: whether weights are negative, or can become so
     inhibits: bool = False
+    #: in how many seconds activity fades, the shortest and the longest, of those that have a trace
+    traces: tuple[float, ...] = ()
 
 
 def entries(contents: Contents, gains: Gains, theme: Theme, *, brief: bool = False) -> list[Entry]:
@@ -52,6 +55,8 @@ def entries(contents: Contents, gains: Gains, theme: Theme, *, brief: bool = Fal
         result.append(_dotted(contents.teaches, theme))
     if contents.delays:
         result.append(_bead(contents.delays, theme))
+    if contents.traces:
+        result.append(_trace(contents.traces, theme))
     if contents.lesions:
         result.append(_faint(theme))
     return result
@@ -142,6 +147,16 @@ def _bead(words: str, theme: Theme) -> Entry:
         Text((0, SECOND_Y), words, SMALL, theme.muted),
     )
     return Entry(shapes, across)
+
+
+def _trace(seconds: tuple[float, ...], theme: Theme) -> Entry:
+    """A disc, and how it fades."""
+    first, second = "activity fades", f"to 1/e in {' … '.join(texts.number(one) for one in seconds)} s"
+    across = max(64.0, texts.width(first, SMALL), texts.width(second, SMALL))
+    fills = colours(theme, [1.0, 0.6, 0.3, 0.1])
+    discs = [Disc((6 + 17.0 * place, SAMPLE_Y), 6, fill, theme.ring, 0.8) for place, fill in enumerate(fills)]
+    words = [Text((0, FIRST_Y), first, SMALL, theme.muted), Text((0, SECOND_Y), second, SMALL, theme.muted)]
+    return Entry((heading("Trace", theme), *discs, *words), across)
 
 
 def _faint(theme: Theme) -> Entry:

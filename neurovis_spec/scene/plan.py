@@ -17,6 +17,7 @@ from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.layout.model import RADIUS, Layout
 from neurovis_spec.scene import delays, encoding, legend, texts
 from neurovis_spec.scene.boxes import Box, boxes_of
+from neurovis_spec.scene.fading import seconds_of
 from neurovis_spec.scene.frame import MARGIN, MOST, UNIT, Frame, Wishes, fit
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.geometry import FloatArray, Point, Rect, bounds, samples
@@ -169,6 +170,7 @@ def _frame(
             delays=delayed,
             lesions=bool(lesions_of(network)),
             inhibits=_inhibits(network),
+            traces=_ends_of(seconds_of(network)),
         )
         for brief in (False, True):
             items = legend.entries(contents, gains, around.theme, brief=brief)
@@ -188,6 +190,12 @@ def _frame(
     narrowest = max(fitting, around.narrowest)
     wishes = Wishes((min(header[0], _ROOM - 2 * MARGIN), header[1]), footer, narrowest)
     return title, items, fit(around.extent, wishes, settings.size)
+
+
+def _ends_of(seconds: FloatArray) -> tuple[float, ...]:
+    """The shortest and the longest time above 0: one where these are the same, none where there are none."""
+    above = seconds[seconds > 0]
+    return tuple(sorted({float(above.min()), float(above.max())})) if len(above) else ()
 
 
 def _inhibits(network: Network) -> bool:

@@ -19,6 +19,7 @@ from neurovis_spec.layout.model import Layout
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.scene import encoding, strips
 from neurovis_spec.scene.encode import tooltips
+from neurovis_spec.scene.fading import snapshots_of
 from neurovis_spec.scene.frame import MARGIN
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.gains import Scale as Own
@@ -197,7 +198,7 @@ class Maker:
     def snapshots(self) -> Sequence[Snapshot]:
         """Those of the frames."""
         recording = self.shots.recording
-        return [recording.snapshot(int(recording.step[row])) for row in self.shots.frames.tolist()]
+        return list(snapshots_of(self.network, recording, recording.step[self.shots.frames].tolist()))
 
     def _traces(self, panel: Panel) -> Block:
         named = panel.shown is not None

@@ -1,0 +1,90 @@
+"""Traces for the eye: what was active fades, so that a spike of one step can be seen.
+
+In: a network, whose spec may say how long; a recording, or a run step by step. Out: what a picture of a step shows in
+place of the activity: of the activities up to now, each faded by the time since, the one that is furthest from 0.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.runtime.recording import Recording, Snapshot
+
+#: Seconds of a film in which the trace of a spike fades to 1/e, where the spec does not say; and the least steps.
+_SECONDS, _STEPS = 0.2, 2.0
+#: Frames a second of a film at most, and where the spec writes no dt: a frame is a step.
+_MOST_FPS, _FPS = 60.0, 25.0
+#: A trace that is fainter than this share cannot be told from nothing, nor can two pictures that differ by it.
+_FAINTEST = 1e-5
+#: Rows looked at together.
+_CHUNK = 256
+
+
+def seconds_of(network: Network) -> FloatArray:
+    """The time in which the activity of each neuron fades to 1/e in a picture, 0 for those that have no trace (n,).
+
+    Without a word of the spec those that spike have one.
+    """
+    fps = min(1 / network.dt, _MOST_FPS) if network.dt_given else _FPS
+    usual = network.dt * max(_STEPS, _SECONDS * fps)
+    result = np.zeros(len(network.neurons))
+    for group in network.neurons.groups:
+        if group.spikes:
+            result[group.start : group.start + group.count] = usual
+    for stated in network.render.traces:
+        result[list(stated.members)] = stated.seconds
+    return result
+
+
+class Fading:
+    """Follows the activities of a run, forward, and knows what a picture shows of them."""
+
+    def __init__(self, network: Network) -> None:
+        seconds = seconds_of(network)
+        has = seconds > 0
+        #: the share of an activity that is left after a step, by neuron
+        self._left = np.zeros(len(seconds))
+        self._left[has] = np.exp(-network.dt / seconds[has])
+        self._step, self._shown = 0, np.zeros(0)
+
+    def __bool__(self) -> bool:
+        """Whether a neuron has a trace."""
+        return bool(self._left.any())
+
+    @property
+    def reach(self) -> float:
+        """For how many steps a trace can be told from nothing."""
+        longest = float(self._left.max(initial=0.0))
+        return math.log(_FAINTEST) / math.log(longest) if 0 < longest < 1 else longest * math.inf
+
+    def follow(self, steps: IntArray, rows: FloatArray) -> FloatArray:
+        """What is shown at the last of these steps, whose activities are ``rows`` (steps, n)."""
+        for first in range(0, len(steps), _CHUNK):
+            some, now = rows[first : first + _CHUNK], steps[first : first + _CHUNK]
+            if len(self._shown):
+                some, now = np.vstack([self._shown, some]), np.concatenate([[self._step], now])
+            with np.errstate(invalid="ignore", under="ignore"):
+                faded = (some * self._left ** (now[-1] - now)[:, None])[::-1]  # what is no number is as nothing
+            furthest = np.nan_to_num(np.abs(faded), nan=0.0).argmax(axis=0)  # of equal ones the latest
+            self._step, self._shown = int(now[-1]), faded[furthest, np.arange(faded.shape[1])]
+        return self._shown
+
+
+def snapshots_of(network: Network, recording: Recording, steps: Iterable[int]) -> Iterator[Snapshot]:
+    """The snapshots of ascending steps of a recording, with the traces of what was before. Raises RecordingError."""
+    fading, done = Fading(network), 0
+    for step in steps:
+        snapshot = recording.snapshot(step)
+        if fading:
+            row = recording.row(step)
+            done = max(done, int(np.searchsorted(recording.step, step - fading.reach)))
+            rows = slice(done, row + 1)
+            seen = fading.follow(recording.step[rows], recording.activity[rows])
+            snapshot, done = replace(snapshot, seen=seen), row + 1
+        yield snapshot
