@@ -426,3 +426,14 @@ def test_within_the_braces_of_a_label_parameters_and_the_number_are_offered_and_
     shown = hover(*marked(LABELLED.replace("(number", "(num¦ber")))
     assert shown is not None
     assert "number of the instance" in shown.markdown
+
+
+def test_the_colours_of_a_theme_are_offered_and_explained() -> None:
+    offered = {one.label for one in complete(*marked(BASE + "render: {theme: {base: dark, ¦}}"))}
+    assert {"negative", "glow", "ends"} <= offered
+    assert {one.label for one in complete(*marked(BASE + "render: {theme: {base: ¦}}"))} == {
+        "default", "dark", "print", "paper",
+    }  # fmt: skip
+    shown = hover(*marked(BASE + 'render: {theme: {ne¦gative: "#d55e00"}}'))
+    assert shown is not None
+    assert "colour of −1" in shown.markdown

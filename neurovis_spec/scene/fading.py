@@ -51,11 +51,12 @@ class Fading:
         #: the share of an activity that is left after a step, by neuron
         self._left = np.zeros(len(seconds))
         self._left[has] = np.exp(-network.dt / seconds[has])
+        self._any = bool(has.any())
         self._step, self._shown = 0, np.zeros(0)
 
     def __bool__(self) -> bool:
         """Whether a neuron has a trace."""
-        return bool(self._left.any())
+        return self._any
 
     @property
     def reach(self) -> float:
