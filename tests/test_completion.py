@@ -98,6 +98,7 @@ def test_a_root_is_a_folder() -> None:
         (("run", "--backend", ""), {"list", "numpy", "reference"}),
         (("layout", "x.yaml", "--engine", "la"), {"large", "layered"}),
         (("render", "x.yaml", "--theme", "pa"), {"paper"}),
+        (("animate", "x.yaml", "--view", "ra"), {"raster"}),
         (("validate", "--format", "s"), {"sarif"}),
         (("inspect", "--format", "j"), {"json"}),
     ],

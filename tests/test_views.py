@@ -23,6 +23,7 @@ from neurovis_spec.runtime.recording import Recording, RecordingError
 from neurovis_spec.scene import THEMES, Disc, Film, Group, Image, Polyline, Rectangle, Scene, Text, colours, still
 from neurovis_spec.scene.figure import figure
 from neurovis_spec.scene.heat import strongest
+from neurovis_spec.scene.matrix import order_of
 from neurovis_spec.scene.palette import MOST, distinct
 from neurovis_spec.scene.panels import ViewError, panels_of
 from neurovis_spec.scene.series import chosen, full_name
@@ -394,6 +395,21 @@ def test_a_matrix_has_sources_as_rows_and_targets_as_columns_in_the_order_of_the
     assert fill["I -> A1"] == fill["I -> A2"] == THEMES["default"].positive
     assert [fill["S -> B"]] == colours(THEMES["default"], [-0.5 / 0.8])
     assert "weight" in found["S -> B"].title
+
+
+def test_neurons_of_a_ring_stay_in_their_own_order_and_instances_together() -> None:
+    ring = nv.compile(Path(__file__).parents[1] / "specs" / "ring.yaml")
+    names = ring.network.neurons.names
+    order = order_of(ring.network, ring.drawn().value, range(len(names)))
+    assert [names[index] for index in order.neurons.tolist()] == ["A", "B", *(f"R{k}" for k in range(1, 9))]
+    legs = (
+        "neurovis: 1\nname: legs\nmodules:\n  leg:\n    neurons: {A: {bias: 1}, B: {}}\n    connections: {A -> B: 1}\n"
+    )
+    walker = nv.compile_text(
+        legs + "instances: {left: {module: leg}, right: {module: leg}}\nlayout: {mirror: [[left, right]]}\n"
+    )
+    order = order_of(walker.network, walker.drawn().value, range(4))
+    assert [(band.name, band.count) for band in order.levels[0]] == [("left", 2), ("right", 2)]
 
 
 def test_cells_of_weights_that_change_do_so_in_a_film() -> None:

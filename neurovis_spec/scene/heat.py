@@ -1,8 +1,8 @@
 """Raster: neurons × time as coloured cells, in the colours that they have in the picture of the network (Eq. 2).
 
 In: activities, colour values, a Span. Out: a Part. Where there are more steps or neurons than cells can be seen, a cell
-has the strongest colour of those it stands for, so that nothing is lost. A neuron whose activity is only ever 0 or 1
-and whose model has states spikes: its spikes are marks.
+has the strongest colour of those it stands for, so that nothing is lost. A group whose model has states and whose
+activities are 0 but for single steps of 1 spikes: its spikes are marks.
 """
 
 from __future__ import annotations
@@ -65,7 +65,9 @@ class Heat:
     colour: Callable[[IntArray], FloatArray]
     may_spike: npt.NDArray[np.bool_]
     names: tuple[str, ...]
-    bands: tuple[Band, ...]
+    #: the groups, and what they are in: the instance, if they are in one
+    groups: tuple[Band, ...]
+    outer: tuple[Band, ...]
     scale: Scale
 
     @property
@@ -76,8 +78,14 @@ class Heat:
     @property
     def left(self) -> float:
         """How wide the names beside the rows are."""
-        named = self.names if self._named(self.natural) else [band.name for band in self.bands]
-        return min(_LABEL, max((_width(name) for name in named), default=0.0)) + 8
+        named = [_parts(name) for name in self.names]
+        if not self._named(self.natural):
+            named = [(band.name, "") for band in self._bands(self.natural)]
+        return min(_LABEL, max((texts.width(base, SMALL, 400, sub) for base, sub in named), default=0.0)) + 8
+
+    def _bands(self, plot: float) -> tuple[Band, ...]:
+        """The groups where there is room for them, else the instances."""
+        return self.groups if plot >= _GROUPED * len(self.groups) else self.outer
 
     def _named(self, plot: float) -> bool:
         return plot >= _NAMED * len(self.names)
@@ -108,13 +116,17 @@ class Heat:
         steps = strips.columns(span, int(span.right - span.left))
         count = len(self.names)
         rows = np.unique(np.linspace(0, count, min(count, max(1, int(2 * plot))) + 1).astype(np.int64))
-        shown, marked, spike = np.empty((len(steps) - 1, count)), np.empty((len(steps) - 1, count)), np.empty(count)
+        shown, marked = (np.empty((len(steps) - 1, count)) for _ in range(2))
+        kinds, spike = np.empty(count, np.int64), np.zeros(count)
         for first in range(0, count, _TOGETHER):
             some = np.arange(first, min(first + _TOGETHER, count))
             activity = self.activity(some)
             shown[:, some] = strongest(self.colour(some), steps, 0)
             marked[:, some] = strongest(activity, steps, 0)
-            spike[some] = spiking(activity) & self.may_spike[some]
+            kinds[some] = np.where(self.may_spike[some], spiking(activity), -1)
+        for group in self.groups:  # also those of its neurons that are silent
+            own_kinds = kinds[group.start : group.start + group.count]
+            spike[group.start : group.start + group.count] = own_kinds.min() >= 0 and own_kinds.max() > 0
         colours = blend(theme, strongest(shown, rows, 1))
         own = strongest(spike[None], rows, 1)[0] > 0
         colours[:, own] = np.array(channels(theme.box_fill), np.uint8)
@@ -126,19 +138,21 @@ class Heat:
         """Names beside the rows, or of the groups; lines between groups."""
         each = plot / max(len(self.names), 1)
         shapes: list[Shape] = []
-        for band in self.bands[1:]:
+        bands = self._bands(plot)
+        for band in bands[1:] if plot >= _GROUPED * len(bands) else ():
             y = top + band.start * each
             shapes.append(Polyline(((span.left - 4, y), (span.right, y)), theme.background, 1.2))
         if self._named(plot):
             size = min(SMALL, 0.9 * each)
             for row, name in enumerate(self.names):
-                shapes.append(_beside(name, span.left - 6, top + (row + 0.5) * each, size, theme))
+                parts = _parts(name)
+                shapes.append(_beside(*parts, span.left - 6, top + (row + 0.5) * each, size, theme))
             return shapes
         free = top
-        for band in self.bands:
+        for band in bands:
             middle = top + (band.start + band.count / 2) * each
             if band.count * each >= _GROUPED and middle - SMALL / 2 >= free - 1:
-                shapes.append(_beside(band.name, span.left - 6, middle, SMALL, theme))
+                shapes.append(_beside(band.name, "", span.left - 6, middle, SMALL, theme))
                 free = middle + SMALL / 2
         return shapes
 
@@ -158,20 +172,25 @@ def strongest(values: FloatArray, cuts: IntArray, axis: int) -> FloatArray:
     return result
 
 
-def _beside(name: str, right: float, middle: float, size: float, theme: Theme) -> Text:
-    base, subscript = texts.with_subscript(name) if "." not in name else (name, "")
+def _parts(name: str) -> tuple[str, str]:
+    """The name of a neuron and its subscript."""
+    return texts.with_subscript(name) if "." not in name else (name, "")
+
+
+def _beside(base: str, subscript: str, right: float, middle: float, size: float, theme: Theme) -> Text:
     if texts.width(base, size, 400, subscript) > _LABEL:
-        base, subscript = texts.shorten(name, size, _LABEL), ""
+        base, subscript = texts.shorten(base + subscript, size, _LABEL), ""
     return Text((right, middle + 0.36 * size), base, size, theme.ink, "end", subscript=subscript)
 
 
-def _width(name: str) -> float:
-    base, subscript = texts.with_subscript(name) if "." not in name else (name, "")
-    return texts.width(base, SMALL, 400, subscript)
+def spiking(activity: FloatArray) -> IntArray:
+    """Whose activities (steps, rows) are spikes: 1 where they are 1 at times and else 0, never twice in a row; 0 where
+    they are always 0; −1 for others.
 
-
-def spiking(activity: FloatArray) -> npt.NDArray[np.bool_]:
-    """Whose activities (steps, rows) are 0 or 1, and not always 1."""
-    only = ((activity == 0) | (activity == 1)).all(axis=0)
-    result: npt.NDArray[np.bool_] = only & (activity == 0).any(axis=0)
+    >>> spiking(np.array([[0, 1, 0.0], [1, 1, 0], [0, 0, 0]]))
+    array([ 1, -1,  0])
+    """
+    on = activity == 1
+    only = (on | (activity == 0)).all(axis=0) & ~(on[1:] & on[:-1]).any(axis=0)
+    result: IntArray = np.where(only, on.any(axis=0), -1).astype(np.int64)
     return result

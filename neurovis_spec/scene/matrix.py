@@ -30,6 +30,8 @@ _MOST_SHAPES = 2_000
 #: Cells smaller than this have no name for each.
 _NAMED = 9.0
 _SIZE, _LABEL, _TITLE_ROOM, _LINE = 11.0, 110.0, 24.0, 16.0
+#: Neurons are in a line where none lies so far beside another, in units of the layout.
+_LINED = 0.5
 #: Lines between the groups of a module are so far apart at least.
 _APART = 14.0
 
@@ -50,7 +52,7 @@ class Order:
 
 def order_of(network: Network, layout: Layout, wanted: Sequence[int]) -> Order:
     """Neurons in the order of the layout: along its direction, then across; what belongs together stays together, and
-    stands where its middle is."""
+    stands where its middle is. The neurons of a group that are in no line (a ring, a grid) are in their own order."""
     direction, names = network.layout.direction, network.neurons.names
     sign = -1.0 if direction in ("up", "left") else 1.0
     group_of = {index: group.name for group in network.neurons.groups for index in group.indices}
@@ -62,11 +64,13 @@ def order_of(network: Network, layout: Layout, wanted: Sequence[int]) -> Order:
         at[index] = (sign * y, x) if direction in ("down", "up") else (sign * x, y)
         for path in paths[index]:
             of_path.setdefault(path, []).append(at[index])
+    lines = {name for name, places in of_path.items() if np.ptp(places, axis=0).min() < _LINED}
     middles = {path: tuple(np.mean(places, axis=0).round(3).tolist()) for path, places in of_path.items()}
 
     def key(index: int) -> list[tuple[float, float, str, int]]:
         outer = [(*middles[path], path, 0) for path in paths[index]]
-        return [*outer, (*at[index], "", index)]
+        own = at[index] if group_of[index] in lines else (0.0, 0.0)
+        return [*outer, (*own, "", index)]
 
     ordered = sorted(wanted, key=key)
     depth = max((len(path) for path in paths.values()), default=0)

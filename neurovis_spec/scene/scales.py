@@ -65,4 +65,4 @@ def scale_of(name: str, used: Sequence[tuple[Own, float]]) -> Scale:
         return Scale(name, low, high)
     parts = [f"{named(own)} ±{texts.number(full)}" + (f" around {texts.number(own.centre)}" if own.centre else "")
              for own, full in used]  # fmt: skip
-    return Scale(f"{name} of {' · '.join(parts)}", "−", "+")
+    return Scale(f"{name} of {' · '.join(parts)}" if name else " · ".join(parts), "−", "+")

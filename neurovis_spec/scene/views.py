@@ -247,7 +247,8 @@ class Maker:
         for block in network.blocks:
             stateful[block.members] = bool(block.model.state)
         group_of = {index: group.name for group in network.neurons.groups for index in group.indices}
-        bands = bands_of([group_of[index] for index in neurons.tolist()])
+        groups = [group_of[index] for index in neurons.tolist()]
+        bands = bands_of(groups), bands_of([group.partition(".")[0] for group in groups])
         rows, gains = self.shots.rows, self.gains
         assert gains is not None
 
@@ -261,9 +262,9 @@ class Maker:
 
         own = set(np.unique(gains.activity[neurons]).tolist())
         used = [(one, 1 / abs(one.gain or 1e-9)) for one in gains.activity_scales if one.gain in own]
-        scale = Scale("") if self.explained else scale_of("activity", used)
+        scale = Scale("") if self.explained else scale_of("", used)
         names = tuple(short_name(curve, network) for curve in curves if curve.of == "neuron")
-        return Raster(Heat("activity", activity, colour, stateful[neurons], names, bands, scale))
+        return Raster(Heat("activity", activity, colour, stateful[neurons], names, *bands, scale))
 
     def _matrix(self, shown: tuple[Curve, ...] | None) -> Block:
         network = self.network
