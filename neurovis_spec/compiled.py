@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from neurovis_spec.runtime.simulation import Simulation
     from neurovis_spec.runtime.until import Until
     from neurovis_spec.scene import Film, Scene
+    from neurovis_spec.scene.excerpt import Excerpt
     from neurovis_spec.scene.gains import Gains
     from neurovis_spec.scene.panels import View
 
@@ -43,6 +44,8 @@ if TYPE_CHECKING:
 DEFAULT_FPS, MOST_FPS = 25.0, 60.0
 #: Frames of a film that are held at once, and how many numbers they are about.
 _FEWEST_AT_ONCE, _MOST_AT_ONCE, _NUMBERS_AT_ONCE = 16, 512, 4_000_000
+#: The largest SVG, in bytes, with as many connections as there are.
+_LARGEST_SVG = 5_000_000
 #: The most steps of a run: beyond it a step is no number that a double can hold.
 _MOST_STEPS = 1 << 53
 
@@ -307,6 +310,11 @@ class CompiledNetwork:
         window: int | None = None,
         dpi: float | None = None,
         progress: Progress | None = None,
+        collapse: str | Sequence[str] = (),
+        focus: str | None = None,
+        paths: str | None = None,
+        min_weight: float | None = None,
+        full: bool = False,
     ) -> None:
         """Draw one step into a file whose suffix says what kind.
 
@@ -315,32 +323,47 @@ class CompiledNetwork:
         run. ``view`` says what is shown, from top to bottom: ``network``, ``matrix``, ``traces``, ``raster``,
         ``weights``, alone or with references (``traces: C1, C2`` or {"traces": ["C1", "C2"]}); by default it is the
         spec's ``figure``. Views over time show the whole recording or run, or ``window`` steps around the one that is
-        drawn. ``dpi`` are the pixels of an inch, 96 of which are a picture's usual size on the screen. Raises
-        OutputError for a kind that nobody draws and a view that there is not, KeyError for an unknown reference, before
-        anything is run.
+        drawn. ``dpi`` are the pixels of an inch, 96 of which are a picture's usual size on the screen.
+
+        ``collapse`` names groups and instances that are one glyph each (not in a figure of several views), ``focus``
+        neurons that are shown with all they are connected to, ``paths`` (``"A -> B"``) what the shortest paths are
+        shown of; connections below ``min_weight`` are left out. Of very many connections, and of those that would make
+        an SVG larger than 5 MB, the thinnest are left out, with a warning, unless it is to be ``full``. Raises
+        OutputError for a kind that nobody draws, for a view, a name to be shown and a path that there is not, KeyError
+        for an unknown reference, before anything is run.
         """
+        from neurovis_spec.scene.excerpt import Excerpt
         from neurovis_spec.scene.renderers import renderer_for
 
         _check(recording=recording, inputs=inputs, theme=theme, engine=engine, progress=progress)
         place, wanted = arguments.path("path", path), None if step is None else arguments.integer("step", step)
         renderer_for(suffix := place.suffix, moving=False)
         density = None if dpi is None else _density(dpi)
-        panels, settings = self._panels(view), self._settings(theme)
+        panels = self._panels(view)
+        seen, settings = self._seen(theme, Excerpt(_listed(collapse), focus, paths, min_weight, full), panels)
         if window is not None:
             settings = replace(settings, window=arguments.integer("window", window, 1))
         layout = self._placed(panels, engine)
+        picture: Callable[[RenderSettings], Scene]
         if panels:
             if recording is not None:
-                shown, gains = recording, self._gains_of(panels, recording)
+                shown, some = recording, seen._gains_of(panels, recording)
             else:
-                shown, gains = self._ran(max(self.network.steps, (wanted or 0) + 1), inputs, panels, progress)
+                shown, some = seen._ran(max(self.network.steps, (wanted or 0) + 1), inputs, panels, progress)
             shots = pipeline.shot_of(self.network, shown, wanted, settings.window)
-            scene = pipeline.frame(pipeline.page(self.network, layout, panels, shots, gains, settings, 1.0), 0)
+
+            def picture(settings: RenderSettings) -> Scene:
+                return pipeline.frame(pipeline.page(self.network, layout, panels, shots, some, settings, 1.0), 0)
         else:
             assert layout is not None
-            snapshot, gains = self._snapshot(wanted, recording, progress, inputs)
-            scene = pipeline.picture(self.network, layout, snapshot, gains, settings)
-        content = pipeline.draw(scene if density is None else _denser(scene, density), suffix)
+            snapshot, gains = seen._snapshot(wanted, recording, progress, inputs)
+            picture = partial(pipeline.picture, self.network, layout, snapshot, gains)
+
+        def draw(settings: RenderSettings) -> tuple[Scene, bytes]:
+            scene = picture(settings)
+            return scene, pipeline.draw(scene if density is None else _denser(scene, density), suffix)
+
+        content = _bounded(draw, settings, suffix)
         with replacing(place) as file:
             file.write(content)
 
@@ -359,17 +382,23 @@ class CompiledNetwork:
         engine: str | None = None,
         view: View | Sequence[View] | None = None,
         progress: Progress | None = None,
+        collapse: str | Sequence[str] = (),
+        focus: str | None = None,
+        paths: str | None = None,
+        min_weight: float | None = None,
+        full: bool = False,
     ) -> None:
         """Draw ``steps`` steps from step ``start`` on, one in ``every`` a frame, into a file whose suffix says what
         kind.
 
         ``fps`` defaults to 1/dt, at most 60, and to 25 where the spec writes no dt. Without ``every`` all steps are
         drawn, of more than 3,000 (or ``frames``) one in so many that no more frames come out; a warning says which.
-        ``inputs`` and ``view`` as in ``render``; views over time show the steps of the film. Raises OutputError for a
-        kind that nobody makes, for a film that is too long and a view that there is not, KeyError for an unknown
+        ``inputs``, ``view`` and what is shown as in ``render``; views over time show the steps. Raises OutputError for
+        a kind that nobody makes, for a film that is too long and a view that there is not, KeyError for an unknown
         reference, before anything is run.
         """
         from neurovis_spec.runtime.simulation import Simulation
+        from neurovis_spec.scene.excerpt import Excerpt
         from neurovis_spec.scene.film_size import check_film, thinned
         from neurovis_spec.scene.renderers import renderer_for
         from neurovis_spec.snapshots import in_parts, snapshots_from, snapshots_of_run, steps_from
@@ -384,40 +413,70 @@ class CompiledNetwork:
             fps = min(1 / self.network.dt, MOST_FPS) if self.network.dt_given else DEFAULT_FPS
         if not (math.isfinite(arguments.number("fps", fps)) and fps > 0):
             raise ValueError(f"frames a second are above 0, not {fps}")
+        panels = self._panels(view)
+        seen, settings = self._seen(theme, Excerpt(_listed(collapse), focus, paths, min_weight, full), panels)
         span = steps_from(self.network, first, count, recording)
         stride = thinned(span, each, most)
         shown = -(-span // stride)
         check_film(self.network, shown, suffix, capabilities)
         if stride > 1 and each is None and most is None:
             warnings.warn(_thinned(span, stride, shown, fps), stacklevel=2)
-        panels, settings = self._panels(view), self._settings(theme)
         layout, streams = self._placed(panels, engine), suffix in capabilities.streams
         made = recording
         if recording is None and (panels or not streams):
             made = self.run(first + span, inputs, progress=progress, states=self._states(panels))
+        film: Callable[[RenderSettings], Film]
         films: Iterator[Film]
         if panels:
             assert made is not None
             chosen = snapshots_from(self.network, first, count, made, stride)
             shots = pipeline.shots_of(chosen.recording, chosen.steps)
-            gains = self._gains_of(panels, recording, inputs)
-            films = iter([pipeline.page(self.network, layout, panels, shots, gains, settings, fps)])
+            some = seen._gains_of(panels, recording, inputs)
+
+            def film(settings: RenderSettings) -> Film:
+                return pipeline.page(self.network, layout, panels, shots, some, settings, fps)
+
+            films = map(film, [settings])
         else:
             assert layout is not None
+            gains = seen._gains_for(recording, inputs)
             if made is None:
                 snapshots = snapshots_of_run(Simulation(self.network, inputs=inputs), first, span, stride)
             else:
-                snapshots = iter(snapshots_from(self.network, first, count, made, stride))
+                chosen = snapshots_from(self.network, first, count, made, stride)
+                snapshots = iter(chosen)
+
+                def film(settings: RenderSettings) -> Film:
+                    return pipeline.moving(self.network, layout, chosen, gains, settings, fps)
+
             wide = len(self.network.neurons) + 3 * len(self.network.connections)
-            many = max(_FEWEST_AT_ONCE, min(_MOST_AT_ONCE, _NUMBERS_AT_ONCE // wide)) if streams else shown
-            film = partial(pipeline.moving, self.network, layout, settings=settings, fps=fps)
-            film = partial(film, gains=self._gains_for(recording, inputs))
-            films = map(film, in_parts(snapshots, many))
+            many = max(_FEWEST_AT_ONCE, min(_MOST_AT_ONCE, _NUMBERS_AT_ONCE // wide))
+            part = partial(pipeline.moving, self.network, layout, gains=gains, settings=settings, fps=fps)
+            films = map(part, in_parts(snapshots, many))
+
+        def draw(settings: RenderSettings) -> tuple[Scene, bytes]:
+            made = film(settings)
+            return made.scene, pipeline.animate(made, suffix, progress)
+
         with replacing(place, "part" if streams else "neurovis-new") as file:
             if streams:
-                pipeline.stream(films, shown, suffix, file, progress)
+                pipeline.stream(_noting(films), shown, suffix, file, progress)
             else:
-                file.write(pipeline.animate(next(films), suffix, progress))
+                file.write(_bounded(draw, settings, suffix))
+
+    def _seen(
+        self, theme: str | None, excerpt: Excerpt, panels: Sequence[Panel]
+    ) -> tuple[CompiledNetwork, RenderSettings]:
+        """How it is to be drawn; and the same network, whose gains are those of what is collapsed: nothing in a figure,
+        whose views share their gains."""
+        from neurovis_spec.scene.excerpt import excerpted
+
+        settings = excerpted(self.network, self._settings(theme), excerpt)
+        if panels:
+            settings = replace(settings, collapse=())
+        if settings.collapse == self.network.render.collapse:
+            return self, settings
+        return replace(self, network=replace(self.network, render=settings)), settings
 
     def _settings(self, theme: str | None) -> RenderSettings:
         from neurovis_spec.scene.renderers import RendererError
@@ -566,6 +625,41 @@ def _thinned(steps: int, every: int, frames: int, fps: float) -> str:
         f"of {steps:,} steps one in {every} is drawn: {frames:,} frames, {frames / fps:.4g} s at {fps:.4g} a second "
         f"(every=1, on the command line --every 1, draws all)"
     )
+
+
+def _listed(names: str | Sequence[str]) -> tuple[str, ...]:
+    return (names,) if isinstance(names, str) else tuple(names)
+
+
+def _bounded(draw: Callable[[RenderSettings], tuple[Scene, bytes]], settings: RenderSettings, suffix: str) -> bytes:
+    """The file of a picture, an SVG with so many connections as make it no larger than 5 MB, unless all are asked for;
+    and a warning for each note in it."""
+    scene, content = draw(settings)
+    if suffix.lower() == ".svg" and not settings.full and len(content) > _LARGEST_SVG:
+        lines = sum("connection" in group.data for group in scene.groups)
+        bare = len(draw(replace(settings, most=0))[1]) if lines else 0
+        for _ in range(3):  # strong lines may take more room than weak ones
+            if len(content) <= _LARGEST_SVG or not lines:
+                break
+            lines = max(0, int(0.98 * lines * (_LARGEST_SVG - bare) / max(len(content) - bare, 1)))
+            scene, content = draw(replace(settings, most=lines))
+    _note(scene)
+    return content
+
+
+def _noting(films: Iterator[Film]) -> Iterator[Film]:
+    """The parts of a film; of the first one the notes are warned of."""
+    for place, film in enumerate(films):
+        if place == 0:
+            _note(film.scene)
+        yield film
+
+
+def _note(scene: Scene) -> None:
+    from neurovis_spec.scene.shown import LeftOut
+
+    for note in scene.notes:
+        warnings.warn(note, LeftOut, stacklevel=4)
 
 
 def _check(**given: object) -> None:

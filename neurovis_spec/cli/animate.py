@@ -11,6 +11,7 @@ from neurovis_spec.cli.files import network_of, recording_of, show_warnings, tab
 from neurovis_spec.cli.options import (
     engine_option,
     examples,
+    excerpt_options,
     input_option,
     need_run,
     output_option,
@@ -63,6 +64,7 @@ def _finite(ctx: click.Context, param: click.Parameter, value: float | None) -> 
 @theme_option
 @view_option
 @engine_option
+@excerpt_options
 @set_option
 def command(
     spec: str,
@@ -78,6 +80,11 @@ def command(
     views: tuple[str, ...],
     engine: str | None,
     settings: dict[str, float],
+    collapse: tuple[str, ...],
+    focus: str | None,
+    path: str | None,
+    min_weight: float | None,
+    full: bool,
 ) -> None:
     """Draw a run as a moving picture, a frame a step.
 
@@ -106,6 +113,11 @@ def command(
             engine=engine,
             view=view,
             progress=bar,
+            collapse=collapse,
+            focus=focus,
+            paths=path,
+            min_weight=min_weight,
+            full=full,
         )
     if network.needs_layout(view):
         show_warnings(network.drawn(engine))

@@ -147,7 +147,7 @@ def _plain_warnings() -> Iterator[None]:
         file: object = None,
         line: str | None = None,
     ) -> None:
-        click.echo(f"warning: {message}", err=True)
+        click.echo(f"{getattr(category, 'prefix', 'warning')}: {message}", err=True)
 
     with warnings.catch_warnings():
         warnings.showwarning = show

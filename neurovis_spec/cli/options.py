@@ -195,6 +195,33 @@ recording_option = click.option(
 )
 
 
+def excerpt_options(command: F) -> F:
+    """What of the network is shown, for the commands that draw."""
+    collapse = click.option(
+        "--collapse",
+        metavar="REF",
+        multiple=True,
+        help="Draw a group or an instance as one glyph, its connections added up. Repeatable.",
+    )
+    focus = click.option("--focus", metavar="REFS", help="Show these neurons with all that they are connected to.")
+    paths_ = click.option("--path", "path", metavar="'A -> B'", help="Show the shortest directed paths from A to B.")
+    least = click.option(
+        "--min-weight",
+        type=click.FloatRange(min=0),
+        callback=_finite,
+        metavar="X",
+        help="Leave out connections with |w| below X.",
+    )
+    full = click.option("--full", is_flag=True, help="Draw all connections, however many there are.")
+    return collapse(focus(paths_(least(full(command)))))
+
+
+def _finite(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
+    if value is not None and not math.isfinite(value):
+        raise click.BadParameter(f"{value} is not a finite number.")
+    return value
+
+
 def output_option(text: str, *, required: bool = False) -> Callable[[F], F]:
     """``-o FILE``."""
     kind = click.Path(path_type=Path)

@@ -11,6 +11,7 @@ from neurovis_spec.cli.files import count, network_of, recording_of, show_warnin
 from neurovis_spec.cli.options import (
     engine_option,
     examples,
+    excerpt_options,
     input_option,
     need_run,
     output_option,
@@ -39,6 +40,7 @@ def _why(network: CompiledNetwork, step: int | None, steps: int) -> str:
         "neurovis render first.yaml -o first.png --step 120 --theme dark",
         "neurovis render first.yaml -o first.svg --recording first.npz",
         "neurovis render first.yaml -o first.svg --view network --view traces --window 300",
+        "neurovis render worm.yaml -o worm.svg --focus AVAL --min-weight 0.2",
     )
 )
 @spec_argument
@@ -54,6 +56,7 @@ def _why(network: CompiledNetwork, step: int | None, steps: int) -> str:
     metavar="N",
     help="Views over time show N steps around the one that is drawn; default: the spec's, else all.",
 )
+@excerpt_options
 @engine_option
 @click.option(
     "--dpi",
@@ -74,6 +77,11 @@ def command(
     engine: str | None,
     dpi: float | None,
     settings: dict[str, float],
+    collapse: tuple[str, ...],
+    focus: str | None,
+    path: str | None,
+    min_weight: float | None,
+    full: bool,
 ) -> None:
     """Draw one step as a picture.
 
@@ -102,6 +110,11 @@ def command(
             window=window,
             dpi=dpi,
             progress=bar,
+            collapse=collapse,
+            focus=focus,
+            paths=path,
+            min_weight=min_weight,
+            full=full,
         )
     if network.needs_layout(view):
         show_warnings(network.drawn(engine))

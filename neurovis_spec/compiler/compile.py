@@ -97,7 +97,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
     layout = layout_settings(spec.layout, units, population, findings)
     made = connect(units, population, request.limits, seed)
     bundles = made.bundles
-    render = render_settings(spec.render, Finder(wires_of(made), directory, findings), constants)
+    render = render_settings(spec.render, Finder(wires_of(made), directory, findings), constants, directory)
     outputs = make_outputs(spec, population, made, findings)
     if spec.render is not None and spec.render.figure:
         from neurovis_spec.compiler.figure import figure_of

@@ -23,6 +23,7 @@ from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel, Rende
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.source import Mapping as SourceMapping
 from neurovis_spec.language.theme import ThemeModel
+from neurovis_spec.language.values import Reference
 from neurovis_spec.themes import COLOURS
 
 #: The most pixels of a picture: 8K is a little less. Its bytes take some 250 MB of memory.
@@ -117,8 +118,23 @@ def _check_engine(engine: Located[str], findings: Findings) -> None:
     findings.error("unknown-engine", engine.span, f"there is no layout engine '{shown(name)}' here", hint)
 
 
-def render_settings(model: RenderModel | None, finder: Finder, constants: Constants) -> RenderSettings:
-    """The ``render`` section; ``finder`` knows what references in it name."""
+def _collapsed(
+    reference: Reference | None, directory: Directory, findings: Findings
+) -> Iterator[tuple[str, tuple[int, ...]]]:
+    """What is drawn as one glyph each: no neuron is in two."""
+    texts = () if reference is None else reference.parts
+    if resolve(texts, directory, findings, instances=True) is None:
+        return
+    for text in texts:
+        found = resolve((text,), directory, findings, instances=True)
+        if found:
+            yield text.value.strip(), found
+
+
+def render_settings(
+    model: RenderModel | None, finder: Finder, constants: Constants, directory: Directory
+) -> RenderSettings:
+    """The ``render`` section; ``finder`` and ``directory`` know what references in it name."""
     if model is None:
         return RenderSettings()
     gain, theme = model.gain, model.theme
@@ -130,6 +146,10 @@ def render_settings(model: RenderModel | None, finder: Finder, constants: Consta
             message = f"a picture has at most {_MOST_PIXELS:,} pixels, this one {size[0] * size[1]:,}"
             hint = "an '.svg' can be shown as large as one likes"
             constants.findings.error("out-of-range", model.size[1].span, message, hint)
+    least = None if model.min_weight is None else constants.scalar(model.min_weight)
+    if least is not None and model.min_weight is not None and least < 0:
+        message = f"'min_weight' is not negative, this is {least:g}"
+        constants.findings.error("out-of-range", model.min_weight.span, message)
     return RenderSettings(
         activity=() if gain is None else stated_gains(gain.activity, "activity", finder, constants),
         signal=() if gain is None else stated_gains(gain.signal, "signal", finder, constants),
@@ -143,6 +163,8 @@ def render_settings(model: RenderModel | None, finder: Finder, constants: Consta
         legend=model.legend is None or model.legend.value,
         title=True if model.title is None else model.title.value,
         window=None if model.window is None else constants.integer(model.window, "a window of steps", 1),
+        collapse=tuple(_collapsed(model.collapse, directory, constants.findings)),
+        min_weight=least,
     )
 
 

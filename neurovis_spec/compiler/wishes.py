@@ -105,3 +105,15 @@ class RenderSettings:
     figure: tuple[Panel, ...] = ()
     #: how many steps the views over time show; None: all
     window: int | None = None
+    #: what is drawn as one glyph each: its name, its neurons
+    collapse: tuple[tuple[str, tuple[int, ...]], ...] = ()
+    #: connections with less are left out
+    min_weight: float | None = None
+    #: whether all connections are drawn, however many there are
+    full: bool = False
+    #: the most connections that are drawn, the thinnest left out
+    most: int | None = None
+    #: what is drawn with all that it is connected to: as written, and its neurons
+    focus: tuple[str, tuple[int, ...]] | None = None
+    #: what is drawn: the shortest directed paths from the one to the other
+    path: tuple[str, tuple[int, ...], tuple[int, ...]] | None = None

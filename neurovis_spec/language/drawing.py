@@ -297,6 +297,12 @@ class RenderModel(Model):
     window: FormulaField | None = Field(
         None, description="How many steps around the one that is drawn the views over time show (default all)."
     )
+    collapse: ReferenceField | None = Field(
+        None, description="Groups and instances that are drawn as one glyph each, with what connects them added up."
+    )
+    min_weight: FormulaField | None = Field(
+        None, description="Connections with |w| below this are left out; 0 draws all, however many there are."
+    )
 
 
 def _size(node: Node, info: ValidationInfo) -> tuple[Node, Node]:

@@ -17,9 +17,12 @@ from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.scene import encoding, texts
 from neurovis_spec.scene.caption import caption
+from neurovis_spec.scene.collapse import gathered
 from neurovis_spec.scene.fading import seconds_of
 from neurovis_spec.scene.gains import Gains
+from neurovis_spec.scene.gathered_layout import laid_out
 from neurovis_spec.scene.geometry import FloatArray
+from neurovis_spec.scene.glyphs import marks_of
 from neurovis_spec.scene.lesions import FAINT
 from neurovis_spec.scene.model import Disc, Group, Scene, Shape, Spline, ended
 from neurovis_spec.scene.plan import Plan, plan
@@ -45,23 +48,31 @@ class Looks:
 
 def encode(network: Network, layout: Layout, snapshot: Snapshot, gains: Gains, settings: RenderSettings) -> Scene:
     """The picture of one step. Raises KeyError for an unknown theme or a neuron without a position."""
-    planned = plan(network, layout, gains, settings)
-    seen = looks(network, snapshot, gains, planned.frame.widest)
-    words = tooltips(network, gains, snapshot.activity[None], snapshot.weights[None])
+    drawn = gathered(network, settings.collapse)
+    step = drawn.snapshot(snapshot)
+    planned = plan(drawn, laid_out(drawn, layout), gains, settings, np.abs(step.weights))
+    seen = looks(drawn.network, step, gains, planned.frame.widest, drawn.signals(snapshot))
+    words = tooltips(drawn.network, gains, step.activity[None], step.weights[None])
     said = caption(network, snapshot.step, snapshot.activity)
     return paint(planned, seen, seen.glows > 0, said, words, snapshot.step)
 
 
-def looks(network: Network, snapshot: Snapshot, gains: Gains, widest: float) -> Looks:
-    """What a step looks like, with lines of at most this width."""
+def looks(
+    network: Network, snapshot: Snapshot, gains: Gains, widest: float, signals: FloatArray | None = None
+) -> Looks:
+    """What a step looks like, with lines of at most this width; ``signals`` (m,) are what leaves the source of each
+    connection, where that is not its activity times the weight."""
     connections = network.connections
     widths = encoding.line_width(snapshot.weights, gains.thickness, widest)
     changes = encoding.glow(snapshot.weights, snapshot.previous_weights, gains.change)
     seen = snapshot.activity if snapshot.seen is None else snapshot.seen
-    sent = seen[connections.sources]
+    if signals is None:
+        lines = encoding.connection_colour(seen[connections.sources], snapshot.weights, gains.signal)
+    else:
+        lines = encoding.connection_colour(signals, np.ones_like(signals), gains.signal)
     return Looks(
         discs=encoding.neuron_colour(seen, gains.activity, gains.centre),
-        lines=encoding.connection_colour(sent, snapshot.weights, gains.signal),
+        lines=lines,
         widths=widths,
         glows=encoding.glow_width(widths, changes),
         bars=snapshot.weights < 0,
@@ -86,6 +97,7 @@ def paint(
         density=planned.frame.density,
         theme=planned.theme,
         title=f"{planned.title}, {words}",
+        notes=planned.notes,
         groups=(
             *planned.back,
             *_fainter(_connections(planned, seen, glowing, titles[1]), lesions_by_id(planned), step),
@@ -120,12 +132,16 @@ def _neurons(planned: Plan, seen: Looks, titles: list[str]) -> list[Group]:
     fills = colours(theme, seen.discs)
     groups = []
     for index, name in enumerate(planned.network.neurons.names):
-        disc = Disc(planned.centres[index], planned.radius, fills[index], theme.ring, planned.ring)
-        label = planned.labels[index]
+        disc = Disc(planned.centres[index], planned.radii[index], fills[index], theme.ring, planned.rings[index])
+        label, data = planned.labels[index], {"neuron": name}
         shapes: tuple[Shape, ...] = (disc,)
+        if index in planned.sizes:
+            data["size"] = str(planned.sizes[index])
+            shapes = (disc, *marks_of(planned, index, readable(theme, fills[index])))
         if label is not None:
-            shapes = (disc, label.shape(readable(theme, fills[index]) if label.on_disc else theme.ink, theme.box_fill))
-        groups.append(Group(shapes, f"n{index}", {"neuron": name}, titles[index]))
+            ink = readable(theme, fills[index]) if label.on_disc else theme.ink
+            shapes = (*shapes, label.shape(ink, theme.box_fill))
+        groups.append(Group(shapes, f"n{index}", data, titles[index]))
     return groups
 
 
@@ -134,6 +150,8 @@ def _connections(planned: Plan, seen: Looks, glowing: npt.NDArray[np.bool_], tit
     widths, glows = seen.widths.tolist(), seen.glows.tolist()
     bars = (seen.bars & (planned.theme.ends == "signs")).tolist()
     attributes = data_attributes(planned.network)
+    for index, count in planned.counts.items():
+        attributes[index]["size"] = str(count)
     groups = []
     for index in planned.order:
         line, width = planned.lines[index], widths[index]

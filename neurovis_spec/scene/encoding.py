@@ -58,6 +58,12 @@ def line_width(weight: FloatArray, gain: Gain, widest: float) -> FloatArray:
     return result
 
 
+def clamped(widths: FloatArray) -> FloatArray:
+    """Widths of lines as Eq. 4 gives them, none thinner than ``THINNEST``; what is no finite number is as thin."""
+    result: FloatArray = np.where(np.isfinite(widths), np.maximum(widths, THINNEST), THINNEST)
+    return result
+
+
 def glow(weight: FloatArray, previous: FloatArray | None, gain: Gain) -> FloatArray:
     """Eq. 5: LI_ij[t] = |γ_LI · (w_ij[t] − w_ij[t−1])|, none where there is no step before."""
     if previous is None:

@@ -17,8 +17,10 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.scene.caption import caption
+from neurovis_spec.scene.collapse import gathered
 from neurovis_spec.scene.encode import CAPTION, Looks, lesions_by_id, looks, paint, tooltips
 from neurovis_spec.scene.gains import Gains
+from neurovis_spec.scene.gathered_layout import laid_out
 from neurovis_spec.scene.lesions import FAINT
 from neurovis_spec.scene.model import (
     Arrowhead,
@@ -50,22 +52,28 @@ def film(
     fps: float,
     narrowest: float = 0.0,
 ) -> Film:
-    """One frame a snapshot, ``fps`` frames a second, without a stated size at least ``narrowest`` wide (user units).
+    """One frame a snapshot, ``fps`` frames a second, without a stated size at least ``narrowest`` wide (page units).
     Raises ValueError without a snapshot."""
-    planned = plan(network, layout, gains, settings, narrowest)
-    frames, neurons, connections = len(snapshots), len(network.neurons), len(network.connections)
+    drawn, whole = gathered(network, settings.collapse), network
+    network, frames = drawn.network, len(snapshots)
+    neurons, connections = len(network.neurons), len(network.connections)
     if not frames:
         raise ValueError("a film has at least one frame")
+    peaks = np.zeros(connections)
+    for snapshot in snapshots if len(whole.changing) else list(snapshots)[:1]:
+        peaks = np.fmax(peaks, np.abs(drawn.snapshot(snapshot).weights))
+    planned = plan(drawn, laid_out(drawn, layout), gains, settings, peaks, narrowest)
     fill_values, line_values = np.empty((frames, neurons)), np.empty((frames, connections))
     widths, glows = np.empty((2, frames, connections))
     bars = np.empty((frames, connections), np.bool_)
     captions, steps, low, high = list[str](), list[int](), None, None
-    for frame, snapshot in enumerate(snapshots):
-        seen = looks(network, snapshot, gains, planned.frame.widest)
+    for frame, step in enumerate(snapshots):
+        snapshot = drawn.snapshot(step)
+        seen = looks(network, snapshot, gains, planned.frame.widest, drawn.signals(step))
         fill_values[frame], line_values[frame] = seen.discs, seen.lines
         widths[frame], glows[frame], bars[frame] = seen.widths, seen.glows, seen.bars
         steps.append(snapshot.step)
-        words = caption(network, snapshot.step, snapshot.activity)
+        words = caption(whole, step.step, step.activity)
         shape = planned.caption_shape(words)
         captions.append(shape.text if shape else words)
         now = (snapshot.activity, snapshot.weights)

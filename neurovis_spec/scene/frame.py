@@ -1,8 +1,12 @@
 """The frame: how big a picture is, how layout units become user units, and these pixels.
 
+A picture is arranged in page units, in which texts have the same size everywhere, and drawn in user units, in which
+lines are as wide as Eq. 4 says. These are the same, but where discs are so small that lines would be as thick as they:
+there a page unit is several user units (``unit_for``), so that all lines get thinner together.
+
 In: the extent of what a layout holds, room for header and legend, the size that the author asks for. Out: a Frame.
-Texts and lines have the same size in user units in every picture; a picture that has room to spare has more pixels for
-each instead, so that its texts grow with its discs. Without a stated size a picture has at most 1280 × 960 pixels.
+A picture that has room to spare has more pixels for each unit, so that its texts grow with its discs. Without a stated
+size a picture has at most 1280 × 960 pixels.
 """
 
 from __future__ import annotations
@@ -14,20 +18,23 @@ import numpy as np
 
 from neurovis_spec.scene.geometry import FloatArray, Rect
 
-#: User units for one layout unit in a picture that is small enough.
+#: Page units for one layout unit in a picture that is small enough.
 UNIT = 66.0
 MOST = (1280.0, 960.0)
 MARGIN = 26.0
-#: Pixels for a user unit: without a stated size the first with which the picture is small enough. Multiples of
+#: Pixels for a page unit: without a stated size the first with which the picture is small enough. Multiples of
 #: ``_WHOLE`` units are whole pixels with each.
 DENSITIES, _WHOLE = (1.5, 1.25, 1.0), 4
+#: How many times as wide as the thickest line a disc is, and the most user units in a page unit.
+_DISCS_TO_LINES, _FINEST = 2.0, 256.0
 #: With a stated size at most this, and layout units at most so much larger than ``UNIT``.
 DENSEST, _LARGEST = 4.0, 1.4
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """``user = layout * scale + (left, top)``; the picture is ``width`` by ``height``, ``density`` pixels a unit."""
+    """``unit = layout * scale + (left, top)``; the picture is ``width`` by ``height``, ``density`` pixels a unit: page
+    units, or, after ``times``, user units."""
 
     width: float
     height: float
@@ -42,19 +49,36 @@ class Frame:
         return 2 * float(np.hypot(self.width, self.height))
 
     def map(self, points: FloatArray) -> FloatArray:
-        """Layout units (…, 2) to user units."""
+        """Layout units (…, 2) to units of the frame."""
         result: FloatArray = points * self.scale + np.array([self.left, self.top])
         return result
+
+    def times(self, units: float) -> Frame:
+        """The same picture in so many units for each of this frame's."""
+        wide, high, left, top = (units * length for length in (self.width, self.height, self.left, self.top))
+        return Frame(wide, high, units * self.scale, left, top, self.density / units)
 
 
 @dataclass(frozen=True, slots=True)
 class Wishes:
     """What stands around the layout: a header (width and height), a footer as high as ``footer(width)``, and how wide
-    the picture should be for their sake."""
+    the picture should be for their sake; and the margin on either side."""
 
     header: tuple[float, float]
     footer: Callable[[float], float]
     narrowest: float
+    margin: float = MARGIN
+
+
+def unit_for(radius: float, widths: FloatArray) -> float:
+    """User units in a page unit: as many as make the thickest line no wider than half a disc of this ``radius`` (page
+    units). ``widths`` are those of all lines, in user units; those that nothing would make narrow enough do not count.
+
+    >>> unit_for(19.8, np.array([0.6, 9.0])), unit_for(3.0, np.array([0.6, 9.0])), unit_for(3.0, np.array([9.0, 1e9]))
+    (1.0, 3.0, 3.0)
+    """
+    needed = _DISCS_TO_LINES * np.minimum(widths, 1e12) / (2 * radius)
+    return float(np.max(needed[needed <= _FINEST], initial=1.0))
 
 
 def fit(extent: Rect, wishes: Wishes, size: tuple[int, int] | None) -> Frame:
@@ -76,7 +100,7 @@ def _natural(across: float, down: float, wishes: Wishes) -> tuple[float, float, 
     scale = UNIT
     for _ in range(3):  # the footer's height depends on the width, the width on the scale, the scale on the height left
         scale = min(UNIT, _scale(across, down, wishes, (MOST[0], MOST[1]), wishes.footer(wide)))
-        natural = max(across * scale + 2 * MARGIN, wishes.header[0] + 2 * MARGIN, wishes.narrowest)
+        natural = max(across * scale + 2 * wishes.margin, wishes.header[0] + 2 * MARGIN, wishes.narrowest)
         wide = min(MOST[0], whole(natural))
     high = min(MOST[1], whole(wishes.header[1] + down * scale + wishes.footer(wide) + 2 * MARGIN))
     density = next(d for d in DENSITIES if d == 1 or (wide * d <= MOST[0] and high * d <= MOST[1]))
@@ -105,6 +129,6 @@ def _within(across: float, down: float, wishes: Wishes, size: tuple[float, float
 
 
 def _scale(across: float, down: float, wishes: Wishes, room: tuple[float, float], footer: float) -> float:
-    """The most user units for a layout unit."""
+    """The most page units for a layout unit."""
     left = room[1] - wishes.header[1] - footer - 2 * MARGIN
-    return max(1e-9, min((room[0] - 2 * MARGIN) / across, max(left, 8.0) / down))
+    return max(1e-9, min(max(room[0] - 2 * wishes.margin, 8.0) / across, max(left, 8.0) / down))

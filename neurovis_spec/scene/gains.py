@@ -98,6 +98,14 @@ def plain_gains(network: Network, activity: float, signal: float, thickness: flo
     return choose_gains(network, stated, nothing(network))
 
 
+def in_pages(gains: Gains, unit: float) -> Gains:
+    """The gains with widths in page units, of which each is so many user units."""
+    if unit == 1:
+        return gains
+    scales = tuple(replace(scale, gain=scale.gain / unit) for scale in gains.thickness_scales)
+    return replace(gains, thickness=gains.thickness / unit, thickness_scales=scales)
+
+
 def choose_gains(network: Network, settings: RenderSettings, run: Reached) -> Gains:
     """Gains that use the range of each group and entry well; those that ``settings`` states win. All that are chosen
     are finite and positive."""

@@ -72,18 +72,19 @@ def bounds(points: Iterable[FloatArray]) -> Rect | None:
     return x0, y0, x1, y1
 
 
-def leaving(routes: FloatArray, radius: float) -> FloatArray:
-    """Where routes (m, 1 + 3k, 2) leave the disc of this radius around their first point: the parameter in 0…k.
+def leaving(routes: FloatArray, radius: FloatArray | float) -> FloatArray:
+    """Where routes (m, 1 + 3k, 2) leave the disc of this radius, one or (m,), around their first point: the parameter
+    in 0…k.
 
     Half of the route where it never does. To find where routes arrive, give them reversed.
     """
     m, size, _ = routes.shape
-    k = (size - 1) // 3
+    radii, k = np.broadcast_to(radius, (m,)), (size - 1) // 3
     segments = _segments(routes)
     steps = np.arange(1, 16 * k + 1) / 16
     segment = np.minimum(np.floor(steps).astype(int), k - 1)
     dots = _at(segments[:, segment], np.broadcast_to(steps - segment, (m, len(steps))))
-    outside = np.hypot(*np.moveaxis(dots - routes[:, :1], 2, 0)) >= radius
+    outside = np.hypot(*np.moveaxis(dots - routes[:, :1], 2, 0)) >= radii[:, None]
     first = np.argmax(outside, axis=1)
     low, high = first / 16, (first + 1) / 16
     rows = np.arange(m)
@@ -91,7 +92,7 @@ def leaving(routes: FloatArray, radius: float) -> FloatArray:
         middle = (low + high) / 2
         part = np.minimum(np.floor(middle).astype(int), k - 1)
         at = _at(segments[rows, part], middle - part)
-        out = np.hypot(*(at - routes[:, 0]).T) >= radius
+        out = np.hypot(*(at - routes[:, 0]).T) >= radii
         low, high = np.where(out, low, middle), np.where(out, middle, high)
     result: FloatArray = np.where(outside.any(axis=1), high, k / 2)
     return result

@@ -1,17 +1,23 @@
 """Neuron labels: on the disc, else beside it where there is room, else shortened, else left out.
 
 In: labels, discs and what is in the way. Out: for every neuron a Label or None. Labels do not move neurons; in dense
-pictures they are left out rather than drawn over each other or over discs.
+pictures they are left out rather than drawn over each other or over discs, those of the neurons with the most
+connections last (``beside``). Both of a mirrored pair are treated alike. A larger picture shows every name that a
+smaller one shows.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
+
+import numpy as np
 
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.scene import texts
-from neurovis_spec.scene.geometry import Point, Rect
+from neurovis_spec.scene.beside import Field, Slot, Wanted, placed
+from neurovis_spec.scene.geometry import FloatArray, Point, Rect
 from neurovis_spec.scene.model import Text
 from neurovis_spec.scene.obstacles import Obstacles
 
@@ -26,16 +32,16 @@ _NUMBERED, _TINY = 7.5, 6.0
 _UNLIKE = 1.25
 #: one that is shortened may be
 _LEGIBLE = 8.0
-#: how wide, in radii, a text beside a disc may be, if there is room: it must not look like a title of those around
-_WIDEST_BESIDE = (9.0, 5.0)
-#: of a group with so many labels all stand beside their discs, or none does: some would look as if they meant something
-_MANY = 4
-#: with more labels than this to place beside discs, none is
-_MOST_BESIDE = 150
-#: a disc smaller than this has no label
+#: how long a name beside a disc may be, in sizes of its letters: it must not look like a title of those around
+_WIDEST_BESIDE = 18.0
+#: so many labels are placed beside discs at most: those of the neurons with the most connections
+_MOST_BESIDE = 400
+#: a disc smaller than this has no label on it
 _SMALLEST_DISC = 7.0
-#: one up to this size has its label almost from rim to rim
-_SMALL_DISC = 12.0
+#: and one smaller than this no label beside a number
+_SMALLEST_NUMBERED = 16.0
+#: what a text leaves free of its disc's width, as a share of the radius and at most
+_FREE, _MOST_FREE = 0.126, 2.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +54,7 @@ class Label:
     point: Point
     anchor: Literal["start", "middle", "end"]
     on_disc: bool
-    #: it lies across the line of a box
+    #: it lies across a line
     crosses: bool = False
 
     def shape(self, fill: str, halo: str) -> Text:
@@ -57,32 +63,180 @@ class Label:
         return Text(self.point, self.text, self.size, fill, self.anchor, _WEIGHT, self.subscript, self.on_disc, around)
 
 
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """What labels stand on: discs, in layout units (``places``, ``radii``) and where ``scale`` and ``shift`` put them
+    in the picture; sample points of the lines, in layout units; the extent of it all; and how far labels are to reach
+    beyond it, to either side, in page units."""
+
+    places: FloatArray
+    radii: FloatArray
+    scale: float
+    shift: Point
+    dots: FloatArray
+    extent: Rect
+    reach: float
+
+    def centre(self, index: int) -> Point:
+        """The centre of a disc in the picture."""
+        x, y = self.places[index].tolist()
+        return x * self.scale + self.shift[0], y * self.scale + self.shift[1]
+
+    def radius(self, index: int) -> float:
+        """The radius of a disc in the picture."""
+        return float(self.radii[index]) * self.scale
+
+
 def labels_of(
-    network: Network, centres: list[Point], radius: float, obstacles: Obstacles, picture: Rect
+    network: Network,
+    ground: Ground,
+    obstacles: Obstacles,
+    hidden: Sequence[bool] = (),
+    numbered: Collection[int] = (),
 ) -> list[Label | None]:
-    """A label for every neuron, or None where there is no room for any of it. ``picture``: where texts may be."""
-    level = _level(network)
+    """A label for every neuron, or None where there is no room for any of it, or it is ``hidden``. The discs of those
+    that are ``numbered`` bear a number as well."""
     neurons = network.neurons
-    if radius < _SMALLEST_DISC:
-        return [None] * len(neurons)
     parts = [_parts(label, name) for label, name in zip(neurons.labels, neurons.names, strict=True)]
-    common = _common_size(parts, radius)
-    result = [_on_disc(*both, centre, radius, common) for both, centre in zip(parts, centres, strict=True)]
-    missing = [index for index, found in enumerate(result) if found is None]
-    if len(missing) <= _MOST_BESIDE:
-        for members in _together(network, missing):
-            placed = [
-                _beside(neurons.labels[index], centres[index], radius, obstacles, picture, level) for index in members
-            ]
-            if len(members) >= _MANY and None in placed:
-                obstacles.drop_texts(len(placed) - placed.count(None))
-                continue
-            for index, label in zip(members, placed, strict=True):
-                result[index] = label
-    for index in missing:
-        if result[index] is None:
-            result[index] = _shortened(*parts[index], centres[index], radius)
+    chosen = [index for index in range(len(neurons)) if not (hidden and hidden[index])]
+    partners = {a: b for a, b in partners_of(network).items() if not (hidden and (hidden[a] or hidden[b]))}
+    smallest = float(ground.radii[chosen].min(initial=np.inf)) * ground.scale
+    common = _common_size([parts[index] for index in chosen], smallest) if smallest >= _SMALLEST_DISC else _TINY
+    result: list[Label | None] = [None] * len(neurons)
+    for index in chosen:
+        if ground.radius(index) >= (_SMALLEST_NUMBERED if index in numbered else _SMALLEST_DISC):
+            result[index] = _on_disc(*parts[index], ground.centre(index), ground.radius(index), common)
+    for one, other in partners.items():
+        if result[other] is None:
+            result[one] = None
+    fits = [
+        max(_radius_for(part), _SMALLEST_NUMBERED if index in numbered else _SMALLEST_DISC) / float(radius)
+        for index, (part, radius) in enumerate(zip(parts, ground.radii.tolist(), strict=True))
+    ]
+    for group in neurons.groups:  # what is numbered together stands alike
+        counted = [index for index in group.indices if parts[index][1]]
+        latest = max((fits[index] for index in counted), default=0.0)
+        for index in counted:
+            fits[index] = latest
+    beside = _beside(network, ground, obstacles, chosen, partners, fits)
+    for index in chosen:  # it is easier to read beside a disc than where it has to be very small
+        result[index] = beside.get(index) or result[index]
+    for index, label in beside.items():
+        if result[index] is label:
+            obstacles.add_text(_rect(label))
+    cut = Cut(neurons.labels)
+    for index in chosen:
+        if result[index] is None and index not in numbered and ground.radius(index) >= _SMALLEST_DISC:
+            result[index] = _shortened(*parts[index], ground.centre(index), ground.radius(index), cut)
+    for one, other in partners.items():
+        if result[other] is None:
+            result[one] = None
     return result
+
+
+def partners_of(network: Network) -> dict[int, int]:
+    """The mirror image of each neuron that has one."""
+    result: dict[int, int] = {}
+    for mirror in network.layout.mirrors:
+        for one, other in mirror.pairs:
+            if one != other and one not in result and other not in result:
+                result[one], result[other] = other, one
+    return result
+
+
+def rank_of(network: Network) -> list[int]:
+    """The neurons by the number of their connections, those with the most first."""
+    connections, count = network.connections, len(network.neurons)
+    ends = np.concatenate([connections.sources, connections.targets])
+    degrees = np.bincount(ends, minlength=count)
+    for one, other in partners_of(network).items():
+        degrees[one] = max(degrees[one], degrees[other])
+    order: list[int] = np.lexsort((np.arange(count), -degrees)).tolist()
+    return order
+
+
+def _size_beside(radius: float) -> float:
+    return min(_BESIDE_LARGEST, max(_BESIDE_SMALLEST, _BESIDE_SHARE * radius))
+
+
+def _beside(
+    network: Network,
+    ground: Ground,
+    obstacles: Obstacles,
+    chosen: Sequence[int],
+    partners: Mapping[int, int],
+    fits: Sequence[float],
+) -> dict[int, Label]:
+    """Labels beside discs, by neuron, as far as there is room for them at this scale or a smaller one; from the scale
+    ``fits`` on a label stands on its disc."""
+    labels, cut, among = network.neurons.labels, Cut(network.neurons.labels), set(chosen)
+    said: dict[int, str] = {}
+    wanted: list[Wanted] = []
+    for index in [index for index in rank_of(network) if index in among][:_MOST_BESIDE]:
+        said[index] = cut.shorten(labels[index], 1.0, _WIDEST_BESIDE)
+        partner = partners.get(index)
+        if partner is None or partner not in among:
+            wanted.append(Wanted((index,), (texts.width(said[index], 1.0, _WEIGHT),), fits[index]))
+        elif partner not in said:
+            said[partner] = cut.shorten(labels[partner], 1.0, _WIDEST_BESIDE)
+            both = (index, partner)
+            widths = tuple(texts.width(said[one], 1.0, _WEIGHT) for one in both)
+            wanted.append(Wanted(both, widths, max(fits[index], fits[partner])))
+    field = Field(ground.places, ground.radii, ground.dots, ground.extent, ground.reach, _level(network))
+    found = placed(wanted, field, _size_beside, ground.scale)
+    result: dict[int, Label] = {}
+    for index, slot in found.items():
+        size = _size_beside(ground.radius(index))
+        width = texts.width(said[index], size, _WEIGHT)
+        x0, y0, _, _ = slot.text(ground.radius(index), width, size)
+        x, y = ground.centre(index)
+        anchor: Literal["start", "middle", "end"] = ("end", "middle", "start")[slot.across + 1]
+        start = x + x0 + width * (1 - slot.across) / 2
+        label = Label(said[index], "", size, (start, y + y0 + Slot.RISE * size), anchor, False)
+        result[index] = replace(label, crosses=obstacles.crossed(_rect(label)))
+    return result
+
+
+def _rect(label: Label) -> Rect:
+    """What a label beside a disc covers."""
+    width, (x, y) = texts.width(label.text, label.size, _WEIGHT, label.subscript), label.point
+    left = x - {"start": 0.0, "middle": width / 2, "end": width}[label.anchor]
+    return left - 2, y - 0.8 * label.size, left + width + 2, y + 0.25 * label.size
+
+
+class Cut:
+    """Shortens names so that they can be told apart: of those that share what would be left of them, the beginning
+    goes."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._begins: dict[str, int] = {}
+        for name in set(names):
+            for end in range(1, len(name)):
+                self._begins[name[:end]] = self._begins.get(name[:end], 0) + 1
+
+    def shorten(self, name: str, size: float, room: float) -> str:
+        """The name, or as much of it as fits into ``room`` with an ellipsis; '' where nothing does.
+
+        >>> cut = Cut(["descending_1", "descending_2", "photoreceptor"])
+        >>> cut.shorten("descending_2", 10, 60), cut.shorten("photoreceptor", 10, 60)
+        ('…nding_2', 'photore…')
+        """
+        text = texts.shorten(name, size, room, _WEIGHT)
+        if text in (name, "") or self._begins.get(text[:-1], 0) < 2:
+            return text
+        return texts.shorten(name[::-1], size, room, _WEIGHT)[::-1]
+
+
+def margin_beside(network: Network, radius: float) -> float:
+    """How far labels may reach beyond the discs at the rim: 0 where all fit on discs of this radius."""
+    neurons, cut = network.neurons, Cut(network.neurons.labels)
+    if radius >= _SMALLEST_DISC and all(
+        _on_disc(*_parts(label, name), (0.0, 0.0), radius, _READABLE) is not None
+        for label, name in zip(neurons.labels, neurons.names, strict=True)
+    ):
+        return 0.0
+    said = [cut.shorten(label, 1.0, _WIDEST_BESIDE) for label in neurons.labels]
+    return max((texts.width(text, _BESIDE_SMALLEST, _WEIGHT) for text in said), default=0.0) + Slot.ASIDE + 3
 
 
 def room_beside(network: Network, radius: float) -> list[tuple[int, Point]]:
@@ -92,7 +246,7 @@ def room_beside(network: Network, radius: float) -> list[tuple[int, Point]]:
     result: list[tuple[int, Point]] = []
     for index, (label, name) in enumerate(zip(neurons.labels, neurons.names, strict=True)):
         if _on_disc(*_parts(label, name), (0.0, 0.0), radius, _READABLE) is None:
-            width = min(texts.width(label, _BESIDE_LARGEST, _WEIGHT), _WIDEST_BESIDE[-1] * radius)
+            width = min(texts.width(label, _BESIDE_LARGEST, _WEIGHT), 5 * radius)
             result.append((index, (radius + 8 + width, 0.0) if level else (0.0, radius + 17)))
     return result
 
@@ -100,16 +254,6 @@ def room_beside(network: Network, radius: float) -> list[tuple[int, Point]]:
 def _level(network: Network) -> bool:
     """Whether signals run across, so that there is more room at the ends than beneath."""
     return network.layout.direction in ("right", "left")
-
-
-def _together(network: Network, missing: list[int]) -> list[list[int]]:
-    """Those of a group together."""
-    left, result = set(missing), []
-    for group in network.neurons.groups:
-        members = [index for index in group.indices if index in left]
-        if members:
-            result.append(members)
-    return result
 
 
 def _parts(label: str, name: str) -> tuple[str, str]:
@@ -121,6 +265,17 @@ def _fits(parts: tuple[str, str], size: float, radius: float) -> bool:
     return texts.width(parts[0], size, _WEIGHT, parts[1]) <= _chord(radius, size)
 
 
+def _radius_for(parts: tuple[str, str]) -> float:
+    """The radius of the disc on which a label is easy to read."""
+    low, high = 0.0, 100.0
+    if not _fits(parts, _NUMBERED, high):
+        return np.inf
+    for _ in range(24):
+        middle = (low + high) / 2
+        low, high = (low, middle) if _fits(parts, _NUMBERED, middle) else (middle, high)
+    return high
+
+
 def _common_size(parts: list[tuple[str, str]], radius: float) -> float:
     """The size of most labels: the largest at which all that fit at a readable size do fit."""
     size = largest = min(_LARGEST, 0.76 * radius)
@@ -129,24 +284,23 @@ def _common_size(parts: list[tuple[str, str]], radius: float) -> float:
         size -= 0.5
     smallest = size
     for both in dict.fromkeys(parts):
-        least = _least(both[1], largest)
+        least = _least(both[1], radius)
         if _fits(both, least, radius):
             while smallest > least and not _fits(both, smallest, radius):
                 smallest = max(smallest - 0.5, least)
     return min(size, max(_UNLIKE * smallest, min(_SMALLEST, largest)))
 
 
-def _least(subscript: str, common: float) -> float:
-    """The smallest size on a disc, where most labels have the ``common`` one."""
-    if common < _SMALLEST:
-        return _TINY
-    return _NUMBERED if subscript else _SMALLEST
+def _least(subscript: str, radius: float) -> float:
+    """The smallest size on a disc: it grows no faster than the disc, so that what fits on one fits on a larger one."""
+    return max(_TINY, min(_NUMBERED if subscript else _SMALLEST, 0.5 * radius))
 
 
 def _on_disc(
     base: str, subscript: str, centre: Point, radius: float, common: float, least: float | None = None
 ) -> Label | None:
-    size, least = common, least or _least(subscript, common)
+    least = least or _least(subscript, radius)
+    size = max(common, least)
     while size > least and not _fits((base, subscript), size, radius):
         size = max(size - 0.5, least)
     if not _fits((base, subscript), size, radius):
@@ -157,47 +311,12 @@ def _on_disc(
 
 def _chord(radius: float, size: float) -> float:
     """How wide a text of this size may be on a disc."""
-    return float(
-        2 * (max(radius * radius - (0.4 * size) ** 2, 0.0)) ** 0.5 - (2.5 if radius > _SMALL_DISC else 0.1 * radius)
-    )
+    free = min(_FREE * radius, _MOST_FREE)
+    return float(2 * (max(radius * radius - (0.4 * size) ** 2, 0.0)) ** 0.5 - free)
 
 
-def _beside(label: str, centre: Point, radius: float, obstacles: Obstacles, picture: Rect, level: bool) -> Label | None:
-    size, (x, y) = min(_BESIDE_LARGEST, max(_BESIDE_SMALLEST, _BESIDE_SHARE * radius)), centre
-    aside, corner = radius + 5, 0.75 * radius + 3
-    places: tuple[tuple[Literal["start", "middle", "end"], float, float], ...] = (
-        ("middle", x, y + radius + 4 + 0.8 * size),
-        ("middle", x, y - radius - 6),
-        ("start", x + aside, y + 0.36 * size),
-        ("end", x - aside, y + 0.36 * size),
-        ("start", x + corner, y - corner),
-        ("end", x - corner, y - corner),
-        ("start", x + corner, y + corner + 0.72 * size),
-        ("end", x - corner, y + corner + 0.72 * size),
-    )
-    if level:
-        places = (*places[2:4], *places[:2], *places[4:])
-    across: tuple[Label, Rect] | None = None
-    for text in dict.fromkeys(texts.shorten(label, size, room * radius, _WEIGHT) for room in _WIDEST_BESIDE):
-        width = texts.width(text, size, _WEIGHT)
-        for anchor, at, baseline in places:
-            left = at - {"start": 0.0, "middle": width / 2, "end": width}[anchor]
-            rect = (left - 2, baseline - 0.8 * size, left + width + 2, baseline + 0.25 * size)
-            inside = rect[0] >= picture[0] and rect[1] >= picture[1] and rect[2] <= picture[2] and rect[3] <= picture[3]
-            hits = obstacles.hits(rect) if inside else 1
-            if hits == 0:
-                obstacles.add_text(rect)
-                return Label(text, "", size, (at, baseline), anchor, False)
-            if across is None and inside and hits == obstacles.frame_hits(rect):
-                across = Label(text, "", size, (at, baseline), anchor, False, crosses=True), rect
-    if across is None:
-        return None
-    obstacles.add_text(across[1])
-    return across[0]
-
-
-def _shortened(base: str, subscript: str, centre: Point, radius: float) -> Label | None:
-    """What fits on the disc: the beginning of a name; of a numbered one its number, if need be alone."""
+def _shortened(base: str, subscript: str, centre: Point, radius: float, cut: Cut) -> Label | None:
+    """What fits on the disc: part of a name; of a numbered one its number, if need be alone."""
     if subscript:
         for end in range(min(len(base) - 1, 3), 0, -1):
             found = _on_disc(base[:end] + "…", subscript, centre, radius, _SMALLEST, _LEGIBLE)
@@ -205,7 +324,7 @@ def _shortened(base: str, subscript: str, centre: Point, radius: float) -> Label
                 return found
         return _on_disc(subscript, "", centre, radius, min(_SMALLEST, 0.76 * radius), _TINY)
     size = min(max(_SMALLEST, min(10.0, 0.5 * radius)), 0.76 * radius)
-    text = texts.shorten(base, size, _chord(radius, size), _WEIGHT)
-    if len(text) < 2:
+    text = cut.shorten(base, size, _chord(radius, size))
+    if len(text) < 3:  # a single letter says nothing
         return None
     return Label(text, "", size, (centre[0], centre[1] + 0.36 * size), "middle", True)

@@ -45,15 +45,18 @@ def routes_of(names: Sequence[str], ends: Sequence[tuple[str, str]], layout: Lay
     return routes
 
 
-def trimmed(routes: Sequence[FloatArray], radius: float, gap: float, head: float) -> list[Line]:
-    """Lines for routes (user units) between discs of ``radius``: ``gap`` is left free, a head is ``head`` long."""
+def trimmed(routes: Sequence[FloatArray], radius: FloatArray | float, gap: float, head: float) -> list[Line]:
+    """Lines for routes between discs of ``radius``, one or (m, 2), those of the sources and of the targets: ``gap`` is
+    left free, a head is ``head`` long."""
     lines: list[Line | None] = [None] * len(routes)
+    radii = np.broadcast_to(radius, (len(routes), 2)) + gap
     for members, batch in batches(routes):
         backward = batch[:, ::-1]
         k = (batch.shape[1] - 1) // 3
-        starts = leaving(batch, radius + gap)
-        tips = k - leaving(backward, radius + gap)
-        notches = k - leaving(backward, radius + gap + Arrowhead.NOTCH * head)
+        sources, targets = radii[members].T
+        starts = leaving(batch, sources)
+        tips = k - leaving(backward, targets)
+        notches = k - leaving(backward, targets + Arrowhead.NOTCH * head)
         apart = (starts < notches) & (notches < tips) & (k == 1)  # single cubics are cut together
         cut = _cut(batch[apart], starts[apart], notches[apart], tips[apart], head) if apart.any() else []
         for index, line in zip(np.flatnonzero(apart).tolist(), cut, strict=True):

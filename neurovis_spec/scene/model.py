@@ -224,6 +224,8 @@ class Scene:
     groups: tuple[Group, ...]
     #: pixels for a user unit where the picture is shown in its own size
     density: float = 1.0
+    #: what the picture leaves out, as it says itself
+    notes: tuple[str, ...] = ()
 
     @property
     def pixels(self) -> tuple[int, int]:

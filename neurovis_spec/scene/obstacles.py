@@ -18,23 +18,20 @@ class Obstacles:
     """Collects what is drawn; ``hits`` counts what a rectangle would cover."""
 
     def __init__(
-        self, lines: Sequence[FloatArray], reaches: Sequence[float], centres: FloatArray, radius: float
+        self, lines: Sequence[FloatArray], reaches: Sequence[float], centres: FloatArray, radii: FloatArray
     ) -> None:
-        """``reaches``: how far each line (half its width and its glow) reaches beyond its sample points."""
+        """``reaches``: how far each line (half its width and its glow) reaches beyond its sample points; ``radii`` of
+        the discs."""
         self._dots = np.concatenate(lines) if lines else np.zeros((0, 2))
         self._reaches = np.repeat(np.asarray(reaches, float), [len(line) for line in lines])
         self._centres = centres
-        self._radius = radius
+        self._radii = radii
         self._texts: list[Rect] = []
         self._frames = np.zeros((0, 2))
 
     def add_text(self, rect: Rect) -> None:
         """Room that a text has taken."""
         self._texts.append(rect)
-
-    def drop_texts(self, count: int) -> None:
-        """The last so many texts are not drawn after all."""
-        del self._texts[len(self._texts) - count :]
 
     def add_line(self, dots: FloatArray, reach: float = 2.5) -> None:
         """One more line, as sample points."""
@@ -45,14 +42,18 @@ class Obstacles:
         """The line of a box, as sample points."""
         self._frames = np.concatenate([self._frames, dots])
 
+    def crossed(self, rect: Rect) -> bool:
+        """Whether a line, of a connection or of a box, runs through a rectangle."""
+        return self.line_hits(rect) > 0 or self.frame_hits(rect) > 0
+
     def frame_hits(self, rect: Rect) -> int:
         """How many sample points of boxes' lines a rectangle covers."""
         return _within(self._frames, np.full(len(self._frames), 2.5), rect)
 
     def near(self, rect: Rect) -> Obstacles:
         """Only what lies in a rectangle, and all texts, also those that will be added."""
-        reach = self._radius + 1
-        result = Obstacles([], [], self._centres[_inside(self._centres, rect, reach)], self._radius)
+        near = _inside(self._centres, rect, self._radii + 1)
+        result = Obstacles([], [], self._centres[near], self._radii[near])
         inside = _inside(self._dots, rect)
         result._dots, result._reaches = self._dots[inside], self._reaches[inside]
         result._frames = self._frames[_inside(self._frames, rect)]
@@ -69,7 +70,7 @@ class Obstacles:
         near_x = np.clip(self._centres[:, 0], x0, x1)
         near_y = np.clip(self._centres[:, 1], y0, y1)
         away = np.hypot(self._centres[:, 0] - near_x, self._centres[:, 1] - near_y)
-        return int(np.count_nonzero(away < self._radius + 1))
+        return int(np.count_nonzero(away < self._radii + 1))
 
     def text_hits(self, rect: Rect) -> int:
         """How many texts a rectangle touches."""
@@ -83,10 +84,10 @@ class Obstacles:
 
     def path_hits(self, dots: FloatArray, ends: tuple[int, ...]) -> int:
         """How much a line through these points would cross: discs other than ``ends`` weigh more than lines."""
-        others = np.delete(self._centres, list(ends), axis=0)
+        others, radii = np.delete(self._centres, list(ends), axis=0), np.delete(self._radii, list(ends))
         hits = 0
         for x, y in dots.tolist():
-            if len(others) and np.hypot(others[:, 0] - x, others[:, 1] - y).min() < self._radius + 3:
+            if (np.hypot(others[:, 0] - x, others[:, 1] - y) < radii + 3).any():
                 hits += 1000
             if len(self._dots) and np.hypot(self._dots[:, 0] - x, self._dots[:, 1] - y).min() < 4:
                 hits += 1

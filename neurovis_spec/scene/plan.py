@@ -1,38 +1,51 @@
 """The plan of a picture: all that does not change from step to step.
 
-In: a network, its layout, gains and settings. Out: a Plan: the frame, discs, lines, boxes, labels, title and legend, in
-user units. ``encode`` and ``film`` paint activities and weights on it, so every step of a network
-has the same geometry.
+In: a network, its layout, gains and settings. Out: a Plan: the frame, discs, lines, boxes, labels, title and legend.
+``encode`` and ``film`` paint activities and weights on it, so every step of a network has the same geometry. All is
+arranged in page units; the Plan is in user units (``frame``).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.layout.model import RADIUS, Layout
+from neurovis_spec.layout.naming import natural_key
 from neurovis_spec.scene import delays, encoding, legend, texts
+from neurovis_spec.scene.beside import beyond
 from neurovis_spec.scene.boxes import Box, boxes_of
+from neurovis_spec.scene.collapse import Gathered
 from neurovis_spec.scene.fading import seconds_of
-from neurovis_spec.scene.frame import MARGIN, MOST, UNIT, Frame, Wishes, fit
-from neurovis_spec.scene.gains import Gains
-from neurovis_spec.scene.geometry import FloatArray, Point, Rect, bounds, samples
-from neurovis_spec.scene.heading import HEADER, TITLE, caption_text, title_text
-from neurovis_spec.scene.labels import Label, labels_of, room_beside
+from neurovis_spec.scene.frame import MARGIN, MOST, UNIT, Frame, Wishes, fit, unit_for
+from neurovis_spec.scene.gains import Gains, in_pages
+from neurovis_spec.scene.gathered_layout import radius_of
+from neurovis_spec.scene.geometry import FloatArray, Point, Rect, batches, bounds, samples
+from neurovis_spec.scene.glyphs import raised
+from neurovis_spec.scene.heading import CAPTION, CAPTION_Y, HEADER, TITLE, caption_text, title_text
+from neurovis_spec.scene.labels import Ground, Label, labels_of, margin_beside, room_beside
 from neurovis_spec.scene.legend_entry import Entry
 from neurovis_spec.scene.lesions import Lesions, lesions_of
 from neurovis_spec.scene.lines import Line, routes_of, trimmed
 from neurovis_spec.scene.model import Arrowhead, Group, Rectangle, Spline, Text, Theme, head_half_width
 from neurovis_spec.scene.obstacles import Obstacles
+from neurovis_spec.scene.scaling import at, scaled_group, scaled_label, scaled_line, scaled_rectangle, scaled_text
+from neurovis_spec.scene.shown import shown
 from neurovis_spec.scene.teachers import Teacher, dash, dotted, label_of, teachers_of
 from neurovis_spec.scene.themes import theme_of
+from neurovis_spec.scene.tints import tints_of
 from neurovis_spec.scene.titles import Titled, outline, titles_of
 
-#: a picture is made so wide at most to have its legend in few rows, and its whole title
+#: how high a line is that says what is left out; what texts keep of the picture's edge
+_NOTE_LINE, _EDGE = 16.0, 6.0
+#: how large a neuron is that is out of focus
+_UNFOCUSED = 0.4
+#: a picture is made so wide at most to have its legend in one row, and its whole title
 _ROOM = 840.0
 #: more dotted lines than this would not be quiet
 _MOST_TEACHERS = 200
@@ -47,9 +60,14 @@ class Plan:
     theme: Theme
     title: str
     frame: Frame
-    radius: float
-    ring: float
+    #: of every neuron
+    radii: tuple[float, ...]
+    rings: tuple[float, ...]
     centres: tuple[Point, ...]
+    #: how many neurons each stands for, where it is a glyph, and how many connections each line
+    sizes: Mapping[int, int]
+    counts: Mapping[int, int]
+    #: of every connection; those that are drawn are in ``order``
     lines: tuple[Line, ...]
     order: tuple[int, ...]
     #: on connections whose signal takes several steps, by index
@@ -61,64 +79,126 @@ class Plan:
     back: tuple[Group, ...]
     front: tuple[Group, ...]
     captioned: bool
+    #: user units in a page unit
+    unit: float
+    #: what is left out, as the picture says it
+    notes: tuple[str, ...]
 
     def caption_shape(self, words: str) -> Text | None:
         """The line under the title, if there is one."""
-        return caption_text(words, self.frame.width, self.theme) if self.captioned else None
+        if not self.captioned:
+            return None
+        return scaled_text(caption_text(words, self.frame.width / self.unit, self.theme), self.unit)
 
 
-def plan(network: Network, layout: Layout, gains: Gains, settings: RenderSettings, narrowest: float = 0.0) -> Plan:
-    """Arrange everything that stays the same; without a stated size the picture is at least ``narrowest`` wide. Raises
-    KeyError for a theme that does not exist."""
+def plan(
+    drawn: Gathered,
+    layout: Layout,
+    gains: Gains,
+    settings: RenderSettings,
+    peaks: FloatArray | None = None,
+    narrowest: float = 0.0,
+) -> Plan:
+    """Arrange everything that stays the same. ``layout`` is that of what is drawn; ``peaks`` (m,) are the largest
+    magnitudes of its weights in what is drawn, by default those at first. Without a stated size the picture is at least
+    ``narrowest`` wide (page units). Raises KeyError for a theme that does not exist, RendererError for a path that is
+    none."""
+    network = drawn.network
     theme = theme_of(settings)
     positions, routes = _in_units(network, layout)
+    weights = np.abs(network.connections.weights) if peaks is None else peaks
+    widths = encoding.thickness(weights, gains.thickness)
+    seen = shown(network, drawn.asked(settings), weights, widths, _lengths(routes))
+    factors = np.array([radius_of(size) for size in drawn.sizes.tolist()]) * np.where(seen.focus, 1.0, _UNFOCUSED)
     boxes = boxes_of(network, positions, routes)
-    teachers = teachers_of(network)[:_MOST_TEACHERS]
+    teachers = [one for one in teachers_of(network) if seen.focus[one.source] and seen.focus[one.target]]
+    teachers = teachers[:_MOST_TEACHERS]
     beside = room_beside(network, RADIUS * UNIT) if settings.labels else []
-    extent = _extent(positions, routes, boxes, beside)
-    around = _Around(theme, teachers, extent, narrowest)
-    title, items, frame = _frame(network, gains, settings, around, delays.label_of(network))
-    if not delays.visible(RADIUS * frame.scale):
-        title, items, frame = _frame(network, gains, settings, around, "")
+    extent = _extent(positions, factors, routes, boxes, beside)
+    smallest = float(factors[seen.focus].min(initial=RADIUS))
+    wanted = _Wanted(network, gains, settings, theme, teachers, seen.notes, extent, narrowest)
+    title, items, frame, unit, margin = _framed(wanted, smallest, encoding.clamped(widths[seen.lines]))
+    gains = in_pages(gains, unit)
     centres = frame.map(positions)
+    radii = factors * frame.scale
     radius = RADIUS * frame.scale
     gap, head = min(1.5, 0.1 * radius), _head(radius)
-    lines = trimmed([frame.map(route) for route in routes], radius, gap, head)
-    obstacles = Obstacles(_dots(lines), _reaches(network, gains, frame.widest), centres, radius)
+    ends = np.stack([radii[network.connections.sources], radii[network.connections.targets]], axis=1)
+    lines = trimmed([frame.map(route) for route in routes], ends, gap, head)
+    reaches, dots_of = _reaches(network, gains, frame.widest), _dots(lines)
+    kept = np.flatnonzero(seen.lines).tolist()
+    obstacles = Obstacles([dots_of[i] for i in kept], [reaches[i] for i in kept], centres, radii)
     dots = [(teacher, dotted(teacher, centres, radius, gap, head, obstacles)) for teacher in teachers]
     for points in _dots([line for _, line in dots]):
         obstacles.add_line(points)
     for box in boxes:
         obstacles.add_frame(outline(_mapped(box.rect, frame)))
     header = _header(title, frame, theme) if title is not None else None
-    top = HEADER if header else 4.0
+    notes = _noted(seen.notes, title is not None, frame, theme)
+    top = _top(title is not None, len(seen.notes)) or 4.0
     bottom = frame.height - legend.height(items, frame.width - 2 * MARGIN) - (MARGIN if items else 4.0)
     picture = (6.0, top, frame.width - 6.0, bottom - (8.0 if items else 0.0))
     spots: list[Point] = [(x, y) for x, y in centres.tolist()]
-    labels = labels_of(network, spots, radius, obstacles, picture) if settings.labels else [None] * len(spots)
+    sizes = {unit: size for unit, size in enumerate(drawn.sizes.tolist()) if drawn.glyph[unit]}
+    labels: list[Label | None] = [None] * len(spots)
+    if settings.labels:
+        inner = np.concatenate(samples([routes[i] for i in kept], 24)) if kept else np.zeros((0, 2))
+        reach = margin_beside(network, RADIUS * frame.scale) if margin > MARGIN else 0.0
+        ground = Ground(positions, factors, frame.scale, (frame.left, frame.top), inner, extent, reach)
+        labels = labels_of(network, ground, obstacles, (~seen.focus).tolist(), sizes)
     titles = _box_titles(boxes, frame, obstacles, theme, picture)
-    front = [*titles, *([header] if header else [])]
+    front = [*titles, *([header] if header else []), *([notes] if notes else [])]
     if items:
         front.append(legend.flow(items, frame.width - 2 * MARGIN, MARGIN, bottom))
-    ring = min(2.5, 0.12 * radius)
-    return Plan(
+    rings = np.minimum(2.5, 0.12 * radii)
+    made = Plan(
         network=network,
         gains=gains,
         theme=theme,
         title=network.title or network.name,
         frame=frame,
-        radius=radius - ring / 2,
-        ring=ring,
+        radii=tuple((radii - rings / 2).tolist()),
+        rings=tuple(rings.tolist()),
         centres=tuple(spots),
+        sizes=sizes,
+        counts={line: count for line, count in enumerate(drawn.counts.tolist()) if drawn.sheaf[line]},
         lines=tuple(lines),
-        order=_order(network),
+        order=_order(network, encoding.thickness(network.connections.weights, gains.thickness), seen.lines),
         beads=delays.beads(network, lines, radius, theme),
         lesions=lesions_of(network),
-        labels=tuple(labels),
+        labels=tuple(raised(labels, sizes)),
         back=(*_box_frames(boxes, frame, theme), *_dotted_groups(network, dots, theme)),
         front=tuple(front),
         captioned=header is not None,
+        unit=1.0,
+        notes=seen.notes,
     )
+    return made if unit == 1 else _in_user_units(made, unit)
+
+
+def _in_user_units(made: Plan, unit: float) -> Plan:
+    """A plan in page units, of which each is so many user units, in these."""
+    return replace(
+        made,
+        frame=made.frame.times(unit),
+        radii=tuple(unit * radius for radius in made.radii),
+        rings=tuple(unit * ring for ring in made.rings),
+        centres=tuple(at(centre, unit) for centre in made.centres),
+        lines=tuple(scaled_line(line, unit) for line in made.lines),
+        beads={index: scaled_rectangle(bead, unit) for index, bead in made.beads.items()},
+        labels=tuple(scaled_label(label, unit) for label in made.labels),
+        back=tuple(scaled_group(group, unit) for group in made.back),
+        front=tuple(scaled_group(group, unit) for group in made.front),
+        unit=unit,
+    )
+
+
+def _lengths(routes: Sequence[FloatArray]) -> FloatArray:
+    """How far routes go, roughly: along their control points."""
+    lengths = np.zeros(len(routes))
+    for members, control in batches(routes):
+        lengths[members] = np.hypot(*np.moveaxis(np.diff(control, axis=1), 2, 0)).sum(axis=1)
+    return lengths
 
 
 def _in_units(network: Network, layout: Layout) -> tuple[FloatArray, list[FloatArray]]:
@@ -132,7 +212,11 @@ def _in_units(network: Network, layout: Layout) -> tuple[FloatArray, list[FloatA
 
 
 def _extent(
-    positions: FloatArray, routes: Sequence[FloatArray], boxes: Sequence[Box], beside: Sequence[tuple[int, Point]]
+    positions: FloatArray,
+    radii: FloatArray,
+    routes: Sequence[FloatArray],
+    boxes: Sequence[Box],
+    beside: Sequence[tuple[int, Point]],
 ) -> Rect:
     """What the layout takes up, in its units; the neurons in ``beside`` have labels that reach so far."""
     corners = [np.array([box.rect[:2], box.rect[2:]]) for box in boxes]
@@ -140,24 +224,52 @@ def _extent(
         x, y = positions[index].tolist()
         corners.append(np.array([(x - across / UNIT, y), (x + across / UNIT, y + down / UNIT)]))
     per_segment = 12 if len(routes) < 5000 else 4
-    around = bounds([positions - RADIUS, positions + RADIUS, *corners, *samples(routes, per_segment)])
+    discs = np.maximum(radii, RADIUS)[:, None]
+    around = bounds([positions - discs, positions + discs, *corners, *samples(routes, per_segment)])
     return around if around is not None else (0.0, 0.0, 1.0, 1.0)
 
 
-@dataclass(frozen=True)
-class _Around:
-    """What the frame of a picture depends on."""
+@dataclass(frozen=True, slots=True)
+class _Wanted:
+    """What a frame goes by."""
 
+    network: Network
+    gains: Gains
+    settings: RenderSettings
     theme: Theme
     teachers: list[Teacher]
+    notes: tuple[str, ...]
     extent: Rect
     narrowest: float
 
+    def margin(self, frame: Frame | None) -> float:
+        """What is left free on either side, so that there is room for the labels of discs at the rim."""
+        if not self.settings.labels or frame is None:
+            return MARGIN
+        return _EDGE + beyond(self.extent, frame.scale, margin_beside(self.network, RADIUS * frame.scale))
 
-def _frame(
-    network: Network, gains: Gains, settings: RenderSettings, around: _Around, delayed: str
-) -> tuple[str | None, list[Entry], Frame]:
-    """The title (None: no header), the legend's entries, and the frame. In a picture too small for them both go."""
+
+def _framed(
+    wanted: _Wanted, smallest: float, widths: FloatArray
+) -> tuple[str | None, list[Entry], Frame, float, float]:
+    """The title (None: no header), the legend's entries, the frame in page units, the user units in one of these,
+    and the margin: none of the ``widths`` is wider than the discs of the ``smallest`` radius (layout units)."""
+    delayed, unit = delays.label_of(wanted.network), 1.0
+    title, items, frame = _frame(wanted, wanted.gains, delayed, MARGIN)
+    if not delays.visible(RADIUS * frame.scale):
+        delayed = ""
+        title, items, frame = _frame(wanted, wanted.gains, delayed, MARGIN)
+    margin = wanted.margin(frame)
+    for _ in range(2):
+        before, unit = unit, unit_for(smallest * frame.scale, widths)
+        if (unit, margin) != (before, MARGIN):
+            title, items, frame = _frame(wanted, in_pages(wanted.gains, unit), delayed, margin)
+    return title, items, frame, unit, margin
+
+
+def _frame(wanted: _Wanted, gains: Gains, delayed: str, margin: float) -> tuple[str | None, list[Entry], Frame]:
+    """The title, the legend's entries, and the frame. In a picture too small for them both go."""
+    network, settings, theme = wanted.network, wanted.settings, wanted.theme
     words = settings.title if isinstance(settings.title, str) else network.title or network.name
     title = words if settings.title is not False and words else None
     wide, high = MOST if settings.size is None else settings.size
@@ -166,14 +278,14 @@ def _frame(
         contents = legend.Contents(
             lines=len(network.connections) > 0,
             learns=len(network.changing) > 0,
-            teaches=label_of(around.teachers) if around.teachers else "",
+            teaches=label_of(wanted.teachers) if wanted.teachers else "",
             delays=delayed,
             lesions=bool(lesions_of(network)),
             inhibits=_inhibits(network),
             traces=_ends_of(seconds_of(network)),
         )
         for brief in (False, True):
-            items = legend.entries(contents, gains, around.theme, brief=brief)
+            items = legend.entries(contents, gains, theme, brief=brief)
             widest = max(item.width for item in items)
             if widest <= wide - 2 * MARGIN and legend.height(items, wide - 2 * MARGIN) <= 0.4 * high:
                 break
@@ -181,15 +293,35 @@ def _frame(
             items = []
     if title is not None and high < 4 * HEADER:
         title = None
-    header = (texts.width(title, TITLE, 600), HEADER) if title is not None else (0.0, 0.0)
+    noted = max((texts.width(note, CAPTION) for note in wanted.notes), default=0.0)
+    across = max(noted, texts.width(title, TITLE, 600) if title is not None else 0.0)
 
     def footer(width: float) -> float:
         return legend.height(items, width - 2 * MARGIN) + (0.9 * MARGIN if items else 0.0)
 
     fitting = min(max(legend.widest_row(items, _ROOM - 2 * MARGIN) + 2 * MARGIN, 120.0), _ROOM)
-    narrowest = max(fitting, around.narrowest)
-    wishes = Wishes((min(header[0], _ROOM - 2 * MARGIN), header[1]), footer, narrowest)
-    return title, items, fit(around.extent, wishes, settings.size)
+    narrowest = max(fitting, wanted.narrowest)
+    header = (min(across, _ROOM - 2 * MARGIN), _top(title is not None, len(wanted.notes)))
+    wishes = Wishes(header, footer, narrowest, margin)
+    return title, items, fit(wanted.extent, wishes, settings.size)
+
+
+def _top(titled: bool, notes: int) -> float:
+    """How high the header is."""
+    return (HEADER if titled else 8.0 if notes else 0.0) + _NOTE_LINE * notes
+
+
+def _noted(notes: Sequence[str], titled: bool, frame: Frame, theme: Theme) -> Group | None:
+    """What is left out, below the caption."""
+    if not notes:
+        return None
+    first = (CAPTION_Y if titled else 4.0) + _NOTE_LINE
+    room = frame.width - 2 * MARGIN
+    lines = [
+        Text((MARGIN, first + _NOTE_LINE * place), texts.shorten(note, CAPTION, room), CAPTION, theme.muted)
+        for place, note in enumerate(notes)
+    ]
+    return Group(tuple(lines), id="notes", title="\n".join(notes))
 
 
 def _ends_of(seconds: FloatArray) -> tuple[float, ...]:
@@ -208,14 +340,13 @@ def _header(title: str, frame: Frame, theme: Theme) -> Group:
     return Group((title_text(title, frame.width, theme),), id="title")
 
 
-def _order(network: Network) -> tuple[int, ...]:
-    """Lines that can glow come first, so that their glow lies beneath all others; then weak ones before strong ones, so
-    that what matters is seen in a dense picture; else as in the network."""
-    weights = np.nan_to_num(np.abs(network.connections.weights), posinf=np.inf)
-    fixed = np.ones(len(weights), bool)
+def _order(network: Network, widths: FloatArray, lines: npt.NDArray[np.bool_]) -> tuple[int, ...]:
+    """The ``lines`` that are drawn. Those that can glow come first, so that their glow lies beneath all others; then
+    thin ones before thick ones, so that what matters is seen in a dense picture; else as in the network."""
+    fixed = np.ones(len(widths), bool)
     fixed[network.changing] = False
-    order = np.lexsort((np.arange(len(weights)), np.where(fixed, weights, 0.0), fixed))
-    return tuple(order.tolist())
+    order = np.lexsort((np.arange(len(widths)), np.nan_to_num(widths, posinf=np.inf), fixed))
+    return tuple(order[lines[order]].tolist())
 
 
 def _head(radius: float) -> float:
@@ -240,17 +371,17 @@ def _dots(lines: Sequence[Line]) -> list[FloatArray]:
 
 def _box_frames(boxes: Sequence[Box], frame: Frame, theme: Theme) -> list[Group]:
     groups = []
+    tints = tints_of(theme, sorted({box.name for box in boxes if box.kind == "box"}, key=natural_key))
     for box in boxes:
         x0, y0, x1, y1 = _mapped(box.rect, frame)
         radius = min(10.0, 0.2 * frame.scale)
-        shape = Rectangle((x0, y0), x1 - x0, y1 - y0, radius, theme.box_fill, theme.box_line, 1.0)
+        fill, line = tints.get(box.name if box.kind == "box" else "", (theme.box_fill, theme.box_line))
+        shape = Rectangle((x0, y0), x1 - x0, y1 - y0, radius, fill, line, 1.0)
         groups.append(Group((shape,), id=f"{box.kind}:{box.path}", title=box.path))
     return groups
 
 
 def _box_titles(boxes: Sequence[Box], frame: Frame, obstacles: Obstacles, theme: Theme, picture: Rect) -> list[Group]:
-    if frame.scale < 12:  # the boxes are smaller than their titles
-        return []
     items = [
         Titled(box, _mapped(box.rect, frame), _room(box, boxes, frame, picture), _foreign(box, boxes, frame))
         for box in boxes

@@ -13,8 +13,9 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.record import record
 from neurovis_spec.runtime.recording import Recording
+from neurovis_spec.scene.collapse import gathered
 from neurovis_spec.scene.gains import Gains, choose_gains
-from neurovis_spec.scene.reached import nothing, reached
+from neurovis_spec.scene.reached import nothing
 
 #: Most numbers that a probe records: 32 MB of activities and weights.
 BUDGET = 4_000_000
@@ -33,9 +34,9 @@ def probe_steps(network: Network) -> int:
 def probe(network: Network, progress: Progress | None = None, made: Recording | None = None) -> Gains:
     """The gains of a network: what its spec states, else from the peaks of its default run. Where this is ``made``, as
     far as they need it or further, it is not run again."""
-    steps = probe_steps(network)
+    steps, drawn = probe_steps(network), gathered(network, network.render.collapse)
     if not steps:
-        return choose_gains(network, network.render, nothing(network))
+        return choose_gains(drawn.network, drawn.network.render, nothing(drawn.network))
     if made is None:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # the run that the author asks for warns
@@ -44,10 +45,11 @@ def probe(network: Network, progress: Progress | None = None, made: Recording | 
     recording = replace(
         made, step=made.step[rows], activity=made.activity[rows], weights=made.weights[rows], states=made.states[rows]
     )
-    return choose_gains(network, network.render, reached(network, recording))
+    return choose_gains(drawn.network, drawn.network.render, drawn.reached(recording))
 
 
 def gains_of(network: Network, recording: Recording) -> Gains:
     """The gains for a recording: what the spec states, else from all of its steps, so that each looks the same. Raises
     RecordingError for a partial one."""
-    return choose_gains(network, network.render, reached(network, recording))
+    drawn = gathered(network, network.render.collapse)
+    return choose_gains(drawn.network, drawn.network.render, drawn.reached(recording))

@@ -1,0 +1,426 @@
+"""Collapse: groups and instances as one glyph each, with what runs between them added up.
+
+In: a network and what of it is collapsed. Out: a Gathered: a network to be drawn, in which a glyph is a neuron whose
+activity is the mean of those that it holds, and all that runs from one glyph, or neuron, to another is one connection
+(a bundle): its weight is the sum of their weights, whatever their delays and rules, its signal the sum of their
+signals. What runs within a glyph is not drawn. The network is drawn, never run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.changes import Change
+from neurovis_spec.compiler.network import Connections, Group, Instance, Network, Neurons
+from neurovis_spec.compiler.program import Plasticity
+from neurovis_spec.compiler.settable import Settable
+from neurovis_spec.compiler.wishes import LayoutSettings, Mirror, RenderSettings, StatedGain
+from neurovis_spec.scene import texts
+from neurovis_spec.scene.lesions import lesions_of
+from neurovis_spec.scene.reached import Reached, reached, reached_by
+
+if TYPE_CHECKING:
+    from neurovis_spec.runtime.recording import Recording, Snapshot
+
+#: What a legend calls all that is added up: it has one gain, so that thick says more than thin.
+ADDED = "added up"
+#: So many neurons of a glyph are named where a pointer shows it.
+_NAMED = 12
+#: Rows of a recording that are added up together.
+_CHUNK = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Gathered:
+    """``network`` is drawn in place of ``whole``. ``unit`` (of each neuron of the whole) and ``bundle`` (of each of its
+    connections, −1 within a glyph) are indices into it; ``sizes`` and ``counts`` say how many of the whole each neuron
+    and each connection stands for, ``glyph`` and ``sheaf`` whether it is a glyph, or runs from or to one."""
+
+    whole: Network
+    network: Network
+    unit: IntArray
+    bundle: IntArray
+    sizes: IntArray
+    counts: IntArray
+    glyph: tuple[bool, ...]
+    sheaf: tuple[bool, ...]
+
+    @property
+    def any(self) -> bool:
+        """Whether anything is collapsed."""
+        return self.network is not self.whole
+
+    def mean(self, activity: FloatArray) -> FloatArray:
+        """Activities (…, n) of the whole as those of what is drawn."""
+        return _added(activity, self.unit, len(self.sizes)) / self.sizes
+
+    def total(self, values: FloatArray) -> FloatArray:
+        """Weights or signals (…, m) of the whole, added up."""
+        return _added(values, self.bundle, len(self.counts))
+
+    def asked(self, settings: RenderSettings) -> RenderSettings:
+        """What is asked to be seen of the whole as of what is drawn."""
+        if not self.any:
+            return settings
+        if settings.focus is not None:
+            settings = replace(settings, focus=(settings.focus[0], self._units(settings.focus[1])))
+        if settings.path is not None:
+            name, *ends = settings.path
+            settings = replace(settings, path=(name, self._units(ends[0]), self._units(ends[1])))
+        return settings
+
+    def _units(self, members: Sequence[int]) -> tuple[int, ...]:
+        return tuple(np.unique(self.unit[list(members)]).tolist())
+
+    def snapshot(self, snapshot: Snapshot) -> Snapshot:
+        """A step of the whole as one of what is drawn."""
+        if not self.any:
+            return snapshot
+        before = snapshot.previous_weights
+        return replace(
+            snapshot,
+            activity=self.mean(snapshot.activity),
+            seen=None if snapshot.seen is None else self.mean(snapshot.seen),
+            weights=self.total(snapshot.weights),
+            previous_weights=None if before is None else self.total(before),
+        )
+
+    def signals(self, snapshot: Snapshot) -> FloatArray | None:
+        """What a step of the whole sends along each line that is drawn; None where this is weight times activity."""
+        if not self.any:
+            return None
+        with np.errstate(over="ignore", invalid="ignore"):
+            seen = snapshot.activity if snapshot.seen is None else snapshot.seen
+            return self.total(seen[self.whole.connections.sources] * snapshot.weights)
+
+    def reached(self, recording: Recording) -> Reached:
+        """How far a recording of the whole takes what is drawn."""
+        if not self.any:
+            return reached(self.whole, recording)
+        changing, sources = self.network.changing, self.network.connections.sources
+        fixed = self.total(_weights(recording, slice(0, 0)))
+        parts = [self.total(_weights(recording, rows))[:, changing] for rows in _rows(recording)]
+        found = reached_by(sources, fixed[0], self.mean(recording.activity), np.concatenate(parts), changing)
+        signals = np.zeros(len(self.counts))
+        with np.errstate(over="ignore", invalid="ignore"):
+            for rows in _rows(recording):
+                sent = recording.activity[rows][:, recording.sources] * _weights(recording, rows)
+                sizes = np.abs(self.total(sent))
+                signals = np.maximum(signals, np.where(np.isfinite(sizes), sizes, 0.0).max(axis=0, initial=0.0))
+        return replace(found, signals=signals)
+
+
+def _rows(recording: Recording) -> list[slice]:
+    return [slice(first, first + _CHUNK) for first in range(0, max(len(recording.activity), 1), _CHUNK)]
+
+
+def _weights(recording: Recording, rows: slice) -> FloatArray:
+    """All weights of these rows of a recording (rows, m); without rows one, with the changing ones 0."""
+    changing = recording.weights[rows]
+    weights = np.zeros((max(len(changing), 1), len(recording.sources)))
+    fixed = np.delete(np.arange(len(recording.sources)), recording.plastic)
+    weights[:, fixed] = recording.weights_static
+    if len(changing):
+        weights[:, recording.plastic] = changing
+    return weights
+
+
+def _added(values: FloatArray, to: IntArray, count: int) -> FloatArray:
+    """Values (…, k) added up by where they go (k,), −1 for nowhere: (…, count)."""
+    kept = np.flatnonzero(to >= 0)
+    order = kept[np.argsort(to[kept], kind="stable")]
+    starts = np.searchsorted(to[order], np.arange(count))
+    if not count:
+        return np.zeros((*values.shape[:-1], 0))
+    result: FloatArray = np.add.reduceat(values[..., order], starts, axis=-1)
+    return result
+
+
+def gathered(network: Network, collapse: Sequence[tuple[str, tuple[int, ...]]]) -> Gathered:
+    """A network with these neurons, by name, as one glyph each; no neuron is in two."""
+    collapse = _by_instance(network, collapse)
+    if not collapse:
+        ones = np.ones(len(network.neurons), np.int64), np.ones(len(network.connections), np.int64)
+        here = np.arange(len(network.neurons)), np.arange(len(network.connections))
+        plain = (False,) * len(network.neurons), (False,) * len(network.connections)
+        return Gathered(network, network, *here, *ones, *plain)
+    return _Gatherer(network, collapse).gathered()
+
+
+def _by_instance(
+    network: Network, collapse: Sequence[tuple[str, tuple[int, ...]]]
+) -> list[tuple[str, tuple[int, ...]]]:
+    """With instances that are named together each by itself."""
+    result: list[tuple[str, tuple[int, ...]]] = []
+    for name, members in collapse:
+        each = [(one.path, tuple(one.indices)) for one in network.instances if one.number and one.declared == name]
+        result += each or [(name, members)]
+    return result
+
+
+class _Gatherer:
+    """Makes the network that is drawn, part by part."""
+
+    def __init__(self, network: Network, collapse: Sequence[tuple[str, tuple[int, ...]]]) -> None:
+        self.whole = network
+        owner = np.full(len(network.neurons), -1, np.int64)
+        for number, (_, members) in enumerate(collapse):
+            owner[list(members)] = number
+        seen: dict[tuple[bool, int], int] = {}
+        of = [seen.setdefault((own >= 0, own if own >= 0 else i), len(seen)) for i, own in enumerate(owner.tolist())]
+        self.unit = np.array(of, np.int64)
+        self.glyphs = {seen[True, number]: name for number, (name, _) in enumerate(collapse)}
+        self.members: list[list[int]] = [[] for _ in seen]
+        for index, unit in enumerate(of):
+            self.members[unit].append(index)
+        self.sources = self.unit[network.connections.sources].tolist()
+        self.targets = self.unit[network.connections.targets].tolist()
+        self.bundles: list[list[int]] = []
+        self.bundle = np.full(len(network.connections), -1, np.int64)
+        found: dict[tuple[int, int], int] = {}
+        for index, ends in enumerate(zip(self.sources, self.targets, strict=True)):
+            joined = ends[0] in self.glyphs or ends[1] in self.glyphs
+            if joined and ends[0] == ends[1]:
+                continue
+            place = found.setdefault(ends, len(self.bundles)) if joined else len(self.bundles)
+            if place == len(self.bundles):
+                self.bundles.append([])
+            self.bundles[place].append(index)
+            self.bundle[index] = place
+        self.sheaf = tuple(
+            self.sources[own[0]] in self.glyphs or self.targets[own[0]] in self.glyphs for own in self.bundles
+        )
+
+    def gathered(self) -> Gathered:
+        """The whole, and what is drawn in its place."""
+        whole = self.whole
+        network = replace(
+            whole,
+            neurons=self._neurons(),
+            connections=self._connections(),
+            inputs=(),
+            outputs=(),
+            noises=(),
+            blocks=(),
+            program=(),
+            plasticity=self._plasticity(),
+            layout=self._layout(),
+            render=self._render(),
+            instances=self._instances(),
+            settable=Settable(),
+            changes=self._changes(),
+            numbering=None,
+        )
+        network.__dict__["changing"] = np.unique(self._bundles_of(whole.changing))
+        ends = zip(network.connections.sources.tolist(), network.connections.targets.tolist(), strict=True)
+        names = network.neurons.names
+        network.__dict__["connection_names"] = tuple(
+            f"{names[a]} -> {names[b]}" if joined else whole.connection_names[own[0]]
+            for (a, b), own, joined in zip(ends, self.bundles, self.sheaf, strict=True)
+        )
+        sizes = np.array([len(own) for own in self.members], np.int64)
+        counts = np.array([len(own) for own in self.bundles], np.int64)
+        glyph = tuple(unit in self.glyphs for unit in range(len(self.members)))
+        return Gathered(whole, network, self.unit, self.bundle, sizes, counts, glyph, self.sheaf)
+
+    def _whole_units(self, indices: Iterable[int]) -> list[int]:
+        """The units of which these neurons are all the members, in order."""
+        chosen = set(indices)
+        units = sorted({int(self.unit[index]) for index in chosen})
+        return [unit for unit in units if chosen.issuperset(self.members[unit])]
+
+    def _bundles_of(self, indices: IntArray) -> IntArray:
+        found: IntArray = self.bundle[indices]
+        return found[found >= 0]
+
+    def _neurons(self) -> Neurons:
+        neurons = self.whole.neurons
+        group_of = [number for number, group in enumerate(neurons.groups) for _ in group.indices]
+        groups: list[Group] = []
+        taken = {neurons.names[own[0]] for unit, own in enumerate(self.members) if unit not in self.glyphs}
+        names, labels = [], []
+        for unit, own in enumerate(self.members):
+            group = neurons.groups[group_of[own[0]]]
+            if unit in self.glyphs:
+                name = self.glyphs[unit]
+                while name in taken:  # a group may be called like a neuron of another
+                    name += "*"
+                names.append(name)
+                labels.append(name)
+                groups.append(self._glyph(unit, name, [neurons.groups[group_of[index]] for index in own]))
+                continue
+            names.append(neurons.names[own[0]])
+            labels.append(neurons.labels[own[0]])
+            last = groups[-1] if groups else None
+            if last is not None and last.name == group.name and (unit - 1) not in self.glyphs:
+                groups[-1] = replace(last, count=last.count + 1)
+            else:
+                groups.append(replace(group, start=unit, count=1))
+        first = [own[0] for own in self.members]
+        return Neurons(
+            tuple(names),
+            tuple(labels),
+            tuple(groups),
+            neurons.bias[first],
+            neurons.initial[first],
+            np.full(len(first), -1, np.int64),
+            neurons.position[first],
+        )
+
+    def _glyph(self, unit: int, name: str, groups: Sequence[Group]) -> Group:
+        """The group of a glyph; it says what the glyph holds."""
+        own, neurons = self.members[unit], self.whole.neurons
+        held = [neurons.names[index] for index in own]
+        words = ", ".join(held if len(held) <= _NAMED else [*held[: _NAMED - 1], "…", held[-1]])
+        within = sum(a == b == unit for a, b in zip(self.sources, self.targets, strict=True))
+        lines = f"\n{within:,} connections within" if within else ""
+        boxes = {group.box for group in groups}
+        box = boxes.pop() if len(boxes) == 1 else None
+        if box is not None:
+            around = [index for group in neurons.groups if group.box == box for index in group.indices]
+            box = None if len(around) == len(own) else box
+        many = f"the mean of {len(own):,} neurons" if len(own) > 1 else "one neuron"
+        return Group(name, unit, 1, many, "static", "sum", {}, {}, box=box, description=words + lines)
+
+    def _connections(self) -> Connections:
+        old = self.whole.connections
+        first = np.array([own[0] for own in self.bundles], np.int64)
+        entries = list(old.entries)
+        descriptions, learns = list(old.descriptions), list(old.learns)
+        entry = old.entry[first].tolist()
+        weights = old.weights[first].tolist()
+        for place, (own, joined) in enumerate(zip(self.bundles, self.sheaf, strict=True)):
+            if not joined:
+                continue
+            values = old.weights[own]
+            weights[place] = float(values.sum())
+            up, down = float(values[values > 0].sum()), float(values[values < 0].sum())
+            parts = [f"{len(own):,} connection{'s' * (len(own) > 1)}, added up"]
+            if up and down:
+                parts.append(f"at first {texts.number(up, sign=True)} and {texts.number(down)}")
+            rules = {old.learns[old.entry[index]] for index in own} - {None}
+            entry[place] = len(entries)
+            entries.append(ADDED)
+            descriptions.append(": ".join(parts))
+            learns.append(", ".join(sorted(rule for rule in rules if rule)) or None)
+        count = len(self.bundles)
+        delays = np.array([int(old.delays[own].min()) for own in self.bundles], np.int64)
+        return Connections(
+            np.array([self.sources[own[0]] for own in self.bundles], np.int64),
+            np.array([self.targets[own[0]] for own in self.bundles], np.int64),
+            np.array(weights, float),
+            np.zeros(count),
+            delays,
+            np.full(count, -1, np.int64),
+            np.array(entry, np.int64),
+            np.full(count, -np.inf),
+            np.full(count, np.inf),
+            tuple(entries),
+            tuple(descriptions),
+            tuple(learns),
+        )
+
+    def _plasticity(self) -> tuple[Plasticity, ...]:
+        """Rules whose signals and targets are neurons that are drawn: these are taught, and have an error."""
+        count, result = len(self.whole.neurons), []
+        targets = self.whole.connections.targets
+        for one in self.whole.plasticity:
+            ends = [targets[one.members], *one.signals.values()]
+            drawn = all(
+                (index < count).all() and not any(unit in self.glyphs for unit in self.unit[index].tolist())
+                for index in ends
+            )
+            bundle = self.bundle[one.members]
+            if not drawn or (bundle < 0).any():
+                continue
+            members, first = np.unique(bundle, return_index=True)
+            signals = {name: self.unit[index[first]] for name, index in one.signals.items()}
+            parameters = {name: values[first] for name, values in one.parameters.items()}
+            result.append(Plasticity(one.rule, members, parameters, signals))
+        return tuple(result)
+
+    def _layout(self) -> LayoutSettings:
+        old = self.whole.layout
+        boxes = []
+        for name, members in old.boxes:
+            units = self._whole_units(members)
+            if len(units) > 1 or (units and units[0] not in self.glyphs):
+                boxes.append((name, tuple(units)))
+        mirrors = []
+        for mirror in old.mirrors:
+            pairs = {(int(self.unit[a]), int(self.unit[b])) for a, b in mirror.pairs}
+            apart = tuple(sorted((a, b) for a, b in pairs if a != b and len(self.members[a]) == len(self.members[b])))
+            if apart:
+                mirrors.append(Mirror(mirror.scope, apart))
+        return LayoutSettings(
+            direction=old.direction,
+            boxes=tuple(boxes),
+            neuron_spacing=old.neuron_spacing,
+            rank_spacing=old.rank_spacing,
+            mirrors=tuple(mirrors),
+        )
+
+    def _render(self) -> RenderSettings:
+        old = self.whole.render
+
+        def of_neurons(stated: tuple[StatedGain, ...]) -> tuple[StatedGain, ...]:
+            return tuple(
+                one if one.members is None else replace(one, members=tuple(self._whole_units(one.members)))
+                for one in stated
+            )
+
+        def of_lines(stated: tuple[StatedGain, ...]) -> tuple[StatedGain, ...]:
+            result = []
+            for one in stated:
+                if one.members is not None:
+                    chosen = set(one.members)
+                    places = {int(self.bundle[index]) for index in one.members} - {-1}
+                    whole = sorted(place for place in places if chosen.issuperset(self.bundles[place]))
+                    one = replace(one, members=tuple(whole))
+                result.append(one)
+            return tuple(result)
+
+        return replace(
+            old,
+            activity=of_neurons(old.activity),
+            signal=of_lines(old.signal),
+            thickness=of_lines(old.thickness),
+            change=of_lines(old.change),
+        )
+
+    def _instances(self) -> tuple[Instance, ...]:
+        """The instances that are not within a glyph, and of which no glyph holds a part alone."""
+        result = []
+        for instance in self.whole.instances:
+            units = self._whole_units(instance.indices)
+            held = sum(len(self.members[unit]) for unit in units)
+            if held == instance.count and units and not (len(units) == 1 and units[0] in self.glyphs):
+                result.append(replace(instance, start=units[0], count=len(units)))
+        return tuple(result)
+
+    def _changes(self) -> tuple[Change, ...]:
+        """Lesions: of a glyph, or a bundle, at the step at which the last of it is gone."""
+        gone = lesions_of(self.whole)
+        neurons, lines = _last(self.members, gone.neurons), _last(self.bundles, gone.connections)
+        return tuple(
+            Change(
+                at,
+                lesioned_neurons=np.array(neurons.get(at, []), np.int64),
+                lesioned_connections=np.array(lines.get(at, []), np.int64),
+            )
+            for at in sorted({*neurons, *lines})
+        )
+
+
+def _last(parts: Sequence[Sequence[int]], since: Mapping[int, int]) -> dict[int, list[int]]:
+    """By step, the parts all of whose members are gone from that step on."""
+    result: dict[int, list[int]] = {}
+    for part, own in enumerate(parts):
+        if all(index in since for index in own):
+            result.setdefault(max(since[index] for index in own), []).append(part)
+    return result

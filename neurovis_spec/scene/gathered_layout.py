@@ -1,0 +1,138 @@
+"""Where glyphs stand: at the centres of what they hold, in the layout of the whole, else laid out anew.
+
+In: a Gathered, the layout of the whole. Out: the layout of what is drawn. All keep their places to each other; where
+everything is far apart it moves closer together. Where discs would touch, all is laid out anew, mirrored pairs
+mirrored.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.layout.arrange import lay_out_problem
+from neurovis_spec.layout.geometry import snap
+from neurovis_spec.layout.model import RADIUS, Layout, LayoutProblem, Point
+from neurovis_spec.layout.problem import canonical
+from neurovis_spec.scene.collapse import Gathered
+
+#: How a glyph grows with the number of its neurons: so much for ten times as many, and at most.
+_GROWTH, _LARGEST = 0.5, 3.0
+#: More square units than this a disc are much, for so many discs at most; all is laid out anew where that takes so many
+#: times less.
+_AREA, _MOST_ANEW, _SPARSER = 8.0, 300, 1.5
+#: Between the rims of any two discs at least, and where all move closer together, in layout units.
+_LEAST, _CLOSE = 0.15, 1.2
+
+
+def radius_of(size: int) -> float:
+    """The radius of a glyph of so many neurons, in layout units.
+
+    >>> radius_of(1), round(radius_of(10), 3)
+    (0.3, 0.45)
+    """
+    return RADIUS * min(_LARGEST, 1 + _GROWTH * math.log10(max(size, 1)))
+
+
+def laid_out(drawn: Gathered, layout: Layout) -> Layout:
+    """The layout of what is drawn in place of the whole."""
+    if not drawn.any:
+        return layout
+    places = np.array([layout.positions[name] for name in drawn.whole.neurons.names], float)
+    centres = np.stack([drawn.mean(places[:, axis]) for axis in (0, 1)], axis=1)
+    radii = np.array([radius_of(size) for size in drawn.sizes.tolist()])
+    scale = _scale(centres, radii)
+    if scale is None or _sparse(scale * centres):
+        spacing = max(1.0, 2 * float(radii.max()) + _LEAST)
+        anew = lay_out_problem(_problem(drawn, {}, spacing))
+        if scale is None or _SPARSER * _across(anew) < _across(scale * centres):
+            return anew
+    names = drawn.network.neurons.names
+    points = [(snap(x), snap(y)) for x, y in (scale * centres).tolist()]
+    found = _routed(drawn, dict(zip(names, points, strict=True)), _larger(np.array(points), radii))
+    if scale != 1:
+        return found
+    kept = {
+        name: layout.routes[name]
+        for name, joined in zip(drawn.network.connection_names, drawn.sheaf, strict=True)
+        if not joined and name in layout.routes
+    }
+    ends = zip(drawn.network.connections.sources.tolist(), drawn.network.connections.targets.tolist(), strict=True)
+    for name, (a, b) in zip(drawn.network.connection_names, ends, strict=True):
+        if name in kept:  # from centre to centre, to the last digit
+            kept[name] = (found.positions[names[a]], *kept[name][1:-1], found.positions[names[b]])
+    return Layout(found.network, layout.engine, found.positions, {**found.routes, **kept})
+
+
+def _sparse(places: FloatArray) -> bool:
+    """Whether discs stand so far from each other that laying them out anew may well show more."""
+    wide, high = (places.max(axis=0) - places.min(axis=0) + 1).tolist()
+    return len(places) <= _MOST_ANEW and wide * high > _AREA * len(places)
+
+
+def _across(places: FloatArray | Layout) -> float:
+    """How far it is from corner to corner."""
+    points = np.array(list(places.positions.values())) if isinstance(places, Layout) else places
+    return float(np.hypot(*(points.max(axis=0) - points.min(axis=0) + 1)))
+
+
+def _larger(places: FloatArray, radii: FloatArray) -> float:
+    """How many times as large as a neuron discs are taken to be where lines are to keep off them."""
+    one, other = np.triu_indices(len(places), 1)
+    apart = np.hypot(*(places[one] - places[other]).T)
+    room = float(apart.min(initial=np.inf)) / (2 * RADIUS + 0.05)
+    return max(1.0, min(float(radii.max(initial=RADIUS)) / RADIUS, room))
+
+
+def _routed(drawn: Gathered, where: dict[str, Point], larger: float) -> Layout:
+    """Routes between these places, round discs so many times as large as neurons: as if all else were smaller."""
+    pins = {name: (x / larger, y / larger) for name, (x, y) in where.items()}
+    found = lay_out_problem(_problem(drawn, pins, 1.0), "manual")
+    ends = zip(drawn.network.connections.sources.tolist(), drawn.network.connections.targets.tolist(), strict=True)
+    routes, names = {}, drawn.network.neurons.names
+    for name, (a, b) in zip(drawn.network.connection_names, ends, strict=True):
+        inner = tuple((larger * x, larger * y) for x, y in found.routes[name][1:-1])
+        routes[name] = (where[names[a]], *inner, where[names[b]])
+    return Layout(found.network, found.engine, where, routes)
+
+
+def _scale(centres: FloatArray, radii: FloatArray) -> float | None:
+    """What to multiply places by so that discs are apart, and not farther than need be; None where some would touch."""
+    one, other = np.triu_indices(len(centres), 1)
+    if not len(one):
+        return 1.0
+    apart = np.hypot(*(centres[one] - centres[other]).T)
+    rims = radii[one] + radii[other]
+    if (apart < rims + _LEAST).any():
+        return None
+    return min(1.0, float(((rims + _CLOSE) / apart).max()))
+
+
+def _problem(drawn: Gathered, pins: dict[str, Point], spacing: float) -> LayoutProblem:
+    network = drawn.network
+    names, connections, settings = network.neurons.names, network.connections, network.layout
+    ends = zip(connections.sources.tolist(), connections.targets.tolist(), connections.delays.tolist(), strict=True)
+    edges = [
+        (name, names[source], names[target], delay)
+        for name, (source, target, delay) in zip(network.connection_names, ends, strict=True)
+    ]
+    boxes = [(name, [names[i] for i in members]) for name, members in settings.boxes]
+    boxes += [(group.box, [names[i] for i in group.indices]) for group in network.neurons.groups if group.box]
+    mirrors = [
+        (mirror.scope, [(names[a], names[b]) for a, b in mirror.pairs], ())
+        for mirror in settings.mirrors
+        if not mirror.scope
+    ]
+    return canonical(
+        network.name,
+        names,
+        [(group.name + f"/{group.start}", [names[i] for i in group.indices]) for group in network.neurons.groups],
+        edges,
+        pins,
+        settings.direction,
+        boxes=() if pins else boxes,
+        spacing=(spacing * settings.neuron_spacing, spacing * settings.rank_spacing),
+        mirrors=() if pins else mirrors,
+    )

@@ -1,0 +1,175 @@
+"""Shown: which neurons and connections a picture draws, and what it says of those that it leaves out.
+
+In: a network, what the author or the reader asks for, how thick lines are in what is drawn. Out: Shown. Nothing that is
+drawn looks different for it: what is left out is not drawn at all, and neurons that are out of focus are small.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.wishes import RenderSettings
+from neurovis_spec.scene import texts
+from neurovis_spec.scene.renderers import RendererError
+
+BoolArray = npt.NDArray[np.bool_]
+
+#: With more connections than this nobody can follow one: then the thinnest are left out, down to so many, or to so many
+#: a neuron where there are many of these; of more than the last a picture shows nothing.
+_MOST_LINES, _LINES_EACH, _MOST_OF_ALL = 1000, 2, 5000
+
+
+class LeftOut(UserWarning):
+    """What a picture leaves out, for who does not see it in the picture."""
+
+    prefix = "note"
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """``lines`` (m,) are drawn; neurons that are not in ``focus`` (n,) are small and have no label; ``notes`` are lines
+    of text that say so."""
+
+    lines: BoolArray
+    focus: BoolArray
+    notes: tuple[str, ...]
+
+
+def shown(
+    network: Network, settings: RenderSettings, weights: FloatArray, widths: FloatArray, lengths: FloatArray
+) -> Shown:
+    """What is drawn of a network. ``weights`` (m,) are the magnitudes of its weights, ``widths`` those of its lines
+    (Eq. 4), each the largest in what is drawn, ``lengths`` those of its routes. Raises RendererError."""
+    lines, focus = np.ones(len(network.connections), bool), np.ones(len(network.neurons), bool)
+    notes: list[str] = []
+    if settings.focus is not None:
+        name, members = settings.focus
+        lines, focus, words = _focused(network, name, np.array(members, np.int64))
+        notes.append(words)
+    if settings.path is not None:
+        name, sources, targets = settings.path
+        lines, focus, words = _paths(network, name, np.array(sources, np.int64), np.array(targets, np.int64))
+        notes.append(words)
+    if settings.min_weight is not None:
+        few = lines & (weights < settings.min_weight)
+        if few.any():
+            notes.append(_left_out(int(few.sum()), int(lines.sum()), f"with |w| < {texts.number(settings.min_weight)}"))
+        lines = lines & ~few
+    most = _most(network, settings)
+    if most is not None and int(lines.sum()) > most:
+        before = int(lines.sum())
+        lines = _thickest(lines, widths, lengths, most)
+        why = "to keep the file below 5 MB" if settings.most is not None else "to keep the rest readable"
+        notes.append(f"{_left_out(before - most, before, 'the thinnest,')} {why}; all: --full")
+    return Shown(lines, focus, tuple(notes))
+
+
+def check_path(network: Network, settings: RenderSettings) -> None:
+    """Raise RendererError where the path that is asked for is none."""
+    if settings.path is not None:
+        name, sources, targets = settings.path
+        _paths(network, name, np.array(sources, np.int64), np.array(targets, np.int64))
+
+
+def _most(network: Network, settings: RenderSettings) -> int | None:
+    """The most lines; None where all are wanted."""
+    if settings.full:
+        return None
+    if settings.most is not None or settings.min_weight is not None or settings.focus or settings.path:
+        return settings.most
+    return min(max(_MOST_LINES, _LINES_EACH * len(network.neurons)), _MOST_OF_ALL)
+
+
+def _left_out(count: int, of: int, which: str) -> str:
+    if which.endswith(","):
+        return f"{count:,} of {of:,} connections are left out, {which[:-1]},"
+    return f"{count:,} of {of:,} connections are left out: those {which}"
+
+
+def _thickest(lines: BoolArray, widths: FloatArray, lengths: FloatArray, most: int) -> BoolArray:
+    """So many of the lines, the thickest; of lines as thick as each other the shortest."""
+    order = np.lexsort((np.arange(len(widths)), lengths, -np.where(lines, np.nan_to_num(widths, nan=0.0), -1.0)))
+    result = np.zeros(len(lines), bool)
+    result[order[:most]] = True
+    return result
+
+
+def _focused(network: Network, name: str, members: IntArray) -> tuple[BoolArray, BoolArray, str]:
+    """Neurons with all that drives them or is driven by them."""
+    connections = network.connections
+    chosen = np.zeros(len(network.neurons), bool)
+    chosen[members] = True
+    into, out = chosen[connections.targets], chosen[connections.sources]
+    lines, focus = into | out, chosen.copy()
+    sources = np.unique(connections.sources[into & ~out])
+    targets = np.unique(connections.targets[out & ~into])
+    focus[sources] = focus[targets] = True
+    parts = [_count(len(sources), "source"), _count(len(targets), "target")]
+    return lines, focus, f"focus on {name}: {parts[0]}, {parts[1]}; {_rest(focus)}"
+
+
+def _paths(network: Network, name: str, sources: IntArray, targets: IntArray) -> tuple[BoolArray, BoolArray, str]:
+    """All shortest directed paths to each of ``targets`` from the nearest of ``sources``, of at least one connection.
+    Raises RendererError where none of them is reached."""
+    connections = network.connections
+    begin, end = connections.sources, connections.targets
+    far = np.full(len(network.neurons), -1, np.int64)  # connections from the nearest source
+    reached = np.zeros(len(network.neurons), bool)
+    reached[sources] = True
+    steps = 0
+    while reached.any():
+        steps += 1
+        ahead = np.unique(end[reached[begin]])
+        fresh = ahead[far[ahead] < 0]
+        far[fresh] = steps
+        reached = np.zeros(len(far), bool)
+        reached[fresh] = True
+    there = targets[far[targets] > 0]
+    if not len(there):
+        back = _paths_lead(network, targets, sources)
+        hint = "there is one the other way round" if back else "nothing leads there; --focus shows what a neuron drives"
+        raise RendererError(f"there is no path {name}", hint)
+    starts = np.zeros(len(far), bool)
+    starts[sources] = True
+    lines, focus = np.zeros(len(begin), bool), np.zeros(len(far), bool)
+    front = np.zeros(len(far), bool)
+    for step in range(int(far[there].max()), 0, -1):
+        front[there[far[there] == step]] = True
+        focus |= front
+        own = front[end] & (starts[begin] if step == 1 else (far[begin] == step - 1))
+        lines |= own
+        front = np.zeros(len(far), bool)
+        front[begin[own]] = True
+    focus |= front
+    lengths = sorted({int(step) for step in far[there].tolist()})
+    long = f"{lengths[0]}" if len(lengths) == 1 else f"{lengths[0]} to {lengths[-1]}"
+    plural = "" if lengths == [1] else "s"
+    words = f"shortest paths {name.replace('->', '→')}: {long} connection{plural} long; {_rest(focus)}"
+    return lines, focus, words
+
+
+def _paths_lead(network: Network, sources: IntArray, targets: IntArray) -> bool:
+    """Whether any of the targets is reached from the sources."""
+    begin, end = network.connections.sources, network.connections.targets
+    seen = np.zeros(len(network.neurons), bool)
+    front = np.zeros(len(seen), bool)
+    front[sources] = True
+    while front.any():
+        ahead = np.zeros(len(seen), bool)
+        ahead[end[front[begin]]] = True
+        front = ahead & ~seen
+        seen |= ahead
+    return bool(seen[targets].any())
+
+
+def _rest(focus: BoolArray) -> str:
+    return f"{_count(int((~focus).sum()), 'other neuron')} small, without connections"
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number:,} {what}{'' if number == 1 else 's'}"
