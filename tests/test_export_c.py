@@ -18,6 +18,7 @@ from test_runtime_conformance import EVENTS, SPECS
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.runtime import c_export
 from neurovis_spec.runtime.c_export import Exported
 from neurovis_spec.runtime.c_package import files, size_of_state
 from neurovis_spec.runtime.record import record
@@ -43,8 +44,12 @@ def test_an_exported_example_gives_the_recording_of_the_reference(path: Path, la
     runs_alike(nv.compile(path).network, tmp_path, language)
 
 
+@pytest.mark.parametrize("small", [0, 600], ids=["loops", "written out"])
 @pytest.mark.parametrize("language", LANGUAGES)
-def test_events_noise_and_rules_are_part_of_it(language: str, tmp_path: Path) -> None:
+def test_events_noise_and_rules_are_part_of_it(
+    language: str, small: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(c_export, "SMALL", small)
     runs_alike(nv.compile_text(EVENTS).network, tmp_path, language, 40)
 
 

@@ -250,7 +250,7 @@ class Exported:
         taken["s"] = f"const {real} *{quick} const s = state->vector;"
         taken["holding"] = f"const {real} *{quick} const holding = state->holding;"
         taken["held"] = f"const unsigned char *{quick} const held = state->held;"
-        taken["p"] = f"const {real} *const p = state->parameters;"
+        taken["parameters"] = f"const {real} *const parameters = state->parameters;"
         for kind, sizes in (
             ("cells", [(len(block.model.state), len(block.members)) for block in network.blocks]),
             ("traces", [(len(rule.rule.state), len(rule.members)) for rule in network.plasticity]),
@@ -317,16 +317,16 @@ class Exported:
         """What follows parameters that are set."""
         code = self._code()
         write_follow(code, self.network.settable)
-        taken = {name: line for name, line in self._taken().items() if name != "p"}
-        more = f", {self.real} *p, unsigned char *changed"
+        taken = {name: line for name, line in self._taken().items() if name != "parameters"}
+        more = f", {self.real} *parameters, unsigned char *changed"
         about = "What follows parameters that change: gives 0, and changes nothing, where it cannot be."
         return self._function(code, about, "int nv_follow", taken, more)
 
     def _begin_setting(self, code: Code) -> None:
         count = len(self.network.settable.slots)
-        code.line(f"{self.real} p[{count}];")
+        code.line(f"{self.real} parameters[{count}];")
         code.line(f"unsigned char changed[{count}];")
-        code.line("memcpy(p, state->parameters, sizeof p);")
+        code.line("memcpy(parameters, state->parameters, sizeof parameters);")
         code.line("memset(changed, 0, sizeof changed);")
 
     def _events(self) -> list[str]:
@@ -341,9 +341,9 @@ class Exported:
                 self._begin_setting(code)
                 values = [code.text(formula(code, one, 0, "state->parameters")) for _, one in change.parameters]
                 for (slot, _), value in zip(change.parameters, values, strict=True):
-                    code.line(f"p[{slot}] = {value};")
+                    code.line(f"parameters[{slot}] = {value};")
                     code.line(f"changed[{slot}] = 1;")
-                code.line("if (nv_follow(state, p, changed)) {")
+                code.line("if (nv_follow(state, parameters, changed)) {")
                 for slot, _ in change.parameters:
                     code.line(f"    state->chosen[{slot}] = 1;")
                 code.line("}")
@@ -376,7 +376,10 @@ class Exported:
         code, network = self._code(), self.network
         for number, entry in enumerate(network.inputs):
             if entry.expression is not None:
-                known: dict[str, Value] = {**network.parameters, **{n: f"p[{slot}]" for n, slot in entry.slots.items()}}
+                known: dict[str, Value] = {
+                    **network.parameters,
+                    **{n: f"parameters[{slot}]" for n, slot in entry.slots.items()},
+                }
                 value = code.variable("n", code.value(entry.expression, known))
                 code.line(code.loop("i", entry.size))
                 code.line(f"    v[{entry.start} + i] = {value};")
@@ -422,7 +425,7 @@ class Exported:
             drawn = f"({a}) + ({b})*{number}"
             return code.let("d", drawn if isinstance(second, float) and second >= 0 else f"({b}) < 0 ? NAN : {drawn}")
 
-        known: dict[str, Value] = {**noise.parameters, **{n: f"p[{slot}]" for n, slot in noise.slots.items()}}
+        known: dict[str, Value] = {**noise.parameters, **{n: f"parameters[{slot}]" for n, slot in noise.slots.items()}}
         known |= {"i": f"({self.real})i", "n": float(len(noise.members))}
         with code.block(code.loop("i", len(noise.members))):
             value = code.value(noise.expression, known, {}, drawn)
@@ -472,9 +475,9 @@ class Exported:
         """The function that sets a parameter."""
         code, slot = self._code(), self.network.settable.index[parameter]
         self._begin_setting(code)
-        code.line(f"p[{slot}] = value;")
+        code.line(f"parameters[{slot}] = value;")
         code.line(f"changed[{slot}] = 1;")
-        code.line("if (!nv_follow(state, p, changed))")
+        code.line("if (!nv_follow(state, parameters, changed))")
         code.line("    return 0;")
         code.line(f"state->chosen[{slot}] = 1;")
         if self.holding:

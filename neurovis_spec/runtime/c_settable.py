@@ -30,7 +30,7 @@ class ExportError(ValueError):
     """A network that C cannot be made of."""
 
 
-def formula(code: Code, dependent: Dependent, place: Place, parameters: str = "p") -> Value:
+def formula(code: Code, dependent: Dependent, place: Place, parameters: str = "parameters") -> Value:
     """The number at a place of what a formula gives. Raises ExportError."""
     match dependent:
         case ParameterFormula(tree=tree, places=places, known=known, draw=draw):
@@ -87,13 +87,15 @@ def regular(dependent: Dependent) -> bool:
 
 
 def write_follow(code: Code, settable: Settable) -> None:
-    """The body of ``follow(state, p, changed)``: ``p`` are parameters of which some are ``changed``. All that depends
+    """The body of ``follow(state, parameters, changed)``, where some of the parameters are ``changed``. All that depends
     on them follows; it gives 0, and nothing has changed, where a number would not be finite or leave its bounds."""
     for slot, entry in enumerate(settable.slots):
         reads = {slot}.union(*(bound.slots for bound in (entry.low, entry.high) if not isinstance(bound, float)))
         condition = " || ".join(f"changed[{other}]" for other in sorted(reads))
         code.line(f"if ({condition}) {{")
-        code.line(f"    if (!isfinite(p[{slot}]){_outside(code, f'p[{slot}]', entry.low, entry.high)})")
+        code.line(
+            f"    if (!isfinite(parameters[{slot}]){_outside(code, f'parameters[{slot}]', entry.low, entry.high)})"
+        )
         code.line("        return 0;")
         code.line("}")
         for place, follower in enumerate(settable.slots):
@@ -102,13 +104,13 @@ def write_follow(code: Code, settable: Settable) -> None:
             read = " || ".join(f"changed[{other}]" for other in sorted(follower.formula.slots))
             condition = f"({read})" if "||" in read else read
             with code.block(f"if (!changed[{place}] && !state->chosen[{place}] && {condition})"):
-                code.line(f"p[{place}] = {code.text(formula(code, follower.formula, 0))};")
+                code.line(f"parameters[{place}] = {code.text(formula(code, follower.formula, 0))};")
                 code.line(f"changed[{place}] = 1;")
     with code.block("for (int write = 0; write < 2; write++)"):
         for binding in settable.bindings:
             if binding.slots:
                 _write_binding(code, binding, settable)
-    code.line(f"memcpy(state->parameters, p, {len(settable.slots)}*sizeof(p[0]));")
+    code.line(f"memcpy(state->parameters, parameters, {len(settable.slots)}*sizeof(parameters[0]));")
     code.line("return 1;")
 
 
