@@ -141,6 +141,28 @@ def test_an_unknown_state_is_refused_in_words(network: nv.CompiledNetwork, refer
         network.run(2, states=[reference])
 
 
+def test_weights_are_asked_for_by_their_own_name(network: nv.CompiledNetwork) -> None:
+    with pytest.raises(KeyError, match=r"weight\('A -> B'\) gives the weight of a connection"):
+        network.run(2)["A1 -> O"]
+
+
+@pytest.mark.parametrize("name", ["(A2 -> O).eligibility", "(A1 -> O (2)).baseline", "left2.K1.b"])
+def test_a_measure_names_the_state_of_a_rule_as_that_of_a_model(network: nv.CompiledNetwork, name: str) -> None:
+    recording = network.run(30, states=[name])
+    expected = recording[name].ravel()
+    assert len(set(expected.tolist())) > 3
+    np.testing.assert_array_equal(network.measure(f"2*{name} + k", recording), 2 * expected + np.arange(30.0))
+    level = float(np.sort(np.abs(expected))[20])
+    first = int(np.flatnonzero(np.abs(expected) >= level)[0])
+    until = network.until(f"max(abs({name}), last=1) >= {level!r}")
+    assert len(network.run(30, until=until)) == first + 1
+
+
+def test_a_measure_of_several_states_is_told_to_name_one(network: nv.CompiledNetwork) -> None:
+    with pytest.raises(nv.SpecError, match=r"'\(A -> O\).baseline' is 4 states, and no single one"):
+        network.until("(A -> O).baseline > 0")
+
+
 def test_a_state_that_was_not_recorded_is_said(network: nv.CompiledNetwork) -> None:
     recording = network.run(2)
     with pytest.raises(KeyError, match=r"'left1.K.v' was not recorded"):

@@ -87,8 +87,9 @@ def regular(dependent: Dependent) -> bool:
 
 
 def write_follow(code: Code, settable: Settable) -> None:
-    """The body of ``follow(state, parameters, changed)``, where some of the parameters are ``changed``. All that depends
-    on them follows; it gives 0, and nothing has changed, where a number would not be finite or leave its bounds."""
+    """The body of ``follow(state, parameters, changed)``, where some of the parameters are ``changed``. All that
+    depends on them follows; it gives 0, and nothing has changed, where a number would not be finite or leave its
+    bounds."""
     for slot, entry in enumerate(settable.slots):
         reads = {slot}.union(*(bound.slots for bound in (entry.low, entry.high) if not isinstance(bound, float)))
         condition = " || ".join(f"changed[{other}]" for other in sorted(reads))

@@ -16,7 +16,7 @@ import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.states import StateOf, split_state
+from neurovis_spec.compiler.states import StateOf, names_of_states, split_state
 from neurovis_spec.diagnostics import Findings, Span, shown, suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.evaluate import evaluate
@@ -31,10 +31,6 @@ from neurovis_spec.runtime.windows import running
 
 #: Names that mean the same in every measure.
 _OF_TIME: Final = ("k", "t", "dt", "pi", "e")
-
-
-#: What to do about ``(K1 -> O).eligibility``, which is no name.
-_OF_RULE: Final = "name the state of a rule under 'outputs', as in 'outputs: {x: (A -> B).STATE}', and write x here"
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,8 +98,7 @@ def parsed(text: str, label: str, *, bounded: bool = False) -> Formula:
         formula = parse_measure(text)
     except ExpressionError as error:
         for one in (error, *error.others):
-            hint = _OF_RULE if one.code == "no-attributes" and "->" in text else one.hint
-            findings.error(one.code, _span(label, one.start, one.end), one.message, hint)
+            findings.error(one.code, _span(label, one.start, one.end), one.message, one.hint)
     for window in () if formula is None or not bounded else formula.windows:
         if window.last is None:
             message = f"'{window.summary}' here needs the number of steps that it is of"
@@ -147,7 +142,9 @@ def _resolve_state(
     output = next((one for one in network.outputs if one.name == name and one.states), None)
     if output is None:
         split = split_state(name)
-        if split is None or not isinstance(directory.find(name), str) or isinstance(directory.find(split.owner), str):
+        if split is None or not isinstance(directory.find(name), str):
+            return False
+        if not split.of_rule and isinstance(directory.find(split.owner), str):
             return False
         try:
             found = find_states(network, name, directory)
@@ -156,11 +153,13 @@ def _resolve_state(
             return True
     else:
         found = output.states
+    first = next(one for one in found if one.size)
     if sum(one.size for one in found) == 1:
-        states[name] = next(one for one in found if one.size)
+        states[name] = first
     else:
-        message = f"'{shown(name)}' is {sum(one.size for one in found)} states, and no single one"
-        findings.error("not-one-number", span, message, "name that of one neuron")
+        (one,) = names_of_states(network, [StateOf(first.state, first.neurons[:1], first.connections[:1])])
+        message = f"'{shown(name)}' is {sum(state.size for state in found)} states, and no single one"
+        findings.error("not-one-number", span, message, f"name one of them, as in '{one}'")
     return True
 
 

@@ -153,6 +153,11 @@ class Recording:
         if isinstance(found, str):
             states = self._names.find_states(name)
             if not isinstance(states, Found):
+                if states is None and "->" in name:
+                    raise UnknownNameError(
+                        f"'{name}' is no neuron, group or output: weight('A -> B') gives the weight of a connection, "
+                        "'(A -> B).x' is the state x of its rule"
+                    )
                 raise UnknownNameError(states or found)
             return self.states, states
         if self.recorded is None:

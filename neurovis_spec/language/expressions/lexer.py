@@ -38,6 +38,8 @@ _NUMBER = re.compile(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 #: In a measure also ``left1.K3`` and ``K1..K3``.
 _REFERENCE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(?:\.{1,2}[A-Za-z_][A-Za-z0-9_]*)*")
+#: And ``(K1 -> O).eligibility``, ``(A -> B (2)).x``: an arrow stands nowhere else.
+_OF_RULE = re.compile(r"\([^()]*->[^()]*(?:\([0-9]+\)\s*)?\)\s*\.\s*[A-Za-z_][A-Za-z0-9_]*")
 _KEYWORD = re.compile(r"=(?!=)")
 _TAIL = re.compile(r"[A-Za-z0-9_.]+")
 #: An integer with zeros in front of it: a text in YAML, an octal number in other languages.
@@ -77,8 +79,8 @@ _LOOKALIKES: Mapping[str, str] = {
 
 
 def tokens(text: str, *, references: bool = False) -> tuple[Token, ...]:
-    """The tokens of an expression. Raises ExpressionError. With ``references`` names may hold points, and ``=`` stands
-    behind the name of an argument.
+    """The tokens of an expression. Raises ExpressionError. With ``references`` names may hold points, the state of a
+    rule is a name, and ``=`` stands behind the name of an argument.
 
     >>> [token.text for token in tokens("-x^2 <= .5e-3")]
     ['-', 'x', '^', '2', '<=', '.5e-3', '']
@@ -110,8 +112,9 @@ def is_operand(token: Token | None) -> bool:
 
 
 def _referring(text: str, at: int, found: Sequence[Token]) -> Token | None:
-    """What measures have besides: a reference with points, the sign in ``last=N``."""
-    if (name := _REFERENCE.match(text, at)) and "." in name.group():
+    """What measures have besides: a reference with points, the state of a rule, the sign in ``last=N``."""
+    name = _REFERENCE.match(text, at) or _OF_RULE.match(text, at)
+    if name and "." in name.group():
         return Token("name", name.group(), at, name.end())
     if _KEYWORD.match(text, at) and len(found) > 2 and found[-1].kind == "name" and found[-2].text in ("(", ","):
         return Token("operator", "=", at, at + 1)
