@@ -53,6 +53,21 @@ def test_events_noise_and_rules_are_part_of_it(
     runs_alike(nv.compile_text(EVENTS).network, tmp_path, language, 40)
 
 
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_neuron_alone_may_have_many_connections(
+    language: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(c_export, "SMALL", 0)
+    text = """
+neurovis: 1
+name: one
+seed: 2
+neurons: {S: {count: 20, bias: "0.1*i", activation: tanh}, O: {combine: product, bias: 0.2}}
+connections: {S -> O: {weight: "uniform(0.5, 1.5)"}, O -> S: {weight: "normal(0, 1)"}}
+"""
+    runs_alike(nv.compile_text(text).network, tmp_path, language, 20)
+
+
 def test_what_is_set_follows_as_in_a_simulation(tmp_path: Path) -> None:
     network = nv.compile_text(EVENTS).network
     controller, simulation = compiled(network, tmp_path), Simulation(network, "reference")

@@ -116,8 +116,8 @@ class StepCode:
                 with code.block(code.loop("p", len(block.members))):
                     self.neuron(number, "p", arrivals, f"{sums}[p]")
         elif arrivals.lanes is not None and self.reads_drive(block):
-            with arrivals.beside(arrivals.lanes) as total:
-                self.neuron(number, "p", arrivals, total)
+            with arrivals.beside(arrivals.lanes) as (place, total):
+                self.neuron(number, place, arrivals, total)
         else:
             with code.block(code.loop("p", len(block.members))):
                 self.neuron(number, "p", arrivals)
@@ -491,8 +491,8 @@ class _Arrivals:
         return bool((rows == regular).all() and (sources == sources[0]).all())
 
     @contextmanager
-    def beside(self, lanes: _Lanes) -> Iterator[str]:
-        """The body of a loop over all neurons ``p`` of the block: what arrives at it."""
+    def beside(self, lanes: _Lanes) -> Iterator[tuple[Place, str]]:
+        """The body of a loop over all neurons of the block: the place of one, and what arrives at it."""
         code, count = self.code, len(lanes.neurons)
         start: Value = 1.0 if self.block.combine == "product" else 0.0
         begins, rests = code.tables.name(lanes.begins), code.tables.name(lanes.rests)
@@ -505,11 +505,14 @@ class _Arrivals:
             code.line(f"const {code.real} {sums}[{_LANES}] = {{{', '.join(totals)}}};")
             code.line(f"const int32_t last = {_LANES}*g + {_LANES} < {count} ? {_LANES}*g + {_LANES} : {count};")
             with code.block(code.loop("i", "last", f"{_LANES}*g")):
-                code.line(f"const int32_t p = {code.at(lanes.neurons, 'i')};")
+                place = code.at(lanes.neurons, "i")
+                if isinstance(place, str):
+                    code.line(f"const int32_t p = {place};")
+                    place = "p"
                 total = code.variable("u", f"{sums}[i - {_LANES}*g]")
                 with code.block(code.loop("e", f"{rests}[i + 1]", f"{rests}[i]")):
                     self._add(total, "e", slice(None))
-                yield code.text(self._finished(total))
+                yield place, code.text(self._finished(total))
 
     def matrix(self) -> str:
         """The sums of a full matrix; the name of their array."""
