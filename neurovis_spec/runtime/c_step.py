@@ -116,8 +116,8 @@ class StepCode:
                 with code.block(code.loop("p", len(block.members))):
                     self.neuron(number, "p", arrivals, f"{sums}[p]")
         elif arrivals.lanes is not None and self.reads_drive(block):
-            with arrivals.beside(arrivals.lanes) as (place, total):
-                self.neuron(number, place, arrivals, total)
+            with arrivals.beside(arrivals.lanes) as (where, total):
+                self.neuron(number, where, arrivals, total)
         else:
             with code.block(code.loop("p", len(block.members))):
                 self.neuron(number, "p", arrivals)
