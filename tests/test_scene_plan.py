@@ -13,11 +13,12 @@ from hand_networks import C, Case, G, loop, network, numbered, straight, straigh
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.layout.model import Layout, Point
-from neurovis_spec.scene import Arrowhead, Disc, Group, Rectangle, Scene, Spline, Text, still, texts
+from neurovis_spec.scene import Arrowhead, Disc, Group, Rectangle, Scene, Spline, Text, legend, still, texts
 from neurovis_spec.scene.encode import encode
 from neurovis_spec.scene.film import film
 from neurovis_spec.scene.gains import choose_gains, plain_gains
 from neurovis_spec.scene.geometry import Rect, overlap, sample, samples
+from neurovis_spec.scene.legend_entry import Entry
 from neurovis_spec.scene.legend_scales import nice_weights
 from neurovis_spec.scene.lines import trimmed
 
@@ -268,6 +269,15 @@ def test_the_legend_explains_what_there_is_and_nothing_else() -> None:
     assert {"Colour", "Thickness"} <= words
     assert not {"Glow", "Dotted", "Bead"} & words
     assert not all_texts(small(made, layout, RenderSettings(legend=False, labels=False, title=False)))
+
+
+def test_the_rows_of_a_legend_are_even() -> None:
+    items = [Entry((), float(width)) for width in (250, 250, 100, 100, 100, 100)]
+    made = legend.flow([replace(one, shapes=(Text((0, 0), str(one.width), 9, "#000000"),)) for one in items], 890, 0, 0)
+    rows = [shape.point[1] for shape in made.shapes if isinstance(shape, Text)]
+    assert [rows.count(row) for row in sorted(set(rows))] == [2, 4]  # not 5 and 1, which 890 would hold
+    assert legend.height(items, 890) == 2 * items[0].height + 10
+    assert legend.height(items, 1020) == items[0].height
 
 
 def test_the_legend_states_the_gains() -> None:

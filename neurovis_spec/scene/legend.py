@@ -75,7 +75,11 @@ def widest_row(items: Sequence[Entry], width: float) -> float:
 def height(items: Sequence[Entry], width: float) -> float:
     """How high the entries are when they flow into rows of this width; 0 without entries."""
     rows = _rows(items, width)
-    return sum(map(_high, rows)) + (len(rows) - 1) * _ROW_GAP if rows else 0.0
+    return _in_all(rows) + (len(rows) - 1) * _ROW_GAP if rows else 0.0
+
+
+def _in_all(rows: Sequence[Sequence[Entry]]) -> float:
+    return sum(map(_high, rows))
 
 
 def _high(row: Sequence[Entry]) -> float:
@@ -96,6 +100,21 @@ def flow(items: Sequence[Entry], width: float, left: float, top: float) -> Group
 
 
 def _rows(items: Sequence[Entry], width: float) -> list[list[Entry]]:
+    """As few rows as fit into a width, and as even as they can be without getting higher: none has a lone entry at the
+    end while the others are full."""
+    full = _filled(items, width)
+    if len(full) < 2:
+        return full
+    spans = (row_width(items[first:end]) for first in range(len(items)) for end in range(first + 1, len(items) + 1))
+    for narrower in sorted({span for span in spans if span < width}):
+        rows = _filled(items, narrower)
+        if len(rows) == len(full) and _in_all(rows) <= _in_all(full):
+            return rows
+    return full
+
+
+def _filled(items: Sequence[Entry], width: float) -> list[list[Entry]]:
+    """Rows of which each has as many entries as fit into it."""
     rows: list[list[Entry]] = []
     used = 0.0
     for entry in items:
