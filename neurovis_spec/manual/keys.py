@@ -159,9 +159,10 @@ def _list(shape: Mapping[str, object]) -> str:
 
 
 def _mapping(shape: Mapping[str, object]) -> str:
-    if shape.get("maxProperties") == 1:
-        return _SINGLE
     properties = shape.get("properties")
+    if shape.get("maxProperties") == 1:
+        plain = isinstance(properties, dict) and any("anyOf" in one for one in properties.values())
+        return "{name: …}" if plain else _SINGLE
     if isinstance(properties, dict) and "file" in properties:
         return "{file: …}"
     return "mapping"
