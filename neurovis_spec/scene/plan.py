@@ -253,7 +253,8 @@ def _framed(
     wanted: _Wanted, smallest: float, widths: FloatArray
 ) -> tuple[str | None, list[Entry], Frame, float, float]:
     """The title (None: no header), the legend's entries, the frame in page units, the user units in one of these,
-    and the margin: none of the ``widths`` is wider than the discs of the ``smallest`` radius (layout units)."""
+    and the margin: none of the ``widths`` is wider than the discs of the ``smallest`` radius (layout units). A picture
+    that is part of another has the units of that."""
     delayed, unit = delays.label_of(wanted.network), 1.0
     title, items, frame = _frame(wanted, wanted.gains, delayed, MARGIN)
     if not delays.visible(RADIUS * frame.scale):
@@ -261,7 +262,7 @@ def _framed(
         title, items, frame = _frame(wanted, wanted.gains, delayed, MARGIN)
     margin = wanted.margin(frame)
     for _ in range(2):
-        before, unit = unit, unit_for(smallest * frame.scale, widths)
+        before, unit = unit, 1.0 if wanted.narrowest else unit_for(smallest * frame.scale, widths)
         if (unit, margin) != (before, MARGIN):
             title, items, frame = _frame(wanted, in_pages(wanted.gains, unit), delayed, margin)
     return title, items, frame, unit, margin
