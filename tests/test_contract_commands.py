@@ -148,7 +148,7 @@ def test_a_command_that_is_not_there_yet_is_answered_with_those_that_are(name: s
     ("words", "kinds"),
     [
         ("run small.yaml -o x.parquet", (".csv", ".npz", ".mcap")),
-        ("render small.yaml -o x.eps", (".svg", ".png")),
+        ("render small.yaml -o x.bmp", (".webp",)),
         ("animate small.yaml -o x.avi", (".svg", ".gif", ".webp", ".mp4")),
     ],
 )

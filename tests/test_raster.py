@@ -129,7 +129,8 @@ def test_a_curve_has_no_gap_where_its_direction_turns(width: float, angle: float
 
 def test_a_corner_is_filled() -> None:
     drawn = shares(stroke([(40, 40), (80, 40), (100, 40), (120, 40), (120, 60), (120, 80), (120, 120)], 8))
-    assert drawn[37:43, 112:123].min() > 0.99
+    assert drawn[37:43, 112:123].min() > 0.96
+    assert drawn[36, 123] < 0.5  # it is round
     assert drawn[:35].max() == 0
 
 
@@ -141,7 +142,9 @@ def test_strokes_know_their_shares_at_every_narrower_width() -> None:
         wide = made.shares(np.full(len(made), width / 2, np.float32))
         kept = np.zeros(SIZE[0] * SIZE[1])
         np.maximum.at(kept, made.pixels, wide)
-        assert np.abs(kept.reshape(160, 200) - shares(stroke(line, width))).max() < 0.01
+        apart = np.abs(kept.reshape(160, 200) - shares(stroke(line, width)))
+        assert apart.max() < 0.3  # at the edge of the line, where two pieces meet
+        assert apart.sum() < 0.01 * kept.sum()
 
 
 @given(st.floats(2, 40), st.floats(60, 140), st.floats(60, 100))

@@ -151,8 +151,8 @@ def _met(starts: FloatArray, ends: FloatArray, owners: IntArray) -> Pieces:
 class Strokes:
     """Where strokes run over pixels: the curve, the pixel, how far its centre lies beside the middle of the stroke,
     counted along its column (or row, where the stroke is steep); by the piece: how fast that changes from column to
-    column, and how much longer a way across is along the column; what share of the pixel lies before the ends; and the
-    half width from which on the piece reaches so far where it overlaps another."""
+    column, and how much longer a way across is along the column; what share of the pixel lies before the ends; and how
+    far it is from the end of its piece, where it lies beyond and another piece follows."""
 
     owners: IntArray
     pixels: IntArray
@@ -160,7 +160,7 @@ class Strokes:
     slopes: Numbers
     secants: Numbers
     within: Numbers
-    least: Numbers
+    beyond: Numbers
 
     def __len__(self) -> int:
         return len(self.pixels)
@@ -174,7 +174,7 @@ class Strokes:
             self.slopes[chosen],
             self.secants[chosen],
             self.within[chosen],
-            self.least[chosen],
+            self.beyond[chosen],
         )
 
     def shares(self, halves: Numbers) -> Numbers:
@@ -184,7 +184,8 @@ class Strokes:
         both = _band(self.beside + aside, reach)
         both += _band(self.beside - aside, reach)
         both *= 0.5 * self.within
-        both *= halves >= self.least
+        # where pieces meet, each has a round end
+        np.minimum(both, np.clip(halves + np.float32(0.5) - self.beyond, 0, 1), out=both)
         return both
 
 
@@ -241,18 +242,17 @@ def strokes(pieces: Pieces, halves: FloatArray, size: Size, hidden: BoolArray | 
         column, place, pixels = column[seen], place[seen], pixels[seen]
     origin = piece[column]
     beside = ((top - middle).astype(np.float32) + np.float32(0.5))[column] + place
-    least = np.zeros(len(u))
-    for end, is_end, reach, sign in ((u0, opens, ahead, -1.0), (u1, closes, behind, 1.0)):
-        over = np.flatnonzero(~is_end[piece] & (sign * (u + 0.5 - end[piece]) > 0))
-        at = piece[over]
-        least[over] = sign * (u[over] + 0.5 - end[at]) / np.maximum(reach[at], 1e-9)
-    within = np.ones(len(pixels), np.float32)
+    within, beyond = np.ones(len(pixels), np.float32), np.zeros(len(pixels), np.float32)
     for end, is_end, sign in ((u0, opens, -1.0), (u1, closes, 1.0)):
-        near = np.flatnonzero(is_end[origin])
+        over = is_end[piece] | (sign * (u + 0.5 - end[piece]) > 0)
+        near = np.flatnonzero(over[column])
         at = origin[near]
-        # along the piece, from its end outwards
-        beyond = (sign * (u[column[near]] + 0.5 - end[at])) * secant[at] + sign * slope[at] / secant[at] * beside[near]
-        within[near] *= np.clip(0.5 - beyond, 0, 1)
+        # how far along the piece, from its end outwards
+        past = (sign * (u[column[near]] + 0.5 - end[at])) * secant[at] + sign * slope[at] / secant[at] * beside[near]
+        last = is_end[at]
+        within[near] *= np.where(last, np.clip(0.5 - past, 0, 1), 1)
+        far = np.where(last | (past <= 0), 0, np.hypot(past, beside[near] / secant[at]))
+        beyond[near] = np.maximum(beyond[near], far)
     return Strokes(
         pieces.owners[origin],
         pixels,
@@ -260,7 +260,7 @@ def strokes(pieces: Pieces, halves: FloatArray, size: Size, hidden: BoolArray | 
         slope.astype(np.float32)[origin],
         secant.astype(np.float32)[origin],
         within,
-        np.minimum(least, 1e30).astype(np.float32)[column],
+        beyond,
     )
 
 
@@ -390,7 +390,7 @@ def all_strokes(parts: Sequence[Strokes]) -> Strokes:
         np.concatenate([_NO_NUMBERS, *(part.slopes for part in parts)]),
         np.concatenate([_NO_NUMBERS, *(part.secants for part in parts)]),
         np.concatenate([_NO_NUMBERS, *(part.within for part in parts)]),
-        np.concatenate([_NO_NUMBERS, *(part.least for part in parts)]),
+        np.concatenate([_NO_NUMBERS, *(part.beyond for part in parts)]),
     )
 
 

@@ -197,8 +197,8 @@ class Band:
         found, strokes, heads, least = _gathered(moving, top, size)
         front, colours = len(moving.sheet), np.array(moving.sheet.colours, np.int64)
         rank = found.shares.copy()
-        # of several pieces of a line the one that reaches a pixel at every width, the nearest
-        rank[: len(strokes)] -= strokes.least * 1e3 + np.abs(strokes.beside) / strokes.secants
+        # of several pieces of a line the one that covers the pixel at the least width, the nearest
+        rank[: len(strokes)] -= np.maximum(strokes.beyond, np.abs(strokes.beside) / strokes.secants)
         kept, still = _sorted_out(found, least, rank, moving.coloured | moving.shaped, front)
         stack = Stack(size[0] * size[1])
         stack.add(found.only(still), colours[found.owners[still]], front)
