@@ -17,7 +17,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.geometry import FloatArray
-from neurovis_spec.scene.heat import Band, bands_of, strongest
+from neurovis_spec.scene.heat import Band, bands_of
 from neurovis_spec.scene.model import Group, Image, Polyline, Rectangle, Shape, Text, Theme
 from neurovis_spec.scene.parts import Changes, Part
 from neurovis_spec.scene.scales import Scale
@@ -148,8 +148,7 @@ class Cells:
         targets = np.array([columns[index] for index in ends.targets[self.connections].tolist()], np.int64)
         pairs, members = np.unique(sources * len(columns) + targets, return_inverse=True)
         summed = np.zeros((len(values), len(pairs)))
-        for place in range(values.shape[1]):
-            summed[:, members[place]] += values[:, place]
+        np.add.at(summed.T, members, values.T)
         summed = np.clip(summed, -1.0, 1.0)
         by_pair: dict[int, list[int]] = {}
         for place, pair in enumerate(members.tolist()):
@@ -183,19 +182,19 @@ class Cells:
     ) -> Group:
         """Cells that stay, so many that each as a shape would be too much."""
         down, across = len(self.rows.neurons), len(self.columns.neurons)
-        whole = np.zeros((down, across))
-        there = np.zeros((down, across))
-        whole.reshape(-1)[pairs] = values
-        there.reshape(-1)[pairs] = 1.0
         cuts = [
             np.unique(np.linspace(0, n, min(n, max(1, int(2 * cell * n))) + 1).astype(np.int64)) for n in (down, across)
         ]
-        for axis in (0, 1):
-            whole, there = strongest(whole, cuts[axis], axis), strongest(there, cuts[axis], axis)
-        pixels = blend(theme, whole)
-        pixels[there == 0] = np.array(channels(theme.box_fill), np.uint8)
+        row, column = (
+            np.searchsorted(some, place, "right") - 1
+            for some, place in zip(cuts, np.divmod(pairs, across), strict=True)
+        )
+        shape = len(cuts[0]) - 1, len(cuts[1]) - 1
+        pixels = np.tile(np.array(channels(theme.box_fill), np.uint8), (shape[0] * shape[1], 1))
+        order = np.argsort(np.abs(values), kind="stable")  # of several in a cell the strongest is put last
+        pixels[(row * shape[1] + column)[order]] = blend(theme, values[order])
         extent = cell * across, cell * down
-        image = Image(corner, *extent, pixels.shape[1], pixels.shape[0], pixels.tobytes())
+        image = Image(corner, *extent, shape[1], shape[0], pixels.tobytes())
         return Group((image,), f"{prefix}cells", {"cells": str(len(pairs))}, f"{len(pairs):,} connections")
 
     def _marks(self, corner: tuple[float, float], cell: float, theme: Theme) -> list[Shape]:
