@@ -21,9 +21,9 @@ from neurovis_spec.scene.geometry import FloatArray, Rect
 _FIRST, _STEP = 6.0, 1.25
 #: Between a label and the middle of a line that does not touch it, in page units.
 _LINE = 2.5
-#: How far labels may reach beyond the discs at the rim, in page units, and where more is asked for, as a share of the
-#: width.
-BEYOND, _SHARE = 20.0, 0.33
+#: How far labels may reach beyond the discs at the rim, in page units; where more is asked for, so much and a share of
+#: the width.
+BEYOND, _ALWAYS, _SHARE = 20.0, 50.0, 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +103,7 @@ class Field:
 def beyond(extent: Rect, scale: float, wanted: float) -> float:
     """How far labels may reach beyond the extent on either side, at a scale: as far as wanted, but most of the picture
     is for the network."""
-    return max(BEYOND, min(wanted, _SHARE * scale * (extent[2] - extent[0])))
+    return max(BEYOND, min(wanted, _ALWAYS + _SHARE * scale * (extent[2] - extent[0])))
 
 
 def placed(wanted: Sequence[Wanted], field: Field, size_of: Callable[[float], float], scale: float) -> dict[int, Slot]:
