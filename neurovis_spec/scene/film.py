@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
+from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -60,7 +61,7 @@ def film(
     if not frames:
         raise ValueError("a film has at least one frame")
     peaks = np.zeros(connections)
-    for snapshot in snapshots if len(whole.changing) else list(snapshots)[:1]:
+    for snapshot in snapshots if len(whole.changing) else islice(snapshots, 1):
         peaks = np.fmax(peaks, np.abs(drawn.snapshot(snapshot).weights))
     planned = plan(drawn, laid_out(drawn, layout), gains, settings, peaks, narrowest)
     fill_values, line_values = np.empty((frames, neurons)), np.empty((frames, connections))
