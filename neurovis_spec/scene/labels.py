@@ -109,9 +109,11 @@ def labels_of(
     for one, other in partners.items():
         if result[other] is None:
             result[one] = None
+    across = [texts.width(base, _NUMBERED, _WEIGHT, subscript) for base, subscript in parts]
+    needed = {width: _radius_for(width) for width in set(across)}
     fits = [
-        max(_radius_for(part), _SMALLEST_NUMBERED if index in numbered else _SMALLEST_DISC) / float(radius)
-        for index, (part, radius) in enumerate(zip(parts, ground.radii.tolist(), strict=True))
+        max(needed[width], _SMALLEST_NUMBERED if index in numbered else _SMALLEST_DISC) / float(radius)
+        for index, (width, radius) in enumerate(zip(across, ground.radii.tolist(), strict=True))
     ]
     for group in neurons.groups:  # what is numbered together stands alike
         counted = [index for index in group.indices if parts[index][1]]
@@ -265,14 +267,14 @@ def _fits(parts: tuple[str, str], size: float, radius: float) -> bool:
     return texts.width(parts[0], size, _WEIGHT, parts[1]) <= _chord(radius, size)
 
 
-def _radius_for(parts: tuple[str, str]) -> float:
-    """The radius of the disc on which a label is easy to read."""
+def _radius_for(width: float) -> float:
+    """The radius of the disc on which a label so wide is easy to read."""
     low, high = 0.0, 100.0
-    if not _fits(parts, _NUMBERED, high):
+    if _chord(high, _NUMBERED) < width:
         return np.inf
     for _ in range(24):
         middle = (low + high) / 2
-        low, high = (low, middle) if _fits(parts, _NUMBERED, middle) else (middle, high)
+        low, high = (low, middle) if width <= _chord(middle, _NUMBERED) else (middle, high)
     return high
 
 
