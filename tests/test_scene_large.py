@@ -26,7 +26,7 @@ from neurovis_spec.scene.shown import LeftOut
 
 GAINS = "render: {gain: {activity: 2, signal: 3, thickness: 5, change: 1}}"
 LARGE = "layout: {engine: large}"
-WORM = connectome(90, 1500, 4, more=f"{GAINS}\n{LARGE}")
+WORM = connectome(90, 2600, 4, more=f"{GAINS}\n{LARGE}")
 
 
 def scene_of(network: CompiledNetwork, settings: RenderSettings | None = None, step: int = 2) -> Scene:
@@ -59,33 +59,33 @@ def test_of_too_many_connections_the_thickest_are_drawn_and_the_strong_ones_last
     everything = np.sort(np.maximum(0.6, 5 * np.abs(whole.connections.weights)))
     assert drawn == everything[-1000:].tolist()
     assert scene.notes == (
-        "500 of 1,500 connections are left out, the thinnest, to keep the rest readable; all: --full",
+        "1,600 of 2,600 connections are left out, the thinnest, to keep the rest readable; all: --full",
     )
     assert any(isinstance(s, Text) and s.text == scene.notes[0] for group in scene.groups for s in group.shapes)
-    assert len(widths(scene_of(WORM, replace(whole.render, full=True)))) == 1500
+    assert len(widths(scene_of(WORM, replace(whole.render, full=True)))) == 2600
     assert not scene_of(WORM, replace(whole.render, full=True)).notes
     assert len(of_kind(scene, "neuron")) == 90
 
 
-def test_what_has_no_more_than_a_thousand_connections_is_drawn_whole() -> None:
-    assert len(widths(scene_of(connectome(60, 1000, 3, more=LARGE)))) == 1000
+def test_what_has_no_more_connections_than_can_be_read_is_drawn_whole() -> None:
+    assert len(widths(scene_of(connectome(60, 2500, 3, more=LARGE)))) == 2500
 
 
 def test_of_connections_that_are_equally_thick_the_longest_are_left_out() -> None:
     network = nv.compile_text(
-        "neurovis: 1\nname: x\nneurons: {N: {count: 40}}\nlayout: {engine: circular}\n"
+        "neurovis: 1\nname: x\nneurons: {N: {count: 60}}\nlayout: {engine: circular}\n"
         "connections: {N -> N: {pattern: all_to_all, weight: 0.1}}\n"
     )
     scene = scene_of(network)
     far = Counter(
-        min(apart, 40 - apart)
+        min(apart, 60 - apart)
         for name in of_kind(scene, "connection")
         for a, b in [re.findall(r"\d+", name)]
         for apart in [abs(int(a) - int(b))]
     )
     assert sum(far.values()) == 1000
-    assert set(far) == set(range(1, 14))  # 80 of each distance
-    assert all(far[apart] == 80 for apart in range(1, 13))
+    assert set(far) == set(range(1, 10))  # 120 of each distance
+    assert all(far[apart] == 120 for apart in range(1, 7))
 
 
 @pytest.mark.parametrize("least", [0.0, 0.2, 1.0])
@@ -94,7 +94,7 @@ def test_min_weight_leaves_out_what_is_weaker_and_nothing_else(least: float) -> 
     weights = np.abs(WORM.network.connections.weights)
     assert len(widths(scene)) == np.count_nonzero(weights >= least)
     weak = np.count_nonzero(weights < least)
-    words = f"{weak:,} of 1,500 connections are left out: those with |w| < {least:g}"
+    words = f"{weak:,} of 2,600 connections are left out: those with |w| < {least:g}"
     assert scene.notes == ((words,) if weak else ())
 
 

@@ -19,8 +19,10 @@ from neurovis_spec.scene.renderers import RendererError
 
 BoolArray = npt.NDArray[np.bool_]
 
-#: With more connections than this nobody can follow one: then the thinnest are left out, down to so many, or to so many
-#: a neuron where there are many of these; of more than the last a picture shows nothing.
+#: With more connections than this nobody can follow one, and the thinnest are left out.
+_ALL = 2500
+#: Then so many are drawn, or so many a neuron where there are many of these; of more than the last a picture shows
+#: nothing.
 _MOST_LINES, _LINES_EACH, _MOST_OF_ALL = 1000, 2, 5000
 
 
@@ -82,7 +84,11 @@ def _most(network: Network, settings: RenderSettings) -> int | None:
         return None
     if settings.most is not None or settings.min_weight is not None or settings.focus or settings.path:
         return settings.most
-    return min(max(_MOST_LINES, _LINES_EACH * len(network.neurons)), _MOST_OF_ALL)
+    return (
+        None
+        if len(network.connections) <= _ALL
+        else min(max(_MOST_LINES, _LINES_EACH * len(network.neurons)), _MOST_OF_ALL)
+    )
 
 
 def _left_out(count: int, of: int, which: str) -> str:
