@@ -1,8 +1,8 @@
 """Pictures: ours beside matplotlib with networkx, skia-python and naive Pillow, in one run.
 
 ``.venv/bin/python benchmarks/pictures.py [NEURONS…]``. Every contender draws the same step of the same network in as
-many pixels, in a process of its own: seconds of the processor and memory of a still with its PNG, and frames of a film (in
-memory, not encoded) by the clock and for each second of the processor. skia-python and Pillow draw the same shapes,
+many pixels, in a process of its own: seconds of the processor and memory of a still with its PNG, and frames of a film
+(in memory, not encoded) by the clock and for each second of the processor. skia-python and Pillow draw the same shapes,
 matplotlib with networkx its nodes and edges at the same places. The peers are no dependencies: ``pip install matplotlib
 skia-python``. What is not installed is a dash.
 """
