@@ -11,6 +11,8 @@ import subprocess
 import sys
 import time
 import warnings
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +27,7 @@ from test_raster import short_film
 
 from neurovis_spec import api, compiled, pipeline
 from neurovis_spec.cli.commands import neurovis
-from neurovis_spec.scene import still
+from neurovis_spec.scene import Film, still
 from neurovis_spec.scene.film_size import thinned
 from neurovis_spec.scene.renderers import RendererError
 
@@ -123,6 +125,69 @@ def test_a_film_that_is_killed_can_be_played(spec: Path, tmp_path: Path) -> None
     assert not (tmp_path / "film.mp4").exists()
     shutil.copy(part, tmp_path / "left.mp4")
     assert len(decoded(tmp_path / "left.mp4")) >= 2 * 20
+
+
+@pytest.mark.parametrize(("suffix", "mark"), [(".mp4", b"moof"), (".webm", b"\x1f\x43\xb6\x75")])
+def test_what_there_is_of_a_film_can_be_played_when_the_encoder_is_killed(
+    suffix: str, mark: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What it has not written by then is lost, and nothing else."""
+    started: list[subprocess.Popen[bytes]] = []
+
+    class Seen(subprocess.Popen):  # type: ignore[type-arg]
+        def __init__(self, *given: object, **more: object) -> None:
+            super().__init__(*given, **more)  # type: ignore[call-overload]
+            started.append(self)
+
+    filmed, path = replace(short_film(), fps=3.0), tmp_path / f"film{suffix}"
+
+    def parts() -> Iterator[Film]:
+        for _ in range(12):
+            yield filmed
+        end = time.monotonic() + 60
+        while path.read_bytes().count(mark) < 8:
+            assert time.monotonic() < end
+            time.sleep(0.02)
+        started[-1].kill()
+        yield filmed
+
+    assert ffmpeg() is not None  # found before the starts are counted
+    monkeypatch.setattr(subprocess, "Popen", Seen)
+    with path.open("wb") as file, pytest.raises(RendererError, match="ffmpeg failed"):
+        VideoRenderer().stream(parts(), 13 * 6, suffix, file)
+    assert 7 * 6 <= len(decoded(path)) < 13 * 6
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".webm"])
+def test_a_video_begins_at_0_and_says_how_long_it_is_and_what_its_colours_are(suffix: str, tmp_path: Path) -> None:
+    """So that players show it whole, can go to any place, and need not guess."""
+    filmed = replace(short_film(), fps=3.0)
+    with (tmp_path / f"film{suffix}").open("wb") as file:
+        VideoRenderer().stream(iter([filmed] * 3), 18, suffix, file)
+    (tmp_path / f"held{suffix}").write_bytes(VideoRenderer().animate(filmed, suffix))
+    for name, seconds in (("film", "06.00"), ("held", "02.00")):
+        said = described(tmp_path / f"{name}{suffix}")
+        assert f"Duration: 00:00:{seconds}, start: 0.000000" in said
+        assert "yuv420p(tv, bt709, " in said  # not bt709/unknown/unknown
+    assert suffix == ".mp4" or b"\x1c\x53\xbb\x6b" in (tmp_path / "film.webm").read_bytes()  # an index
+
+
+def test_ctrl_c_ends_a_film_and_leaves_nothing(spec: Path, tmp_path: Path) -> None:
+    """The signal reaches all processes of a terminal; what was there before stays."""
+    (tmp_path / "film.mp4").write_bytes(b"before")
+    command = [sys.executable, "-m", "neurovis_spec", "animate", str(spec), "-o", "film.mp4", "--steps", "100000"]
+    running = subprocess.Popen(
+        [*command, "--every", "1"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
+    )
+    part, end = tmp_path / ".film.mp4.part", time.monotonic() + 60
+    while not (part.exists() and part.read_bytes().count(b"moof") >= 3):
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    os.killpg(running.pid, signal.SIGINT)
+    _, said = running.communicate(timeout=60)
+    assert (running.returncode, said) == (130, b"\nstopped\n")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["film.mp4", "film.yaml"]
+    assert (tmp_path / "film.mp4").read_bytes() == b"before"
 
 
 def test_without_ffmpeg_a_video_is_refused_before_anything_is_run(

@@ -1,21 +1,23 @@
 """Videos: a Film as MP4 (H.264) or WebM (VP9), written while it is made.
 
 In: a Film, in parts of some frames each. Out: a file in fragments of two seconds, so that what is there can be played
-at any time, also when whoever wrote it has been killed. ffmpeg encodes, in a process of its own: that of the package
-``imageio-ffmpeg`` (extra ``video``), else the system's. Colours are stated as those of BT.709, four brightnesses to a
-colour (4:2:0), which is what everything plays.
+at any time, also when whoever wrote it has been killed. ffmpeg encodes, in a process of its own that writes the file:
+that of the package ``imageio-ffmpeg`` (extra ``video``), else the system's. Colours are stated as those of BT.709, four
+brightnesses to a colour (4:2:0), which is what everything plays.
 """
 
 from __future__ import annotations
 
 import io
+import os
 import shutil
 import subprocess
 from collections.abc import Iterator
 from contextlib import suppress
 from importlib.util import find_spec
 from itertools import chain
-from threading import Thread
+from pathlib import Path
+from tempfile import TemporaryDirectory, TemporaryFile
 from typing import BinaryIO, cast
 
 import numpy as np
@@ -27,19 +29,23 @@ from neurovis_spec.scene.renderers import RendererError
 
 #: Seconds of a fragment.
 _FRAGMENT = 2.0
+#: Colours, which are halved across and down, are kept finer than brightness would need; without frames that look ahead
+#: (B) an MP4 in fragments begins at 0, and without a WebM's lag (25 by default) as little as can be is on the way.
 _ENCODERS = {
     ".mp4": (
-        *("-c:v", "libx264", "-preset", "veryfast", "-crf", "16", "-x264-params", "log-level=error"),
+        *("-c:v", "libx264", "-preset", "veryfast", "-crf", "16", "-bf", "0"),
+        *("-x264-params", "log-level=error:chroma-qp-offset=-6"),
         *("-movflags", "frag_keyframe+empty_moov+default_base_moof", "-f", "mp4"),
     ),
     ".webm": (
-        *("-c:v", "libvpx-vp9", "-crf", "24", "-b:v", "0", "-deadline", "realtime", "-cpu-used", "6", "-row-mt", "1"),
-        *("-f", "webm"),
+        *("-c:v", "libvpx-vp9", "-crf", "16", "-b:v", "0", "-deadline", "realtime", "-cpu-used", "6", "-row-mt", "1"),
+        *("-lag-in-frames", "0", "-cluster_time_limit", str(round(1000 * _FRAGMENT)), "-f", "webm"),
     ),
 }
+#: How the colours are made of those of screens, and said to be made: no player has to guess.
 _COLOURS = (
-    *("-vf", "scale=out_color_matrix=bt709:out_range=tv,format=yuv420p", "-color_range", "tv"),
-    *("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709"),
+    "scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd+full_chroma_int,format=yuv420p,"
+    "setparams=range=tv:colorspace=bt709:color_primaries=bt709:color_trc=bt709"
 )
 _HINT = 'install ffmpeg, or the extra: pip install "neurovis-spec[video]"'
 
@@ -79,26 +85,54 @@ class VideoRenderer:
     def stream(
         self, films: Iterator[Film], frames: int, suffix: str, file: BinaryIO, progress: Progress | None = None
     ) -> None:
-        """Write a film that comes in parts to a file, as it is made. Raises RendererError where ffmpeg fails."""
-        first = next(films)
-        wide, high = (side + side % 2 for side in first.scene.pixels)
-        encoder = _Encoder(_command(suffix, (wide, high), first.fps), file)
+        """Write a film that comes in parts to a file, as it is made: to its path, since an index at the end takes a
+        file in which ffmpeg can go back. Raises RendererError where ffmpeg fails."""
+        where = getattr(file, "name", None)
+        if isinstance(where, str | os.PathLike):
+            _write(films, frames, suffix, os.fspath(where), progress)
+            return
+        with TemporaryDirectory() as folder:
+            path = Path(folder) / f"film{suffix}"
+            _write(films, frames, suffix, str(path), progress)
+            with path.open("rb") as made:
+                shutil.copyfileobj(made, file)
+
+
+def _write(films: Iterator[Film], frames: int, suffix: str, path: str, progress: Progress | None) -> None:
+    """Write a film to the file of this path."""
+    first = next(films)
+    wide, high = (side + side % 2 for side in first.scene.pixels)
+    command = _command(suffix, (wide, high), first.fps, path)
+    with TemporaryFile() as said:
+        # in a session of its own: Ctrl-C is for us
+        encoder = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=said, start_new_session=True)
+        pictures = cast(io.BufferedWriter, encoder.stdin)
         try:
-            for picture in all_frames(chain([first], films), frames, progress):
-                encoder.write(_even(picture))
-            encoder.finish()
-        finally:
-            encoder.end()
+            with suppress(BrokenPipeError):  # it has ended, and says why
+                for picture in all_frames(chain([first], films), frames, progress):
+                    pictures.write(np.ascontiguousarray(_even(picture)).data)
+                pictures.close()
+            status = encoder.wait()
+        finally:  # leave no process behind, whatever has happened
+            encoder.kill()
+            with suppress(BrokenPipeError):
+                pictures.close()
+            encoder.wait()
+        if status:
+            said.seek(0)
+            lines = said.read()[-2000:].decode("utf-8", "replace").strip().splitlines()
+            raise RendererError(f"ffmpeg failed: {lines[-1] if lines else status}", _HINT)
 
 
-def _command(suffix: str, size: tuple[int, int], fps: float) -> list[str]:
+def _command(suffix: str, size: tuple[int, int], fps: float, path: str) -> list[str]:
     program = ffmpeg()
     if program is None:
         raise RendererError(f"there is no ffmpeg, which films of the kind '{suffix}' need", _HINT)
     raw = ("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-framerate", f"{fps:.6g}")
     every = max(1, round(_FRAGMENT * fps))
-    start = (program, "-hide_banner", "-loglevel", "error", "-nostdin")
-    return [*start, *raw, "-i", "pipe:0", "-an", *_COLOURS, "-g", str(every), *_ENCODERS[suffix], "pipe:1"]
+    start = (program, "-hide_banner", "-loglevel", "error", "-nostdin", "-y")
+    made = ("-an", "-vf", _COLOURS, "-g", str(every), *_ENCODERS[suffix], "-flush_packets", "1")
+    return [*start, *raw, "-i", "pipe:0", *made, f"file:{path}"]
 
 
 def _even(picture: Pixels) -> Pixels:
@@ -107,64 +141,3 @@ def _even(picture: Pixels) -> Pixels:
     if high % 2 or wide % 2:
         picture = np.pad(picture, ((0, high % 2), (0, wide % 2), (0, 0)), mode="edge")
     return picture
-
-
-class _Encoder:
-    """An ffmpeg that is given pictures, and whose output goes to a file."""
-
-    def __init__(self, command: list[str], file: BinaryIO) -> None:
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-        self._in, self._out, self._err = (cast(io.BufferedRandom, pipe) for pipe in self._pipes())
-        self._file, self._failure, self._said = file, list[OSError](), b""
-        self._threads = [Thread(target=target, daemon=True) for target in (self._copy, self._listen)]
-        for thread in self._threads:
-            thread.start()
-
-    def _pipes(self) -> tuple[object, object, object]:
-        return self._process.stdin, self._process.stdout, self._process.stderr
-
-    def _copy(self) -> None:
-        """What comes out goes to the file at once, so that it can be played."""
-        while data := self._out.read1(1 << 16):
-            if self._failure:
-                continue
-            try:
-                self._file.write(data)
-                self._file.flush()
-            except OSError as failure:
-                self._failure.append(failure)
-
-    def _listen(self) -> None:
-        self._said = self._err.read()[-2000:]
-
-    def write(self, picture: Pixels) -> None:
-        """One more picture."""
-        if self._failure:
-            raise self._failure[0]
-        try:
-            self._in.write(np.ascontiguousarray(picture).data)
-        except BrokenPipeError:
-            self.finish()
-
-    def finish(self) -> None:
-        """Wait for the end. Raises RendererError, and OSError where the file cannot be written."""
-        with suppress(BrokenPipeError):
-            self._in.close()
-        for thread in self._threads:
-            thread.join()
-        if self._failure:
-            raise self._failure[0]
-        if self._process.wait():
-            said = self._said.decode("utf-8", "replace").strip().splitlines()
-            raise RendererError(f"ffmpeg failed: {said[-1] if said else self._process.returncode}", _HINT)
-
-    def end(self) -> None:
-        """Leave no process behind, whatever has happened."""
-        if self._process.poll() is None:
-            self._process.kill()
-        self._process.wait()
-        for thread in self._threads:
-            thread.join()
-        for pipe in (self._in, self._out, self._err):
-            with suppress(OSError):
-                pipe.close()
