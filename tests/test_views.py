@@ -551,3 +551,20 @@ def test_traces_alone_need_no_layout() -> None:
     assert not PAIR.needs_layout(["traces", "raster", "weights"])
     assert PAIR.needs_layout("matrix")
     assert PAIR.needs_layout()
+
+
+def test_views_over_time_show_the_steps_between_the_frames_of_a_film(tmp_path: Path) -> None:
+    """A spike of one step is in the traces, wherever the frames are; the cursor stands at the frames."""
+    text = "neurovis: 1\nname: x\ntime: {dt: 0.1, steps: 81}\ninputs: {push: {expression: 1 if k == 13 else 0}}\n"
+    network = nv.compile_text(text + "neurons: {A: {input: push, activation: identity}}\n")
+    lines, cursors = [], []
+    for every in (1, 8):
+        path = tmp_path / f"{every}.svg"
+        network.animate(path, every=every, view="traces: A")
+        root = ET.parse(path).getroot()
+        lines.append([line.get("d") for line in root.iter(NS + "path")])
+        moves = next(root.iter(NS + "animateTransform")).get("values") or ""
+        cursors.append([float(place.split()[0]) for place in moves.split(";")])
+    assert lines[0] == lines[1]
+    assert (len(cursors[0]), len(cursors[1])) == (81, 11)
+    assert cursors[1] == pytest.approx(cursors[0][::8], abs=0.02)

@@ -39,6 +39,7 @@ def shot_of(network: Network, recording: Recording, step: int | None, window: in
 
 
 def shots_of(recording: Recording, steps: Sequence[int]) -> Shots:
-    """The steps of a film."""
-    rows = np.array([recording.row(step) for step in steps], np.int64)
-    return Shots(recording, rows, rows)
+    """The steps of a film; views over time show those between them, too: a film in which one step in many is a frame
+    lacks no spike."""
+    frames = np.array([recording.row(step) for step in steps], np.int64)
+    return Shots(recording, np.arange(frames[0], frames[-1] + 1), frames)
