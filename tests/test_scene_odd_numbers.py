@@ -19,6 +19,7 @@ from neurovis_spec.runtime.record import Course
 from neurovis_spec.runtime.recording import Recording, Snapshot
 from neurovis_spec.scene import RendererCapabilities, Spline, encoding
 from neurovis_spec.scene.film_size import MOST_COLOURS, check_film
+from neurovis_spec.scene.reached import reached
 from neurovis_spec.scene.renderers import RendererError
 from neurovis_spec.snapshots import snapshots_from
 
@@ -55,7 +56,8 @@ def test_every_number_can_be_drawn_without_a_warning_of_numpy(weight: str, bias:
             network.render(tmp_path / f"{place}.webp")
         content = (tmp_path / f"{place}.svg").read_text(encoding="utf-8")
         assert not re.search(r'"[^"]*\b(nan|inf)\b', content)
-        assert max(map(float, re.findall(r'stroke-width="([^"]*)"', content))) < 4000
+        width, height = map(float, re.findall(r'viewBox="0 0 ([^ "]*) ([^ "]*)"', content)[0])
+        assert max(map(float, re.findall(r'stroke-width="([^"]*)"', content))) <= 2.1 * np.hypot(width, height)
 
 
 def test_widths_follow_equation_4_until_they_cover_the_picture() -> None:
@@ -104,11 +106,11 @@ def test_a_film_that_is_too_long_is_refused_before_anything_is_run(
     network = nv.compile_text("neurovis: 1\nname: x\nneurons: {A: {}, B: {}}\nconnections: {A -> B: 1}")
     monkeypatch.setattr(pipeline, "simulate", lambda *_: pytest.fail("it was run"))
     with pytest.raises(RendererError, match=r"20,000 frames of 1280 × 960 pixels is too long: 13,981") as caught:
-        network.animate(tmp_path / "x.gif", steps=20_000)
+        network.animate(tmp_path / "x.gif", steps=20_000, every=1)
     assert "--steps 13981" in str(caught.value.hint)
     assert "'.svg'" in str(caught.value.hint)
     with pytest.raises(RendererError, match="of 3 neurons and connections is too long"):
-        network.animate(tmp_path / "x.svg", steps=MOST_COLOURS // 3 + 1)
+        network.animate(tmp_path / "x.svg", steps=MOST_COLOURS // 3 + 1, every=1)
     check_film(network.network, MOST_COLOURS // 3, ".svg", RendererCapabilities())
     assert not list(tmp_path.iterdir())
 
@@ -127,3 +129,21 @@ def test_a_film_takes_snapshots_one_after_the_other(monkeypatch: pytest.MonkeyPa
     assert (len(found), made) == (5, [])
     assert [snapshot.step for snapshot, _ in zip(found, range(3), strict=False)] == [2, 3, 4]
     assert len(made) <= 4
+
+
+def test_weights_and_activities_of_any_size_have_scales_of_their_own() -> None:
+    spec = """neurovis: 1
+name: x
+time: {steps: 20}
+neurons: {S: {bias: 0.5}, H: {count: 3}, Q: {activation: tanh}, E: {initial: 1}, F: {}}
+connections: {S -> H: 1e12, H -> Q: 1e-11, S -> Q: 1, Q -> S: -1e30, E -> E: 1e200, E -> F: 1e250}
+"""
+    network = nv.compile_text(spec)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        gains = network.gains
+    for index, name in enumerate(network.network.connection_names):
+        assert gains.thickness[index] * abs(network.network.connections.weights[index]) < 6, name
+    peaks = reached(network.network, network.run(2)).activity
+    assert (gains.activity > 0).all()
+    assert ((gains.activity * peaks)[:5] < 10).all()
