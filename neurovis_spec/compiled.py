@@ -439,7 +439,7 @@ class CompiledNetwork:
             films = map(film, [settings])
         else:
             assert layout is not None
-            gains = seen._gains_for(recording, inputs)
+            gains = seen.gains_for(recording, inputs)
             if made is None:
                 snapshots = snapshots_of_run(Simulation(self.network, inputs=inputs), first, span, stride)
             else:
@@ -536,7 +536,7 @@ class CompiledNetwork:
         from neurovis_spec.snapshots import snapshot_at
 
         if recording is not None or (step is not None and step < 0):
-            return snapshot_at(self.network, step, recording, self.run), self._gains_for(recording)
+            return snapshot_at(self.network, step, recording, self.run), self.gains_for(recording)
         wanted = self.network.steps if step is None else step + 1
         made, gains = self._ran(wanted, inputs, (), progress)
         return snapshot_at(self.network, wanted - 1, made, self.run), gains
@@ -545,9 +545,9 @@ class CompiledNetwork:
         self, panels: Sequence[Panel], recording: Recording | None, inputs: Mapping[str, npt.ArrayLike] | None = None
     ) -> Gains | None:
         """The gains, where one of the views needs them: what was recorded in part serves the others."""
-        return self._gains_for(recording, inputs) if _shows(panels, "network", "matrix", "raster") else None
+        return self.gains_for(recording, inputs) if _shows(panels, "network", "matrix", "raster") else None
 
-    def _gains_for(self, recording: Recording | None, inputs: Mapping[str, npt.ArrayLike] | None = None) -> Gains:
+    def gains_for(self, recording: Recording | None, inputs: Mapping[str, npt.ArrayLike] | None = None) -> Gains:
         """The gains of pictures of a recording, or of runs of its own, perhaps with other inputs."""
         if inputs is not None:
             return pipeline.measure(self.network, made=self.run(self._probe_steps, inputs))

@@ -34,10 +34,11 @@ COMMANDS: Final[Mapping[str, str]] = {
     "sweep": "Run a spec over a grid of parameters and seeds, into a table.",
     "render": "Draw one step as a picture.",
     "animate": "Draw a run as a moving picture.",
+    "live": "Show a network in the browser while it runs.",
     "export": "Write a network as source code for a robot.",
 }
 #: What the language names and this version does not have yet.
-LATER: Final = ("live", "ros", "analyze", "import")
+LATER: Final = ("ros", "analyze", "import")
 NO_READER: Final = 141  # as a process that SIGPIPE has ended
 
 EPILOG = """\b

@@ -98,6 +98,18 @@ class Simulation:
         return self._state.weights[self.network.changing]
 
     @property
+    def connection_weights(self) -> FloatArray:
+        """w[k], for the next step, of all connections (m,); a copy."""
+        return self._state.weights.copy()
+
+    @property
+    def lesioned(self) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+        """Which neurons (n,) and connections (m,) take no part from step k on, copies; a connection is lesioned with
+        either of its ends."""
+        now = self._state.conditions
+        return now.lesioned_neurons.copy(), now.structure.gone.copy()
+
+    @property
     def parameters(self) -> Mapping[str, float]:
         """The parameters of the spec, as they are for the next step."""
         slots = self.network.settable.index

@@ -1,0 +1,150 @@
+"""Carrying over: a run goes on in a network that was edited, at the same step, with what was learned.
+
+In: a state of the old network, what was turned in it, the new network. Out: a state of the new one at the same step.
+What has the same name keeps its activity, its weight where it learns, the states of its model and rule, and, with the
+same delay, the signals under way; what is new begins as at step 0. Parameters, clamps and lesions are what the events
+of the new spec make of them by this step, and what was turned by hand comes after.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.patch import PatchError
+from neurovis_spec.live.simulated import SimulatedSource
+from neurovis_spec.live.source import Turned
+from neurovis_spec.live.turns import Feed, turn
+from neurovis_spec.runtime.conditions import Controls
+from neurovis_spec.runtime.signals import signal_layout
+from neurovis_spec.runtime.simulation import Simulation
+from neurovis_spec.runtime.state import State, initial_state
+
+
+def carried(old: SimulatedSource, simulation: Simulation) -> SimulatedSource:
+    """The source that goes on where ``old`` stands, which nobody uses after that; from the beginning where the two
+    networks have no neuron in common."""
+    was, network, turned, fed = old.network, simulation.network, old.turned, old.fed
+    if not set(was.neurons.names) & set(network.neurons.names):
+        return SimulatedSource(simulation)
+    sizes = {entry.name: entry.size for entry in network.inputs}
+    simulation.restore(carried_state(was, old.leave(), network))
+    done = _turn_again(simulation, turned, sizes)
+    kept = {name: values for name, values in fed.items() if sizes.get(name) == len(values)}
+    return SimulatedSource(simulation, simulation.state(), done, kept, origin=initial_state(network))
+
+
+def _turn_again(simulation: Simulation, turned: Sequence[Turned], inputs: dict[str, int]) -> list[Turned]:
+    """Turn what was turned; gives what can still be turned."""
+    done = []
+    for entry in turned:
+        try:
+            if not isinstance(entry.turn, Feed):
+                turn(simulation, entry.turn)
+            elif entry.turn.name not in inputs:
+                continue
+        except (ValueError, KeyError):
+            continue
+        done.append(entry)
+    return done
+
+
+def carried_state(was: Network, old: State, network: Network) -> State:
+    """A state of ``network`` at the step of ``old``, a state of ``was``."""
+    state = initial_state(network)
+    _replay(network, state, old.k)
+    state.continued, state.drawn = old.continued, old.drawn
+    neurons = _shared(was.neurons.names, network.neurons.names)
+    connections = _shared(was.connection_names, network.connection_names)
+    _carry_activity(old, state, neurons)
+    learn = was.connections.rules[connections[0]] >= 0
+    learn &= network.connections.rules[connections[1]] >= 0
+    state.weights[connections[1][learn]] = old.weights[connections[0][learn]]
+    _carry_states(was, old, network, state, neurons, connections)
+    _carry_signals(was, old, network, state, connections)
+    return state
+
+
+def _replay(network: Network, state: State, k: int) -> None:
+    """What the events until step k change."""
+    controls = Controls(network)
+    for at in sorted(change.at for change in network.changes if change.at <= k):
+        state.k = at
+        try:
+            controls.begin(state)
+        except PatchError:
+            continue
+    state.k = k
+
+
+def _shared(old: Sequence[str], new: Sequence[str]) -> tuple[IntArray, IntArray]:
+    """The places of the names that both have, in the one and in the other."""
+    places = {name: index for index, name in enumerate(old)}
+    pairs = [(places[name], index) for index, name in enumerate(new) if name in places]
+    both = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    return both[:, 0], both[:, 1]
+
+
+def _carry_activity(old: State, state: State, neurons: tuple[IntArray, IntArray]) -> None:
+    state.activity[neurons[1]] = old.activity[neurons[0]]
+    depths = len(old.history), len(state.history)
+    for ago in range(1, min(old.k, *depths) + 1):
+        step = old.k - ago
+        state.history[step % depths[1], neurons[1]] = old.history[step % depths[0], neurons[0]]
+
+
+def _carry_states(
+    was: Network,
+    old: State,
+    network: Network,
+    state: State,
+    neurons: tuple[IntArray, IntArray],
+    connections: tuple[IntArray, IntArray],
+) -> None:
+    """States of models and rules, by their names."""
+    cells: dict[str, FloatArray] = {}
+    for block, arrays in zip(was.blocks, old.cells, strict=True):
+        for quantity, array in zip(block.model.state, arrays, strict=True):
+            _spread(cells, quantity.name, block.members, array, len(was.neurons))
+    for block, arrays in zip(network.blocks, state.cells, strict=True):
+        for quantity, array in zip(block.model.state, arrays, strict=True):
+            _gather(cells.get(quantity.name), block.members, array, neurons, len(network.neurons))
+    traces: dict[str, FloatArray] = {}
+    for entry, arrays in zip(was.plasticity, old.traces, strict=True):
+        for quantity, array in zip(entry.rule.state, arrays, strict=True):
+            _spread(traces, quantity.name, entry.members, array, len(was.connections))
+    for entry, arrays in zip(network.plasticity, state.traces, strict=True):
+        for quantity, array in zip(entry.rule.state, arrays, strict=True):
+            _gather(traces.get(quantity.name), entry.members, array, connections, len(network.connections))
+
+
+def _spread(found: dict[str, FloatArray], name: str, members: IntArray, values: FloatArray, count: int) -> None:
+    """Put a state of some members into an array of all."""
+    found.setdefault(name, np.full(count, np.nan))[members] = values
+
+
+def _gather(
+    values: FloatArray | None, members: IntArray, into: FloatArray, shared: tuple[IntArray, IntArray], count: int
+) -> None:
+    """Take what the old network knew of the members."""
+    if values is None:
+        return
+    known = np.full(count, np.nan)
+    known[shared[1]] = values[shared[0]]
+    there = ~np.isnan(known[members])
+    into[there] = known[members][there]
+
+
+def _carry_signals(
+    was: Network, old: State, network: Network, state: State, connections: tuple[IntArray, IntArray]
+) -> None:
+    before, after = signal_layout(was).offsets, signal_layout(network).offsets
+    same = was.connections.delays[connections[0]] == network.connections.delays[connections[1]]
+    for delay in np.unique(network.connections.delays).tolist():
+        own = same & (network.connections.delays[connections[1]] == delay)
+        slots = np.arange(delay)
+        one, other = before[connections[0][own]], after[connections[1][own]]
+        state.signals[other[:, None] + slots] = old.signals[one[:, None] + slots]

@@ -1,0 +1,112 @@
+"""The drawing: a scene as a page gets it, once.
+
+In: a Scene, its network. Out: JSON, compressed: the shapes as the renderers get them, the theme, and the constants of
+what depends on a step (heads, halos). Lengths are rounded to hundredths of a unit, as in an SVG.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.scene import (
+    FAMILIES,
+    HALO,
+    HEAD_MORE,
+    HEAD_OF_LENGTH,
+    HEAD_OF_WIDTH,
+    SUBSCRIPT_DROP,
+    SUBSCRIPT_SIZE,
+    Arrowhead,
+    Disc,
+    Group,
+    Image,
+    Ramp,
+    Rectangle,
+    Scene,
+    Shape,
+    Spline,
+    Text,
+)
+from neurovis_spec.scene.lesions import FAINT
+
+
+def content(network: Network, scene: Scene, more: Mapping[str, float]) -> bytes:
+    """The scene and what a page must know of its network, as JSON, compressed; ``more`` are further constants."""
+    value = {
+        "name": network.name,
+        "title": scene.title,
+        "width": scene.width,
+        "height": scene.height,
+        "density": scene.density,
+        "theme": asdict(scene.theme),
+        "dt": network.dt if network.dt_given else None,
+        "discs": len(network.neurons),
+        "lines": len(network.connections),
+        "inputs": [
+            {"name": entry.name, "size": entry.size}
+            for entry in network.inputs
+            if entry.expression is None and entry.table is None
+        ],
+        "constants": {
+            "families": list(FAMILIES), "halo": HALO, "subscriptDrop": SUBSCRIPT_DROP, "subscriptSize": SUBSCRIPT_SIZE,
+            "headOfLength": HEAD_OF_LENGTH, "headOfWidth": HEAD_OF_WIDTH, "headMore": HEAD_MORE,
+            "notch": Arrowhead.NOTCH, "bar": Arrowhead.BAR, "lap": Arrowhead.LAP, "faint": FAINT,
+            **more,
+        },
+        "groups": [
+            {**_named(group), "shapes": [_shape(shape) for shape in group.shapes]} for group in scene.groups
+        ],
+    }  # fmt: skip
+    text = json.dumps(value, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    return gzip.compress(text.encode("utf-8", "replace"), 6, mtime=0)
+
+
+def _named(group: Group) -> dict[str, object]:
+    return {"id": group.id, "data": dict(group.data), "title": group.title}
+
+
+def _shape(shape: Shape) -> dict[str, object]:
+    match shape:
+        case Disc():
+            what = {"kind": "disc", "at": _points([shape.centre]), "radius": _short(shape.radius), "fill": shape.fill}
+            return {**what, "stroke": shape.stroke, "width": _short(shape.stroke_width)}
+        case Spline():
+            what = {"kind": "line", "points": _points(shape.points), "stroke": shape.stroke, "width": shape.width}
+            return {**what, "dash": list(shape.dash), "opacity": shape.opacity}
+        case Arrowhead():
+            (dx, dy), what = shape.direction, {"kind": "head", "at": _points([shape.tip]), "fill": shape.fill}
+            more = {
+                "along": [round(dx, 5), round(dy, 5)],
+                "length": _short(shape.length),
+                "half": _short(shape.half_width),
+            }
+            return {**what, **more, "bar": shape.kind == "bar", "width": shape.width}
+        case Rectangle():
+            what = {"kind": "box", "at": _points([shape.corner]), "size": _points([(shape.width, shape.height)])}
+            more = {"radius": _short(shape.radius), "fill": shape.fill, "stroke": shape.stroke}
+            return {**what, **more, "width": _short(shape.stroke_width)}
+        case Ramp():
+            what = {"kind": "ramp", "at": _points([shape.corner]), "size": _points([(shape.width, shape.height)])}
+            return {**what, "colours": list(shape.colours)}
+        case Image():
+            what = {"kind": "image", "at": _points([shape.corner]), "size": _points([(shape.width, shape.height)])}
+            pixels = base64.b64encode(shape.pixels).decode()
+            return {**what, "columns": shape.columns, "rows": shape.rows, "pixels": pixels}
+        case Text():
+            what = {"kind": "text", "at": _points([shape.point]), "text": shape.text, "size": _short(shape.size)}
+            more = {"fill": shape.fill, "anchor": shape.anchor, "weight": shape.weight, "subscript": shape.subscript}
+            return {**what, **more, "onDisc": shape.on_disc, "halo": shape.halo}
+
+
+def _short(value: float) -> float:
+    return round(value, 2)
+
+
+def _points(points: Sequence[tuple[float, float]]) -> list[float]:
+    """Coordinates one after the other, to hundredths of a unit, as in an SVG."""
+    return [_short(value) for point in points for value in point]

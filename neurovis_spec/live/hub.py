@@ -1,0 +1,165 @@
+"""The hub: who looks on, and what each of them is sent: the latest frame that it has room for.
+
+In: what a run shows, from its thread. Out: for each client the next messages, on the event loop. A client that has not
+drawn the frames that it was sent gets no more; what changes meanwhile it gets with the next one. So a slow client sees
+fewer frames, a stalled one none, and neither costs the others or the run anything.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.live.protocol import frame_message, scene_message, status_message
+from neurovis_spec.live.run import Shown, Status
+
+#: Frames that a client may be sent before it has drawn them.
+AHEAD: Final = 2
+#: Texts that wait for a client; of more the oldest are dropped.
+_TEXTS: Final = 16
+
+
+@dataclass(eq=False)
+class Client:
+    """Somebody who looks on, and who as the owner may ask for something."""
+
+    owner: bool
+    #: the version of the scene, the serial of the frame and the status that were sent last
+    version: int = 0
+    sent: int = 0
+    status: str = ""
+    #: the serials of frames that were sent and are not drawn yet
+    ahead: deque[int] = field(default_factory=deque)
+    texts: deque[str] = field(default_factory=lambda: deque(maxlen=_TEXTS))
+    wake: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def tell(self, text: str) -> None:
+        """Send a text when there is room."""
+        self.texts.append(text)
+        self.wake.set()
+
+
+class Hub:
+    """The clients of a run. All methods but ``show`` and ``watched`` are called on the event loop."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self._loop = loop
+        self._clients: set[Client] = set()
+        self._slot: Shown | None = None
+        self._scheduled = False
+        self._shown: Shown | None = None
+        self._version, self._serial = 0, 0
+        #: for each item (connections, then neurons) the serial of the frame in which it last changed
+        self._changed_at: npt.NDArray[np.int64] = np.zeros(0, np.int64)
+        self._frames: dict[int, bytes] = {}
+        self._statuses: dict[bool, str] = {}
+        self._findings = ""
+
+    def __len__(self) -> int:
+        return len(self._clients)
+
+    @property
+    def watched(self) -> bool:
+        """Whether anybody looks on."""
+        return bool(self._clients)
+
+    def show(self, shown: Shown) -> None:
+        """Have this seen, in place of what was not yet taken; from any thread, and without waiting."""
+        self._slot = shown
+        if not self._scheduled:
+            self._scheduled = True
+            self._loop.call_soon_threadsafe(self._take)
+
+    def join(self, client: Client) -> None:
+        """Somebody has come."""
+        self._clients.add(client)
+        if self._findings:
+            client.tell(self._findings)
+        client.wake.set()
+
+    def leave(self, client: Client) -> None:
+        """Somebody has gone."""
+        self._clients.discard(client)
+
+    def tell(self, text: str, keep: bool = False) -> None:
+        """Tell all; with ``keep`` those who come later, too, until something else is kept."""
+        if keep:
+            self._findings = text
+        for client in self._clients:
+            client.tell(text)
+
+    def drawn(self, client: Client, serial: int) -> None:
+        """A client has drawn a frame, and so those before it."""
+        while client.ahead and client.ahead[0] <= serial:
+            client.ahead.popleft()
+        if client.sent < self._serial:
+            client.wake.set()
+
+    def messages(self, client: Client) -> Iterator[bytes | str]:
+        """What is to be sent to a client now."""
+        while client.texts:
+            yield client.texts.popleft()
+        shown = self._shown
+        if shown is None:
+            return
+        if client.version != self._version:
+            client.version, client.sent = self._version, 0
+            client.ahead.clear()
+            yield scene_message(shown.view.content, self._version)
+        status = self._statuses[client.owner]
+        if client.status != status:
+            client.status = status
+            yield status
+        if client.sent < self._serial and len(client.ahead) < AHEAD:
+            since, client.sent = client.sent, self._serial
+            client.ahead.append(self._serial)
+            yield self._frame(since)
+
+    def _take(self) -> None:
+        self._scheduled = False
+        shown, before = self._slot, self._shown
+        if shown is None or shown is before:
+            return
+        self._serial += 1
+        if before is None or shown.view is not before.view:
+            self._version = self._version % 0xFFFF + 1
+            self._changed_at = np.full(len(shown.look.kinds), self._serial, np.int64)
+        else:
+            self._changed_at[_changed(before, shown)] = self._serial
+        if before is None or before.status != shown.status or not self._statuses:
+            self._statuses = {owner: status_message(shown.status, owner) for owner in (True, False)}
+        self._shown = shown
+        self._frames.clear()
+        for client in self._clients:
+            if len(client.ahead) < AHEAD or client.version != self._version or client.status != self._statuses[client.owner]:
+                client.wake.set()
+
+    def _frame(self, since: int) -> bytes:
+        """The latest frame for whoever has the one of this serial; most have the same, so it is made once for them."""
+        found = self._frames.get(since)
+        if found is None:
+            assert self._shown is not None
+            changed = np.flatnonzero(self._changed_at > since)
+            shown = self._shown
+            found = frame_message(shown.look, shown.reach, self._version, self._serial, changed)
+            self._frames[since] = found
+        return found
+
+    @property
+    def status(self) -> Status | None:
+        """How the run stands."""
+        return None if self._shown is None else self._shown.status
+
+
+def _changed(before: Shown, now: Shown) -> npt.NDArray[np.bool_]:
+    """Which items (connections, then neurons) look otherwise, but for their colours."""
+    one, other = before.look, now.look
+    changed: npt.NDArray[np.bool_] = one.kinds != other.kinds
+    changed[: len(other.lines)] |= (one.widths != other.widths) | (one.glows != other.glows)
+    return changed

@@ -1,0 +1,186 @@
+"""A live view from its beginning to its end.
+
+In: how a network is compiled, run and drawn, where to listen. Out: a server that runs until it is told to end.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import socket
+import sys
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.diagnostics import Diagnostic, SpecError
+from neurovis_spec.findings import show_text
+from neurovis_spec.interrupts import ENDING, Ended
+from neurovis_spec.layout.model import LayoutRefusalError
+from neurovis_spec.live.access import Access
+from neurovis_spec.live.carry import carried
+from neurovis_spec.live.hub import Hub
+from neurovis_spec.live.protocol import findings_message
+from neurovis_spec.live.recorded import RecordedSource
+from neurovis_spec.live.run import Change, Run, Stage
+from neurovis_spec.live.server import Server
+from neurovis_spec.live.simulated import SimulatedSource
+from neurovis_spec.live.source import Source
+from neurovis_spec.live.view import View, view_of
+from neurovis_spec.live.watch import Watch
+from neurovis_spec.runtime.recording import RecordingError
+
+if TYPE_CHECKING:
+    from neurovis_spec.runtime.recording import Recording
+
+
+@dataclass(frozen=True)
+class Show:
+    """What is shown, and how: a run, which may go on from ``start``, or a ``recording``."""
+
+    recording: Recording | None = None
+    start: Recording | None = None
+    theme: str | None = None
+    engine: str | None = None
+    backend: str | None = None
+
+    def stage(self, compiled: CompiledNetwork) -> Stage:
+        """The source and its view. Raises RecordingError, BackendError, LayoutRefusalError."""
+        return self._source(compiled), self._view(compiled)
+
+    def changed(self, compiled: CompiledNetwork) -> Change:
+        """What shows an edited network at the step that is shown. Raises as ``stage`` does."""
+        view = self._view(compiled)
+        if self.recording is not None:
+            recorded = RecordedSource(compiled.network, self.recording)
+
+            def same_row(old: Source) -> Stage:
+                recorded.go(old.step)
+                return recorded, view
+
+            return same_row
+        simulation = compiled.simulator(self.backend, start=self.start)
+
+        def same_step(old: Source) -> Stage:
+            assert isinstance(old, SimulatedSource)
+            return carried(old, simulation), view
+
+        return same_step
+
+    def _source(self, compiled: CompiledNetwork) -> Source:
+        if self.recording is not None:
+            return RecordedSource(compiled.network, self.recording)
+        return SimulatedSource(compiled.simulator(self.backend, start=self.start))
+
+    def _view(self, compiled: CompiledNetwork) -> View:
+        return view_of(compiled, compiled.gains_for(self.recording), self.theme, self.engine)
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """A socket bound to an address; port 0 is any that is free. Raises OSError."""
+    family, kind, number, _, address = socket.getaddrinfo(
+        host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+    )[0]
+    sock = socket.socket(family, kind, number)
+    try:
+        if sys.platform != "win32":
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        sock.bind(address)
+    except BaseException:
+        sock.close()
+        raise
+    return sock
+
+
+class Edits:
+    """Has edited specs shown; what is wrong with one is told, and the old network goes on."""
+
+    def __init__(
+        self,
+        show: Show,
+        compile: Callable[[], CompiledNetwork],
+        files: Callable[[CompiledNetwork], Iterable[Path]],
+        known: CompiledNetwork,
+        run: Run,
+        tell: Callable[[str], None],
+    ) -> None:
+        self._show, self._compile, self._files, self._run, self._tell = show, compile, files, run, tell
+        self._watched = set(files(known))
+
+    def watch(self) -> Watch:
+        """What watches the files."""
+        return Watch(self._watched, self._edited)
+
+    def _edited(self) -> Iterable[Path]:
+        try:
+            compiled = self._compile()
+            change = self._show.changed(compiled)
+        except SpecError as error:
+            self._tell(findings_message(show_text(error.diagnostics, error.sources), errors=True))
+            return self._watched
+        except LayoutRefusalError as error:
+            found: tuple[Diagnostic, ...] = () if error.diagnostic is None else (error.diagnostic,)
+            self._tell(findings_message(show_text(found, error.sources) or str(error), errors=True))
+            return self._watched
+        except (RecordingError, OSError, ValueError) as error:
+            self._tell(findings_message(str(error), errors=True))
+            return self._watched
+        self._watched = set(self._files(compiled))
+        self._run.change(change)
+        self._tell(findings_message(show_text(compiled.warnings, compiled.sources), errors=False))
+        return self._watched
+
+
+async def serve(
+    stage: Stage,
+    sock: socket.socket,
+    access: Access,
+    announce: Callable[[], None],
+    edits: Callable[[Run, Callable[[str], None]], Watch] | None = None,
+) -> None:
+    """Serve until a signal asks for an end. Raises Ended."""
+    loop = asyncio.get_running_loop()
+    ended: asyncio.Future[int] = loop.create_future()
+    _heed_signals(loop, ended)
+    hub = Hub(loop)
+    run = Run(*stage, hub.show, lambda: hub.watched, lambda: loop.call_soon_threadsafe(_fail, ended))
+    server = Server(access, hub, run)
+
+    def tell(text: str) -> None:
+        loop.call_soon_threadsafe(hub.tell, text, True)
+
+    watch = None if edits is None else edits(run, tell)
+    await server.start(sock)
+    try:
+        run.start()
+        if watch is not None:
+            watch.start()
+        announce()
+        number = await ended
+    finally:
+        if watch is not None:
+            watch.end()
+        run.end()
+        await server.stop()
+    if run.failure is not None:
+        raise run.failure
+    raise Ended(number)
+
+
+def _fail(ended: asyncio.Future[int]) -> None:
+    if not ended.done():
+        ended.set_result(0)
+
+
+def _heed_signals(loop: asyncio.AbstractEventLoop, ended: asyncio.Future[int]) -> None:
+    """Let the signals that would end the process end the server, those that are not ignored."""
+
+    def end(number: int) -> None:
+        if not ended.done():
+            ended.set_result(number)
+
+    for number in ENDING:
+        if callable(signal.getsignal(number)):
+            loop.add_signal_handler(number, end, int(number))

@@ -1,0 +1,88 @@
+/**
+ * Controls: the buttons, the speed, the scrubber and the keys of a run.
+ */
+
+/** @typedef {import('./protocol.js').Link} Link */
+/** @typedef {import('./protocol.js').Look} Look */
+
+/** @template {HTMLElement} T @param {string} id @returns {T} */
+const part = (id) => /** @type {T} */ (document.getElementById(id));
+
+/** The bar below the picture. */
+export class Controls {
+  /** @param {Link} link */
+  constructor(link) {
+    this.link = link;
+    this.playing = true;
+    /** @type {HTMLButtonElement} */
+    this.play = part('play');
+    /** @type {HTMLSelectElement} */
+    this.speed = part('speed');
+    /** @type {HTMLInputElement} */
+    this.scrub = part('scrub');
+    this.told = part('told');
+    this.findings = part('findings');
+    /** @type {Object<string, () => void>} */
+    const actions = {
+      restart: () => link.ask('restart'),
+      back: () => link.ask('step', { by: -1 }),
+      play: () => this.toggle(),
+      step: () => link.ask('step', { by: 1 }),
+    };
+    for (const [id, action] of Object.entries(actions)) part(id).onclick = action;
+    this.speed.onchange = () => link.ask('speed', { value: this.speed.value });
+    this.scrub.oninput = () => link.ask('seek', { step: Number(this.scrub.value) });
+    /** @type {Object<string, () => void>} */
+    this.keys = { ' ': actions.play, ArrowRight: actions.step, ArrowLeft: actions.back, Home: actions.restart };
+    addEventListener('keydown', (event) => this.key(event));
+  }
+
+  /** @param {KeyboardEvent} event */
+  key(event) {
+    const at = /** @type {Element} */ (event.target);
+    if (event.ctrlKey || event.metaKey || event.altKey || at.closest('input, select, textarea')) return;
+    if (event.key === ' ' && at.closest('button')) return;
+    const action = this.keys[event.key];
+    if (action) {
+      action();
+      event.preventDefault();
+    }
+  }
+
+  /** Play or pause. */
+  toggle() {
+    this.link.ask(this.playing ? 'pause' : 'play');
+  }
+
+  /** How the run stands. @param {any} status */
+  status(status) {
+    this.playing = status.playing;
+    this.play.textContent = status.playing ? '⏸' : '▶';
+    this.play.setAttribute('aria-label', status.playing ? 'pause' : 'play');
+    this.speed.value = status.speed;
+    for (const id of ['restart', 'back', 'play', 'step', 'speed', 'scrub']) {
+      /** @type {HTMLButtonElement} */ (part(id)).disabled = !status.owner;
+    }
+  }
+
+  /** @param {Look} look */
+  frame(look) {
+    if (document.activeElement !== this.scrub || this.playing) {
+      [this.scrub.min, this.scrub.max, this.scrub.value] = [String(look.first), String(look.last), String(look.step)];
+    }
+    this.scrub.setAttribute('aria-valuetext', `step ${look.step} of ${look.last}, back to ${look.first}`);
+    this.tell(`step ${look.step}`);
+  }
+
+  /** @param {string} text */
+  tell(text) {
+    if (this.told.textContent !== text) this.told.textContent = text;
+  }
+
+  /** What is wrong with an edited spec, or was noticed. @param {{text: string, errors: boolean}} found */
+  found(found) {
+    this.findings.textContent = found.text;
+    this.findings.hidden = !found.text;
+    this.findings.classList.toggle('mild', !found.errors);
+  }
+}

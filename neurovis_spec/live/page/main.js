@@ -1,0 +1,89 @@
+/**
+ * The page: joins the link, the camera, the drawing and the controls; draws at the display's rate what is new.
+ */
+
+import { Camera } from './camera.js';
+import { Controls } from './controls.js';
+import { Drawing } from './draw.js';
+import { Link } from './protocol.js';
+
+const canvas = /** @type {HTMLCanvasElement} */ (document.getElementById('picture'));
+const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d', { alpha: false }));
+const camera = new Camera();
+/** @type {Drawing | null} */
+let drawing = null;
+let fresh = false, asked = false;
+
+/** Draw before the display's next frame. */
+function redraw() {
+  if (!asked) {
+    asked = true;
+    requestAnimationFrame(show);
+  }
+}
+
+/** Draw, and say so. */
+function show() {
+  asked = false;
+  const { look } = link;
+  if (!drawing || !look || !look.serial) return;
+  drawing.draw(context, camera, look);
+  controls.frame(look);
+  if (fresh) {
+    fresh = false;
+    link.drawn();
+  }
+}
+
+/** Fill the window, a pixel a pixel. */
+function resize() {
+  const box = canvas.getBoundingClientRect(), density = devicePixelRatio;
+  camera.window = [Math.max(1, Math.round(box.width * density)), Math.max(1, Math.round(box.height * density))];
+  [canvas.width, canvas.height] = camera.window;
+  redraw();
+}
+
+const link = new Link({
+  scene(scene) {
+    drawing = new Drawing(scene);
+    camera.size = [scene.width, scene.height];
+    document.title = `${scene.title} – NeuroVis`;
+    const names = { back: 'background', ink: 'ink', muted: 'muted', line: 'box_line', fill: 'box_fill' };
+    for (const [name, of] of Object.entries(names)) {
+      document.documentElement.style.setProperty(`--${name}`, scene.theme[of]);
+    }
+    canvas.setAttribute('aria-label', scene.title);
+    redraw();
+  },
+  frame() {
+    fresh = true;
+    redraw();
+  },
+  text(message) {
+    if (message.type === 'status') controls.status(message);
+    else if (message.type === 'findings') controls.found(message);
+    else if (message.type === 'refused') controls.tell(message.reason);
+  },
+  link(open) {
+    if (!open) controls.tell('not connected, trying again …');
+  },
+});
+const controls = new Controls(link);
+
+new ResizeObserver(resize).observe(canvas);
+canvas.addEventListener('wheel', (event) => {
+  const density = devicePixelRatio;
+  camera.closer(Math.exp(-event.deltaY / 400), event.offsetX * density, event.offsetY * density);
+  event.preventDefault();
+  redraw();
+}, { passive: false });
+canvas.addEventListener('pointermove', (event) => {
+  if (event.buttons !== 1) return;
+  camera.move(event.movementX * devicePixelRatio, event.movementY * devicePixelRatio);
+  redraw();
+});
+Object.assign(controls.keys, {
+  '+': () => { camera.closer(1.25, camera.window[0] / 2, camera.window[1] / 2); redraw(); },
+  '-': () => { camera.closer(0.8, camera.window[0] / 2, camera.window[1] / 2); redraw(); },
+  0: () => { camera.fit(); redraw(); },
+});

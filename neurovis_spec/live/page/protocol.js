@@ -1,0 +1,123 @@
+/**
+ * The protocol: the connection to the server, and what its messages mean (docs/live.md).
+ */
+
+/** @typedef {{kind: string, at: number[], points: number[], size: number[], along: number[], colours: string[],
+ *   dash: number[], radius: number, width: number, length: number, half: number, fill: string, stroke: string,
+ *   opacity: number, bar: boolean, text: string, subscript: string, anchor: string, weight: number, halo: string,
+ *   onDisc: boolean, columns: number, rows: number, pixels: string}} Shape */
+/** @typedef {{id: string, data: Object<string, string>, title: string, shapes: Shape[]}} Group */
+/** @typedef {Object<string, any>} Theme */
+/** @typedef {{version: number, name: string, title: string, width: number, height: number, density: number,
+ *   theme: Theme, dt: number | null, discs: number, lines: number, inputs: {name: string, size: number}[],
+ *   constants: Object<string, any>, groups: Group[]}} Scene */
+/** @typedef {{serial: number, step: number, first: number, last: number, caption: string, discs: Int8Array,
+ *   lines: Int8Array, widths: Uint16Array, glows: Uint16Array, kinds: Uint8Array}} Look */
+/** @typedef {{scene: (scene: Scene) => void, frame: () => void, text: (message: any) => void,
+ *   link: (open: boolean) => void}} Listener */
+
+const SCENE = 1, FRAME = 2, HEAD = 40;
+
+/** Unpack a scene. @param {ArrayBuffer} buffer @returns {Promise<Scene>} */
+async function unpack(buffer) {
+  const stream = new Blob([buffer.slice(4)]).stream().pipeThrough(new DecompressionStream('gzip'));
+  const scene = JSON.parse(await new Response(stream).text());
+  scene.version = new DataView(buffer).getUint16(2, true);
+  return scene;
+}
+
+/** Take a frame over into a look; false where it is of another scene.
+ * @param {ArrayBuffer} buffer @param {number} version @param {Look} look @returns {boolean} */
+export function take(buffer, version, look) {
+  const view = new DataView(buffer), lines = look.widths.length, discs = look.kinds.length - lines;
+  if (view.getUint16(2, true) !== version) return false;
+  look.serial = view.getUint32(4, true);
+  const changed = view.getUint32(8, true), words = view.getUint16(36, true);
+  [look.step, look.first, look.last] = [12, 20, 28].map((at) => view.getFloat64(at, true));
+  const items = new Uint32Array(buffer, HEAD, changed);
+  const widths = new Uint16Array(buffer, HEAD + 4 * changed, changed);
+  const glows = new Uint16Array(buffer, HEAD + 6 * changed, changed);
+  const kinds = new Uint8Array(buffer, HEAD + 8 * changed, changed);
+  for (let i = 0; i < changed; i++) {
+    const item = items[i];
+    look.kinds[item] = kinds[i];
+    if (item < lines) {
+      look.widths[item] = widths[i];
+      look.glows[item] = glows[i];
+    }
+  }
+  const colours = HEAD + 9 * changed;
+  look.discs = new Int8Array(buffer, colours, discs);
+  look.lines = new Int8Array(buffer, colours + discs, lines);
+  look.caption = new TextDecoder().decode(new Uint8Array(buffer, colours + discs + lines, words));
+  return true;
+}
+
+/** A connection that is made again whenever it is lost. */
+export class Link {
+  /** @param {Listener} listener */
+  constructor(listener) {
+    this.listener = listener;
+    /** @type {Scene | null} */
+    this.scene = null;
+    /** @type {Look | null} */
+    this.look = null;
+    /** @type {WebSocket | null} */
+    this.socket = null;
+    this.wait = 250;
+    this.work = Promise.resolve();
+    this.open();
+  }
+
+  /** Connect. */
+  open() {
+    const token = new URLSearchParams(location.search).get('token') || '';
+    const scheme = location.protocol === 'https:' ? 'wss' : 'ws';
+    const socket = new WebSocket(`${scheme}://${location.host}/live?token=${encodeURIComponent(token)}`);
+    socket.binaryType = 'arraybuffer';
+    socket.onopen = () => {
+      this.wait = 250;
+      this.listener.link(true);
+    };
+    // one message after the other: a scene takes a while to unpack
+    socket.onmessage = (event) => { this.work = this.work.then(() => this.receive(event.data)); };
+    socket.onclose = () => {
+      this.listener.link(false);
+      setTimeout(() => this.open(), this.wait);
+      this.wait = Math.min(4000, this.wait * 2);
+    };
+    this.socket = socket;
+  }
+
+  /** @param {string | ArrayBuffer} data */
+  async receive(data) {
+    if (typeof data === 'string') {
+      this.listener.text(JSON.parse(data));
+      return;
+    }
+    const kind = new Uint8Array(data)[0];
+    if (kind === SCENE) {
+      this.scene = await unpack(data);
+      const { lines, discs } = this.scene;
+      this.look = {
+        serial: 0, step: 0, first: 0, last: 0, caption: '', discs: new Int8Array(discs), lines: new Int8Array(lines),
+        widths: new Uint16Array(lines), glows: new Uint16Array(lines), kinds: new Uint8Array(lines + discs),
+      };
+      this.listener.scene(this.scene);
+    } else if (kind === FRAME && this.scene && this.look && take(data, this.scene.version, this.look)) {
+      this.listener.frame();
+    }
+  }
+
+  /** Ask for something. @param {string} type @param {object} [more] */
+  ask(type, more) {
+    if (this.socket && this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify({ type, ...more }));
+  }
+
+  /** Say that the latest frame has been drawn. */
+  drawn() {
+    if (this.look && this.socket && this.socket.readyState === WebSocket.OPEN) {
+      this.socket.send(new Uint32Array([this.look.serial]));
+    }
+  }
+}

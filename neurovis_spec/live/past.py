@@ -1,0 +1,96 @@
+"""The past: states of a run in bounded memory, from which any step since the first of them is made again, exactly.
+
+In: states, at every so many steps and wherever somebody has turned something. Out: the latest state at or before a
+step. A state costs what it holds; where the room is full the oldest go.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from neurovis_spec.runtime.conditions import Conditions
+from neurovis_spec.runtime.state import State
+
+#: bytes
+ROOM = 256 << 20
+#: steps between two states: at most so many are run again to step back
+EVERY = 64
+#: what a state takes besides its numbers, in bytes
+_OVERHEAD = 4096
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """All that a run goes on from: its state, and what is fed to inputs."""
+
+    state: State
+    fed: Mapping[str, tuple[float, ...]]
+
+    @property
+    def size(self) -> int:
+        """About how many bytes it takes."""
+        return _OVERHEAD + _bytes(self.state) + _bytes(self.state.conditions)
+
+
+def _bytes(value: object) -> int:
+    """The bytes of the arrays in a bundle of arrays and tuples of arrays."""
+    if isinstance(value, np.ndarray):
+        return int(value.nbytes)
+    if isinstance(value, tuple):
+        return sum(_bytes(part) for part in value)
+    if not isinstance(value, State | Conditions):
+        return 0
+    parts = (getattr(value, field.name) for field in fields(value))
+    return sum(_bytes(part) for part in parts if isinstance(part, np.ndarray | tuple))
+
+
+class Past:
+    """States by their step k, ascending; what they take together is at most ``room`` bytes, but for the newest."""
+
+    def __init__(self, room: int = ROOM) -> None:
+        self._room, self._taken = room, 0
+        self._steps: list[int] = []
+        self._kept: list[Kept] = []
+
+    def __len__(self) -> int:
+        return len(self._kept)
+
+    @property
+    def first(self) -> int:
+        """The k of the oldest state."""
+        return self._steps[0]
+
+    @property
+    def taken(self) -> int:
+        """The bytes that it takes."""
+        return self._taken
+
+    def keep(self, kept: Kept) -> None:
+        """Keep a state, in place of another of the same step; there are none of later steps."""
+        self.cut(kept.state.k - 1)
+        self._steps.append(kept.state.k)
+        self._kept.append(kept)
+        self._taken += kept.size
+        while self._taken > self._room and len(self._kept) > 1:
+            self._taken -= self._kept.pop(0).size
+            self._steps.pop(0)
+
+    def cut(self, k: int) -> None:
+        """Forget the states after step k."""
+        while self._steps and self._steps[-1] > k:
+            self._steps.pop()
+            self._taken -= self._kept.pop().size
+
+    def before(self, k: int) -> Kept | None:
+        """The latest state at or before step k."""
+        place = bisect_right(self._steps, k) - 1
+        return self._kept[place] if place >= 0 else None
+
+    def at(self, k: int) -> Kept | None:
+        """The state of step k, if it is kept."""
+        found = self.before(k)
+        return found if found is not None and found.state.k == k else None

@@ -1,0 +1,210 @@
+"""The protocol: what goes between the server and a page, as bytes and texts (docs/live.md has every message).
+
+In: looks and statuses; texts from clients, which are trusted with nothing. Out: messages; commands whose shape
+and range are checked.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Final, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.live.clock import SPEEDS
+from neurovis_spec.live.commands import Branch, Command, Event, Pause, Play, Restart, Seek, Speed, Step
+from neurovis_spec.live.run import Status
+from neurovis_spec.live.source import Reach, Turned
+from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set
+from neurovis_spec.live.view import Look
+
+#: The first byte of a binary message from the server.
+SCENE, FRAME = 1, 2
+#: kind, scene
+_SCENE_HEAD = struct.Struct("<BxH")
+#: kind, scene, serial, changed, step, first, last, bytes of the caption, of what follows it none
+_HEAD = struct.Struct("<BxHIIdddHxx")
+#: A message of a client: at most so many bytes, names so many characters.
+LARGEST, _LONGEST = 16_384, 4096
+#: The most steps there can be (a double holds each).
+_MOST = (1 << 53) - 1
+#: The most components of an input, and parameters set at once.
+_MANY = 1024
+
+
+class ProtocolError(ValueError):
+    """A message that no page of ours sends."""
+
+
+# --- what the server sends
+
+
+def scene_message(content: bytes, version: int) -> bytes:
+    """The scene with its version, which frames name."""
+    return _SCENE_HEAD.pack(SCENE, version) + content
+
+
+def frame_message(look: Look, reach: Reach, version: int, serial: int, changed: npt.NDArray[np.int64]) -> bytes:
+    """A frame: all colours, and of the ``changed`` items (connections, then neurons) widths, glows and kinds."""
+    lines = len(look.lines)
+    of_lines = np.minimum(changed, max(lines - 1, 0))
+    none = np.zeros(len(changed), np.uint16)
+    widths, glows = (values[of_lines] if lines else none for values in (look.widths, look.glows))
+    words = look.caption.encode("utf-8", "replace")[:4096]
+    head = _HEAD.pack(FRAME, version, serial, len(changed), look.step, reach.first, reach.last, len(words))
+    colours = look.discs.tobytes() + look.lines.tobytes()
+    parts = [
+        *(head, changed.astype("<u4").tobytes(), widths.astype("<u2").tobytes(), glows.astype("<u2").tobytes()),
+        *(look.kinds[changed].tobytes(), colours, words),
+    ]
+    return b"".join(parts)
+
+
+def status_message(status: Status, owner: bool) -> str:
+    """How the run stands."""
+    return _text(
+        "status",
+        playing=status.playing,
+        speed="max" if math.isinf(status.speed) else f"{status.speed:g}",
+        ended=status.ended,
+        owner=owner,
+        can=asdict(status.capabilities),
+        parameters={name: value for name, value in status.parameters.items() if math.isfinite(value)},
+        turned=[_turned(entry) for entry in status.turned],
+        events=list(status.events[:10_000]),
+    )
+
+
+def _turned(entry: Turned) -> dict[str, object]:
+    """A turn, and the step after which it was taken."""
+    return {"step": entry.step, "type": type(entry.turn).__name__.lower(), **asdict(entry.turn)}
+
+
+def findings_message(text: str, errors: bool) -> str:
+    """What was noticed about an edited spec, as ``validate`` shows it; nothing: all is well."""
+    return _text("findings", text=text, errors=errors)
+
+
+def refused_message(reason: str) -> str:
+    """Why what was asked is not done."""
+    return _text("refused", reason=reason)
+
+
+def _text(kind: str, **values: object) -> str:
+    return json.dumps({"type": kind, **values}, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+
+
+# --- what a client sends
+
+
+@dataclass(frozen=True, slots=True)
+class Acknowledged:
+    """The client has drawn the frame of this serial."""
+
+    serial: int
+
+
+#: What of a message's values must hold.
+Check: TypeAlias = Callable[[object], object]
+
+
+def acknowledged(data: bytes) -> Acknowledged:
+    """A binary message: four bytes. Raises ProtocolError."""
+    if len(data) != 4:
+        raise ProtocolError("a frame is acknowledged in four bytes")
+    return Acknowledged(int.from_bytes(data, "little"))
+
+
+def command_of(text: str) -> Command:
+    """A text message. Raises ProtocolError."""
+    if len(text) > LARGEST:
+        raise ProtocolError("the message is too long")
+    try:
+        message = json.loads(text, parse_constant=_no_constant)
+    except (ValueError, RecursionError):
+        raise ProtocolError("the message is no JSON") from None
+    if not isinstance(message, dict):
+        raise ProtocolError("a message is an object")
+    kind = message.pop("type", None)
+    wanted = _MESSAGES.get(kind) if isinstance(kind, str) else None
+    if wanted is None:
+        raise ProtocolError("the type of the message is unknown")
+    checks, make = wanted
+    if set(message) != set(checks):
+        raise ProtocolError(f"a message '{kind}' has other members")
+    return make(**{name: check(message[name]) for name, check in checks.items()})
+
+
+def _no_constant(name: str) -> object:
+    raise ValueError(name)
+
+
+def _number(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= 1e300:
+        raise ProtocolError("a finite number is wanted")
+    return float(value)
+
+
+def _whole(low: int, high: int) -> Callable[[object], int]:
+    def check(value: object) -> int:
+        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            raise ProtocolError(f"an integer from {low} to {high} is wanted")
+        return value
+
+    return check
+
+
+def _name(value: object) -> str:
+    if not isinstance(value, str) or not 0 < len(value) <= _LONGEST:
+        raise ProtocolError("a name is wanted")
+    return value
+
+
+def _truth(value: object) -> bool:
+    if not isinstance(value, bool):
+        raise ProtocolError("true or false is wanted")
+    return value
+
+
+def _speed(value: object) -> float:
+    if not isinstance(value, str) or value not in SPEEDS:
+        raise ProtocolError(f"a speed is wanted: {', '.join(SPEEDS)}")
+    return SPEEDS[value]
+
+
+def _values(value: object) -> Mapping[str, float]:
+    if not isinstance(value, dict) or not 0 < len(value) <= _MANY:
+        raise ProtocolError("names with numbers are wanted")
+    return {_name(name): _number(number) for name, number in value.items()}
+
+
+def _numbers(value: object) -> tuple[float, ...]:
+    if not isinstance(value, list) or len(value) > _MANY:
+        raise ProtocolError("a list of numbers is wanted")
+    return tuple(_number(number) for number in value)
+
+
+_MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command]]]] = {
+    "play": ({}, Play),
+    "pause": ({}, Pause),
+    "step": ({"by": _whole(-_MANY, _MANY)}, Step),
+    "seek": ({"step": _whole(0, _MOST)}, Seek),
+    "event": ({"by": _whole(-1, 1)}, Event),
+    "restart": ({}, Restart),
+    "branch": ({}, Branch),
+    "speed": ({"value": _speed}, Speed),
+    "set": ({"values": _values}, Set),
+    "feed": ({"name": _name, "values": _numbers}, Feed),
+    "hold": ({"neurons": _name, "value": _number}, Hold),
+    "release": ({"neurons": _name}, Release),
+    "lesion": ({"part": _name}, Lesion),
+    "mend": ({"part": _name}, Mend),
+    "learn": ({"connections": _name, "on": _truth}, Learn),
+}
+#: The types of the messages that a client may send, for the tests of the documentation.
+MESSAGES: Final = tuple(_MESSAGES)

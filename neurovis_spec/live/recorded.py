@@ -1,0 +1,91 @@
+"""A recording as a source: its steps, to and fro, as they were.
+
+In: a Network and a Recording of it. Out: a Source that takes no turns. What is lesioned is what the spec's events say.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+
+import numpy as np
+
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned
+from neurovis_spec.live.turns import Turn
+from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.scene.lesions import lesions_of
+from neurovis_spec.snapshots import fitted
+
+
+class RecordedSource:
+    """The steps of a recording; it stands at the first. Raises RecordingError for one of another network, a partial or
+    an empty one."""
+
+    capabilities = Capabilities(turns=False, ends=True)
+
+    def __init__(self, network: Network, recording: Recording) -> None:
+        recording.check_whole("a live view cannot show")
+        self.network, self._recording = network, fitted(recording, network)
+        if not len(recording):
+            raise RecordingError("the recording holds no step")
+        self._steps: list[int] = recording.step.tolist()
+        self._lesions = lesions_of(network)
+        self._row = 0
+
+    @property
+    def step(self) -> int:
+        """The step that it stands at."""
+        return self._steps[self._row]
+
+    @property
+    def reach(self) -> Reach:
+        """All of it."""
+        return Reach(self._steps[0], self._steps[-1])
+
+    @property
+    def turned(self) -> tuple[Turned, ...]:
+        """Nothing."""
+        return ()
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Nothing can be set."""
+        return {}
+
+    def seen(self) -> Seen:
+        """What is seen of the step that it stands at."""
+        neurons, connections = np.zeros(len(self.network.neurons), bool), np.zeros(len(self.network.connections), bool)
+        for mask, lesions in ((neurons, self._lesions.neurons), (connections, self._lesions.connections)):
+            mask[[index for index, step in lesions.items() if step <= self.step]] = True
+        return Seen(self._recording.snapshot(self.step), neurons, connections)
+
+    def advance(self) -> bool:
+        """Go on by one row; False at the end."""
+        if self._row == len(self._steps) - 1:
+            return False
+        self._row += 1
+        return True
+
+    def beside(self, by: int) -> int:
+        """The step so many rows further on, or back."""
+        return self._steps[min(max(self._row + by, 0), len(self._steps) - 1)]
+
+    def go(self, step: int) -> None:
+        """Go to a step, or the next one that was recorded. Raises SourceError."""
+        if not self._steps[0] <= step <= self._steps[-1]:
+            raise SourceError(
+                f"step {step} is not in the recording, which goes from {self._steps[0]} to {self._steps[-1]}"
+            )
+        self._row = bisect_left(self._steps, step)
+
+    def restart(self) -> None:
+        """Back to its first step."""
+        self._row = 0
+
+    def branch(self) -> None:
+        """Raises SourceError: a recording stays as it is."""
+        raise SourceError("a recording cannot go on differently: run the spec")
+
+    def turn(self, turn: Turn) -> None:
+        """Raises SourceError: a recording stays as it is."""
+        raise SourceError("a recording cannot be changed: run the spec")

@@ -1,0 +1,224 @@
+"""The run: a thread that drives a source by the clock and shows what is seen.
+
+In: a Source, its View, and commands. Out: Looks and a Status, given to a function that must not wait. Nobody who looks
+on can hold the thread up: commands come in a queue, and what is shown is handed over.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from queue import Empty, SimpleQueue
+from threading import Thread
+from typing import TypeAlias
+
+from neurovis_spec.live.clock import FRAMES, Clock
+from neurovis_spec.live.commands import Branch, Command, Event, Pause, Play, Present, Restart, Seek, Speed, Step
+from neurovis_spec.live.source import Capabilities, Reach, Source, SourceError, Turned
+from neurovis_spec.live.view import Look, View
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """What a client is told of a run when it changes: ``ended`` where there is no further step; ``events``, the steps
+    at which the spec has some."""
+
+    playing: bool
+    speed: float
+    ended: bool
+    capabilities: Capabilities
+    parameters: Mapping[str, float]
+    turned: tuple[Turned, ...]
+    events: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shown:
+    """What is to be seen now. ``view`` is the network's, which is another after an edit."""
+
+    view: View
+    look: Look
+    reach: Reach
+    status: Status
+
+
+Stage: TypeAlias = tuple[Source, View]
+#: Called with what is shown; must not wait.
+Show: TypeAlias = Callable[[Shown], None]
+#: Called with what was refused and why.
+Refuse: TypeAlias = Callable[[str], None]
+#: Gives what to show in place of a source, such as an edited network.
+Change: TypeAlias = Callable[[Source], Stage]
+
+
+def _ignore(message: str) -> None:
+    """Nobody is told."""
+
+
+class Run:
+    """A live run; it plays from the start on. ``wanted`` says whether anybody looks on: else nothing is shown.
+    ``failed`` is called where it cannot go on; ``failure`` says why."""
+
+    def __init__(
+        self,
+        source: Source,
+        view: View,
+        show: Show,
+        wanted: Callable[[], bool] = lambda: True,
+        failed: Callable[[], object] = lambda: None,
+    ) -> None:
+        self._source, self._view, self._show, self._wanted, self._failed = source, view, show, wanted, failed
+        self._asked: SimpleQueue[tuple[Command | Change | None, Refuse]] = SimpleQueue()
+        self._playing, self._ended = True, False
+        #: the step to go to, which is further than has been reached
+        self._target: int | None = None
+        self._clock = self._clock_of(source, 1.0)
+        self._thread = Thread(target=self._drive, name="live run", daemon=True)
+        self.failure: Exception | None = None
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def ask(self, command: Command, refuse: Refuse = _ignore) -> None:
+        """Have a command carried out between two steps."""
+        self._asked.put((command, refuse))
+
+    def change(self, change: Change, refuse: Refuse = _ignore) -> None:
+        """Have another network shown, from between two steps on."""
+        self._asked.put((change, refuse))
+
+    def end(self) -> None:
+        """Stop, and wait until it has."""
+        self._asked.put((None, _ignore))
+        self._thread.join()
+
+    @staticmethod
+    def _clock_of(source: Source, speed: float) -> Clock:
+        return Clock.of(source.network.dt, source.network.dt_given, speed)
+
+    def _drive(self) -> None:
+        try:
+            self._clock.start(time.perf_counter())
+            self._present()
+            while self._attend():
+                if self._running:
+                    self._move()
+        except Exception as failure:
+            self.failure = failure
+            self._failed()
+
+    @property
+    def _running(self) -> bool:
+        return self._playing or self._target is not None
+
+    def _attend(self) -> bool:
+        """Carry out what was asked until a step is due; False at the end."""
+        shown = time.perf_counter()
+        while True:
+            wait = None
+            if self._running:
+                due = 0.0 if self._target is not None else self._clock.next()
+                wait = max(0.0, max(due, shown + 1 / FRAMES if self._target is None else 0.0) - time.perf_counter())
+            try:
+                asked, refuse = self._asked.get(timeout=wait) if wait != 0.0 else self._asked.get_nowait()
+            except Empty:
+                return True
+            if asked is None:
+                return False
+            try:
+                self._carry_out(asked)
+            except SourceError as error:
+                refuse(str(error))
+            self._present()
+
+    def _carry_out(self, asked: Command | Change) -> None:
+        source, now = self._source, time.perf_counter()
+        match asked:
+            case Play():
+                self._playing, self._target = not self._ended, None
+                self._clock.start(now)
+            case Pause():
+                self._playing, self._target = False, None
+            case Speed():
+                self._clock.set_speed(asked.value, now)
+            case Step():
+                self._go(source.beside(asked.by))
+            case Seek():
+                self._go(asked.step)
+            case Event():
+                self._go(self._event(asked.by))
+            case Restart():
+                source.restart()
+                self._target, self._ended = None, False
+                self._clock.start(now)
+            case Branch():
+                source.branch()
+            case Present():
+                pass
+            case _ if callable(asked):
+                self._source, self._view = asked(source)
+                self._clock = self._clock_of(self._source, self._clock.speed)
+                self._clock.start(now)
+                self._ended, self._target = False, None
+            case _:
+                source.turn(asked)
+
+    def _event(self, by: int) -> int:
+        events, here = self._events(), self._source.step
+        place = bisect_right(events, here) if by > 0 else bisect_left(events, here) - 1
+        if not 0 <= place < len(events):
+            raise SourceError("there is no event " + ("after" if by > 0 else "before") + f" step {here}")
+        return events[place]
+
+    def _events(self) -> tuple[int, ...]:
+        return tuple(sorted({change.at for change in self._source.network.changes}))
+
+    def _go(self, step: int) -> None:
+        source = self._source
+        self._playing, self._target = False, None
+        if step > source.reach.last and not source.capabilities.ends:
+            self._target = step
+            return
+        source.go(step)
+        self._ended = source.capabilities.ends and source.step == source.reach.last
+
+    def _move(self) -> None:
+        """Make the steps that are due, at most as many as there is time for in a frame, and show the last."""
+        begun = time.perf_counter()
+        due = math.inf if self._target is not None else self._clock.due(begun)
+        made = 0
+        while made < due:
+            if not self._source.advance():
+                self._ended, self._playing = True, False
+                break
+            made += 1
+            if self._target is not None and self._source.step >= self._target:
+                self._target = None
+                break
+            if time.perf_counter() - begun > 1 / FRAMES:
+                break
+        self._clock.make(made)
+        if made or self._ended:
+            self._present()
+
+    def _present(self) -> None:
+        if self._wanted():
+            self._show(self.shown())
+
+    def shown(self) -> Shown:
+        """What is to be seen now; to be called by this thread, or before it begins."""
+        source = self._source
+        status = Status(
+            playing=self._running,
+            speed=self._clock.speed,
+            ended=self._ended,
+            capabilities=source.capabilities,
+            parameters=source.parameters,
+            turned=source.turned,
+            events=self._events(),
+        )
+        return Shown(self._view, self._view.look(source.seen()), source.reach, status)

@@ -1,0 +1,205 @@
+"""The server: the page and its websocket, over aiohttp.
+
+In: requests. Out: one page at ``/``, and at ``/live`` the stream of a hub; everything else is refused. Nothing that a
+client does or leaves undone is waited for by the others or by the run.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import hashlib
+import re
+import socket
+import time
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from weakref import WeakSet
+
+from aiohttp import WSCloseCode, WSMsgType, web
+
+from neurovis_spec.live.access import PAGE, Access
+from neurovis_spec.live.commands import Present
+from neurovis_spec.live.hub import Client, Hub
+from neurovis_spec.live.protocol import LARGEST, ProtocolError, acknowledged, command_of, refused_message
+from neurovis_spec.live.run import Run
+
+#: Websockets at once, and connections of any kind.
+MOST_CLIENTS, MOST_CONNECTIONS = 128, 256
+#: Seconds in which a connection must have asked for something, a message must be on its way, and between pings.
+ASKING, SENDING, PINGS = 10.0, 15.0, 20.0
+#: Messages a second that a client may send in the long run, and at once.
+RATE, BURST = 200, 400
+
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+def page() -> str:
+    """The page, as ``page/build.py`` has put it together."""
+    return (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
+
+
+def policy(html: str) -> str:
+    """The Content-Security-Policy of a page: its own script and style alone, and its own websocket."""
+
+    def hashed(tag: str) -> str:
+        found = re.findall(rf"<{tag}[^>]*>(.*?)</{tag}>", html, re.DOTALL)
+        digests = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in found]
+        return " ".join(f"'sha256-{digest}'" for digest in digests) or "'none'"
+
+    return (
+        f"default-src 'none'; script-src {hashed('script')}; style-src {hashed('style')}; connect-src 'self'; "
+        "img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    )
+
+
+def headers(csp: str) -> dict[str, str]:
+    """What every answer carries."""
+    return {
+        "Content-Security-Policy": csp,
+        "X-Content-Type-Options": "nosniff",
+        "X-Frame-Options": "DENY",
+        "Referrer-Policy": "no-referrer",
+        "Cache-Control": "no-store",
+        "Cross-Origin-Opener-Policy": "same-origin",
+        "Cross-Origin-Resource-Policy": "same-origin",
+        "Permissions-Policy": "camera=(), geolocation=(), microphone=()",
+        "Server": "neurovis",
+    }
+
+
+class Server:
+    """Serves a run to whoever has a token."""
+
+    def __init__(self, access: Access, hub: Hub, run: Run) -> None:
+        self._access, self._hub, self._run = access, hub, run
+        self._html = page()
+        self._headers = headers(policy(self._html))
+        self._streams: WeakSet[web.WebSocketResponse] = WeakSet()
+        self._asked: WeakSet[object] = WeakSet()
+        self._app = web.Application(client_max_size=LARGEST)
+        self._app.router.add_route("*", "/{path:.*}", self._answer)
+        self._app.on_response_prepare.append(self._prepare)
+        self._runner = web.AppRunner(
+            self._app, access_log=None, keepalive_timeout=15.0, handle_signals=False, shutdown_timeout=1.0
+        )
+        self._listening: asyncio.Server | None = None
+
+    async def start(self, sock: socket.socket) -> None:
+        """Listen at a socket that is bound."""
+        await self._runner.setup()
+        self._listening = await asyncio.get_running_loop().create_server(self._accept, sock=sock, backlog=128)
+
+    async def stop(self) -> None:
+        """Say goodbye to everybody."""
+        if self._listening is not None:
+            self._listening.close()
+        goodbyes = [stream.close(code=WSCloseCode.GOING_AWAY, message=b"the server ends") for stream in self._streams]
+        if goodbyes:
+            await asyncio.wait([asyncio.ensure_future(goodbye) for goodbye in goodbyes], timeout=1.0)
+        await self._runner.cleanup()
+
+    def _accept(self) -> asyncio.Protocol:
+        """A connection: refused where there are too many, and closed where it asks for nothing."""
+        server = self._runner.server
+        assert server is not None
+        if len(server.connections) >= MOST_CONNECTIONS:
+            return _Closed()
+        protocol = server()
+        asyncio.get_running_loop().call_later(ASKING, self._close_silent, protocol)
+        return protocol
+
+    def _close_silent(self, protocol: web.RequestHandler) -> None:
+        if protocol not in self._asked and protocol.transport is not None:
+            protocol.transport.abort()
+
+    async def _prepare(self, request: web.Request, response: web.StreamResponse) -> None:
+        response.headers.update(self._headers)
+
+    async def _answer(self, request: web.Request) -> web.StreamResponse:
+        self._asked.add(request.protocol)
+        token = request.query.get("token")
+        head = request.headers
+        refused = self._access.refusal(request.method, request.path, head.get("Host"), head.get("Origin"), token)
+        if refused is not None:
+            return self._refuse(refused.status, refused.reason)
+        if request.path == PAGE:
+            return web.Response(text=self._html, content_type="text/html", charset="utf-8")
+        return await self._stream(request, bool(self._access.of(token)))
+
+    @staticmethod
+    def _refuse(status: int, reason: str) -> web.Response:
+        more = {"Allow": "GET"} if status == 405 else {}
+        response = web.Response(status=status, text=f"{reason}\n", headers=more)
+        response.force_close()
+        return response
+
+    async def _stream(self, request: web.Request, owner: bool) -> web.StreamResponse:
+        stream = web.WebSocketResponse(max_msg_size=LARGEST, heartbeat=PINGS, compress=False, timeout=1.0)
+        if not stream.can_prepare(request):
+            return self._refuse(426, "here is a websocket")
+        if len(self._hub) >= MOST_CLIENTS:
+            return self._refuse(503, f"{MOST_CLIENTS} clients look on already")
+        client = Client(owner)
+        self._hub.join(client)
+        writer: asyncio.Task[None] | None = None
+        try:
+            await stream.prepare(request)
+            self._streams.add(stream)
+            self._run.ask(Present())
+            writer = asyncio.create_task(self._write(stream, client, request))
+            await self._read(stream, client)
+        finally:
+            self._hub.leave(client)
+            if writer is not None:
+                writer.cancel()
+        return stream
+
+    async def _write(self, stream: web.WebSocketResponse, client: Client, request: web.Request) -> None:
+        """Send what there is for a client whenever there is something."""
+        try:
+            while True:
+                await client.wake.wait()
+                client.wake.clear()
+                for message in list(self._hub.messages(client)):
+                    async with asyncio.timeout(SENDING):
+                        await (stream.send_bytes(message) if isinstance(message, bytes) else stream.send_str(message))
+        except (TimeoutError, ConnectionError):
+            if request.transport is not None:
+                request.transport.abort()
+
+    async def _read(self, stream: web.WebSocketResponse, client: Client) -> None:
+        """Take what a client sends; a message that no page of ours sends ends its connection."""
+        loop = asyncio.get_running_loop()
+
+        def refuse(reason: str) -> None:
+            loop.call_soon_threadsafe(client.tell, refused_message(reason))
+
+        left, then = float(BURST), time.monotonic()
+        async for message in stream:
+            now = time.monotonic()
+            left, then = min(BURST, left + (now - then) * RATE), now
+            left -= 1
+            if left < 0:
+                await stream.close(code=WSCloseCode.POLICY_VIOLATION, message=b"too many messages")
+                return
+            try:
+                if message.type is WSMsgType.BINARY:
+                    self._hub.drawn(client, acknowledged(message.data).serial)
+                elif message.type is WSMsgType.TEXT:
+                    command = command_of(message.data)
+                    if client.owner:
+                        self._run.ask(command, refuse)
+                    else:
+                        client.tell(refused_message("this page only looks on"))
+            except ProtocolError as error:
+                await stream.close(code=WSCloseCode.POLICY_VIOLATION, message=str(error).encode()[:120])
+                return
+
+
+class _Closed(asyncio.Protocol):
+    """A connection that is closed at once."""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Close it."""
+        transport.close()

@@ -1,0 +1,167 @@
+"""The simulator as a source: a run that can be stepped back, turned, and gone on from differently.
+
+In: a Simulation. Out: a Source. Every so many steps, and at every turn, the state is kept; a step of the past is made
+again from the state before it, bit for bit, and what was turned on the way is turned again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.live.past import EVERY, ROOM, Kept, Past
+from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned
+from neurovis_spec.live.turns import Feed, Turn, turn
+from neurovis_spec.runtime.recording import Snapshot
+from neurovis_spec.runtime.simulation import Simulation
+from neurovis_spec.runtime.state import State
+
+
+class SimulatedSource:
+    """A network that runs; it stands at the first step to be computed: step 0, or that of ``begin``, a state in which
+    ``turned`` has had its effect and inputs are ``fed``. ``origin`` is where it begins anew."""
+
+    capabilities = Capabilities(turns=True, ends=False)
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        begin: State | None = None,
+        turned: Sequence[Turned] = (),
+        fed: Mapping[str, tuple[float, ...]] | None = None,
+        origin: State | None = None,
+        room: int = ROOM,
+    ) -> None:
+        self.network: Network = simulation.network
+        self._simulation, self._room = simulation, room
+        self._origin = simulation.state() if origin is None else origin
+        self._begin(self._origin if begin is None else begin, turned, fed or {})
+
+    def _begin(self, state: State, turned: Sequence[Turned], fed: Mapping[str, tuple[float, ...]]) -> None:
+        self._past = Past(self._room)
+        self._fed, self._turned = dict(fed), list(turned)
+        self._started = self._last = state.k
+        self._simulation.restore(state)
+        self._keep()
+        self._seen = self._make(None)
+
+    @property
+    def step(self) -> int:
+        """The step that it stands at."""
+        return self._seen.snapshot.step
+
+    @property
+    def reach(self) -> Reach:
+        """From the first step whose changes of weights are known, for they are seen; from the beginning, where it is
+        still there."""
+        first = self._past.first
+        return Reach(min(self.step, first if first == self._started else first + 1), self._last)
+
+    @property
+    def turned(self) -> tuple[Turned, ...]:
+        """The turns taken on the way to the step that it stands at."""
+        return tuple(entry for entry in self._turned if entry.step <= self.step)
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The parameters that can be set, as they are now."""
+        now = self._simulation.parameters
+        return {name: value for name, value in now.items() if name not in self.network.structural}
+
+    @property
+    def fed(self) -> Mapping[str, tuple[float, ...]]:
+        """What is fed to inputs."""
+        return self._fed
+
+    def leave(self) -> State:
+        """The state from which the step that it stands at is made; nobody uses this source after that."""
+        run, step = self._simulation, self.step
+        kept = self._past.before(step)
+        if kept is not None:
+            self._take(kept)
+            while run.k < step:
+                self._make(None)
+        return run.state()
+
+    def seen(self) -> Seen:
+        """What is seen of the step that it stands at."""
+        return self._seen
+
+    def advance(self) -> bool:
+        """Go on by one step."""
+        self._seen = self._make(self._seen.snapshot)
+        self._last = max(self._last, self.step)
+        known = self._past.at(self._simulation.k)
+        if known is not None:  # whatever was turned here is turned again
+            self._take(known)
+        elif self._simulation.k % EVERY == 0:
+            self._keep()
+        if self._turned and any(entry.step == self.step for entry in self._turned):
+            self._seen = Seen(self._seen.snapshot, *self._simulation.lesioned)
+        return True
+
+    def beside(self, by: int) -> int:
+        """The step so many further on, or back."""
+        return max(self.reach.first, self.step + by)
+
+    def go(self, step: int) -> None:
+        """Go to a step within reach, to those of the past by making them again. Raises SourceError."""
+        reach = self.reach
+        if not reach.first <= step <= reach.last:
+            raise SourceError(f"step {step} is out of reach: the past goes from step {reach.first} to {reach.last}")
+        kept = self._past.before(step - 1) or self._past.before(step)
+        if step != self.step and kept is not None and (step < self.step or kept.state.k > self._simulation.k):
+            self._take(kept)
+            self._seen = self._make(None)
+        while self.step < step:
+            self.advance()
+
+    def restart(self) -> None:
+        """Begin anew, at step 0."""
+        self._begin(self._origin, (), {})
+
+    def branch(self) -> None:
+        """Forget what came after the step that it stands at."""
+        self._past.cut(self._simulation.k)
+        self._last = self.step
+        self._turned = list(self.turned)
+
+    def turn(self, what: Turn) -> None:
+        """Take a turn, from the next step on. Raises SourceError."""
+        try:
+            if isinstance(what, Feed):
+                self._feed(what)
+            else:
+                turn(self._simulation, what)
+        except (ValueError, KeyError) as error:
+            raise SourceError(str(error)) from None
+        self.branch()
+        self._keep()
+        self._turned.append(Turned(self.step, what))
+        self._seen = Seen(self._seen.snapshot, *self._simulation.lesioned)
+
+    def _feed(self, what: Feed) -> None:
+        entry = next((entry for entry in self.network.inputs if entry.name == what.name), None)
+        if entry is None:
+            raise SourceError(f"there is no input '{what.name}'")
+        if not what.values:
+            self._fed = {name: values for name, values in self._fed.items() if name != what.name}
+            return
+        if len(what.values) not in (1, entry.size):
+            raise SourceError(f"the input '{what.name}' takes {entry.size} numbers, not {len(what.values)}")
+        self._fed = {**self._fed, what.name: (what.values * entry.size)[: entry.size]}
+
+    def _keep(self) -> None:
+        self._past.keep(Kept(self._simulation.state(), self._fed))
+
+    def _take(self, kept: Kept) -> None:
+        self._simulation.restore(kept.state)
+        self._fed = dict(kept.fed)
+
+    def _make(self, before: Snapshot | None) -> Seen:
+        """Compute a step; ``before`` is what was seen of the one before it."""
+        run = self._simulation
+        step, weights, lesioned = run.k, run.connection_weights, run.lesioned
+        run.step({name: values if len(values) > 1 else values[0] for name, values in self._fed.items()})
+        previous = before.weights if before is not None and before.step == step - 1 else None
+        return Seen(Snapshot(step, run.activity, weights, previous), *lesioned)

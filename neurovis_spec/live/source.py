@@ -1,0 +1,112 @@
+"""The Source: what the live view shows, one small interface.
+
+In: nothing; these are the types. A Source stands at a step and shows it; it goes on step by step, back
+where it can, and takes turns where it can. ``simulated`` and ``recorded`` are the two there are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.live.turns import Turn
+from neurovis_spec.runtime.recording import Snapshot
+
+Mask: TypeAlias = npt.NDArray[np.bool_]
+
+
+class SourceError(ValueError):
+    """What a source refuses: a step out of its reach, a turn that it cannot take."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """The steps that a source can go to, both included."""
+
+    first: int
+    last: int
+
+
+@dataclass(frozen=True, slots=True)
+class Capabilities:
+    """What a source can do besides showing and going on: ``turns`` (set, clamp, lesion, stop learning, feed an input)
+    and ``ends`` (there is a last step)."""
+
+    turns: bool
+    ends: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """What is seen of a step: its snapshot, and which neurons (n,) and connections (m,) are lesioned."""
+
+    snapshot: Snapshot
+    lesioned_neurons: Mask
+    lesioned_connections: Mask
+
+
+@dataclass(frozen=True, slots=True)
+class Turned:
+    """A turn that was taken after ``step`` was shown: it has its effect from the next one on."""
+
+    step: int
+    turn: Turn
+
+
+class Source(Protocol):
+    """What a live view shows. It stands at a step from the beginning on."""
+
+    network: Network
+    capabilities: Capabilities
+
+    @property
+    def step(self) -> int:
+        """The step that it stands at."""
+        ...
+
+    @property
+    def reach(self) -> Reach:
+        """Where ``go`` can go."""
+        ...
+
+    @property
+    def turned(self) -> tuple[Turned, ...]:
+        """The turns taken on the way to the step that it stands at."""
+        ...
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The parameters that can be set, as they are now."""
+        ...
+
+    def seen(self) -> Seen:
+        """What is seen of the step that it stands at."""
+        ...
+
+    def advance(self) -> bool:
+        """Go on by one step; False at the end, and then nothing has changed."""
+        ...
+
+    def beside(self, by: int) -> int:
+        """The step so many further on, or back, at most the first of its reach; there need not be one yet."""
+        ...
+
+    def go(self, step: int) -> None:
+        """Go to a step within reach. Raises SourceError."""
+        ...
+
+    def restart(self) -> None:
+        """Begin anew: nothing was turned, and the past is forgotten."""
+        ...
+
+    def branch(self) -> None:
+        """From here on differently: forget what came after the step that it stands at."""
+        ...
+
+    def turn(self, turn: Turn) -> None:
+        """Take a turn; what came after the step that it stands at is forgotten. Raises SourceError."""
+        ...

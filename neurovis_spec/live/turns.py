@@ -1,0 +1,84 @@
+"""Turns: what somebody changes by hand while a network runs.
+
+In: names and values, as a client sends them. Out: frozen values that a Simulation is turned by.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from neurovis_spec.runtime.simulation import Simulation
+
+
+@dataclass(frozen=True, slots=True)
+class Set:
+    """Parameters have other values from now on."""
+
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Feed:
+    """An input has these values from now on, in place of its source; none: its source again."""
+
+    name: str
+    values: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """Neurons are clamped to a value."""
+
+    neurons: str
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """Neurons are clamped no more."""
+
+    neurons: str
+
+
+@dataclass(frozen=True, slots=True)
+class Lesion:
+    """A neuron or a connection takes no part any more."""
+
+    part: str
+
+
+@dataclass(frozen=True, slots=True)
+class Mend:
+    """The opposite of a lesion."""
+
+    part: str
+
+
+@dataclass(frozen=True, slots=True)
+class Learn:
+    """Rules of connections are carried out, or not."""
+
+    connections: str
+    on: bool
+
+
+Turn: TypeAlias = Set | Feed | Hold | Release | Lesion | Mend | Learn
+
+
+def turn(simulation: Simulation, what: Set | Hold | Release | Lesion | Mend | Learn) -> None:
+    """Turn a simulation. Raises ParameterError or another ValueError, or KeyError, and then nothing has changed."""
+    match what:
+        case Set():
+            simulation.set(what.values)
+        case Hold():
+            simulation.clamp(what.neurons, what.value)
+        case Release():
+            simulation.release(what.neurons)
+        case Lesion():
+            simulation.lesion(what.part)
+        case Mend():
+            simulation.mend(what.part)
+        case Learn():
+            simulation.learning(what.connections, what.on)
