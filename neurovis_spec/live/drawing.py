@@ -98,7 +98,7 @@ def _shape(shape: Shape) -> dict[str, object]:
             pixels = base64.b64encode(shape.pixels).decode()
             return {**what, "columns": shape.columns, "rows": shape.rows, "pixels": pixels}
         case Text():
-            what = {"kind": "text", "at": _points([shape.point]), "text": shape.text, "size": _short(shape.size)}
+            what = {"kind": "text", "at": _points([shape.point]), "text": shape.text, "font": _short(shape.size)}
             more = {"fill": shape.fill, "anchor": shape.anchor, "weight": shape.weight, "subscript": shape.subscript}
             return {**what, **more, "onDisc": shape.on_disc, "halo": shape.halo}
 

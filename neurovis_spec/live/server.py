@@ -76,7 +76,8 @@ class Server:
         self._html = page()
         self._headers = headers(policy(self._html))
         self._streams: WeakSet[web.WebSocketResponse] = WeakSet()
-        self._asked: WeakSet[object] = WeakSet()
+        #: connections that have asked for nothing yet
+        self._silent: set[asyncio.Protocol] = set()
         self._app = web.Application(client_max_size=LARGEST)
         self._app.router.add_route("*", "/{path:.*}", self._answer)
         self._app.on_response_prepare.append(self._prepare)
@@ -106,18 +107,21 @@ class Server:
         if len(server.connections) >= MOST_CONNECTIONS:
             return _Closed()
         protocol = server()
+        self._silent.add(protocol)
         asyncio.get_running_loop().call_later(ASKING, self._close_silent, protocol)
         return protocol
 
     def _close_silent(self, protocol: web.RequestHandler) -> None:
-        if protocol not in self._asked and protocol.transport is not None:
-            protocol.transport.abort()
+        if protocol in self._silent:
+            self._silent.discard(protocol)
+            if protocol.transport is not None:
+                protocol.transport.abort()
 
     async def _prepare(self, request: web.Request, response: web.StreamResponse) -> None:
         response.headers.update(self._headers)
 
     async def _answer(self, request: web.Request) -> web.StreamResponse:
-        self._asked.add(request.protocol)
+        self._silent.discard(request.protocol)
         token = request.query.get("token")
         head = request.headers
         refused = self._access.refusal(request.method, request.path, head.get("Host"), head.get("Origin"), token)

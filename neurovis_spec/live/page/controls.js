@@ -57,7 +57,7 @@ export class Controls {
   /** How the run stands. @param {any} status */
   status(status) {
     this.playing = status.playing;
-    this.play.textContent = status.playing ? '⏸' : '▶';
+    this.play.textContent = status.playing ? '❚❚' : '▶';
     this.play.setAttribute('aria-label', status.playing ? 'pause' : 'play');
     this.speed.value = status.speed;
     for (const id of ['restart', 'back', 'play', 'step', 'speed', 'scrub']) {

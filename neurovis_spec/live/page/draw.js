@@ -210,21 +210,21 @@ export class Drawing {
 
   /** @param {Context} context @param {Shape} shape @param {string} fill */
   text(context, shape, fill) {
-    const { constants } = this, { size, anchor, weight } = shape, small = constants.subscriptSize * size;
+    const { constants } = this, { font: size, anchor, weight } = shape, small = constants.subscriptSize * size;
     /** @param {number} at */
-    const font = (at) => { context.font = `${weight} ${at}px ${this.family}`; };
+    const choose = (at) => { context.font = `${weight} ${at}px ${this.family}`; };
     let [x, y] = shape.at;
     let below = 0;
     if (shape.subscript) {
-      font(small);
+      choose(small);
       below = context.measureText(shape.subscript).width;
     }
-    font(size);
+    choose(size);
     const across = below || anchor !== 'start' ? context.measureText(shape.text).width : 0;
     if (anchor !== 'start') x -= (across + below) / (anchor === 'middle' ? 2 : 1);
     this.letters(context, shape.text, x, y, fill, shape.halo, size);
     if (below) {
-      font(small);
+      choose(small);
       y += constants.subscriptDrop * size;
       this.letters(context, shape.subscript, x + across, y, fill, shape.halo, size);
     }
