@@ -3,25 +3,23 @@
 In: a state of the old network, what was turned in it, the new network. Out: a state of the new one at the same step.
 What has the same name keeps its activity, its weight where it learns, the states of its model and rule, and, with the
 same delay, the signals under way; what is new begins as at step 0. Parameters, clamps and lesions are what the events
-of the new spec make of them by this step, and what was turned by hand comes after.
+of the new spec and what was turned by hand make of them by this step.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.patch import PatchError
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import Turned
 from neurovis_spec.live.turns import Feed, turn
-from neurovis_spec.runtime.conditions import Controls
 from neurovis_spec.runtime.signals import signal_layout
 from neurovis_spec.runtime.simulation import Simulation
-from neurovis_spec.runtime.state import State, initial_state
+from neurovis_spec.runtime.state import State
 
 
 def carried(old: SimulatedSource, simulation: Simulation) -> SimulatedSource:
@@ -30,32 +28,42 @@ def carried(old: SimulatedSource, simulation: Simulation) -> SimulatedSource:
     was, network, turned, fed = old.network, simulation.network, old.turned, old.fed
     if not set(was.neurons.names) & set(network.neurons.names):
         return SimulatedSource(simulation)
+    origin, then = simulation.state(), old.leave()
     sizes = {entry.name: entry.size for entry in network.inputs}
-    simulation.restore(carried_state(was, old.leave(), network))
-    done = _turn_again(simulation, turned, sizes)
+    done = _replay(simulation, then.k, turned, sizes)
+    state = simulation.state()
+    _carry(was, then, network, state)
+    simulation.restore(state)
     kept = {name: values for name, values in fed.items() if sizes.get(name) == len(values)}
-    return SimulatedSource(simulation, simulation.state(), done, kept, origin=initial_state(network))
+    return SimulatedSource(simulation, state, done, kept, origin)
 
 
-def _turn_again(simulation: Simulation, turned: Sequence[Turned], inputs: dict[str, int]) -> list[Turned]:
-    """Turn what was turned; gives what can still be turned."""
+def _replay(simulation: Simulation, k: int, turned: Sequence[Turned], inputs: Mapping[str, int]) -> list[Turned]:
+    """Change what events until step k change, and turn what was turned, in the order of their steps; gives what could
+    be turned."""
+    events = [(change.at, 0, None) for change in simulation.network.changes if change.at <= k]
     done = []
-    for entry in turned:
+    for at, _, entry in sorted([*events, *((entry.step + 1, 1, entry) for entry in turned)], key=lambda item: item[:2]):
         try:
+            if entry is None:
+                state = simulation.state()
+                state.k = at
+                simulation.restore(state)
+                continue
             if not isinstance(entry.turn, Feed):
                 turn(simulation, entry.turn)
             elif entry.turn.name not in inputs:
                 continue
-        except (ValueError, KeyError):
+        except (ValueError, KeyError):  # of what is no longer there
             continue
         done.append(entry)
     return done
 
 
-def carried_state(was: Network, old: State, network: Network) -> State:
-    """A state of ``network`` at the step of ``old``, a state of ``was``."""
-    state = initial_state(network)
-    _replay(network, state, old.k)
+def _carry(was: Network, old: State, network: Network, state: State) -> None:
+    """Have ``state`` hold what ``old``, a state of ``was``, knows, and be at its step."""
+    if state.k != old.k:
+        state.k, state.begun = old.k, -1
     state.continued, state.drawn = old.continued, old.drawn
     neurons = _shared(was.neurons.names, network.neurons.names)
     connections = _shared(was.connection_names, network.connection_names)
@@ -65,19 +73,6 @@ def carried_state(was: Network, old: State, network: Network) -> State:
     state.weights[connections[1][learn]] = old.weights[connections[0][learn]]
     _carry_states(was, old, network, state, neurons, connections)
     _carry_signals(was, old, network, state, connections)
-    return state
-
-
-def _replay(network: Network, state: State, k: int) -> None:
-    """What the events until step k change."""
-    controls = Controls(network)
-    for at in sorted(change.at for change in network.changes if change.at <= k):
-        state.k = at
-        try:
-            controls.begin(state)
-        except PatchError:
-            continue
-    state.k = k
 
 
 def _shared(old: Sequence[str], new: Sequence[str]) -> tuple[IntArray, IntArray]:

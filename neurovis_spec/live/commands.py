@@ -23,7 +23,7 @@ class Pause:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """So many steps on, or back; the run then stands still."""
+    """A few steps on, or back; the run then stands still."""
 
     by: int
 

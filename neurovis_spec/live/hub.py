@@ -137,7 +137,11 @@ class Hub:
         self._shown = shown
         self._frames.clear()
         for client in self._clients:
-            if len(client.ahead) < AHEAD or client.version != self._version or client.status != self._statuses[client.owner]:
+            if (
+                len(client.ahead) < AHEAD
+                or client.version != self._version
+                or client.status != self._statuses[client.owner]
+            ):
                 client.wake.set()
 
     def _frame(self, since: int) -> bytes:

@@ -35,6 +35,8 @@ LARGEST, _LONGEST = 16_384, 4096
 _MOST = (1 << 53) - 1
 #: The most components of an input, and parameters set at once.
 _MANY = 1024
+#: The most steps that are made at once.
+_NEAR = 64
 
 
 class ProtocolError(ValueError):
@@ -192,7 +194,7 @@ def _numbers(value: object) -> tuple[float, ...]:
 _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command]]]] = {
     "play": ({}, Play),
     "pause": ({}, Pause),
-    "step": ({"by": _whole(-_MANY, _MANY)}, Step),
+    "step": ({"by": _whole(-_NEAR, _NEAR)}, Step),
     "seek": ({"step": _whole(0, _MOST)}, Seek),
     "event": ({"by": _whole(-1, 1)}, Event),
     "restart": ({}, Restart),

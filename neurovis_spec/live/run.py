@@ -146,7 +146,7 @@ class Run:
             case Speed():
                 self._clock.set_speed(asked.value, now)
             case Step():
-                self._go(source.beside(asked.by))
+                self._step(source.beside(asked.by))
             case Seek():
                 self._go(asked.step)
             case Event():
@@ -166,6 +166,15 @@ class Run:
                 self._ended, self._target = False, None
             case _:
                 source.turn(asked)
+
+    def _step(self, step: int) -> None:
+        """To a step nearby, at once, so that of several steps asked for each is made."""
+        source, ends = self._source, self._source.capabilities.ends
+        self._playing, self._target = False, None
+        source.go(step if ends else min(step, source.reach.last))
+        while source.step < step and source.advance():
+            pass
+        self._ended = ends and source.step == source.reach.last
 
     def _event(self, by: int) -> int:
         events, here = self._events(), self._source.step

@@ -89,7 +89,12 @@ class SimulatedSource:
 
     def advance(self) -> bool:
         """Go on by one step."""
-        self._seen = self._make(self._seen.snapshot)
+        self._next(self._seen.snapshot)
+        return True
+
+    def _next(self, before: Snapshot | None) -> None:
+        """Compute a step; ``before`` is what was seen of the one before it."""
+        self._seen = self._make(before)
         self._last = max(self._last, self.step)
         known = self._past.at(self._simulation.k)
         if known is not None:  # whatever was turned here is turned again
@@ -98,7 +103,6 @@ class SimulatedSource:
             self._keep()
         if self._turned and any(entry.step == self.step for entry in self._turned):
             self._seen = Seen(self._seen.snapshot, *self._simulation.lesioned)
-        return True
 
     def beside(self, by: int) -> int:
         """The step so many further on, or back."""
@@ -112,7 +116,7 @@ class SimulatedSource:
         kept = self._past.before(step - 1) or self._past.before(step)
         if step != self.step and kept is not None and (step < self.step or kept.state.k > self._simulation.k):
             self._take(kept)
-            self._seen = self._make(None)
+            self._next(None)
         while self.step < step:
             self.advance()
 

@@ -67,7 +67,7 @@ def small(text: str) -> str:
 
 def page() -> str:
     """The page."""
-    environment = Environment(undefined=StrictUndefined, autoescape=False, keep_trailing_newline=True)  # noqa: S701
+    environment = Environment(undefined=StrictUndefined, autoescape=False, keep_trailing_newline=True)
     frame = environment.from_string((HERE / "frame.html").read_text(encoding="utf-8"))
     return frame.render(style="\n" + small((HERE / "style.css").read_text(encoding="utf-8")), script=script())
 

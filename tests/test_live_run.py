@@ -1,0 +1,175 @@
+"""The run of a live view: its clock, its commands, and that what it shows is the picture of the step."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+import neurovis_spec as nv
+from neurovis_spec.live.clock import Clock
+from neurovis_spec.live.commands import Branch, Command, Event, Pause, Play, Restart, Seek, Speed, Step
+from neurovis_spec.live.recorded import RecordedSource
+from neurovis_spec.live.run import Run, Shown
+from neurovis_spec.live.simulated import SimulatedSource
+from neurovis_spec.live.source import Reach, Source
+from neurovis_spec.live.turns import Lesion, Set
+from neurovis_spec.live.view import BAR, FAINT, FINENESS, LEVELS, view_of
+from neurovis_spec.scene.encode import looks
+
+SPEC = """neurovis: 1
+name: live
+time: {dt: 0.05, steps: 40}
+parameters: {pull: {value: 0.1, min: 0, max: 1}}
+neurons:
+  A: {count: 3, activation: tanh, bias: 0.4}
+  B: {activation: tanh}
+connections:
+  A -> B: {weight: -0.5, plasticity: {hebbian: {rate: 0.05}}}
+  B -> A: pull
+events:
+  - {at: 30, lesion: [A2]}
+  - {at: 55, set: {pull: 0.2}}
+render: {gain: {activity: 1, signal: 1, thickness: 4, change: 10}}
+"""
+COMPILED = nv.compile_text(SPEC)
+VIEW = view_of(COMPILED, COMPILED.gains)
+
+
+class Driven:
+    """A run that stands still at first; all that it shows is kept."""
+
+    def __init__(self, source: Source) -> None:
+        self.shown: list[Shown] = []
+        self.refused: list[str] = []
+        self.run = Run(source, VIEW, self.shown.append)
+        self.run.ask(Pause())
+        self.run.start()
+
+    def ask(self, *commands: Command) -> Shown:
+        """What is shown when all commands have been carried out, and it stands still."""
+        for command in commands:
+            self.run.ask(command, self.refused.append)
+        return self.until(lambda shown: not shown.status.playing)
+
+    def until(self, true: Callable[[Shown], bool]) -> Shown:
+        """What is shown when something is true of it, after all that was asked."""
+        seen: list[int] = []
+        self.run.ask(Set({"none": 0.0}), lambda reason: seen.append(len(self.shown)))  # refused, when its turn comes
+        for _ in range(2000):
+            if seen and len(self.shown) > seen[0] and true(self.shown[-1]):
+                return self.shown[-1]
+            time.sleep(0.005)
+        raise AssertionError(f"never: step {self.shown[-1].look.step}, {self.run.failure}")
+
+
+@pytest.fixture
+def driven() -> Iterator[Driven]:
+    made = Driven(SimulatedSource(COMPILED.simulator()))
+    yield made
+    made.run.end()
+    assert made.run.failure is None
+
+
+def test_the_clock_counts_steps_in_real_time_and_at_other_speeds() -> None:
+    clock = Clock.of(0.05, True)
+    clock.start(10.0)
+    assert clock.next() == pytest.approx(10.05)
+    assert clock.due(10.04) == 0
+    assert clock.due(10.05) == 1
+    clock.make(1)
+    assert clock.due(10.16) == 2
+    clock.make(2)
+    clock.set_speed(16.0, 10.16)
+    assert clock.due(10.26) == 32
+    clock.set_speed(math.inf, 10.26)
+    assert clock.due(10.26) == math.inf
+    assert clock.next() == 10.26
+
+
+def test_without_a_dt_it_is_a_step_a_frame() -> None:
+    clock = Clock.of(1.0, False)
+    clock.start(0.0)
+    assert clock.due(1 / 60) == 1
+    assert clock.due(0.2) == 12
+
+
+def test_what_is_late_is_not_caught_up() -> None:
+    clock = Clock.of(0.05, True)
+    clock.start(0.0)
+    assert clock.due(60.0) == 1
+    clock.make(1)
+    assert clock.next() == pytest.approx(60.05)
+
+
+def test_it_is_stepped_sought_and_begun_anew(driven: Driven) -> None:
+    assert driven.ask().look.step == 0
+    assert driven.ask(Step(1), Step(1)).look.step == 2
+    assert driven.ask(Step(-1)).look.step == 1
+    assert driven.ask(Seek(100)).reach == Reach(0, 100)
+    assert driven.ask(Seek(7)).look.step == 7
+    assert driven.ask(Branch()).reach == Reach(0, 7)
+    assert driven.ask(Step(-20)).look.step == 0
+    assert driven.ask(Event(1)).look.step == 30
+    assert driven.ask(Event(1)).look.step == 55
+    assert driven.ask(Event(-1)).look.step == 30
+    assert driven.ask(Event(-1)).look.step == 30
+    assert driven.refused == ["there is no event before step 30"]
+    assert driven.ask(Restart()).reach == Reach(0, 0)
+
+
+def test_it_plays_past_the_steps_of_the_spec_and_stands_still(driven: Driven) -> None:
+    for command in (Speed(math.inf), Seek(41), Play()):
+        driven.run.ask(command)
+    assert driven.until(lambda shown: shown.look.step > 200).status.playing
+    step = driven.ask(Pause()).look.step
+    assert driven.ask().look.step == step > 200
+
+
+def test_a_turn_is_listed_and_one_that_cannot_be_is_told(driven: Driven) -> None:
+    shown = driven.ask(Seek(5), Set({"pull": 0.9}), Lesion("B"), Set({"pull": 9.0}))
+    assert [entry.turn for entry in shown.status.turned] == [Set({"pull": 0.9}), Lesion("B")]
+    assert shown.status.parameters == {"pull": 0.9}
+    assert "pull" in driven.refused[0]
+    assert shown.look.kinds[-1] == FAINT
+
+
+def test_a_recording_ends() -> None:
+    made = Driven(RecordedSource(COMPILED.network, COMPILED.run(steps=50)))
+    made.run.ask(Speed(math.inf))
+    made.run.ask(Play())
+    shown = made.until(lambda shown: shown.status.ended)
+    assert shown.look.step == 49
+    assert not shown.status.playing
+    assert made.ask(Step(-9)).look.step == 40
+    assert not made.ask(Set({"pull": 0.1})).status.capabilities.turns
+    assert made.refused == ["a recording cannot be changed: run the spec"]
+    made.run.end()
+
+
+def test_nothing_is_shown_to_nobody() -> None:
+    shown: list[Shown] = []
+    run = Run(SimulatedSource(COMPILED.simulator()), VIEW, shown.append, lambda: False)
+    run.start()
+    run.ask(Step(3))
+    run.end()
+    assert shown == []
+
+
+def test_a_look_is_the_picture_of_its_step(driven: Driven) -> None:
+    recording = COMPILED.run(steps=70)
+    for step in (0, 1, 29, 30, 69):
+        look = driven.ask(Seek(step)).look
+        wanted = looks(COMPILED.network, recording.snapshot(step), COMPILED.gains, VIEW.plan.frame.widest)
+        assert np.abs(look.discs / LEVELS - wanted.discs).max() <= 0.5 / LEVELS
+        assert np.abs(look.lines / LEVELS - wanted.lines).max() <= 0.5 / LEVELS
+        assert np.abs(look.widths / FINENESS - wanted.widths).max() <= 0.5 / FINENESS
+        assert np.abs(look.glows / FINENESS - wanted.glows).max() <= 0.5 / FINENESS
+        assert (look.kinds[: len(wanted.bars)] & BAR > 0).tolist() == wanted.bars.tolist()
+        faint = (look.kinds & FAINT > 0).tolist()
+        gone = step >= 30
+        assert faint == [False, gone, False, False, gone, False, False, gone, False, False]
+        assert look.caption == f"step {step} · {step * 0.05:.2f} s"

@@ -1,0 +1,249 @@
+"""Sources of the live view: going on and back is exact, turns are taken again, memory is bounded."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import neurovis_spec as nv
+from neurovis_spec.live.carry import carried
+from neurovis_spec.live.past import EVERY, Kept, Past
+from neurovis_spec.live.recorded import RecordedSource
+from neurovis_spec.live.simulated import SimulatedSource
+from neurovis_spec.live.source import Reach, Seen, SourceError
+from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turn
+
+SPEC = """neurovis: 1
+name: live
+time: {dt: 0.05, steps: 40}
+parameters: {mix: 0.5, pull: {value: 0.1, min: 0, max: 1}}
+inputs: {push: {}}
+neurons:
+  A: {count: 3, activation: tanh, noise: "normal(0, 0.05)"}
+  B: {activation: tanh, input: push}
+connections:
+  A -> A: {pattern: all_to_all, weight: "uniform(-1, 1)", delay: 2}
+  A -> B: {weight: mix, plasticity: {hebbian: {rate: 0.05}}}
+  B -> B: pull
+events:
+  - {at: 30, lesion: [A2]}
+  - {at: 50, mend: [A2]}
+  - {at: 50, set: {pull: 0.2}}
+"""
+
+
+def network(text: str = SPEC) -> nv.CompiledNetwork:
+    return nv.compile_text(text)
+
+
+def same(one: Seen, other: Seen) -> bool:
+    a, b = one.snapshot, other.snapshot
+    before = (a.previous_weights is None) == (b.previous_weights is None)
+    if a.previous_weights is not None and b.previous_weights is not None:
+        before = np.array_equal(a.previous_weights, b.previous_weights)
+    return bool(
+        a.step == b.step
+        and before
+        and np.array_equal(a.activity, b.activity)
+        and np.array_equal(a.weights, b.weights)
+        and np.array_equal(one.lesioned_neurons, other.lesioned_neurons)
+        and np.array_equal(one.lesioned_connections, other.lesioned_connections)
+    )
+
+
+TURNS: dict[int, Turn] = {
+    20: Set({"pull": 0.7}),
+    70: Lesion("A1"),
+    100: Mend("A1"),
+    101: Hold("A3", 0.25),
+    130: Release("A3"),
+    140: Learn("A -> B", False),
+}
+
+
+def driven(source: SimulatedSource, steps: int) -> dict[int, Seen]:
+    """What is seen of each step, with all turns taken."""
+    seen = {source.step: source.seen()}
+    while source.step < steps:
+        source.advance()
+        if source.step in TURNS:
+            source.turn(TURNS[source.step])
+        seen[source.step] = source.seen()
+    return seen
+
+
+def test_what_is_seen_is_what_a_recording_holds() -> None:
+    compiled = network()
+    recording = compiled.run(steps=120)
+    source = SimulatedSource(compiled.simulator())
+    for step in range(120):
+        seen, known = source.seen().snapshot, recording.snapshot(step)
+        assert np.array_equal(seen.activity, known.activity)
+        assert np.array_equal(seen.weights, known.weights)
+        assert (seen.previous_weights is None) == (step == 0)
+        if known.previous_weights is not None and seen.previous_weights is not None:
+            assert np.array_equal(seen.previous_weights, known.previous_weights)
+        source.advance()
+
+
+def test_it_goes_back_and_on_exactly_with_what_was_turned_on_the_way() -> None:
+    source = SimulatedSource(network().simulator())
+    seen = driven(source, 3 * EVERY)
+    assert source.reach == Reach(0, 3 * EVERY)
+    order = [*range(3 * EVERY, -1, -7), *range(0, 3 * EVERY, 11), EVERY, EVERY - 1, EVERY + 1, 0, 20, 21, 19, 20, 101]
+    for step in order:
+        source.go(step)
+        assert same(source.seen(), seen[step]), step
+    source.go(0)
+    for step in range(1, 3 * EVERY + 1):
+        assert source.advance()
+        assert same(source.seen(), seen[step]), step
+    assert [entry.step for entry in source.turned] == list(TURNS)
+    source.go(100)
+    assert [entry.step for entry in source.turned] == [20, 70, 100]
+
+
+def test_a_turn_in_the_past_makes_another_future() -> None:
+    source = SimulatedSource(network().simulator())
+    seen = driven(source, 150)
+    source.go(60)
+    source.turn(Lesion("B"))
+    assert source.reach == Reach(0, 60)
+    assert source.seen().lesioned_neurons.tolist() == [False, False, False, True]
+    source.advance()
+    assert source.seen().snapshot.activity[3] == 0 != seen[61].snapshot.activity[3]
+    source.go(59)
+    assert same(source.seen(), seen[59])
+    source.go(30)
+    source.branch()
+    assert source.reach == Reach(0, 30)
+    assert [entry.step for entry in source.turned] == [20]
+    source.restart()
+    assert (source.step, source.reach, source.turned) == (0, Reach(0, 0), ())
+
+
+def test_an_input_is_fed_until_its_source_has_it_again() -> None:
+    compiled = nv.compile_text(
+        "neurovis: 1\nname: x\nneurons: {A: {activation: identity, input: push}}\ninputs: {push: {}}"
+    )
+    source = SimulatedSource(compiled.simulator())
+    source.turn(Feed("push", (0.5,)))
+    source.advance()
+    assert source.seen().snapshot.activity.tolist() == [0.5]
+    source.turn(Feed("push"))
+    source.advance()
+    assert source.seen().snapshot.activity.tolist() == [0.0]
+    source.go(1)
+    assert source.seen().snapshot.activity.tolist() == [0.5]
+
+
+@pytest.mark.parametrize(
+    "turn",
+    [
+        *(Set({"gian": 1.0}), Set({"pull": 7.0}), Feed("pull", (1.0,)), Feed("push", (1.0, 2.0)), Hold("Q", 0.0)),
+        *(Lesion("Q"), Mend("Q -> B"), Learn("A -> A", False)),
+    ],
+)
+def test_what_cannot_be_turned_is_refused_and_changes_nothing(turn: Turn) -> None:
+    source = SimulatedSource(network().simulator())
+    seen = driven(source, 5)
+    source.go(3)
+    with pytest.raises(SourceError):
+        source.turn(turn)
+    assert source.reach == Reach(0, 5)
+    source.advance()
+    assert same(source.seen(), seen[4])
+
+
+def test_the_past_takes_bounded_memory_and_says_how_far_back_it_reaches() -> None:
+    compiled = network()
+    size = Kept(compiled.simulator().state(), {}).size
+    source = SimulatedSource(compiled.simulator(), room=3 * size + size // 2)
+    seen = driven(source, 10 * EVERY)
+    assert source.reach == Reach(8 * EVERY + 1, 10 * EVERY)
+    for step in (8 * EVERY + 1, 9 * EVERY, 8 * EVERY + 5):
+        source.go(step)
+        assert same(source.seen(), seen[step])
+    with pytest.raises(SourceError, match="the past goes from step 513 to 640"):
+        source.go(8 * EVERY)
+    source.restart()
+    assert same(source.seen(), seen[0])
+
+
+def test_the_room_is_of_the_bytes_that_states_hold() -> None:
+    simulation = network().simulator()
+    past = Past(room=1)
+    for _ in range(3):
+        past.keep(Kept(simulation.state(), {}))
+        simulation.step()
+    assert len(past) == 1
+    assert past.first == 2
+    assert past.taken == Kept(simulation.state(), {}).size
+
+
+def test_a_recording_is_gone_through_row_by_row() -> None:
+    compiled = network()
+    source = RecordedSource(compiled.network, compiled.run(steps=61, every=10))
+    assert (source.step, source.reach) == (0, Reach(0, 60))
+    steps = [source.step]
+    while source.advance():
+        steps.append(source.step)
+    assert steps == [0, 10, 20, 30, 40, 50, 60]
+    assert source.beside(-1) == 50
+    assert source.beside(1) == 60
+    source.go(31)
+    assert source.step == 40
+    assert source.seen().lesioned_neurons.tolist() == [False, True, False, False]
+    with pytest.raises(SourceError):
+        source.go(61)
+    with pytest.raises(SourceError):
+        source.branch()
+    with pytest.raises(SourceError):
+        source.turn(Lesion("B"))
+
+
+def test_an_edited_comment_changes_nothing() -> None:
+    source, known = SimulatedSource(network().simulator()), SimulatedSource(network().simulator())
+    driven(source, 80)
+    seen = driven(known, 200)
+    assert len(seen) == 201
+    other = carried(source, network(SPEC + "# a comment\n").simulator())
+    assert other.step == 80
+    now, then = other.seen().snapshot, seen[80].snapshot
+    assert np.array_equal(now.activity, then.activity)
+    assert np.array_equal(now.weights, then.weights)
+    while other.step < 200:
+        other.advance()
+        if other.step in TURNS:
+            other.turn(TURNS[other.step])
+        assert same(other.seen(), seen[other.step])
+
+
+def test_an_edited_network_goes_on_at_its_step_with_what_it_has_learned() -> None:
+    source = SimulatedSource(network().simulator())
+    driven(source, 60)
+    learned = {name: source.seen().snapshot.weights[i] for i, name in enumerate(source.network.connection_names)}
+    edited = (
+        SPEC.replace("count: 3", "count: 2").replace("lesion: [A2]", "lesion: [A1]").replace("mend: [A2]", "mend: [B]")
+    )
+    edited = edited.replace("  B -> B: pull", "  B -> B: pull\n  B -> C: 0.7").replace(
+        "connections:", "  C: {}\nconnections:"
+    )
+    other = carried(source, network(edited).simulator())
+    assert other.step == 60
+    weights = dict(zip(other.network.connection_names, other.seen().snapshot.weights.tolist(), strict=True))
+    for name in ("A1 -> B", "A2 -> B"):
+        assert weights[name] == learned[name] != 0.5
+    assert weights["B -> C"] == 0.7
+    assert other.seen().lesioned_neurons.tolist() == [True, False, False, False]
+    assert other.parameters == {"mix": 0.5, "pull": 0.2}
+    other.restart()
+    assert other.step == 0
+    assert other.parameters == {"mix": 0.5, "pull": 0.1}
+
+
+def test_a_network_without_a_neuron_of_the_old_one_begins_anew() -> None:
+    source = SimulatedSource(network().simulator())
+    driven(source, 10)
+    other = carried(source, nv.compile_text("neurovis: 1\nname: y\nneurons: {Z: {activation: tanh}}").simulator())
+    assert other.step == 0
