@@ -134,7 +134,7 @@ def test_wrong_usage_is_status_2(folder: Path, words: str) -> None:
     assert [path.name for path in folder.iterdir()] == ["small.yaml"]
 
 
-@pytest.mark.parametrize("name", ["live", "ros", "analyze", "import"])
+@pytest.mark.parametrize("name", ["ros", "analyze", "import"])
 def test_a_command_that_is_not_there_yet_is_answered_with_those_that_are(name: str) -> None:
     """Wrong usage, not a misspelling of another."""
     result = call(f"{name} x.yaml")

@@ -35,6 +35,7 @@ from neurovis_spec.runtime.ros_messages import (
     array_prefix,
     label_of,
     text_message,
+    text_of,
 )
 from neurovis_spec.runtime.rows import RowWriter, Steps
 from neurovis_spec.runtime.unfinished import Part, move, part_of
@@ -197,6 +198,8 @@ class _Reading:
         self._after: dict[str, str] = {}
         self._channels: dict[int, int] = {}
         self._known: set[int] = set()
+        self._specs: set[int] = set()
+        self._spec = ""
         self._named = 0
         self._room = max(_ROOM, _RATIO * file.seek(0, io.SEEK_END))
         self._steps: tuple[list[int], ...] = ([], [], [])
@@ -248,11 +251,16 @@ class _Reading:
     def _channel(self, topic: Topic) -> None:
         self._known.add(topic.channel)
         kind = topic.topic.rpartition("/")[2]
-        if kind in _ARRAYS:
+        if kind == "spec":
+            self._specs.add(topic.channel)
+        elif kind in _ARRAYS:
             self._channels[topic.channel] = _ARRAYS.index(kind)
 
     def _message(self, message: Message) -> None:
         kind = self._channels.get(message.channel)
+        if message.channel in self._specs:
+            self._spec = text_of(message.data)
+            return
         if kind is None:
             if message.channel not in self._known:
                 raise RecordingError("a message is of a channel that there is not")
@@ -276,7 +284,7 @@ class _Reading:
         activity, weights, states = (
             np.array(self._rows[kind][:count]).reshape(count, width) for kind, width in enumerate(frame.widths)
         )
-        recording = replace(frame, step=step, activity=activity, weights=weights, states=states)
+        recording = replace(frame, step=step, activity=activity, weights=weights, states=states, spec=self._spec)
         return ended(recording, self._ended(recording))
 
     def _ended(self, recording: Recording) -> After:
