@@ -1,0 +1,142 @@
+"""The live page in Chromium: the same picture as ``render``, play, pause, step and back, and nothing in its console."""
+
+from __future__ import annotations
+
+import asyncio
+import gzip
+import io
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+from chromium import Page, chromium
+from PIL import Image
+from test_browser import similarity
+
+import neurovis_spec as nv
+from neurovis_spec import pipeline
+from neurovis_spec.compiler.wishes import RenderSettings
+from neurovis_spec.live.access import Access
+from neurovis_spec.live.hub import Hub
+from neurovis_spec.live.live import listen
+from neurovis_spec.live.run import Run
+from neurovis_spec.live.server import Server, page
+from neurovis_spec.live.simulated import SimulatedSource
+from neurovis_spec.live.view import view_of
+
+pytestmark = pytest.mark.browser
+
+SPECS = Path(__file__).parents[1] / "specs"
+STEP = "Number(document.querySelector('#told')?.textContent.split(' ')[1])"
+BAR = 44
+
+
+@asynccontextmanager
+async def shown(
+    spec: str, folder: Path, theme: str | None = None
+) -> AsyncIterator[tuple[Page, nv.CompiledNetwork, Access]]:
+    """A live view of an example, opened in a window that shows its picture a pixel a pixel."""
+    compiled = nv.compile(SPECS / spec)
+    view = view_of(compiled, compiled.gains, theme)
+    hub = Hub(asyncio.get_running_loop())
+    run = Run(SimulatedSource(compiled.simulator()), view, hub.show, lambda: hub.watched)
+    sock = listen("127.0.0.1", 0)
+    access = Access("127.0.0.1", sock.getsockname()[1], viewers=True)
+    server = Server(access, hub, run)
+    await server.start(sock)
+    run.start()
+    frame = view.plan.frame
+    width, height = round(frame.width * frame.density), round(frame.height * frame.density)
+    try:
+        async with chromium(folder) as opened:
+            await opened.size(width, height + BAR)
+            await opened.call("Page.navigate", url=access.url())
+            await opened.until(f"{STEP} >= 0")
+            yield opened, compiled, access
+            assert opened.errors == []
+    finally:
+        run.end()
+        await server.stop()
+
+
+async def pause(opened: Page) -> int:
+    await opened.ask("document.querySelector('#play').click()")
+    await opened.until("document.querySelector('#play').getAttribute('aria-label') == 'play'")
+    step = await opened.ask(f"new Promise(done => setTimeout(() => done({STEP}), 200))")
+    assert isinstance(step, int)
+    return step
+
+
+@pytest.mark.parametrize(
+    ("spec", "theme"), [("cpg_rbf.yaml", "default"), ("cpg_rbf.yaml", "dark"), ("hexapod/hexapod.yaml", "default")]
+)
+def test_the_page_shows_the_picture_that_render_draws(spec: str, theme: str, tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown(spec, tmp_path, theme) as (opened, compiled, _):
+            await opened.until(f"{STEP} > 30")
+            step = await pause(opened)
+            taken = Image.open(io.BytesIO(await opened.shot())).convert("RGB")
+            settings = RenderSettings(theme=theme) if spec == "cpg_rbf.yaml" else compiled.network.render
+            snapshot = compiled.run(step + 1).snapshot(step)
+            layout = compiled.drawn().value
+            scene = pipeline.picture(compiled.network, layout, snapshot, compiled.gains, settings)
+            drawn = Image.open(io.BytesIO(pipeline.draw(scene, ".png"))).convert("RGB")
+            seen = taken.crop((0, 0, *drawn.size))
+            seen.save(tmp_path / "seen.png")
+            drawn.save(tmp_path / "drawn.png")
+            assert similarity(seen, drawn) >= 0.98
+
+    asyncio.run(main())
+
+
+def test_it_plays_stands_still_steps_on_and_back(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):
+            await opened.until(f"{STEP} > 3")
+            step = await pause(opened)
+            await opened.ask("document.querySelector('#step').click()")
+            await opened.until(f"{STEP} == {step + 1}")
+            for _ in range(3):
+                await opened.ask("document.querySelector('#back').click()")
+            await opened.until(f"{STEP} == {step - 2}")
+            await opened.key("ArrowRight")
+            await opened.until(f"{STEP} == {step - 1}")
+            await opened.key("ArrowLeft")
+            await opened.until(f"{STEP} == {step - 2}")
+            scrub = "document.querySelector('#scrub')"
+            assert await opened.ask(f"[{scrub}.min, {scrub}.max, {scrub}.value].map(Number)") == [0, step + 1, step - 2]
+            await opened.ask(f"{scrub}.value = 1; {scrub}.dispatchEvent(new Event('input'))")
+            await opened.until(f"{STEP} == 1")
+            await opened.ask("const speed = document.querySelector('#speed'); speed.value = 'max'; speed.onchange()")
+            await opened.key(" ")
+            await opened.until(f"{STEP} > 500")
+            await opened.key("Home")
+            await opened.until(f"{STEP} < 500")
+
+    asyncio.run(main())
+
+
+def test_a_viewer_has_no_controls(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, access):
+            await opened.call("Page.navigate", url=access.url(owner=False))
+            await opened.until("document.querySelector('#play')?.disabled")
+            await opened.until(f"{STEP} > 3")
+
+    asyncio.run(main())
+
+
+def test_it_connects_again_and_then_shows_the_same(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):
+            await opened.call("Network.enable")
+            step = await pause(opened)
+            await opened.call("Page.reload")
+            await opened.until(f"document.readyState == 'complete' && {STEP} == {step}")
+
+    asyncio.run(main())
+
+
+def test_the_page_is_small() -> None:
+    assert len(gzip.compress(page().encode(), 9)) <= 30 * 1024
