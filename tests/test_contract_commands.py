@@ -53,6 +53,7 @@ OPTIONS = {
     "sweep": "--over --metric --steps --set --input --backend --jobs --scheduler --output",
     "animate": "--output --steps --from --fps --recording --input --theme --engine",
     "export": "--to --output --float --from --set",
+    "live": "--recording --from --watch --host --port --viewers --open --theme --engine --backend --set",
     "explain": "", "docs": "", "lsp": "", "schema": "",
 }  # fmt: skip
 

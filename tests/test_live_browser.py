@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import gzip
 import io
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -21,7 +20,7 @@ from neurovis_spec.live.access import Access
 from neurovis_spec.live.hub import Hub
 from neurovis_spec.live.live import listen
 from neurovis_spec.live.run import Run
-from neurovis_spec.live.server import Server, page
+from neurovis_spec.live.server import Server
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.view import view_of
 
@@ -136,7 +135,3 @@ def test_it_connects_again_and_then_shows_the_same(tmp_path: Path) -> None:
             await opened.until(f"document.readyState == 'complete' && {STEP} == {step}")
 
     asyncio.run(main())
-
-
-def test_the_page_is_small() -> None:
-    assert len(gzip.compress(page().encode(), 9)) <= 30 * 1024

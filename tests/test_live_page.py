@@ -1,0 +1,84 @@
+"""The page as it is shipped: put together from its modules, small, and described in docs/live.md message by message."""
+
+from __future__ import annotations
+
+import gzip
+import importlib.util
+import re
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from neurovis_spec.live.clock import SPEEDS
+from neurovis_spec.live.protocol import LARGEST, MESSAGES
+from neurovis_spec.live.server import ASKING, BURST, MOST_CLIENTS, MOST_CONNECTIONS, PINGS, RATE, page
+
+ROOT = Path(__file__).parents[1]
+MODULES = ROOT / "neurovis_spec/live/page"
+
+
+@pytest.fixture(scope="module")
+def build() -> ModuleType:
+    found = importlib.util.spec_from_file_location("build", MODULES / "build.py")
+    assert found is not None
+    assert found.loader is not None
+    module = importlib.util.module_from_spec(found)
+    found.loader.exec_module(module)
+    return module
+
+
+def test_the_shipped_page_is_that_of_its_modules(build: ModuleType) -> None:
+    assert build.page() == page(), "run python neurovis_spec/live/page/build.py"
+
+
+def test_it_is_small_and_asks_nobody_else() -> None:
+    assert len(gzip.compress(page().encode(), 9)) <= 30 * 1024
+    assert not re.findall(r"(?:https?:)?//[a-z]", page())
+    assert "eval(" not in page()
+    assert "innerHTML" not in page()
+
+
+def test_every_module_is_in_it(build: ModuleType) -> None:
+    assert set(build.order("main.js", [])) == {file.name for file in MODULES.glob("*.js")}
+
+
+def test_a_name_at_the_top_of_two_modules_is_refused(
+    build: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "main.js").write_text("import { a } from './a.js';\nconst SIZE = 1, more = 2;\n")
+    (tmp_path / "a.js").write_text("export const a = 3;\nfunction more() {}\n")
+    monkeypatch.setattr(build, "HERE", tmp_path)
+    with pytest.raises(build.BuildError, match=r"'more' is at the top of main\.js and of a\.js"):
+        build.script()
+
+
+def test_every_message_and_limit_is_documented() -> None:
+    text = (ROOT / "docs/live.md").read_text(encoding="utf-8")
+    assert set(re.findall(r'\{"type": "(\w+)"', text)) == {*MESSAGES, "status", "findings", "refused"}
+    for speed in SPEEDS:
+        assert speed in text
+    for limit in (
+        f"{LARGEST // 1024} KiB",
+        f"{MOST_CLIENTS} websockets",
+        f"beyond {MOST_CONNECTIONS}",
+        f"{RATE} messages",
+    ):
+        assert limit in text
+    for limit in (f"{BURST} at once", f"after {ASKING:g} s", f"after {PINGS:g} s"):
+        assert limit in text
+
+
+def test_every_intrusion_that_is_documented_is_tried() -> None:
+    """A row of the table for each kind of test, so that neither is forgotten."""
+    table = (ROOT / "docs/live.md").read_text(encoding="utf-8").partition("## Intrusions")[2]
+    tests = (ROOT / "tests/test_live_server.py").read_text(encoding="utf-8")
+    for words, test in {
+        "without the token": "without_the_token", "a Host": "foreign_host", "an Origin": "foreign_origin",
+        "other paths": "other_paths_and_methods", "Content-Security-Policy": "strict_policy", "no JSON": "broken_message",
+        "above 16 KiB": "huge_message", "messages a second": "flood", "compressed": "compressed_bombs",
+        "a viewer that asks": "a_viewer_looks_on", "websockets": "more_than_there_may_be", "a thousand": "a_thousand",
+        "first request": "asks_for_nothing", "reads nothing": "never_reads",
+    }.items():  # fmt: skip
+        assert words in table
+        assert re.search(rf"def test_\w*{test}", tests), test
