@@ -75,7 +75,8 @@ def test_every_intrusion_that_is_documented_is_tried() -> None:
     tests = (ROOT / "tests/test_live_server.py").read_text(encoding="utf-8")
     for words, test in {
         "without the token": "without_the_token", "a Host": "foreign_host", "an Origin": "foreign_origin",
-        "other paths": "other_paths_and_methods", "Content-Security-Policy": "strict_policy", "no JSON": "broken_message",
+        "other paths": "other_paths_and_methods", "Content-Security-Policy": "strict_policy",
+        "no JSON": "broken_message",
         "above 16 KiB": "huge_message", "messages a second": "flood", "compressed": "compressed_bombs",
         "a viewer that asks": "a_viewer_looks_on", "websockets": "more_than_there_may_be", "a thousand": "a_thousand",
         "first request": "asks_for_nothing", "reads nothing": "never_reads",

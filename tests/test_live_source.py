@@ -12,6 +12,7 @@ from neurovis_spec.live.recorded import RecordedSource
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import Reach, Seen, SourceError
 from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turn
+from neurovis_spec.scene.fading import Fading
 
 SPEC = """neurovis: 1
 name: live
@@ -157,7 +158,7 @@ def test_what_cannot_be_turned_is_refused_and_changes_nothing(turn: Turn) -> Non
 
 def test_the_past_takes_bounded_memory_and_says_how_far_back_it_reaches() -> None:
     compiled = network()
-    size = Kept(compiled.simulator().state(), {}).size
+    size = Kept(compiled.simulator().state(), {}, Fading(compiled.network)).size
     source = SimulatedSource(compiled.simulator(), room=3 * size + size // 2)
     seen = driven(source, 10 * EVERY)
     assert source.reach == Reach(8 * EVERY + 1, 10 * EVERY)
@@ -174,11 +175,11 @@ def test_the_room_is_of_the_bytes_that_states_hold() -> None:
     simulation = network().simulator()
     past = Past(room=1)
     for _ in range(3):
-        past.keep(Kept(simulation.state(), {}))
+        past.keep(Kept(simulation.state(), {}, Fading(simulation.network)))
         simulation.step()
     assert len(past) == 1
     assert past.first == 2
-    assert past.taken == Kept(simulation.state(), {}).size
+    assert past.taken == Kept(simulation.state(), {}, Fading(simulation.network)).size
 
 
 def test_a_recording_is_gone_through_row_by_row() -> None:

@@ -25,6 +25,7 @@ from neurovis_spec.scene import (
     Disc,
     Group,
     Image,
+    Polyline,
     Ramp,
     Rectangle,
     Scene,
@@ -75,6 +76,8 @@ def _shape(shape: Shape) -> dict[str, object]:
         case Disc():
             what = {"kind": "disc", "at": _points([shape.centre]), "radius": _short(shape.radius), "fill": shape.fill}
             return {**what, "stroke": shape.stroke, "width": _short(shape.stroke_width)}
+        case Polyline():
+            return _shape(shape.spline)
         case Spline():
             what = {"kind": "line", "points": _points(shape.points), "stroke": shape.stroke, "width": shape.width}
             return {**what, "dash": list(shape.dash), "opacity": shape.opacity}
@@ -100,7 +103,7 @@ def _shape(shape: Shape) -> dict[str, object]:
         case Text():
             what = {"kind": "text", "at": _points([shape.point]), "text": shape.text, "font": _short(shape.size)}
             more = {"fill": shape.fill, "anchor": shape.anchor, "weight": shape.weight, "subscript": shape.subscript}
-            return {**what, **more, "onDisc": shape.on_disc, "halo": shape.halo}
+            return {**what, **more, "onDisc": shape.on_disc, "halo": shape.halo, "upward": shape.upward}
 
 
 def _short(value: float) -> float:

@@ -14,6 +14,7 @@ import numpy as np
 
 from neurovis_spec.runtime.conditions import Conditions
 from neurovis_spec.runtime.state import State
+from neurovis_spec.scene.fading import Fading
 
 #: bytes
 ROOM = 256 << 20
@@ -25,10 +26,12 @@ _OVERHEAD = 4096
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """All that a run goes on from: its state, and what is fed to inputs."""
+    """All that a run goes on from: its state, what is fed to inputs, and what is still seen of the steps before."""
 
     state: State
     fed: Mapping[str, tuple[float, ...]]
+    #: the traces of what was active, for the eye
+    fading: Fading
 
     @property
     def size(self) -> int:

@@ -13,6 +13,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned
 from neurovis_spec.live.turns import Turn
 from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.scene.fading import snapshots_of
 from neurovis_spec.scene.lesions import lesions_of
 from neurovis_spec.snapshots import fitted
 
@@ -57,7 +58,8 @@ class RecordedSource:
         neurons, connections = np.zeros(len(self.network.neurons), bool), np.zeros(len(self.network.connections), bool)
         for mask, lesions in ((neurons, self._lesions.neurons), (connections, self._lesions.connections)):
             mask[[index for index, step in lesions.items() if step <= self.step]] = True
-        return Seen(self._recording.snapshot(self.step), neurons, connections)
+        (snapshot,) = snapshots_of(self.network, self._recording, [self.step])
+        return Seen(snapshot, neurons, connections)
 
     def advance(self) -> bool:
         """Go on by one row; False at the end."""

@@ -7,6 +7,9 @@ again from the state before it, bit for bit, and what was turned on the way is t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
+
+import numpy as np
 
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.past import EVERY, ROOM, Kept, Past
@@ -15,6 +18,7 @@ from neurovis_spec.live.turns import Feed, Turn, turn
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.runtime.simulation import Simulation
 from neurovis_spec.runtime.state import State
+from neurovis_spec.scene.fading import Fading
 
 
 class SimulatedSource:
@@ -39,6 +43,7 @@ class SimulatedSource:
 
     def _begin(self, state: State, turned: Sequence[Turned], fed: Mapping[str, tuple[float, ...]]) -> None:
         self._past = Past(self._room)
+        self._fading = Fading(self.network)
         self._fed, self._turned = dict(fed), list(turned)
         self._started = self._last = state.k
         self._simulation.restore(state)
@@ -156,11 +161,11 @@ class SimulatedSource:
         self._fed = {**self._fed, what.name: (what.values * entry.size)[: entry.size]}
 
     def _keep(self) -> None:
-        self._past.keep(Kept(self._simulation.state(), self._fed))
+        self._past.keep(Kept(self._simulation.state(), self._fed, copy(self._fading)))
 
     def _take(self, kept: Kept) -> None:
         self._simulation.restore(kept.state)
-        self._fed = dict(kept.fed)
+        self._fed, self._fading = dict(kept.fed), copy(kept.fading)
 
     def _make(self, before: Snapshot | None) -> Seen:
         """Compute a step; ``before`` is what was seen of the one before it."""
@@ -168,4 +173,6 @@ class SimulatedSource:
         step, weights, lesioned = run.k, run.connection_weights, run.lesioned
         run.step({name: values if len(values) > 1 else values[0] for name, values in self._fed.items()})
         previous = before.weights if before is not None and before.step == step - 1 else None
-        return Seen(Snapshot(step, run.activity, weights, previous), *lesioned)
+        activity = run.activity
+        seen = self._fading.follow(np.array([step]), activity[None]) if self._fading else None
+        return Seen(Snapshot(step, activity, weights, previous, seen), *lesioned)

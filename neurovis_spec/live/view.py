@@ -12,14 +12,15 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.drawing import content
-from neurovis_spec.live.source import Seen
+from neurovis_spec.live.source import Mask, Seen
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.scene import Scene
 from neurovis_spec.scene.caption import caption
+from neurovis_spec.scene.collapse import Gathered, gathered
 from neurovis_spec.scene.encode import looks, paint, tooltips
 from neurovis_spec.scene.gains import Gains
+from neurovis_spec.scene.gathered_layout import laid_out
 from neurovis_spec.scene.plan import Plan, plan
 
 #: A colour value of 1 as a number: between neighbours lie less than 1.2 of 255 levels of a colour.
@@ -46,9 +47,9 @@ class Look:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """How a network is drawn."""
+    """How a network is drawn: ``drawn`` is what stands for it, where parts of it are collapsed."""
 
-    network: Network
+    drawn: Gathered
     gains: Gains
     plan: Plan
     #: all that stays, as a page gets it
@@ -56,9 +57,11 @@ class View:
 
     def look(self, seen: Seen) -> Look:
         """What a step looks like."""
-        snapshot = seen.snapshot
-        shown = looks(self.network, snapshot, self.gains, self.plan.frame.widest)
-        words = self.plan.caption_shape(caption(self.network, snapshot.step, snapshot.activity))
+        whole, drawn = seen.snapshot, self.drawn
+        snapshot = drawn.snapshot(whole)
+        shown = looks(drawn.network, snapshot, self.gains, self.plan.frame.widest, drawn.signals(whole))
+        words = self.plan.caption_shape(caption(drawn.whole, whole.step, whole.activity))
+        neurons, lines = self._lesioned(seen)
         bars = shown.bars & (self.plan.theme.ends == "signs")
         return Look(
             step=snapshot.step,
@@ -67,25 +70,34 @@ class View:
             lines=_levels(shown.lines),
             widths=_parts(shown.widths),
             glows=_parts(shown.glows),
-            kinds=np.concatenate(
-                [bars * BAR + seen.lesioned_connections * FAINT, seen.lesioned_neurons * FAINT]
-            ).astype(np.uint8),
+            kinds=np.concatenate([bars * BAR + lines * FAINT, neurons * FAINT]).astype(np.uint8),
         )
+
+    def _lesioned(self, seen: Seen) -> tuple[Mask, Mask]:
+        """What is drawn as lesioned: a glyph, or a line between glyphs, where all that it stands for is."""
+        drawn = self.drawn
+        if not drawn.any:
+            return seen.lesioned_neurons, seen.lesioned_connections
+        outside = drawn.bundle >= 0
+        neurons = np.bincount(drawn.unit, seen.lesioned_neurons, len(drawn.sizes)) == drawn.sizes
+        gone = np.bincount(drawn.bundle[outside], seen.lesioned_connections[outside], len(drawn.counts))
+        return neurons, gone == drawn.counts
 
 
 def view_of(compiled: CompiledNetwork, gains: Gains, theme: str | None = None, engine: str | None = None) -> View:
-    """How a compiled network is drawn. Raises LayoutRefusalError."""
+    """How a compiled network is drawn. Raises LayoutRefusalError, RendererError."""
     network = compiled.network
-    settings = network.render if theme is None else replace(network.render, theme=theme)
-    planned = plan(network, compiled.drawn(engine).value, gains, settings)
+    settings = network.render if theme is None else replace(network.render, theme=theme, colours=())
+    drawn = gathered(network, settings.collapse)
+    planned = plan(drawn, laid_out(drawn, compiled.drawn(engine).value), gains, settings)
     constants = {"levels": LEVELS, "fineness": FINENESS, "isBar": BAR, "isFaint": FAINT}
-    return View(network, gains, planned, content(network, _scene(planned), constants))
+    return View(drawn, gains, planned, content(drawn.network, _scene(planned, gains), constants))
 
 
-def _scene(planned: Plan) -> Scene:
+def _scene(planned: Plan, gains: Gains) -> Scene:
     """All that stays: the picture before anything happens. No line glows, nothing is faint, and tooltips say no values:
     these come with each Look."""
-    network, gains = planned.network, planned.gains
+    network = planned.network
     activity, weights = np.zeros(len(network.neurons)), network.connections.weights
     shown = looks(network, Snapshot(0, activity, weights, None), gains, planned.frame.widest)
     of_neurons, of_connections = tooltips(network, gains, activity[None], weights[None])

@@ -126,7 +126,10 @@ export class Drawing {
     const { constants } = this, level = look.discs[disc.index] + constants.levels;
     context.globalAlpha = look.kinds[look.widths.length + disc.index] & constants.isFaint ? constants.faint : 1;
     this.shape(context, { ...disc.shape, fill: this.palette.fills[level] });
-    for (const shape of disc.rest) this.text(context, shape, shape.onDisc ? this.palette.texts[level] : shape.fill);
+    for (const shape of disc.rest) {
+      if (shape.kind === 'text') this.text(context, shape, shape.onDisc ? this.palette.texts[level] : shape.fill);
+      else this.shape(context, shape);
+    }
   }
 
   /** The end of a line. @param {Context} context @param {Shape} shape @param {number} width @param {string} colour
@@ -214,6 +217,14 @@ export class Drawing {
     /** @param {number} at */
     const choose = (at) => { context.font = `${weight} ${at}px ${this.family}`; };
     let [x, y] = shape.at;
+    if (shape.upward) {
+      context.save();
+      context.translate(x, y);
+      context.rotate(-Math.PI / 2);
+      this.text(context, { ...shape, at: [0, 0], upward: false }, fill);
+      context.restore();
+      return;
+    }
     let below = 0;
     if (shape.subscript) {
       choose(small);
