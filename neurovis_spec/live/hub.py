@@ -2,7 +2,7 @@
 
 In: what a run shows, from its thread. Out: for each client the next messages, on the event loop. A client that has not
 drawn the frames that it was sent gets no more; what changes meanwhile it gets with the next one. So a slow client sees
-fewer frames, a stalled one none, and neither costs the others or the run anything.
+fewer frames, a stalled one none, and neither costs the others or the run anything. Many viewers see fewer frames each.
 """
 
 from __future__ import annotations
@@ -17,10 +17,12 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.live.protocol import frame_message, scene_message, status_message
-from neurovis_spec.live.run import Shown, Status
+from neurovis_spec.live.run import Shown
 
 #: Frames that a client may be sent before it has drawn them.
 AHEAD: Final = 2
+#: Frames a second that all viewers together are sent, and the least that each is, where it has room.
+_FRAMES_OF_ALL, _FRAMES_EACH = 2000, 20
 #: Texts that wait for a client; of more the oldest are dropped.
 _TEXTS: Final = 16
 
@@ -58,6 +60,9 @@ class Hub:
         #: for each item (connections, then neurons) the serial of the frame in which it last changed
         self._changed_at: npt.NDArray[np.int64] = np.zeros(0, np.int64)
         self._frames: dict[int, bytes] = {}
+        #: when viewers are sent the next frame, and what will do so where there is one
+        self._next = 0.0
+        self._timer: asyncio.TimerHandle | None = None
         self._statuses: dict[bool, str] = {}
         self._findings = ""
 
@@ -98,7 +103,7 @@ class Hub:
         """A client has drawn a frame, and so those before it."""
         while client.ahead and client.ahead[0] <= serial:
             client.ahead.popleft()
-        if client.sent < self._serial:
+        if client.sent < self._serial and (client.owner or self._timer is None):
             client.wake.set()
 
     def messages(self, client: Client) -> Iterator[bytes | str]:
@@ -137,11 +142,18 @@ class Hub:
         self._shown = shown
         self._frames.clear()
         for client in self._clients:
-            if (
-                len(client.ahead) < AHEAD
-                or client.version != self._version
-                or client.status != self._statuses[client.owner]
-            ):
+            told = client.version == self._version and client.status == self._statuses[client.owner]
+            if not told or (client.owner and len(client.ahead) < AHEAD):
+                client.wake.set()
+        if self._timer is None:
+            self._timer = self._loop.call_at(self._next, self._wake_viewers)
+
+    def _wake_viewers(self) -> None:
+        """Send viewers the latest frame; the more there are, the longer until the next."""
+        self._timer = None
+        self._next = self._loop.time() + min(len(self._clients) / _FRAMES_OF_ALL, 1 / _FRAMES_EACH)
+        for client in self._clients:
+            if not client.owner and len(client.ahead) < AHEAD:
                 client.wake.set()
 
     def _frame(self, since: int) -> bytes:
@@ -154,11 +166,6 @@ class Hub:
             found = frame_message(shown.look, shown.reach, self._version, self._serial, changed)
             self._frames[since] = found
         return found
-
-    @property
-    def status(self) -> Status | None:
-        """How the run stands."""
-        return None if self._shown is None else self._shown.status
 
 
 def _changed(before: Shown, now: Shown) -> npt.NDArray[np.bool_]:
