@@ -7,6 +7,7 @@
 #   make fuzz       20,000 broken specs and 5,000 expressions (FUZZ_ARGS=... for more), two or three minutes
 #   make layouts    layouts beside dot's, sfdp's and networkx' (LAYOUTS_ARGS="--all --graphs FOLDER" for more)
 #   make docs       writes the generated parts of docs/ anew
+#   make page       puts the page of the live view together from its modules
 #
 # PYTHON=... names another interpreter to make .venv with, PYTEST_ARGS=... adds to pytest's arguments.
 
@@ -19,7 +20,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ELSEWHERE := browser or dot or compiler or cluster
 
-.PHONY: help install demo gallery test test-all needs fuzz layouts docs format clean
+.PHONY: help install demo gallery test test-all needs fuzz layouts docs page format clean
 .DELETE_ON_ERROR:
 
 help:
@@ -83,6 +84,9 @@ layouts: $(VENV)/tested
 docs: $(VENV)/installed
 	$(BIN)/python docs/make_language.py
 	$(BIN)/python -m neurovis_spec.codes > docs/errors.md
+
+page: $(VENV)/tested
+	$(BIN)/python neurovis_spec/live/page/build.py
 
 format: $(VENV)/tested
 	$(BIN)/ruff check --fix .

@@ -12,7 +12,7 @@ from neurovis_spec.live.recorded import RecordedSource
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import Reach, Seen, SourceError
 from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turn
-from neurovis_spec.scene.fading import Fading
+from neurovis_spec.scene.fading import Fading, snapshots_of
 
 SPEC = """neurovis: 1
 name: live
@@ -248,3 +248,45 @@ def test_a_network_without_a_neuron_of_the_old_one_begins_anew() -> None:
     driven(source, 10)
     other = carried(source, nv.compile_text("neurovis: 1\nname: y\nneurons: {Z: {activation: tanh}}").simulator())
     assert other.step == 0
+
+
+def test_what_spikes_is_seen_to_fade_in_both_sources_and_after_going_back() -> None:
+    spiking = (
+        "neurovis: 1\nname: s\ntime: {dt: 0.01, steps: 200}\nneurons: {A: {model: integrate_and_fire, bias: 0.15}}"
+    )
+    compiled = nv.compile_text(spiking)
+    recording = compiled.run(steps=200)
+    source, recorded = SimulatedSource(compiled.simulator()), RecordedSource(compiled.network, recording)
+    shown = []
+    for snapshot in snapshots_of(compiled.network, recording, range(200)):
+        seen, again = source.seen().snapshot, recorded.seen().snapshot
+        assert snapshot.seen is not None
+        assert seen.seen is not None
+        assert again.seen is not None
+        assert seen.seen == pytest.approx(snapshot.seen, abs=1e-12)
+        assert again.seen == pytest.approx(snapshot.seen, abs=1e-4)
+        shown.append(float(seen.seen[0]))
+        source.advance()
+        recorded.advance()
+    assert any(0 < value < 1 for value in shown)
+    for step in (150, 64, 63, 65, 1, 199):
+        source.go(step)
+        again = source.seen().snapshot
+        assert again.seen is not None
+        assert float(again.seen[0]) == shown[step]
+
+
+def test_events_that_do_not_go_with_what_was_turned_are_told_and_it_goes_on() -> None:
+    compiled = nv.compile_text(
+        "neurovis: 1\nname: e\ntime: {steps: 9}\nparameters: {a: {value: 1, max: 3}, b: 0}\n"
+        "neurons: {A: {bias: a}}\nevents: [{at: 5, set: {a: a + 1}}]"
+    )
+    source = SimulatedSource(compiled.simulator())
+    source.turn(Set({"a": 2.5}))
+    while source.step < 3:
+        source.advance()
+    with pytest.warns(RuntimeWarning, match="the events at step 5"):
+        source.advance()
+    assert source.step == 4
+    source.advance()
+    assert source.parameters["a"] == 2.5

@@ -35,6 +35,8 @@ LARGEST, _LONGEST = 16_384, 4096
 _MOST = (1 << 53) - 1
 #: The most components of an input, and parameters set at once.
 _MANY = 1024
+#: The most turns and events that are listed, the latest turns and the first events.
+_LISTED = 1000
 #: The most steps that are made at once.
 _NEAR = 64
 
@@ -77,8 +79,8 @@ def status_message(status: Status, owner: bool) -> str:
         owner=owner,
         can=asdict(status.capabilities),
         parameters={name: value for name, value in status.parameters.items() if math.isfinite(value)},
-        turned=[_turned(entry) for entry in status.turned],
-        events=list(status.events[:10_000]),
+        turned=[_turned(entry) for entry in status.turned[-_LISTED:]],
+        events=list(status.events[:_LISTED]),
     )
 
 

@@ -94,7 +94,7 @@ class Run:
     def end(self) -> None:
         """Stop, and wait until it has."""
         self._asked.put((None, _ignore))
-        self._thread.join()
+        self._thread.join(5.0)
 
     @staticmethod
     def _clock_of(source: Source, speed: float) -> Clock:

@@ -6,8 +6,11 @@ again from the state before it, bit for bit, and what was turned on the way is t
 
 from __future__ import annotations
 
+import warnings
+from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from copy import copy
+from operator import attrgetter
 
 import numpy as np
 
@@ -16,7 +19,7 @@ from neurovis_spec.live.past import EVERY, ROOM, Kept, Past
 from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned
 from neurovis_spec.live.turns import Feed, Turn, turn
 from neurovis_spec.runtime.recording import Snapshot
-from neurovis_spec.runtime.simulation import Simulation
+from neurovis_spec.runtime.simulation import ParameterError, Simulation
 from neurovis_spec.runtime.state import State
 from neurovis_spec.scene.fading import Fading
 
@@ -65,7 +68,7 @@ class SimulatedSource:
     @property
     def turned(self) -> tuple[Turned, ...]:
         """The turns taken on the way to the step that it stands at."""
-        return tuple(entry for entry in self._turned if entry.step <= self.step)
+        return tuple(self._turned[: bisect_right(self._turned, self.step, key=attrgetter("step"))])
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -106,7 +109,8 @@ class SimulatedSource:
             self._take(known)
         elif self._simulation.k % EVERY == 0:
             self._keep()
-        if self._turned and any(entry.step == self.step for entry in self._turned):
+        place = bisect_right(self._turned, self.step, key=attrgetter("step"))
+        if place and self._turned[place - 1].step == self.step:
             self._seen = Seen(self._seen.snapshot, *self._simulation.lesioned)
 
     def beside(self, by: int) -> int:
@@ -171,7 +175,10 @@ class SimulatedSource:
         """Compute a step; ``before`` is what was seen of the one before it."""
         run = self._simulation
         step, weights, lesioned = run.k, run.connection_weights, run.lesioned
-        run.step({name: values if len(values) > 1 else values[0] for name, values in self._fed.items()})
+        try:
+            run.step({name: values if len(values) > 1 else values[0] for name, values in self._fed.items()})
+        except ParameterError as error:  # what events set does not go with what was turned: the step was made without
+            warnings.warn(str(error), RuntimeWarning, stacklevel=2)
         previous = before.weights if before is not None and before.step == step - 1 else None
         activity = run.activity
         seen = self._fading.follow(np.array([step]), activity[None]) if self._fading else None

@@ -43,9 +43,9 @@ class Watch:
         self._thread.start()
 
     def end(self) -> None:
-        """Stop."""
+        """Stop; a spec that is being compiled is not waited for long."""
         self._ended.set()
-        self._thread.join()
+        self._thread.join(1.0)
 
     def _watch(self) -> None:
         while not self._ended.wait(EVERY):
