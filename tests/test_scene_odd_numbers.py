@@ -107,11 +107,14 @@ def test_a_film_that_is_too_long_is_refused_before_anything_is_run(
     monkeypatch.setattr(pipeline, "simulate", lambda *_: pytest.fail("it was run"))
     with pytest.raises(RendererError, match=r"20,000 frames of 1280 × 960 pixels is too long: 13,981") as caught:
         network.animate(tmp_path / "x.gif", steps=20_000, every=1)
-    assert "--steps 13981" in str(caught.value.hint)
-    assert "'.svg'" in str(caught.value.hint)
-    with pytest.raises(RendererError, match="of 3 neurons and connections is too long"):
+    for way in ("--steps 13981", "--frames 13981", "'.svg'", "'.mp4'"):
+        assert way in str(caught.value.hint)
+    with pytest.raises(RendererError, match="of 3 neurons and connections is too long") as caught:
         network.animate(tmp_path / "x.svg", steps=MOST_COLOURS // 3 + 1, every=1)
+    for way in (f"--steps {MOST_COLOURS // 3}", f"--frames {MOST_COLOURS // 3}", "'.mp4'"):
+        assert way in str(caught.value.hint)
     check_film(network.network, MOST_COLOURS // 3, ".svg", RendererCapabilities())
+    check_film(network.network, 10**12, ".mp4", RendererCapabilities(streams=frozenset({".mp4"})))
     assert not list(tmp_path.iterdir())
 
 

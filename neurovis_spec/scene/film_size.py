@@ -22,14 +22,16 @@ def check_film(network: Network, frames: int, suffix: str, capabilities: Rendere
     if suffix not in capabilities.streams and frames * parts > MOST_COLOURS:
         most = max(1, MOST_COLOURS // parts)
         message = f"a film of {frames:,} frames of {parts:,} neurons and connections is too long: {most:,} is the most"
-        raise RendererError(message, f"draw fewer steps (--steps {most}), or one by one (neurovis render --step N)")
+        hint = f"draw fewer steps (--steps {most}, --frames {most}), or a video ('.mp4'), which may be of any length"
+        raise RendererError(message, hint)
     if capabilities.pixels is None:
         return
     wide, high = network.render.size or (int(MOST[0]), int(MOST[1]))
     most = max(1, capabilities.pixels // (wide * high))
     if frames > most:
         message = f"a '{suffix}' of {frames:,} frames of {wide} × {high} pixels is too long: {most:,} is the most"
-        hint = f"draw fewer steps (--steps {most}), a smaller picture (render: size), or an '.svg', which has no pixels"
+        fewer = f"--steps {most}, --frames {most}"
+        hint = f"draw fewer steps ({fewer}), a smaller picture (render: size), an '.svg', or a video ('.mp4')"
         raise RendererError(message, hint)
 
 
