@@ -232,3 +232,14 @@ def test_a_text_that_reads_upward_is_the_level_one_turned(anchor: Literal["start
     assert level.sum() > 50
     # about (0, 100): (x, y) goes to (y, 100 - x)
     assert np.abs(np.rot90(level)[100:200, 0:100] - turned[:, 0:100]).max() < 1e-9
+
+
+def test_what_stands_still_is_drawn_in_a_film_as_in_a_still() -> None:
+    """Also ends of lines that no connection has: the bar in a legend."""
+    ends = (
+        Arrowhead((150, 90), (1, 0), 14, 6, INK),
+        Arrowhead((180, 90), (1, 0), 14, 6, INK, "bar", 3),
+    )
+    filmed = replace(FILM, scene=replace(SCENE, groups=(*SCENE.groups, Group(ends, "legend"))))
+    for frame, pixels in enumerate(frames(filmed)):
+        assert np.abs(pixels.astype(int) - paint(still(filmed, frame))).max() <= 2

@@ -128,7 +128,7 @@ class Moving:
         halves[ends] = density * np.maximum(
             HEAD_OF_LENGTH * long + HEAD_OF_WIDTH * wide, 0.5 / Arrowhead.NOTCH * wide + HEAD_MORE
         )
-        stems = np.full(len(halves), -1, np.float32)
+        stems = self.sheet.head_stems.copy()  # of those that stand still, too
         stems[ends] = np.where(bars[of], wide * (density / 2), -1)
         result: Numbers = np.rint(halves / _STEP) * _STEP
         return result, stems
