@@ -41,6 +41,8 @@ _ALIKE_WEIGHTS = 3.0
 _WIDEST, _LEARNED, _TYPICAL, _SEEN = 5.0, 5.0, 2.2, 2.0
 #: with more lines than this they get thinner
 _CROWD = 10
+#: what is at most so much is nothing but rounding, and beyond that numbers overflow
+_LEAST, _GREATEST = 1e-12, 1e280
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,7 +247,7 @@ def _shared(full: Sequence[float], *, least: bool = False) -> list[_Share]:
     result = []
     for units in _alike(full, _ALIKE, _SCALES):
         low, high = (end(full[unit] for unit in units) for end in (min, max))
-        result.append(_Share(units, 1 / _nice(low if least else float(np.sqrt(low * high)))))
+        result.append(_Share(units, 1 / _nice(low if least else float(np.sqrt(low) * np.sqrt(high)))))
     return result
 
 
@@ -317,8 +319,8 @@ def _full(peaks: FloatArray) -> float:
 
 
 def _known(values: FloatArray) -> FloatArray:
-    """Those that are neither next to nothing nor beyond all bounds."""
-    result: FloatArray = values[(values > 1e-12) & (values < 1e12)]
+    """Those that are not next to nothing, and finite; those so large that they cannot be added up count as less."""
+    result: FloatArray = np.minimum(values[(values > _LEAST) & np.isfinite(values)], _GREATEST)
     return result
 
 
