@@ -325,7 +325,7 @@ class CompiledNetwork:
         spec's ``figure``. Views over time show the whole recording or run, or ``window`` steps around the one that is
         drawn. ``dpi`` are the pixels of an inch, 96 of which are a picture's usual size on the screen.
 
-        ``collapse`` names groups and instances that are one glyph each (not in a figure of several views), ``focus``
+        ``collapse`` names groups and instances that are one glyph each in the picture of the network, ``focus``
         neurons that are shown with all they are connected to, ``paths`` (``"A -> B"``) what the shortest paths are
         shown of; connections below ``min_weight`` are left out. Of very many connections, and of those that would make
         an SVG larger than 5 MB, the thinnest are left out, with a warning, unless it is to be ``full``. Raises
@@ -347,13 +347,16 @@ class CompiledNetwork:
         picture: Callable[[RenderSettings], Scene]
         if panels:
             if recording is not None:
-                shown, some = recording, seen._gains_of(panels, recording)
+                shown, glyphs = recording, seen._gains_of(panels, recording)
             else:
-                shown, some = seen._ran(max(self.network.steps, (wanted or 0) + 1), inputs, panels, progress)
+                shown, glyphs = seen._ran(max(self.network.steps, (wanted or 0) + 1), inputs, panels, progress)
+            some = seen._whole_gains(panels, glyphs, shown)
             shots = pipeline.shot_of(self.network, shown, wanted, settings.window)
 
             def picture(settings: RenderSettings) -> Scene:
-                return pipeline.frame(pipeline.page(self.network, layout, panels, shots, some, settings, 1.0), 0)
+                return pipeline.frame(
+                    pipeline.page(self.network, layout, panels, shots, some, settings, 1.0, glyphs), 0
+                )
         else:
             assert layout is not None
             snapshot, gains = seen._snapshot(wanted, recording, progress, inputs)
@@ -431,10 +434,11 @@ class CompiledNetwork:
             assert made is not None
             chosen = snapshots_from(self.network, first, count, made, stride)
             shots = pipeline.shots_of(chosen.recording, chosen.steps)
-            some = seen._gains_of(panels, recording, inputs)
+            glyphs = seen._gains_of(panels, recording, inputs)
+            some = seen._whole_gains(panels, glyphs, made)
 
             def film(settings: RenderSettings) -> Film:
-                return pipeline.page(self.network, layout, panels, shots, some, settings, fps)
+                return pipeline.page(self.network, layout, panels, shots, some, settings, fps, glyphs)
 
             films = map(film, [settings])
         else:
@@ -467,12 +471,11 @@ class CompiledNetwork:
     def _seen(
         self, theme: str | None, excerpt: Excerpt, panels: Sequence[Panel]
     ) -> tuple[CompiledNetwork, RenderSettings]:
-        """How it is to be drawn; and the same network, whose gains are those of what is collapsed: nothing in a figure,
-        whose views share their gains."""
+        """How it is to be drawn; and the same network, whose gains are those of what is collapsed."""
         from neurovis_spec.scene.excerpt import excerpted
 
         settings = excerpted(self.network, self._settings(theme), excerpt)
-        if panels:
+        if not _shows(panels, "network"):
             settings = replace(settings, collapse=())
         if settings.collapse == self.network.render.collapse:
             return self, settings
@@ -546,6 +549,15 @@ class CompiledNetwork:
     ) -> Gains | None:
         """The gains, where one of the views needs them: what was recorded in part serves the others."""
         return self.gains_for(recording, inputs) if _shows(panels, "network", "matrix", "raster") else None
+
+    def _whole_gains(self, panels: Sequence[Panel], glyphs: Gains | None, shown: Recording) -> Gains | None:
+        """The gains of the views that show each neuron also where the picture of the network has ``glyphs``."""
+        if not (self.network.render.collapse and _shows(panels, "matrix", "raster")):
+            return glyphs
+        from neurovis_spec.snapshots import fitted
+
+        whole = replace(self.network, render=replace(self.network.render, collapse=()))
+        return pipeline.measure_recording(whole, fitted(shown, whole))
 
     def gains_for(self, recording: Recording | None, inputs: Mapping[str, npt.ArrayLike] | None = None) -> Gains:
         """The gains of pictures of a recording, or of runs of its own, perhaps with other inputs."""

@@ -231,11 +231,13 @@ def page(
     gains: Gains | None,
     settings: RenderSettings,
     fps: float,
+    glyphs: Gains | None = None,
 ) -> Film:
-    """Several views on one page, as a film; of one step a film of one frame."""
+    """Several views on one page, as a film; of one step a film of one frame. ``glyphs`` are the gains of the picture of
+    the network where something is collapsed in it."""
     from neurovis_spec.scene.figure import figure
 
-    return figure(network, layout, panels, shots, gains, settings, fps)
+    return figure(network, layout, panels, shots, gains, settings, fps, glyphs)
 
 
 def frame(moving_scene: Film, number: int) -> Scene:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import re
+from functools import partial
 from itertools import combinations
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -28,6 +29,7 @@ from neurovis_spec.scene.palette import MOST, distinct
 from neurovis_spec.scene.panels import ViewError, panels_of
 from neurovis_spec.scene.series import chosen, full_name
 from neurovis_spec.scene.shots import Shots, shot_of
+from neurovis_spec.scene.shown import LeftOut
 from neurovis_spec.scene.texts import width
 from neurovis_spec.scene.themes import contrast
 
@@ -568,3 +570,28 @@ def test_views_over_time_show_the_steps_between_the_frames_of_a_film(tmp_path: P
     assert lines[0] == lines[1]
     assert (len(cursors[0]), len(cursors[1])) == (81, 11)
     assert cursors[1] == pytest.approx(cursors[0][::8], abs=0.02)
+
+
+def test_the_picture_of_the_network_in_a_figure_is_that_which_stands_alone(tmp_path: Path) -> None:
+    """With its glyphs, their gains and what is left out."""
+    spec = "neurovis: 1\nname: x\ntime: {steps: 20}\nneurons: {A: {count: 4, bias: 3}, B: {count: 2}, O: {}}\n"
+    spec += "connections: {A -> B: {weight: 40, pattern: all_to_all}, B -> O: {weight: 0.5}, A1 -> O: 0.01}\n"
+    network = nv.compile_text(spec)
+    alone, page = tmp_path / "alone.svg", tmp_path / "page.svg"
+    for draw in (network.render, partial(network.animate, steps=5)):
+        for path, view in ((alone, "network"), (page, ["network", "raster", "matrix"])):
+            with pytest.warns(LeftOut, match=r"1 of 3 connections are left out: those with \|w\| < 0\.1"):
+                draw(path, view=view, collapse=["A", "B"], min_weight=0.1)
+        found = []
+        for path in (alone, page):
+            root = ET.fromstring(path.read_bytes())
+            lines = [g for g in root.iter(NS + "g") if "data-connection" in g.attrib]
+            widths = {g.attrib["data-connection"]: g.find(NS + "path").attrib["stroke-width"] for g in lines}
+            discs = {
+                g.attrib["data-neuron"]: g.find(NS + "circle").attrib["fill"]
+                for g in root.iter(NS + "g")
+                if "data-neuron" in g.attrib and g.find(NS + "circle") is not None
+            }
+            found.append((widths, discs))
+        assert found[0] == found[1]
+        assert set(found[0][0]) == {"A -> B", "B -> O"}

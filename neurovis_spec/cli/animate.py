@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import click
@@ -12,6 +11,7 @@ from neurovis_spec.cli.options import (
     engine_option,
     examples,
     excerpt_options,
+    finite,
     input_option,
     need_run,
     output_option,
@@ -23,13 +23,6 @@ from neurovis_spec.cli.options import (
 )
 from neurovis_spec.cli.progress import progress
 from neurovis_spec.cli.targets import check_files, check_target, files_of
-
-
-def _finite(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
-    """What passes every comparison, NaN and infinity, is no number of frames either."""
-    if value is not None and not math.isfinite(value):
-        raise click.BadParameter(f"{value} is not a finite number.")
-    return value
 
 
 @click.command(
@@ -56,7 +49,7 @@ def _finite(ctx: click.Context, param: click.Parameter, value: float | None) -> 
     "--fps",
     type=click.FloatRange(min=0, min_open=True),
     metavar="F",
-    callback=_finite,
+    callback=finite,
     help="Frames a second; default 1/dt, at most 60, and 25 where the spec writes no dt.",
 )
 @recording_option

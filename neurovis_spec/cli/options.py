@@ -208,7 +208,7 @@ def excerpt_options(command: F) -> F:
     least = click.option(
         "--min-weight",
         type=click.FloatRange(min=0),
-        callback=_finite,
+        callback=finite,
         metavar="X",
         help="Leave out connections with |w| below X.",
     )
@@ -216,7 +216,8 @@ def excerpt_options(command: F) -> F:
     return collapse(focus(paths_(least(full(command)))))
 
 
-def _finite(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
+def finite(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
+    """For options that take a number: NaN passes every range."""
     if value is not None and not math.isfinite(value):
         raise click.BadParameter(f"{value} is not a finite number.")
     return value

@@ -12,6 +12,7 @@ from neurovis_spec.cli.options import (
     engine_option,
     examples,
     excerpt_options,
+    finite,
     input_option,
     need_run,
     output_option,
@@ -61,6 +62,7 @@ def _why(network: CompiledNetwork, step: int | None, steps: int) -> str:
 @click.option(
     "--dpi",
     type=click.FloatRange(1, 9600),
+    callback=finite,
     metavar="N",
     help="Pixels of an inch, such as 300 for print; a picture has 96 to 384 by itself.",
 )

@@ -52,10 +52,11 @@ def figure(
     gains: Gains | None,
     settings: RenderSettings,
     fps: float,
+    glyphs: Gains | None = None,
 ) -> Film:
     """All views, one below the other, a frame for each of ``shots.frames``; ``gains`` are those of Eqs. 2–5, which
-    traces and weights do not need. Raises RecordingError where the recording
-    lacks what they show, KeyError for an unknown theme."""
+    traces and weights do not need, ``glyphs`` those of the picture of the network where something in it is collapsed.
+    Raises RecordingError where the recording lacks what they show, KeyError for an unknown theme."""
     drawn = any(panel.view == "network" for panel in panels)
     maker = Maker(network, layout, shots, gains, drawn and settings.legend)
     others = {number: maker.block(panel) for number, panel in enumerate(panels) if panel.view != "network"}
@@ -63,13 +64,14 @@ def figure(
     head = HEADER + _TOP if title is not None else _TOP
     picture: Film | None = None
     if drawn:
+        seen = gains if glyphs is None else glyphs
         assert layout is not None
-        assert gains is not None
+        assert seen is not None
         size = None
         if settings.size is not None:
             size = settings.size[0], _height_left(list(others.values()), head, settings.size)
         own = replace(settings, size=size, title=False)
-        picture = film(network, layout, maker.snapshots(), gains, own, fps, _WIDTH if others else 0.0)
+        picture = film(network, layout, maker.snapshots(), seen, own, fps, _WIDTH if others else 0.0)
         blocks: list[Block] = [others.get(number, Drawing(picture)) for number in range(len(panels))]
         scene = picture.scene
         height = None if settings.size is None else settings.size[1] / scene.density

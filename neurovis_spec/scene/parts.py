@@ -65,7 +65,7 @@ def stacked(page: Page, parts: Sequence[tuple[float, Part]], network: Film | Non
 
     return replace(
         base,
-        scene=Scene(page.width, page.height, page.theme, page.title, tuple(groups), page.density),
+        scene=Scene(page.width, page.height, page.theme, page.title, tuple(groups), page.density, base.scene.notes),
         fps=page.fps,
         fills=(*base.fills, *(name for one in changes for name in one.fills)),
         fill_values=side_by_side([base.fill_values, *(one.fill_values for one in changes)]),
