@@ -19,8 +19,8 @@ from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.scene import Disc, Group, Rectangle, Scene, Spline, Text
+from neurovis_spec.scene.cut import Cut
 from neurovis_spec.scene.film import film
-from neurovis_spec.scene.labels import Cut
 from neurovis_spec.scene.renderers import RendererError
 from neurovis_spec.scene.shown import LeftOut
 

@@ -595,3 +595,15 @@ def test_the_picture_of_the_network_in_a_figure_is_that_which_stands_alone(tmp_p
             found.append((widths, discs))
         assert found[0] == found[1]
         assert set(found[0][0]) == {"A -> B", "B -> O"}
+
+
+def test_names_that_begin_alike_are_told_apart_in_every_view(tmp_path: Path) -> None:
+    name = "the_central_pattern_generator_of_the_leg"
+    text = f"neurovis: 1\nname: x\nneurons: {{{name}: {{count: 2, bias: i}}, O: {{}}}}\n"
+    network = nv.compile_text(f"{text}connections: {{{name} -> O: {{weight: 1, plasticity: decay}}}}\n")
+    for view in (f"traces: {name}", "weights", "raster", "matrix"):
+        network.render(tmp_path / "x.svg", step=5, view=view)
+        root = ET.parse(tmp_path / "x.svg").getroot()
+        said = ["".join(text.itertext()) for text in root.iter(NS + "text")]
+        cut = [words for words in said if "…" in words and "±" not in words]
+        assert len(set(cut)) == 2, (view, said)

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from neurovis_spec.compiler.arrays import IntArray
 from neurovis_spec.scene import strips, texts
+from neurovis_spec.scene.cut import Cut
 from neurovis_spec.scene.geometry import FloatArray
 from neurovis_spec.scene.model import Group, Image, Polyline, Shape, Text, Theme
 from neurovis_spec.scene.parts import Changes, Part
@@ -144,15 +145,17 @@ class Heat:
             shapes.append(Polyline(((span.left - 4, y), (span.right, y)), theme.background, 1.2))
         if self._named(plot):
             size = min(SMALL, 0.9 * each)
+            cut = Cut(self.names)
             for row, name in enumerate(self.names):
-                parts = _parts(name)
+                parts = cut.parts(*_parts(name), size, _LABEL, 400)
                 shapes.append(_beside(*parts, span.left - 6, top + (row + 0.5) * each, size, theme))
             return shapes
-        free = top
+        free, cut = top, Cut(band.name for band in bands)
         for band in bands:
             middle = top + (band.start + band.count / 2) * each
             if band.count * each >= _GROUPED and middle - SMALL / 2 >= free - 1:
-                shapes.append(_beside(band.name, "", span.left - 6, middle, SMALL, theme))
+                name = cut.shorten(band.name, SMALL, _LABEL, 400)
+                shapes.append(_beside(name, "", span.left - 6, middle, SMALL, theme))
                 free = middle + SMALL / 2
         return shapes
 
@@ -178,8 +181,6 @@ def _parts(name: str) -> tuple[str, str]:
 
 
 def _beside(base: str, subscript: str, right: float, middle: float, size: float, theme: Theme) -> Text:
-    if texts.width(base, size, 400, subscript) > _LABEL:
-        base, subscript = texts.shorten(base + subscript, size, _LABEL), ""
     return Text((right, middle + 0.36 * size), base, size, theme.ink, "end", subscript=subscript)
 
 

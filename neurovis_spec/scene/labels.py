@@ -17,6 +17,7 @@ import numpy as np
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.beside import Field, Slot, Wanted, placed
+from neurovis_spec.scene.cut import Cut
 from neurovis_spec.scene.geometry import FloatArray, Point, Rect
 from neurovis_spec.scene.model import Text
 from neurovis_spec.scene.obstacles import Obstacles
@@ -204,29 +205,6 @@ def _rect(label: Label) -> Rect:
     width, (x, y) = texts.width(label.text, label.size, _WEIGHT, label.subscript), label.point
     left = x - {"start": 0.0, "middle": width / 2, "end": width}[label.anchor]
     return left - 2, y - 0.8 * label.size, left + width + 2, y + 0.25 * label.size
-
-
-class Cut:
-    """Shortens names so that they can be told apart: of those that share what would be left of them, the beginning
-    goes."""
-
-    def __init__(self, names: Sequence[str]) -> None:
-        self._begins: dict[str, int] = {}
-        for name in set(names):
-            for end in range(1, len(name)):
-                self._begins[name[:end]] = self._begins.get(name[:end], 0) + 1
-
-    def shorten(self, name: str, size: float, room: float) -> str:
-        """The name, or as much of it as fits into ``room`` with an ellipsis; '' where nothing does.
-
-        >>> cut = Cut(["descending_1", "descending_2", "photoreceptor"])
-        >>> cut.shorten("descending_2", 10, 60), cut.shorten("photoreceptor", 10, 60)
-        ('…nding_2', 'photore…')
-        """
-        text = texts.shorten(name, size, room, _WEIGHT)
-        if text in (name, "") or self._begins.get(text[:-1], 0) < 2:
-            return text
-        return texts.shorten(name[::-1], size, room, _WEIGHT)[::-1]
 
 
 def margin_beside(network: Network, radius: float) -> float:

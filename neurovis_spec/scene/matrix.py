@@ -16,6 +16,7 @@ from neurovis_spec.compiler.arrays import IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.scene import texts
+from neurovis_spec.scene.cut import Cut
 from neurovis_spec.scene.geometry import FloatArray
 from neurovis_spec.scene.heat import Band, bands_of
 from neurovis_spec.scene.model import Group, Image, Polyline, Rectangle, Shape, Text, Theme
@@ -249,10 +250,11 @@ def _names(
 ) -> list[Shape]:
     """Names before rows, or above columns (``upright``), reading upward."""
     shapes: list[Shape] = []
+    leaves = _leaf_names(network, order) if _small(order) else []
+    cut = Cut([base + subscript for base, subscript in leaves] or [band.name for band in _titled(order)])
 
     def put(base: str, subscript: str, middle: float, away: float, size: float) -> None:
-        if texts.width(base, size, 400, subscript) > _LABEL:
-            base, subscript = texts.shorten(base + subscript, size, _LABEL), ""
+        base, subscript = cut.parts(base, subscript, size, _LABEL, 400)
         if upright:
             point = (corner[0] + middle + 0.36 * size, corner[1] - away)
             shapes.append(Text(point, base, size, theme.ink, "start", subscript=subscript, upward=True))
@@ -262,7 +264,7 @@ def _names(
 
     if _small(order) and cell >= 0.75 * _NAMED:
         size = min(_SIZE, 0.9 * cell)
-        for place, (base, subscript) in enumerate(_leaf_names(network, order)):
+        for place, (base, subscript) in enumerate(leaves):
             put(base, subscript, (place + 0.5) * cell, 6.0, size)
         if len(order.levels) > 1:
             away = _names_room(network, order) - _SIZE

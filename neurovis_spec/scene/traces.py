@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from neurovis_spec.scene import strips, texts
+from neurovis_spec.scene.cut import Cut
 from neurovis_spec.scene.geometry import FloatArray
 from neurovis_spec.scene.model import Disc, Group, Point, Polyline, Shape, Text, Theme
 from neurovis_spec.scene.palette import MOST, distinct
@@ -67,7 +68,12 @@ class Traces:
     @property
     def right(self) -> float:
         """How wide the names at the ends of the lines are."""
-        return max((_name_width(trace) for trace in self.traces), default=0.0) + _OFF + 2
+        parts = [_words(trace, self._cut) for trace in self.traces]
+        return max((texts.width(text, SMALL, _BOLD, sub) for text, sub in parts), default=0.0) + _OFF + 2
+
+    @property
+    def _cut(self) -> Cut:
+        return Cut(trace.name for trace in self.traces)
 
     @property
     def range(self) -> tuple[float, float]:
@@ -105,7 +111,7 @@ class Traces:
             frame = _Frame(span, top + TITLE, top + TITLE + plot, *self.range)
             data = {"view": self.view} if number == 0 else {}
             groups.append(Group(tuple(self._ground(frame, number, last, theme)), f"{name}ground", data))
-            groups += _curves(frame, members, theme, name)
+            groups += _curves(frame, members, self._cut, theme, name)
             line, moved = strips.cursor(span, frame.top, frame.bottom, theme, f"{name}cursor")
             groups.append(line)
             shifts.append(line.id)
@@ -156,13 +162,13 @@ class _Frame:
         return result
 
 
-def _curves(frame: _Frame, members: Sequence[Trace], theme: Theme, name: str) -> list[Group]:
+def _curves(frame: _Frame, members: Sequence[Trace], cut: Cut, theme: Theme, name: str) -> list[Group]:
     places = _ends(frame, members)
     groups = []
     for number, (trace, colour) in enumerate(zip(members, distinct(theme), strict=False)):
         shapes: list[Shape] = [Polyline(points, colour, _WIDTH) for points in _lines(frame, trace.values)]
         if places is not None:
-            text, subscript = _words(trace)
+            text, subscript = _words(trace, cut)
             x, end = frame.span.right, _last(frame, trace.values)
             lead = ((x + 1, end), (x + 5, end), (x + _OFF - 5, places[number]), (x + _OFF - 2, places[number]))
             shapes.append(Polyline(lead, colour, 0.8))
@@ -176,16 +182,9 @@ def _curves(frame: _Frame, members: Sequence[Trace], theme: Theme, name: str) ->
     return groups
 
 
-def _words(trace: Trace) -> tuple[str, str]:
-    text, subscript = texts.with_subscript(trace.name) if trace.name == trace.full else (trace.name, "")
-    if texts.width(text, SMALL, _BOLD, subscript) <= _LABEL:
-        return text, subscript
-    return texts.shorten(trace.name, SMALL, _LABEL, _BOLD), ""
-
-
-def _name_width(trace: Trace) -> float:
-    text, subscript = _words(trace)
-    return texts.width(text, SMALL, _BOLD, subscript)
+def _words(trace: Trace, cut: Cut) -> tuple[str, str]:
+    parts = texts.with_subscript(trace.name) if trace.name == trace.full else (trace.name, "")
+    return cut.parts(*parts, SMALL, _LABEL, _BOLD)
 
 
 def _last(frame: _Frame, values: FloatArray) -> float:
