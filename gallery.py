@@ -1,7 +1,8 @@
-"""The gallery: every example as a picture at a telling step, the same as graphviz' dot arranges it, and a page.
+"""The gallery: every example as a picture at a telling step, in every theme, and as graphviz' dot arranges it.
 
-In: ``specs/``. Out: ``docs/pictures/`` and ``docs/gallery.md``, the same bytes each time with the same dot (which must
-be installed). Run by ``make gallery``; ``python gallery.py NAME… --to FOLDER`` draws some of the pictures elsewhere.
+In: ``specs/``. Out: ``docs/pictures/``, ``docs/gallery.md`` and ``docs/themes.md``, the same bytes each time with the
+same dot (which must be installed). Run by ``make gallery``; ``python gallery.py NAME… --to FOLDER`` draws some of the
+pictures elsewhere.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import sys
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 HERE = Path(__file__).parent
@@ -30,6 +32,9 @@ from neurovis_spec.layout.problem import problem_of  # noqa: E402
 #: A number in a picture; and how far two may be apart that differ by the last digits of a machine's functions.
 _NUMBER = re.compile(r"(?<![#\w])[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?")
 _NEXT = 1e-6
+#: What a picture tells those who point at it: a page shows it as an image, in which nobody can.
+_TOLD = re.compile(r"(<g[^>]*>)<title>[^<]*</title>")
+_DATA = re.compile(r' data-[\w-]+="[^"]*"')
 #: Measures of a layout, as the page heads them.
 _MEASURES = {
     "crossings": "crossings",
@@ -55,6 +60,16 @@ class Picture:
     #: what it shows beside the network or in its place, and of views over time how many steps
     views: tuple[str, ...] = ()
     window: int | None = None
+    #: groups and instances that are one glyph each; neurons that are shown with all that they are connected to
+    collapse: tuple[str, ...] = ()
+    focus: str | None = None
+    #: without what it tells those who point at it
+    plain: bool = False
+
+    @property
+    def whole(self) -> bool:
+        """Whether it is a still of the network, all of it, in the spec's own theme."""
+        return not (self.theme or self.frames or self.views or self.collapse or self.focus)
 
 
 PICTURES = (
@@ -186,6 +201,19 @@ PICTURES = (
     ),
 )
 
+#: In the order of the columns of the page of themes; the first is that of the gallery.
+THEMES = ("default", "dark", "print", "paper")
+
+
+def themed() -> list[Picture]:
+    """Every still of a whole network in the other themes."""
+    return [
+        replace(picture, name=f"themes/{picture.name}_{theme}", theme=theme, plain=True)
+        for picture in PICTURES
+        if picture.whole
+        for theme in THEMES[1:]
+    ]
+
 
 #: What dot's drawing of a network shows beside ours, by the name of our picture.
 BESIDE = {
@@ -212,34 +240,47 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("names", nargs="*", help="pictures to draw (default: all, and the page)")
     parser.add_argument("--to", type=Path, default=HERE / "docs" / "pictures", metavar="FOLDER")
     options = parser.parse_args(arguments)
-    options.to.mkdir(parents=True, exist_ok=True)
-    wanted = options.names or [picture.name for picture in PICTURES] + [f"{name}_dot" for name in BESIDE]
+    pictures = (*PICTURES, *themed())
+    wanted = options.names or [picture.name for picture in pictures] + [f"{name}_dot" for name in BESIDE]
     if shutil.which("dot") is None and any(name.endswith("_dot") for name in wanted):
         sys.exit("the gallery shows dot's drawings beside ours and needs dot (on Debian: apt-get install graphviz)")
-    for picture in PICTURES:
+    for picture in pictures:
         if picture.name in wanted:
             draw(picture, options.to / f"{picture.name}.svg")
         if f"{picture.name}_dot" in wanted:
             draw_as_dot(picture, options.to / f"{picture.name}_dot.svg")
     if not options.names:
         (HERE / "docs" / "gallery.md").write_text(page(), encoding="utf-8")
+        (HERE / "docs" / "themes.md").write_text(themes_page(), encoding="utf-8")
 
 
-def compiled(picture: Picture) -> nv.CompiledNetwork:
-    """The network that a picture shows."""
-    return nv.compile(HERE / "specs" / f"{picture.spec}.yaml")
+@cache
+def compiled(spec: str) -> nv.CompiledNetwork:
+    """The network of a spec."""
+    return nv.compile(HERE / "specs" / f"{spec}.yaml")
 
 
 def draw(picture: Picture, path: Path) -> None:
     """Draw one."""
-    network, before = compiled(picture), path.read_bytes() if path.exists() else b""
+    network, before = compiled(picture.spec), path.read_bytes() if path.exists() else b""
+    path.parent.mkdir(parents=True, exist_ok=True)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         if picture.frames:
             network.animate(path, steps=picture.frames, start=picture.step, theme=picture.theme)
         else:
             views = picture.views or None
-            network.render(path, step=picture.step, theme=picture.theme, view=views, window=picture.window)
+            network.render(
+                path,
+                step=picture.step,
+                theme=picture.theme,
+                view=views,
+                window=picture.window,
+                collapse=picture.collapse,
+                focus=picture.focus,
+            )
+    if picture.plain:
+        path.write_text(_DATA.sub("", _TOLD.sub(r"\1", path.read_text(encoding="utf-8"))), encoding="utf-8")
     if alike(before.decode(), path.read_text(encoding="utf-8")):
         path.write_bytes(before)
     _say(path)
@@ -247,7 +288,7 @@ def draw(picture: Picture, path: Path) -> None:
 
 def draw_as_dot(picture: Picture, path: Path) -> None:
     """Draw the same step of the same network with dot's positions and splines, by our renderer, without tooltips."""
-    network = compiled(picture)
+    network = compiled(picture.spec)
     layout, _ = _by_dot(nested, problem_of(network.network))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
@@ -275,7 +316,7 @@ def _by_dot(way: Callable[[LayoutProblem, float], Timed | None], problem: Layout
 
 
 def _say(path: Path) -> None:
-    print(f"{path.stem:<22}{path.stat().st_size / 1024:6.0f} KiB   {path}")
+    print(f"{path.stem:<28}{path.stat().st_size / 1024:6.0f} KiB   {path}")
 
 
 def alike(one: str, other: str) -> bool:
@@ -294,24 +335,7 @@ def alike(one: str, other: str) -> bool:
 def page() -> str:
     """The page that shows them all."""
     parts = [
-        "# Gallery",
-        "Every example in `specs/`, drawn at a telling step. Colour is activity and signal, thickness is weight, glow"
-        " is change; the legend of each picture says on which scale. At the end they stand "
-        "[beside dot's](#beside-dot). Made by `make gallery`, which needs graphviz' dot.",
-    ]
-    for picture in PICTURES:
-        what = f"--steps {picture.frames} --from {picture.step}" if picture.frames else f"--step {picture.step}"
-        theme = f" --theme {picture.theme}" if picture.theme else ""
-        verb = "animate" if picture.frames else "render"
-        views = "".join(f' --view "{view}"' if " " in view else f" --view {view}" for view in picture.views)
-        window = f" --window {picture.window}" if picture.window else ""
-        parts += [
-            f"## {picture.caption}",
-            f"![{picture.caption}](pictures/{picture.name}.svg)",
-            picture.words,
-            f"`neurovis {verb} specs/{picture.spec}.yaml {what}{theme}{views}{window} -o {picture.name}.svg`",
-        ]
-    parts += [
+        *shown(),
         "## Beside dot",
         "The same steps of the same networks; on the right the positions and splines are those of graphviz' dot, drawn"
         " by the same renderer with the same colours and thickness. dot's nodes are as wide as our discs and its ranks"
@@ -325,9 +349,55 @@ def page() -> str:
     return "\n\n".join(parts) + "\n"
 
 
+def shown() -> list[str]:
+    """The paragraphs that show the pictures, each with the command that draws it."""
+    parts = [
+        "# Gallery",
+        "Every example in `specs/`, drawn at a telling step. Colour is activity and signal, thickness is weight, glow"
+        " is change; the legend of each picture says on which scale. The same pictures in the"
+        " [other themes](themes.md); at the end they stand [beside dot's](#beside-dot). Made by `make gallery`, which"
+        " needs graphviz' dot.",
+    ]
+    for picture in PICTURES:
+        what = f"--steps {picture.frames} --from {picture.step}" if picture.frames else f"--step {picture.step}"
+        theme = f" --theme {picture.theme}" if picture.theme else ""
+        verb = "animate" if picture.frames else "render"
+        views = "".join(f' --view "{view}"' if " " in view else f" --view {view}" for view in picture.views)
+        window = f" --window {picture.window}" if picture.window else ""
+        excerpt = "".join(f" --collapse {ref}" for ref in picture.collapse)
+        excerpt += f" --focus {picture.focus}" if picture.focus else ""
+        parts += [
+            f"## {picture.caption}",
+            f"![{picture.caption}](pictures/{picture.name}.svg)",
+            picture.words,
+            f"`neurovis {verb} specs/{picture.spec}.yaml {what}{theme}{views}{window}{excerpt} -o {picture.name}.svg`",
+        ]
+    return parts
+
+
+def themes_page() -> str:
+    """The page that shows the whole networks in every theme."""
+    parts = [
+        "# Themes",
+        "The stills of the [gallery](gallery.md) in all themes, left to right: `default`, `dark` (on a dark page),"
+        " `print` (on paper, also in greys) and `paper` (the red, grey and green of the NeuroVis paper)."
+        " `--theme dark`, or `render: {theme: dark}`. Made by `make gallery`.",
+    ]
+    for picture in PICTURES:
+        if picture.whole:
+            name = picture.name
+            files = [f"pictures/{name}.svg", *(f"pictures/themes/{name}_{theme}.svg" for theme in THEMES[1:])]
+            cells = " | ".join(f"![{theme}]({file})" for theme, file in zip(THEMES, files, strict=True))
+            parts += [
+                f"## {picture.caption}",
+                f"| {' | '.join(THEMES)} |\n|{' :---: |' * len(THEMES)}\n| {cells} |",
+            ]
+    return "\n\n".join(parts) + "\n"
+
+
 def beside(picture: Picture) -> list[str]:
     """Ours and dot's side by side, and what they measure."""
-    network = compiled(picture)
+    network = compiled(picture.spec)
     problem, name = problem_of(network.network), picture.name
     rows = {
         "NeuroVis": network.layout().metrics(),
