@@ -10,6 +10,7 @@ from neurovis_spec import plugins
 from neurovis_spec.layout import Capabilities, Layout, LayoutProblem, LayoutRefusalError, Point
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.choose import choose_engine
+from neurovis_spec.layout.engines import engine_of
 from neurovis_spec.layout.geometry import straight
 from neurovis_spec.layout.model import LayoutModule
 from neurovis_spec.layout.problem import canonical
@@ -45,6 +46,23 @@ def test_auto_lays_tangles_out_by_distance_and_complete_ones_on_a_ring() -> None
     assert choose_engine(acyclic)[0] == "layered"
     layers = [(f"{a}{i}", f"{b}{j}") for a, b in ("AB", "BC", "CA") for i in range(20) for j in range(0, 20, 4)]
     assert choose_engine(grouped("ABC", 20, layers))[0] == "layered"
+
+
+@pytest.mark.parametrize("boxed", [False, True])
+def test_auto_never_chooses_an_engine_that_takes_fewer_connections(boxed: bool) -> None:
+    problem = tangle(400, tuple(range(1, 60)))
+    if boxed:
+        problem = replace(problem, boxes=(("half", tuple(range(200))),))
+    engine, why = choose_engine(problem)
+    assert engine == "large"
+    assert "densely" in why
+    assert "'organic' does not draw so many" in why
+    refuse(asked_by(problem), engine, engine_of(engine).capabilities)
+
+
+def test_auto_takes_the_engine_for_many_neurons_also_where_nothing_connects_them() -> None:
+    names = [f"N{i:06}" for i in range(100_001)]
+    assert choose_engine(canonical("many", names, [("N", names)]))[0] == "large"
 
 
 def test_auto_keeps_boxes_whole_that_many_connections_run_between() -> None:

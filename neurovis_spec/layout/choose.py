@@ -8,7 +8,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence, Set
 
-from neurovis_spec.layout.model import LayoutProblem
+from neurovis_spec.layout.engines import engine_of
+from neurovis_spec.layout.model import LayoutProblem, LayoutRefusalError
+from neurovis_spec.layout.refusals import asked_by, refuse
 
 #: A component of so many neurons, with so many connections each within their group, is a tangle.
 _LARGE, _DENSE = 40, 2.5
@@ -33,7 +35,25 @@ _MOST_TO_AND_FRO, _MOST_IN_ROW, _ENDS = 60, 120, 0.1
 
 
 def choose_engine(problem: LayoutProblem) -> tuple[str, str]:
-    """The engine that ``auto`` stands for, and why, in words for ``inspect``."""
+    """The engine that ``auto`` stands for, and why, in words for ``inspect``. What is too large for the one that suits
+    it best is drawn by ``large``, if that can do all that is asked."""
+    name, why = _most_suitable(problem)
+    if _takes(name, problem) or not _takes("large", problem):
+        return name, why
+    return "large", f"{why}, and '{name}' does not draw so many neurons and connections"
+
+
+def _takes(name: str, problem: LayoutProblem) -> bool:
+    """Whether an engine can do what a problem asks for."""
+    try:
+        refuse(asked_by(problem), name, engine_of(name).capabilities)
+    except LayoutRefusalError:
+        return False
+    return True
+
+
+def _most_suitable(problem: LayoutProblem) -> tuple[str, str]:
+    """The engine whose drawing says most, and why."""
     edges = len(problem.edges)
     if problem.neurons and len(problem.pins) == len(problem.neurons):
         return "manual", "every neuron has a position"
