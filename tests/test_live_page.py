@@ -55,7 +55,7 @@ def test_a_name_at_the_top_of_two_modules_is_refused(
 
 def test_every_message_and_limit_is_documented() -> None:
     text = (ROOT / "docs/live.md").read_text(encoding="utf-8")
-    assert set(re.findall(r'\{"type": "(\w+)"', text)) == {*MESSAGES, "status", "findings", "refused"}
+    assert set(re.findall(r'\{"type": "(\w+)"', text)) == {*MESSAGES, "status", "values", "findings", "refused"}
     for speed in SPEEDS:
         assert speed in text
     for limit in (

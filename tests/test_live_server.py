@@ -285,6 +285,28 @@ def test_a_client_sees_the_scene_the_status_and_frames() -> None:
     served(test)
 
 
+@pytest.mark.parametrize("owner", [True, False])
+def test_whoever_looks_at_something_is_told_its_exact_values(owner: bool) -> None:
+    recording = COMPILED.run(steps=400)
+
+    async def test(live: Live) -> None:
+        async with live.stream(live.access.owner if owner else live.access.viewer) as stream:
+            eyes = Eyes(stream)
+            await eyes.until(lambda: eyes.step > 2)
+            await eyes.ask("look", items=["n3", "c0", "c999999"])
+            await eyes.until(lambda: [told["type"] for told in eyes.told].count("values") > 4)
+            for told in (told for told in eyes.told if told["type"] == "values"):
+                step = told["step"]
+                assert told["values"] == {"n3": recording.activity[step, 3], "c0": recording.weights[step, 0]}
+            live.run.ask(Seek(300))
+            await eyes.until(lambda: eyes.step == 300)
+            await eyes.ask("look", items=["n0"])
+            await eyes.until(lambda: eyes.told[-1].get("values", {}).keys() == {"n0"})
+            assert eyes.told[-1]["step"] == 300
+
+    served(test)
+
+
 def test_one_who_comes_while_it_stands_still_sees_the_same() -> None:
     async def seen(live: Live, token: str) -> tuple[list[int], ...]:
         async with live.stream(token) as stream:
@@ -329,6 +351,8 @@ BROKEN: list[str | bytes] = [
     *('{"type": "set", "values": {"": 1}}', '{"type": "hold", "neurons": "B"}'),
     *('{"type": "hold", "neurons": "B", "value": null}', '{"type": "feed", "name": "x", "values": 3}'),
     *(json.dumps({"type": "lesion", "part": "x" * 5000}), '{"type": "learn", "connections": "A -> B", "on": 1}'),
+    *('{"type": "look", "items": "n1"}', '{"type": "look", "items": ["x1"]}', '{"type": "look", "items": ["n1", 2]}'),
+    *(json.dumps({"type": "look", "items": ["n1"] * 65}), '{"type": "look", "items": ["n-1"]}'),
     *(b"", b"\x00", b"\x00" * 5, b"\x00" * 1000, '{"type": "pl\x00ay"}', '{"type": "step", "by": ' + "9" * 5000 + "}"),
 ]
 

@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.live.protocol import frame_message, scene_message, status_message
+from neurovis_spec.live.protocol import frame_message, scene_message, status_message, values_message
 from neurovis_spec.live.run import Shown
 
 #: Frames that a client may be sent before it has drawn them.
@@ -38,6 +38,9 @@ class Client:
     status: str = ""
     #: the serials of frames that were sent and are not drawn yet
     ahead: deque[int] = field(default_factory=deque)
+    #: what it wants the values of, and whether it has just asked
+    items: tuple[str, ...] = ()
+    asked: bool = False
     texts: deque[str] = field(default_factory=lambda: deque(maxlen=_TEXTS))
     wake: asyncio.Event = field(default_factory=asyncio.Event)
 
@@ -99,6 +102,11 @@ class Hub:
         for client in self._clients:
             client.tell(text)
 
+    def look_at(self, client: Client, items: tuple[str, ...]) -> None:
+        """A client wants values: now, and with each frame."""
+        client.items, client.asked = items, bool(items)
+        client.wake.set()
+
     def drawn(self, client: Client, serial: int) -> None:
         """A client has drawn a frame, and so those before it."""
         while client.ahead and client.ahead[0] <= serial:
@@ -125,6 +133,10 @@ class Hub:
             since, client.sent = client.sent, self._serial
             client.ahead.append(self._serial)
             yield self._frame(since)
+            client.asked = bool(client.items)
+        if client.asked:
+            client.asked = False
+            yield values_message(shown.look.step, shown.view.values(shown.seen, client.items))
 
     def _take(self) -> None:
         self._scheduled = False

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import struct
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
@@ -35,6 +36,8 @@ LARGEST, _LONGEST = 16_384, 4096
 _MOST = (1 << 53) - 1
 #: The most components of an input, and parameters set at once.
 _MANY = 1024
+#: The most items that a client is told of, and the id of one.
+_WATCHED, _ITEM = 64, re.compile(r"[nc][0-9]{1,9}", re.ASCII)
 #: The most turns and events that are listed, the latest turns and the first events.
 _LISTED = 1000
 #: The most steps that are made at once.
@@ -89,6 +92,12 @@ def _turned(entry: Turned) -> dict[str, object]:
     return {"step": entry.step, "type": type(entry.turn).__name__.lower(), **asdict(entry.turn)}
 
 
+def values_message(step: int, values: Mapping[str, float]) -> str:
+    """Exact values of what a client looks at; null for what is no finite number."""
+    known = {name: value if math.isfinite(value) else None for name, value in values.items()}
+    return _text("values", step=step, values=known)
+
+
 def findings_message(text: str, errors: bool) -> str:
     """What was noticed about an edited spec, as ``validate`` shows it; nothing: all is well."""
     return _text("findings", text=text, errors=errors)
@@ -117,6 +126,14 @@ class Acknowledged:
 Check: TypeAlias = Callable[[object], object]
 
 
+@dataclass(frozen=True, slots=True)
+class LookAt:
+    """The client wants the exact values of neurons (``n3``) and connections (``c5``) with each frame; it is nobody
+    else's business, so viewers may ask for it."""
+
+    items: tuple[str, ...]
+
+
 def acknowledged(data: bytes) -> Acknowledged:
     """A binary message: four bytes. Raises ProtocolError."""
     if len(data) != 4:
@@ -124,7 +141,7 @@ def acknowledged(data: bytes) -> Acknowledged:
     return Acknowledged(int.from_bytes(data, "little"))
 
 
-def command_of(text: str) -> Command:
+def command_of(text: str) -> Command | LookAt:
     """A text message. Raises ProtocolError."""
     if len(text) > LARGEST:
         raise ProtocolError("the message is too long")
@@ -193,7 +210,16 @@ def _numbers(value: object) -> tuple[float, ...]:
     return tuple(_number(number) for number in value)
 
 
-_MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command]]]] = {
+def _items(value: object) -> tuple[str, ...]:
+    if isinstance(value, list) and len(value) <= _WATCHED:
+        found = [item for item in value if isinstance(item, str) and _ITEM.fullmatch(item)]
+        if len(found) == len(value):
+            return tuple(dict.fromkeys(found))
+    raise ProtocolError(f"at most {_WATCHED} ids of neurons and connections are wanted")
+
+
+_MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command | LookAt]]]] = {
+    "look": ({"items": _items}, LookAt),
     "play": ({}, Play),
     "pause": ({}, Pause),
     "step": ({"by": _whole(-_NEAR, _NEAR)}, Step),

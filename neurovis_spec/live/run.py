@@ -17,7 +17,7 @@ from typing import TypeAlias
 
 from neurovis_spec.live.clock import FRAMES, Clock
 from neurovis_spec.live.commands import Branch, Command, Event, Pause, Play, Present, Restart, Seek, Speed, Step
-from neurovis_spec.live.source import Capabilities, Reach, Source, SourceError, Turned
+from neurovis_spec.live.source import Capabilities, Reach, Seen, Source, SourceError, Turned
 from neurovis_spec.live.view import Look, View
 
 
@@ -40,6 +40,7 @@ class Shown:
     """What is to be seen now. ``view`` is the network's, which is another after an edit."""
 
     view: View
+    seen: Seen
     look: Look
     reach: Reach
     status: Status
@@ -230,4 +231,5 @@ class Run:
             turned=source.turned,
             events=self._events(),
         )
-        return Shown(self._view, self._view.look(source.seen()), source.reach, status)
+        seen = source.seen()
+        return Shown(self._view, seen, self._view.look(seen), source.reach, status)

@@ -21,7 +21,7 @@ from aiohttp import WSCloseCode, WSMsgType, web
 from neurovis_spec.live.access import PAGE, Access
 from neurovis_spec.live.commands import Present
 from neurovis_spec.live.hub import Client, Hub
-from neurovis_spec.live.protocol import LARGEST, ProtocolError, acknowledged, command_of, refused_message
+from neurovis_spec.live.protocol import LARGEST, LookAt, ProtocolError, acknowledged, command_of, refused_message
 from neurovis_spec.live.run import Run
 
 #: Websockets at once, and connections of any kind.
@@ -192,7 +192,9 @@ class Server:
                     self._hub.drawn(client, acknowledged(message.data).serial)
                 elif message.type is WSMsgType.TEXT:
                     command = command_of(message.data)
-                    if client.owner:
+                    if isinstance(command, LookAt):
+                        self._hub.look_at(client, command.items)
+                    elif client.owner:
                         self._run.ask(command, refuse)
                     else:
                         client.tell(refused_message("this page only looks on"))

@@ -6,6 +6,7 @@ Look: colours, widths and glows as small numbers, as fine as can be seen (Eqs. 2
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -72,6 +73,16 @@ class View:
             glows=_parts(shown.glows),
             kinds=np.concatenate([bars * BAR + lines * FAINT, neurons * FAINT]).astype(np.uint8),
         )
+
+    def values(self, seen: Seen, items: Iterable[str]) -> dict[str, float]:
+        """Exact activities (``n3``) and weights (``c5``) at a step, by the ids of groups, of those that there are."""
+        snapshot = self.drawn.snapshot(seen.snapshot)
+        result = {}
+        for item in items:
+            values, index = snapshot.activity if item[0] == "n" else snapshot.weights, int(item[1:])
+            if index < len(values):
+                result[item] = float(values[index])
+        return result
 
     def _lesioned(self, seen: Seen) -> tuple[Mask, Mask]:
         """What is drawn as lesioned: a glyph, or a line between glyphs, where all that it stands for is."""
