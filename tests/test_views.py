@@ -586,11 +586,12 @@ def test_the_picture_of_the_network_in_a_figure_is_that_which_stands_alone(tmp_p
         for path in (alone, page):
             root = ET.fromstring(path.read_bytes())
             lines = [g for g in root.iter(NS + "g") if "data-connection" in g.attrib]
-            widths = {g.attrib["data-connection"]: g.find(NS + "path").attrib["stroke-width"] for g in lines}
+            widths = {g.attrib["data-connection"]: next(g.iter(NS + "path")).attrib["stroke-width"] for g in lines}
             discs = {
-                g.attrib["data-neuron"]: g.find(NS + "circle").attrib["fill"]
+                g.attrib["data-neuron"]: circle.attrib["fill"]
                 for g in root.iter(NS + "g")
-                if "data-neuron" in g.attrib and g.find(NS + "circle") is not None
+                if "data-neuron" in g.attrib
+                for circle in g.findall(NS + "circle")[:1]
             }
             found.append((widths, discs))
         assert found[0] == found[1]
