@@ -110,8 +110,10 @@ def test_it_plays_stands_still_steps_on_and_back(tmp_path: Path) -> None:
             await opened.ask("const speed = document.querySelector('#speed'); speed.value = 'max'; speed.onchange()")
             await opened.key(" ")
             await opened.until(f"{STEP} > 500")
+            await opened.key(" ")
+            await opened.until("document.querySelector('#play').getAttribute('aria-label') == 'play'")
             await opened.key("Home")
-            await opened.until(f"{STEP} < 500")
+            await opened.until(f"{STEP} == 0")
 
     asyncio.run(main())
 
@@ -126,12 +128,45 @@ def test_a_viewer_has_no_controls(tmp_path: Path) -> None:
     asyncio.run(main())
 
 
-def test_it_connects_again_and_then_shows_the_same(tmp_path: Path) -> None:
+def test_it_is_opened_again_and_shows_the_same_sharp_on_a_display_of_two_pixels_a_pixel(tmp_path: Path) -> None:
     async def main() -> None:
         async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):
-            await opened.call("Network.enable")
             step = await pause(opened)
             await opened.call("Page.reload")
             await opened.until(f"document.readyState == 'complete' && {STEP} == {step}")
+            await opened.size(700, 500, density=2.0)
+            await opened.until("document.querySelector('#picture').width == 1400")
+            await opened.size(700, 500)
+            await opened.key("ArrowLeft")
+            await opened.until("document.querySelector('#picture').width == 700")
+
+    asyncio.run(main())
+
+
+def test_it_connects_again_by_itself(tmp_path: Path) -> None:
+    async def main() -> None:
+        compiled = nv.compile(SPECS / "cpg_rbf.yaml")
+        hub = Hub(asyncio.get_running_loop())
+        run = Run(
+            SimulatedSource(compiled.simulator()), view_of(compiled, compiled.gains), hub.show, lambda: hub.watched
+        )
+        sock = listen("127.0.0.1", 0)
+        access = Access("127.0.0.1", sock.getsockname()[1])
+        server = Server(access, hub, run)
+        await server.start(sock)
+        run.start()
+        try:
+            async with chromium(tmp_path) as opened:
+                await opened.call("Page.navigate", url=access.url())
+                await opened.until(f"{STEP} > 2")
+                await server.stop()
+                await opened.until("document.querySelector('#told').textContent.startsWith('not connected')")
+                server = Server(access, hub, run)
+                await server.start(listen("127.0.0.1", access.port))
+                await opened.until(f"{STEP} > 2")
+                assert all("WebSocket connection" in error for error in opened.errors)
+        finally:
+            run.end()
+            await server.stop()
 
     asyncio.run(main())

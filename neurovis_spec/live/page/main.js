@@ -12,7 +12,7 @@ const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d',
 const camera = new Camera();
 /** @type {Drawing | null} */
 let drawing = null;
-let fresh = false, asked = false;
+let fresh = false, asked = false, density = 1;
 
 /** Draw before the display's next frame. */
 function redraw() {
@@ -27,6 +27,7 @@ function show() {
   asked = false;
   const { look } = link;
   if (!drawing || !look || !look.serial) return;
+  if (density !== devicePixelRatio) resize();
   drawing.draw(context, camera, look);
   controls.frame(look);
   if (fresh) {
@@ -37,7 +38,8 @@ function show() {
 
 /** Fill the window, a pixel a pixel. */
 function resize() {
-  const box = canvas.getBoundingClientRect(), density = devicePixelRatio;
+  const box = canvas.getBoundingClientRect();
+  density = devicePixelRatio;
   camera.window = [Math.max(1, Math.round(box.width * density)), Math.max(1, Math.round(box.height * density))];
   [canvas.width, canvas.height] = camera.window;
   redraw();
@@ -72,14 +74,13 @@ const controls = new Controls(link);
 
 new ResizeObserver(resize).observe(canvas);
 canvas.addEventListener('wheel', (event) => {
-  const density = devicePixelRatio;
   camera.closer(Math.exp(-event.deltaY / 400), event.offsetX * density, event.offsetY * density);
   event.preventDefault();
   redraw();
 }, { passive: false });
 canvas.addEventListener('pointermove', (event) => {
   if (event.buttons !== 1) return;
-  camera.move(event.movementX * devicePixelRatio, event.movementY * devicePixelRatio);
+  camera.move(event.movementX * density, event.movementY * density);
   redraw();
 });
 Object.assign(controls.keys, {
