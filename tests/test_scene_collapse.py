@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -174,11 +175,9 @@ def test_boxes_rules_lesions_and_gains_follow_what_is_drawn() -> None:
     assert whole.render.collapse == (("A", (0, 1, 2)), ("B", (3, 4)))
 
 
-def test_the_reader_collapses_as_the_spec_does(tmp_path: object) -> None:
+def test_the_reader_collapses_as_the_spec_does(tmp_path: Path) -> None:
     plain = nv.compile_text(SPEC.replace(", collapse: [A, B]", ""))
-    from pathlib import Path
-
-    folder = Path(str(tmp_path))
+    folder = tmp_path
     plain.render(folder / "one.svg", step=3, collapse=["A", "B"])
     nv.compile_text(SPEC).render(folder / "other.svg", step=3)
     one, other = ((folder / name).read_text(encoding="utf-8") for name in ("one.svg", "other.svg"))
@@ -191,3 +190,10 @@ def test_what_is_drawn_by_default_is_the_network_itself() -> None:
     network = nv.compile_text(SPEC.replace(", collapse: [A, B]", ""))
     assert len(groups(network, 0, "neuron")) == 6
     assert replace(network.network.render, collapse=()) == network.network.render
+
+
+def test_instances_that_are_not_collapsed_keep_their_frames_where_all_is_laid_out_anew(tmp_path: Path) -> None:
+    network = nv.compile(Path(__file__).parents[1] / "specs" / "hexapod" / "hexapod.yaml")
+    network.render(tmp_path / "x.svg", step=1, collapse=["left", "right2", "DL"])
+    said = {"".join(text.itertext()) for text in ET.parse(tmp_path / "x.svg").iterfind(".//{*}text")}
+    assert {"right1", "right3"} <= said

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.network import Instance, Network
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import RADIUS, Layout, LayoutProblem, Point
@@ -120,10 +121,20 @@ def _problem(drawn: Gathered, pins: dict[str, Point], spacing: float) -> LayoutP
     ]
     boxes = [(name, [names[i] for i in members]) for name, members in settings.boxes]
     boxes += [(group.box, [names[i] for i in group.indices]) for group in network.neurons.groups if group.box]
-    mirrors = [
-        (mirror.scope, [(names[a], names[b]) for a, b in mirror.pairs], ())
+    inside = {instance.path: _inside(network, instance) for instance in network.instances}
+    alike = [
+        (one, other)
+        for mirror in drawn.whole.layout.mirrors
+        for one, other in mirror.instances
+        if not mirror.scope and inside.get(one, ()) == inside.get(other)
+    ]
+    held = {f"{path}.{name}" for path, own in inside.items() for name in own}
+    framed = {f"{path}.{name}" for pair in alike for path in pair for name in inside[path]}
+    pairs = [
+        (names[a], names[b])
         for mirror in settings.mirrors
-        if not mirror.scope
+        for a, b in mirror.pairs
+        if not mirror.scope and all(names[end] in framed or names[end] not in held for end in (a, b))
     ]
     return canonical(
         network.name,
@@ -134,5 +145,11 @@ def _problem(drawn: Gathered, pins: dict[str, Point], spacing: float) -> LayoutP
         settings.direction,
         boxes=() if pins else boxes,
         spacing=(spacing * settings.neuron_spacing, spacing * settings.rank_spacing),
-        mirrors=() if pins else mirrors,
+        modules=() if pins else [(instance.path, instance.module) for instance in network.instances],
+        mirrors=() if pins or not pairs else [("", pairs, alike)],
     )
+
+
+def _inside(network: Network, instance: Instance) -> tuple[str, ...]:
+    """What an instance holds, by its names within."""
+    return tuple(network.neurons.names[index].removeprefix(f"{instance.path}.") for index in instance.indices)
