@@ -332,7 +332,6 @@ class CompiledNetwork:
         OutputError for a kind that nobody draws, for a view, a name to be shown and a path that there is not, KeyError
         for an unknown reference, before anything is run.
         """
-        from neurovis_spec.scene.excerpt import Excerpt
         from neurovis_spec.scene.renderers import renderer_for
 
         _check(recording=recording, inputs=inputs, theme=theme, engine=engine, progress=progress)
@@ -340,7 +339,7 @@ class CompiledNetwork:
         renderer_for(suffix := place.suffix, moving=False)
         density = None if dpi is None else _density(dpi)
         panels = self._panels(view)
-        seen, settings = self._seen(theme, Excerpt(_listed(collapse), focus, paths, min_weight, full), panels)
+        seen, settings = self._seen(theme, _excerpt(collapse, focus, paths, min_weight, full), panels)
         if window is not None:
             settings = replace(settings, window=arguments.integer("window", window, 1))
         layout = self._placed(panels, engine)
@@ -401,7 +400,6 @@ class CompiledNetwork:
         reference, before anything is run.
         """
         from neurovis_spec.runtime.simulation import Simulation
-        from neurovis_spec.scene.excerpt import Excerpt
         from neurovis_spec.scene.film_size import check_film, thinned
         from neurovis_spec.scene.renderers import renderer_for
         from neurovis_spec.snapshots import in_parts, snapshots_from, snapshots_of_run, steps_from
@@ -417,7 +415,7 @@ class CompiledNetwork:
         if not (math.isfinite(arguments.number("fps", fps)) and fps > 0):
             raise ValueError(f"frames a second are above 0, not {fps}")
         panels = self._panels(view)
-        seen, settings = self._seen(theme, Excerpt(_listed(collapse), focus, paths, min_weight, full), panels)
+        seen, settings = self._seen(theme, _excerpt(collapse, focus, paths, min_weight, full), panels)
         span = steps_from(self.network, first, count, recording)
         stride = thinned(span, each, most)
         shown = -(-span // stride)
@@ -639,8 +637,19 @@ def _thinned(steps: int, every: int, frames: int, fps: float) -> str:
     )
 
 
-def _listed(names: str | Sequence[str]) -> tuple[str, ...]:
-    return (names,) if isinstance(names, str) else tuple(names)
+def _excerpt(
+    collapse: str | Sequence[str], focus: str | None, paths: str | None, min_weight: float | None, full: bool
+) -> Excerpt:
+    """What is to be seen. Raises TypeError for what says nothing of the kind."""
+    from neurovis_spec.scene.excerpt import Excerpt
+
+    return Excerpt(
+        arguments.texts("collapse", collapse),
+        None if focus is None else arguments.text("focus", focus),
+        None if paths is None else arguments.text("paths", paths),
+        None if min_weight is None else arguments.number("min_weight", min_weight),
+        arguments.truth("full", full),
+    )
 
 
 def _bounded(draw: Callable[[RenderSettings], tuple[Scene, bytes]], settings: RenderSettings, suffix: str) -> bytes:

@@ -40,7 +40,21 @@ WRONG: dict[str, tuple[object, ...]] = {
     "a view, {view: references}, or several": (5, 1.5, True),
 }
 #: what may be left out: None stands for the default
-OPTIONAL = {"limit", "root", "steps", "step", "fps", "engine", "theme", "backend", "scheduler", "window"}
+OPTIONAL = {
+    "limit",
+    "root",
+    "steps",
+    "step",
+    "fps",
+    "engine",
+    "theme",
+    "backend",
+    "scheduler",
+    "window",
+    "dpi",
+    "focus",
+}
+OPTIONAL |= {"paths", "min_weight", "every", "frames"}
 OVER = {"seed": [1]}
 CALLS: dict[tuple[str, str, str], Callable[..., object]] = {
     ("compile", "source", "a path"): lambda v: nv.compile(v),
@@ -76,6 +90,16 @@ CALLS: dict[tuple[str, str, str], Callable[..., object]] = {
     ("animate", "start", "an integer"): lambda v: NETWORK.animate("x.svg", start=v),
     ("animate", "steps", "an integer"): lambda v: NETWORK.animate("x.svg", steps=v),
     ("animate", "fps", "a number"): lambda v: NETWORK.animate("x.svg", fps=v),
+    ("render", "dpi", "a number"): lambda v: NETWORK.render("x.png", dpi=v),
+    ("render", "collapse", "a text or several"): lambda v: NETWORK.render("x.svg", collapse=v),
+    ("render", "focus", "a text"): lambda v: NETWORK.render("x.svg", focus=v),
+    ("render", "paths", "a text"): lambda v: NETWORK.render("x.svg", paths=v),
+    ("render", "min_weight", "a number"): lambda v: NETWORK.render("x.svg", min_weight=v),
+    ("render", "full", "True or False"): lambda v: NETWORK.render("x.svg", full=v),
+    ("animate", "every", "an integer"): lambda v: NETWORK.animate("x.svg", every=v),
+    ("animate", "frames", "an integer"): lambda v: NETWORK.animate("x.svg", frames=v),
+    ("animate", "collapse", "a text or several"): lambda v: NETWORK.animate("x.svg", collapse=v),
+    ("animate", "full", "True or False"): lambda v: NETWORK.animate("x.svg", full=v),
     ("recording", "name", "a text"): lambda v: RECORDING[v],
     ("weight", "name", "a text"): lambda v: RECORDING.weight(v),
     ("snapshot", "step", "an integer"): lambda v: RECORDING.snapshot(v),
@@ -176,6 +200,7 @@ def test_what_is_no_text_among_several_is_named(value: object) -> None:
     calls: dict[str, Callable[..., object]] = {
         "states": lambda: NETWORK.run(3, states=value),  # type: ignore[arg-type]
         "neurons": lambda: NETWORK.run(3, neurons=value),  # type: ignore[arg-type]
+        "collapse": lambda: NETWORK.render("x.svg", collapse=value),  # type: ignore[arg-type]
         "metrics": lambda: nv.sweep(SPEC, OVER, value),  # type: ignore[arg-type]
     }
     for name, call in calls.items():

@@ -178,7 +178,7 @@ def test_boxes_rules_lesions_and_gains_follow_what_is_drawn() -> None:
 def test_the_reader_collapses_as_the_spec_does(tmp_path: Path) -> None:
     plain = nv.compile_text(SPEC.replace(", collapse: [A, B]", ""))
     folder = tmp_path
-    plain.render(folder / "one.svg", step=3, collapse=["A", "B"])
+    plain.render(folder / "one.svg", step=3, collapse=["A", "B", "A"])
     nv.compile_text(SPEC).render(folder / "other.svg", step=3)
     one, other = ((folder / name).read_text(encoding="utf-8") for name in ("one.svg", "other.svg"))
     assert one == other
@@ -197,3 +197,10 @@ def test_instances_that_are_not_collapsed_keep_their_frames_where_all_is_laid_ou
     network.render(tmp_path / "x.svg", step=1, collapse=["left", "right2", "DL"])
     said = {"".join(text.itertext()) for text in ET.parse(tmp_path / "x.svg").iterfind(".//{*}text")}
     assert {"right1", "right3"} <= said
+
+
+def test_a_neuron_that_is_named_twice_is_one_glyph(tmp_path: Path) -> None:
+    network = nv.compile_text(SPEC.replace(", collapse: [A, B]", ""))
+    for again, file in ((["C"], "one.svg"), (["C", "C"], "other.svg")):
+        network.render(tmp_path / file, step=3, collapse=again)
+    assert (tmp_path / "one.svg").read_bytes() == (tmp_path / "other.svg").read_bytes()

@@ -53,7 +53,7 @@ def excerpted(network: Network, settings: RenderSettings, excerpt: Excerpt) -> R
 def _collapsed(network: Network, names: Names, texts: Sequence[str]) -> tuple[tuple[str, tuple[int, ...]], ...]:
     taken: dict[int, str] = {}
     result = []
-    for text in texts:
+    for text in dict.fromkeys(texts):
         members = _found(network, names, text)
         for index in members:
             other = taken.setdefault(index, text)
