@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import neurovis_spec as nv
 from neurovis_spec import pipeline
-from neurovis_spec.scene import Text
+from neurovis_spec.scene import Disc, Text
+from neurovis_spec.scene.texts import width
 
 LONG = "a very long label that goes on for forty"
 SPEC = f"""
@@ -59,3 +62,29 @@ def test_a_label_across_the_line_of_a_box_keeps_it_away() -> None:
     assert found["a_neuron_with_a_long_name"].text == "a_neuron_with_a_long_name"
     assert found["a_neuron_with_a_long_name"].halo
     assert not found["B"].halo
+
+
+def test_a_label_on_a_disc_leaves_its_ring_free() -> None:
+    network = nv.compile_text(
+        "neurovis: 1\nname: x\nneurons: {saliva: {}, right: {}, food: {}}\n"
+        "connections: {food -> saliva: 1, right -> saliva: 1}\n"
+    )
+    scene = pipeline.picture(
+        network.network, network.layout().value, network.run(3).snapshot(2), network.gains, network.network.render
+    )
+    for group in (group for group in scene.groups if "neuron" in group.data):
+        (disc,) = (shape for shape in group.shapes if isinstance(shape, Disc))
+        (text,) = (shape for shape in group.shapes if isinstance(shape, Text))
+        assert text.on_disc
+        corner = math.hypot(width(text.text, text.size, 600) / 2, 0.4 * text.size)
+        assert corner <= disc.radius - disc.stroke_width / 2 + 0.1
+
+
+def test_a_label_beside_a_disc_keeps_off_the_line_of_a_box_where_it_can() -> None:
+    found = labels(
+        "neurons: {a: {count: 6, box: b}, shoulder: {box: b}, c: {count: 3}}\n"
+        "connections: {a -> shoulder: 1}\nrender: {size: [300, 300]}\nlayout: {arrange: {c: row}}\n"
+    )
+    assert found["shoulder"].text == "shoulder"
+    assert not found["shoulder"].on_disc
+    assert not found["shoulder"].halo

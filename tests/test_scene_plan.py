@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 from hand_networks import C, Case, G, loop, network, numbered, straight, straight_layout, use_case_1
 
+import neurovis_spec as nv
+from neurovis_spec import pipeline
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.layout.model import Layout, Point
@@ -454,3 +458,20 @@ def test_curves_are_cut_together_as_they_are_one_by_one() -> None:
             assert np.hypot(dots[:, 0] - x, dots[:, 1] - y).min() < 0.02
     dots = np.concatenate(samples(routes, 8))
     assert np.array_equal(dots, np.concatenate([sample(route, 8) for route in routes]))
+
+
+def test_beads_of_lines_that_cross_are_apart() -> None:
+    network = nv.compile(Path(__file__).parent.parent / "specs" / "sound.yaml")
+    scene = pipeline.picture(
+        network.network, network.layout().value, network.run(3).snapshot(2), network.gains, network.network.render
+    )
+    beads = [
+        shape
+        for group in scene.groups
+        if "connection" in group.data
+        for shape in group.shapes
+        if isinstance(shape, Rectangle)
+    ]
+    assert len(beads) == 8
+    middles = [(bead.corner[0] + bead.width / 2, bead.corner[1] + bead.height / 2) for bead in beads]
+    assert all(math.dist(one, other) > beads[0].width for one, other in combinations(middles, 2))

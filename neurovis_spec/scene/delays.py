@@ -1,12 +1,13 @@
 """Beads: a small open bead on every connection whose signal arrives later than those of others.
 
-In: delays and lines. Out: a bead in the middle of each such line, and what the legend says of them. Where some
+In: delays and lines. Out: a bead near the middle of each such line, and what the legend says of them. Where some
 connections have no delay, so that what they send takes part in the very step that a picture shows, those with any
 delay have beads; else those of several steps.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from neurovis_spec.compiler.network import Network
@@ -18,6 +19,8 @@ from neurovis_spec.scene.model import Rectangle, Theme
 _MOST = 300
 #: beads are not smaller, so that they can be seen, and none is on lines between discs that are hardly larger
 _SMALLEST, _SMALLEST_DISC = 2.0, 5.0
+#: where they may be on their lines, the best place first; and how far apart, in radii, so that each can be told
+_PLACES, _APART = (1 / 2, 0.42, 0.58, 0.34, 0.66), 2.8
 
 
 def delayed(network: Network) -> list[int]:
@@ -43,8 +46,15 @@ def beads(network: Network, lines: Sequence[Line], disc: float, theme: Theme) ->
     if not visible(disc):
         return {}
     radius = min(3.2, max(_SMALLEST, 0.16 * disc))
-    middles = {index: point_at(lines[index].points, (len(lines[index].points) - 1) / 6) for index in delayed(network)}
-    return {index: bead(middle, radius, theme) for index, middle in middles.items()}
+    found: dict[int, Point] = {}
+    for index in delayed(network):
+        line = lines[index].points
+        places = [point_at(line, share * (len(line) - 1) / 3) for share in _PLACES]
+        free = (
+            place for place in places if all(math.dist(place, other) >= _APART * radius for other in found.values())
+        )
+        found[index] = next(free, places[0])
+    return {index: bead(place, radius, theme) for index, place in found.items()}
 
 
 def label_of(network: Network) -> str:

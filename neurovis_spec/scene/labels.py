@@ -42,7 +42,7 @@ _SMALLEST_DISC = 7.0
 #: and one smaller than this no label beside a number
 _SMALLEST_NUMBERED = 16.0
 #: what a text leaves free of its disc's width, as a share of the radius and at most
-_FREE, _MOST_FREE = 0.126, 2.5
+_FREE, _MOST_FREE = 0.252, 5.0
 
 
 @dataclass(frozen=True, slots=True)

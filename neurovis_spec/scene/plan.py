@@ -142,7 +142,8 @@ def plan(
     sizes = {unit: size for unit, size in enumerate(drawn.sizes.tolist()) if drawn.glyph[unit]}
     labels: list[Label | None] = [None] * len(spots)
     if settings.labels:
-        inner = np.concatenate(samples([routes[i] for i in kept], 24)) if kept else np.zeros((0, 2))
+        around = [outline(box.rect, 4 / UNIT) for box in boxes]
+        inner = np.concatenate([np.zeros((0, 2)), *samples([routes[i] for i in kept], 24), *around])
         reach = margin_beside(network, RADIUS * frame.scale) if margin > MARGIN else 0.0
         ground = Ground(positions, factors, frame.scale, (frame.left, frame.top), inner, extent, reach)
         labels = labels_of(network, ground, obstacles, (~seen.focus).tolist(), sizes)

@@ -222,10 +222,10 @@ def _grown(item: Titled, weight: int) -> Rect:
     return x0 - width, y0 - 40, x1 + width, y1 + 40
 
 
-def outline(rect: Rect) -> FloatArray:
-    """Points on the line of a box, in user units."""
+def outline(rect: Rect, step: float = 4.0) -> FloatArray:
+    """Points on the line of a box, so far apart."""
     x0, y0, x1, y1 = rect
-    across, down = np.arange(x0, x1, 4.0), np.arange(y0, y1, 4.0)
+    across, down = np.arange(x0, x1, step), np.arange(y0, y1, step)
     return np.concatenate(
         [np.column_stack([across, np.full(len(across), y)]) for y in (y0, y1)]
         + [np.column_stack([np.full(len(down), x), down]) for x in (x0, x1)]
