@@ -154,6 +154,26 @@ PICTURES = (
         " is still thinner than that of the food, which does not change.",
     ),
     Picture(
+        "sound",
+        "sound",
+        92,
+        "Spikes: where a sound comes from",
+        "The sound is on the left: the left ear clicked eight steps ago, the right one four steps later. A line "
+        "with a bead takes two to five steps, so that both clicks came to D5, and to no other, in the same step. "
+        "It spiked three steps ago; the spike fades (the legend says how fast), so that the eye can see it. It "
+        "excites M1, which turns the head to the left, and inhibits M2.",
+    ),
+    Picture(
+        "sound_figure",
+        "sound",
+        431,
+        "The same with its spikes",
+        "The raster has a mark for each spike: D5 while the sound is on the left, D3 while it is in the middle, D1 "
+        "from two seconds on. M1 and M2 add the spikes up and forget them slowly; the sound has just passed to the "
+        "right, and they have changed places.",
+        views=("network", "raster: L, R, D", "traces: M1, M2"),
+    ),
+    Picture(
         "reward",
         "reward",
         14364,
@@ -170,6 +190,26 @@ PICTURES = (
         "The rhythm enters the upper delay line at DL6 and passes over the right legs, from hind to front, then over "
         "the left ones. At this frequency every second neuron of DL6 to DL11 is active, and three legs are lifted: "
         "left2, right1 and right3. This is the tripod gait. The lower line swings them forward.",
+    ),
+    Picture(
+        "hexapod_legs",
+        "hexapod/hexapod",
+        588,
+        "Use case 3, a leg a glyph",
+        "The same step; each leg is one glyph of 22 neurons in the colour of their mean activity, with its connections "
+        "added up. The three legs that are lifted, left2, right1 and right3, are the most active. Each takes from both "
+        "delay lines, and hands on to the leg behind it.",
+        collapse=("left", "right"),
+    ),
+    Picture(
+        "hexapod_focus",
+        "hexapod/hexapod",
+        588,
+        "Use case 3, one neuron and what it is connected to",
+        "The rhythm enters the upper delay line at DL6: at once, and later with the opposite sign (the line with a "
+        "bead). DL6 hands it on to DL7 and to B, from where it enters the lower line, and moves two joints of "
+        "right3. What it is not connected to is small.",
+        focus="DL6",
     ),
     Picture(
         "hexapod_matrix",
@@ -225,6 +265,7 @@ BESIDE = {
     " nobody sees a ring. Here the author asks for one (`arrange: {R: ring}`), and opposite lines run side by side.",
     "mlp": "Much the same, but for the order of the neurons.",
     "hebbian": "Much the same.",
+    "sound": "Much the same.",
     "reward": "As above, C2 stands below C1, and the kernels are out of order. G stands near what it drives; ours near"
     " what drives it.",
     "hexapod": "dot draws six legs six times: each has other ranks and another place for its parts, left and right are"
