@@ -28,6 +28,7 @@ from neurovis_spec import pipeline  # noqa: E402
 from neurovis_spec.layout import LayoutProblem  # noqa: E402
 from neurovis_spec.layout.metrics import metrics  # noqa: E402
 from neurovis_spec.layout.problem import problem_of  # noqa: E402
+from neurovis_spec.scene.shown import LeftOut  # noqa: E402
 
 #: A number in a picture; and how far two may be apart that differ by the last digits of a machine's functions.
 _NUMBER = re.compile(r"(?<![#\w])[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?")
@@ -307,6 +308,7 @@ def draw(picture: Picture, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
+        warnings.simplefilter("ignore", LeftOut)
         if picture.frames:
             network.animate(path, steps=picture.frames, start=picture.step, theme=picture.theme)
         else:
