@@ -2,7 +2,7 @@
 
 In: a network, the number of frames, the kind of file. Out: nothing, or RendererError that says the limit and the way
 out. What a film takes of memory grows with its frames where it is not written while it is made: all colours and widths,
-and of pixels what is left of them when they are compressed. A film that nobody asked to be long is thinned.
+or of pixels what is left of them when they are compressed. A film that nobody asked to be long is thinned.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ def check_film(network: Network, frames: int, suffix: str, capabilities: Rendere
         message = f"a film of {frames:,} frames of {parts:,} neurons and connections is too long: {most:,} is the most"
         hint = f"draw fewer steps (--steps {most}, --frames {most}), or a video ('.mp4'), which may be of any length"
         raise RendererError(message, hint)
-    if capabilities.pixels is None:
+    if suffix not in capabilities.pixels:
         return
     wide, high = network.render.size or (int(MOST[0]), int(MOST[1]))
-    most = max(1, capabilities.pixels // (wide * high))
+    most = max(1, capabilities.pixels[suffix] // (wide * high))
     if frames > most:
         message = f"a '{suffix}' of {frames:,} frames of {wide} × {high} pixels is too long: {most:,} is the most"
         fewer = f"--steps {most}, --frames {most}"
-        hint = f"draw fewer steps ({fewer}), a smaller picture (render: size), an '.svg', or a video ('.mp4')"
+        hint = f"draw fewer steps ({fewer}), a smaller picture (render: size), or a '.gif' or '.mp4' of any length"
         raise RendererError(message, hint)
 
 

@@ -288,13 +288,13 @@ class Film:
 @dataclass(frozen=True, slots=True)
 class RendererCapabilities:
     """File suffixes (with the dot, in small letters) of the stills and of the films that a renderer makes; of which
-    films it takes in parts (``StreamingRenderer``); of a film the most ``pixels``, those of all frames together (None:
-    it does not depend on them); and for suffixes that need what is not installed, what to do about it."""
+    films it takes in parts (``StreamingRenderer``); of a film the most ``pixels``, those of all frames together, by
+    suffix, where there is a most; and for suffixes that need what is not installed, what to do about it."""
 
     stills: frozenset[str] = frozenset()
     films: frozenset[str] = frozenset()
     streams: frozenset[str] = frozenset()
-    pixels: int | None = None
+    pixels: Mapping[str, int] = field(default_factory=dict)
     missing: Mapping[str, str] = field(default_factory=dict)
 
 

@@ -7,7 +7,7 @@ its end. Pillow quantises and compresses; its own way of writing many pictures h
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from typing import BinaryIO
 
 import numpy as np
@@ -22,14 +22,14 @@ _COLOURS = 255
 _LONGEST = 655_350
 
 
-def gif(frames: Iterator[Pixels], lasts: Sequence[int], file: BinaryIO) -> None:
+def gif(frames: Iterator[Pixels], lasts: Iterable[int], file: BinaryIO) -> None:
     """Write a GIF: the first picture, then of each the rectangle in which it differs from the one before."""
-    before = next(frames)
+    before, times = next(frames), iter(lasts)
     high, wide = before.shape[:2]
     file.write(b"GIF89a" + struct.pack("<HHBBB", wide, high, 0x70, 0, 0))
     file.write(b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")
-    changed, corner, picture, waiting = np.ones((high, wide), bool), (0, 0), before, lasts[0]
-    for after, last in zip(frames, lasts[1:], strict=True):
+    changed, corner, picture, waiting = np.ones((high, wide), bool), (0, 0), before, next(times)
+    for after, last in zip(frames, times, strict=True):
         differs = (after != before).any(axis=2)
         if not differs.any():  # a picture that stays longer
             waiting += last
@@ -58,10 +58,11 @@ def _write_picture(
         indices = np.full((1, 1), _COLOURS, np.uint8)  # then nothing changes for as long again
 
 
-def webp(frames: Iterator[Pixels], lasts: Sequence[int], file: BinaryIO) -> None:
+def webp(frames: Iterator[Pixels], lasts: Iterable[int], file: BinaryIO) -> None:
     """Write a WebP; its encoder keeps compressed pictures only."""
-    film = _Film(frames, len(lasts))
-    film.save(file, "WEBP", save_all=True, duration=list(lasts), loop=0, quality=85, method=2)
+    durations = list(lasts)
+    film = _Film(frames, len(durations))
+    film.save(file, "WEBP", save_all=True, duration=durations, loop=0, quality=85, method=2)
 
 
 class _Film(Image.Image):

@@ -18,7 +18,7 @@ from neurovis_renderers.films import gif, webp
 from neurovis_renderers.frames import all_frames
 from neurovis_spec.scene import Film, Progress, RendererCapabilities, Scene
 
-#: pixels of all frames of a film: compressed they are kept until the end, some 50 MB for each 2^30
+#: pixels of all frames of a WebP: its encoder keeps them compressed until the end, some 50 MB for each 2^30
 MOST_PIXELS = 1 << 34
 
 
@@ -30,7 +30,7 @@ class PillowRenderer:
         stills=frozenset({".png", ".gif", ".webp"}),
         films=frozenset({".gif", ".webp"}),
         streams=frozenset({".gif", ".webp"}),
-        pixels=MOST_PIXELS,
+        pixels={".webp": MOST_PIXELS},
     )
 
     def draw(self, scene: Scene, suffix: str) -> bytes:
@@ -59,7 +59,7 @@ class PillowRenderer:
         hundredths of a second and at least two, kept in step with the film by rounding the times of the frames."""
         first = next(films)
         unit = 10 if suffix == ".gif" else 1
-        times = [round(1000 * frame / first.fps / unit) * unit for frame in range(frames + 1)]
-        lasts = [max(end - start, 2 * unit) for start, end in pairwise(times)]
+        times = (round(1000 * frame / first.fps / unit) * unit for frame in range(frames + 1))
+        lasts = (max(end - start, 2 * unit) for start, end in pairwise(times))
         pictures = all_frames(chain([first], films), frames, progress)
         (gif if suffix == ".gif" else webp)(pictures, lasts, file)
