@@ -18,7 +18,7 @@ from zlib import crc32
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_renderers.markup import document, element, escape, num, open_group, pairs
+from neurovis_renderers.markup import document, element, escape, num, open_group, pairs, unchanging
 from neurovis_spec.scene import (
     HEAD_MORE,
     HEAD_OF_LENGTH,
@@ -110,8 +110,7 @@ class _Writer:
             return self._shifted(group, self._film.shift_values[:, self._shifts[group.id]])
         if group.id in self._lines:
             return self._connection(group, self._lines[group.id])
-        shapes = "".join(element(shape) for shape in group.shapes)
-        return (f"{open_group(group)}{shapes}</g>" if group.title or group.data else shapes) + "\n"
+        return unchanging(group)
 
     def _letter(self, level: int) -> str:
         self._letters.add(level)

@@ -185,6 +185,14 @@ def _text(shape: Text, attributes: str, content: str) -> str:
     )
 
 
+def unchanging(group: Group) -> str:
+    """A group as it is drawn where nothing of it changes; without what a group would say, its shapes alone."""
+    shapes = "".join(element(shape) for shape in group.shapes)
+    if not group.title and not group.data and group.opacity == 1:
+        return shapes + "\n"
+    return f"{open_group(group)}{shapes}</g>\n"
+
+
 def open_group(group: Group, attributes: str = "") -> str:
     """The start of a group, with its data attributes and its title."""
     data = "".join(f" data-{key}={quoted(value)}" for key, value in group.data.items())

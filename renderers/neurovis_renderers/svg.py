@@ -6,8 +6,8 @@ programs can read them.
 
 from __future__ import annotations
 
-from neurovis_renderers.markup import document, element, open_group
-from neurovis_spec.scene import Film, Group, Progress, RendererCapabilities, Scene
+from neurovis_renderers.markup import document, unchanging
+from neurovis_spec.scene import Film, Progress, RendererCapabilities, Scene
 
 
 class SvgRenderer:
@@ -18,15 +18,8 @@ class SvgRenderer:
 
     def draw(self, scene: Scene, suffix: str) -> bytes:
         """The picture as an SVG file."""
-        return document(scene, "".join(_group(group) for group in scene.groups))
+        return document(scene, "".join(unchanging(group) for group in scene.groups))
 
     def animate(self, film: Film, suffix: str, progress: Progress | None = None) -> bytes:
         """Films are made by ``animated_svg``. Raises ValueError."""
         raise ValueError("this renderer makes no films")
-
-
-def _group(group: Group) -> str:
-    shapes = "".join(element(shape) for shape in group.shapes)
-    if not group.title and not group.data and group.opacity == 1:
-        return shapes + "\n"
-    return f"{open_group(group)}{shapes}</g>\n"
