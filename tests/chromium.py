@@ -83,6 +83,16 @@ class Page:
         for kind in ("keyDown", "keyUp"):
             await self.call("Input.dispatchKeyEvent", type=kind, key=name)
 
+    async def point(self, x: float, y: float) -> None:
+        """Move the pointer."""
+        await self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
+
+    async def click(self, x: float, y: float) -> None:
+        """Click with the left button."""
+        await self.point(x, y)
+        for kind in ("mousePressed", "mouseReleased"):
+            await self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+
     async def shot(self) -> bytes:
         """A PNG of the window."""
         answer = await self.call("Page.captureScreenshot", format="png")

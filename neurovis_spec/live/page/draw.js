@@ -10,7 +10,7 @@ import { palette } from './colours.js';
 /** @typedef {import('./protocol.js').Look} Look */
 /** @typedef {import('./camera.js').Camera} Camera */
 /** @typedef {CanvasRenderingContext2D} Context */
-/** @typedef {{index: number, path: Path2D, head: Shape, rest: Shape[]}} Line */
+/** @typedef {{index: number, path: Path2D, box: number[], head: Shape, rest: Shape[]}} Line */
 /** @typedef {{index: number, shape: Shape, rest: Shape[]}} Disc */
 
 /** The path of a cubic spline. @param {number[]} points @returns {Path2D} */
@@ -22,6 +22,19 @@ function spline(points) {
   }
   return path;
 }
+
+/** The box around the points of a line: least x and y, largest x and y. @param {number[]} points @returns {number[]} */
+function around(points) {
+  const box = [Infinity, Infinity, -Infinity, -Infinity];
+  points.forEach((value, at) => {
+    box[at % 2] = Math.min(box[at % 2], value);
+    box[2 + (at % 2)] = Math.max(box[2 + (at % 2)], value);
+  });
+  return box;
+}
+
+/** How much is seen of what recedes, where something is held. */
+const RECEDING = 0.12;
 
 /** Draws one scene. */
 export class Drawing {
@@ -44,6 +57,9 @@ export class Drawing {
     for (const group of scene.groups) this.sort(group);
     /** @type {HTMLCanvasElement[]} */
     this.layers = [];
+    /** the ids of what stands out; where there are none, all does @type {Set<string>} */
+    this.near = new Set();
+    this.held = '';
     this.layout = '';
   }
 
@@ -53,7 +69,8 @@ export class Drawing {
     if (data.neuron !== undefined) {
       this.discs.push({ index: Number(id.slice(1)), shape: shapes[0], rest: shapes.slice(1) });
     } else if (data.connection !== undefined) {
-      this.lines.push({ index: Number(id.slice(1)), path: spline(shapes[0].points), head: shapes[1], rest: shapes.slice(2) });
+      const { points } = shapes[0], index = Number(id.slice(1));
+      this.lines.push({ index, path: spline(points), box: around(points), head: shapes[1], rest: shapes.slice(2) });
     } else if (id === 'caption') {
       this.caption = shapes[0];
     } else {
@@ -108,7 +125,7 @@ export class Drawing {
     const { constants } = this, kind = look.kinds[line.index];
     const width = look.widths[line.index] / constants.fineness, glow = look.glows[line.index] / constants.fineness;
     const colour = this.palette.fills[look.lines[line.index] + constants.levels];
-    context.globalAlpha = kind & constants.isFaint ? constants.faint : 1;
+    context.globalAlpha = (kind & constants.isFaint ? constants.faint : 1) * this.share(`c${line.index}`);
     if (glow > 0) {
       context.strokeStyle = this.scene.theme.glow;
       context.lineWidth = glow;
@@ -124,12 +141,26 @@ export class Drawing {
   /** @param {Context} context @param {Disc} disc @param {Look} look */
   disc(context, disc, look) {
     const { constants } = this, level = look.discs[disc.index] + constants.levels;
-    context.globalAlpha = look.kinds[look.widths.length + disc.index] & constants.isFaint ? constants.faint : 1;
+    const faint = look.kinds[look.widths.length + disc.index] & constants.isFaint, id = `n${disc.index}`;
+    context.globalAlpha = (faint ? constants.faint : 1) * this.share(id);
     this.shape(context, { ...disc.shape, fill: this.palette.fills[level] });
     for (const shape of disc.rest) {
       if (shape.kind === 'text') this.text(context, shape, shape.onDisc ? this.palette.texts[level] : shape.fill);
       else this.shape(context, shape);
     }
+    if (id === this.held) {
+      const { at, radius } = disc.shape;
+      context.strokeStyle = this.scene.theme.ink;
+      context.lineWidth = 2;
+      context.beginPath();
+      context.arc(at[0], at[1], radius + 3, 0, 2 * Math.PI);
+      context.stroke();
+    }
+  }
+
+  /** How much is seen of something. @param {string} id @returns {number} */
+  share(id) {
+    return !this.near.size || this.near.has(id) ? 1 : RECEDING;
   }
 
   /** The end of a line. @param {Context} context @param {Shape} shape @param {number} width @param {string} colour

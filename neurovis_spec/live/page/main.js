@@ -2,9 +2,11 @@
  * The page: joins the link, the camera, the drawing and the controls; draws at the display's rate what is new.
  */
 
+import { Attention } from './attention.js';
 import { Camera } from './camera.js';
 import { Controls } from './controls.js';
 import { Drawing } from './draw.js';
+import { under } from './pick.js';
 import { Link } from './protocol.js';
 
 const canvas = /** @type {HTMLCanvasElement} */ (document.getElementById('picture'));
@@ -28,7 +30,9 @@ function show() {
   const { look } = link;
   if (!drawing || !look || !look.serial) return;
   if (density !== devicePixelRatio) resize();
+  [drawing.near, drawing.held] = [attention.near, attention.held];
   drawing.draw(context, camera, look);
+  attention.show(camera, look);
   controls.frame(look);
   if (fresh) {
     fresh = false;
@@ -55,6 +59,7 @@ const link = new Link({
       document.documentElement.style.setProperty(`--${name}`, scene.theme[of]);
     }
     canvas.setAttribute('aria-label', scene.title);
+    attention.use(scene);
     redraw();
   },
   frame() {
@@ -63,14 +68,17 @@ const link = new Link({
   },
   text(message) {
     if (message.type === 'status') controls.status(message);
+    else if (message.type === 'values') attention.take(message);
     else if (message.type === 'findings') controls.found(message);
     else if (message.type === 'refused') controls.tell(message.reason);
   },
   link(open) {
-    if (!open) controls.tell('not connected, trying again …');
+    if (open) attention.ask();
+    else controls.tell('not connected, trying again …');
   },
 });
 const controls = new Controls(link);
+const attention = new Attention(link, redraw);
 
 new ResizeObserver(resize).observe(canvas);
 canvas.addEventListener('wheel', (event) => {
@@ -78,8 +86,23 @@ canvas.addEventListener('wheel', (event) => {
   event.preventDefault();
   redraw();
 }, { passive: false });
+/** The neuron or the connection under a pointer. @param {PointerEvent} event @returns {string} */
+function pointed(event) {
+  const { look } = link;
+  return drawing && look ? under(context, drawing, camera, look, event.offsetX * density, event.offsetY * density) : '';
+}
+let dragged = 0;
+canvas.addEventListener('pointerdown', () => { dragged = 0; });
+canvas.addEventListener('pointerup', (event) => { if (dragged < 5 && event.button === 0) attention.hold(pointed(event)); });
+canvas.addEventListener('pointerleave', () => attention.point('', [0, 0]));
 canvas.addEventListener('pointermove', (event) => {
-  if (event.buttons !== 1) return;
+  if (event.buttons !== 1) {
+    const id = pointed(event);
+    canvas.style.cursor = id ? 'pointer' : '';
+    attention.point(id, camera.unit(event.offsetX * density, event.offsetY * density));
+    return;
+  }
+  dragged += Math.abs(event.movementX) + Math.abs(event.movementY);
   camera.move(event.movementX * density, event.movementY * density);
   redraw();
 });
@@ -87,4 +110,7 @@ Object.assign(controls.keys, {
   '+': () => { camera.closer(1.25, camera.window[0] / 2, camera.window[1] / 2); redraw(); },
   '-': () => { camera.closer(0.8, camera.window[0] / 2, camera.window[1] / 2); redraw(); },
   0: () => { camera.fit(); redraw(); },
+  Escape: () => attention.hold(''),
+  ']': () => attention.next(1),
+  '[': () => attention.next(-1),
 });

@@ -1,0 +1,122 @@
+/**
+ * Attention: what is pointed at, and what is held; its values, and what stands out with it.
+ */
+
+/** @typedef {import('./camera.js').Camera} Camera */
+/** @typedef {import('./protocol.js').Link} Link */
+/** @typedef {import('./protocol.js').Look} Look */
+/** @typedef {import('./protocol.js').Scene} Scene */
+/** @typedef {import('./protocol.js').Group} Group */
+
+/** A number with its sign, for what is not told by colour alone. @param {number | null} value @returns {string} */
+function signed(value) {
+  if (value === null) return 'not finite';
+  return (value > 0 ? '+' : '') + String(Number(value.toPrecision(6))).replace('-', '−');
+}
+
+/** What is pointed at and what is held, by the ids of their groups, '' for nothing. */
+export class Attention {
+  /** @param {Link} link @param {() => void} changed called when something else stands out */
+  constructor(link, changed) {
+    this.link = link;
+    this.changed = changed;
+    this.pointed = '';
+    this.held = '';
+    /** @type {Map<string, Group>} */
+    this.groups = new Map();
+    /** the ids of what stands out with what is held @type {Set<string>} */
+    this.near = new Set();
+    /** @type {Object<string, number | null>} */
+    this.values = {};
+    /** where the pointer is, in units @type {number[]} */
+    this.place = [0, 0];
+    this.tip = /** @type {HTMLElement} */ (document.getElementById('tip'));
+  }
+
+  /** Another network; what has the same name in it stays held. @param {Scene} scene */
+  use(scene) {
+    const before = this.groups.get(this.held), name = before && JSON.stringify(before.data);
+    this.groups = new Map(scene.groups.filter(({ id }) => /^[nc]\d+$/.test(id)).map((group) => [group.id, group]));
+    this.pointed = '';
+    const same = [...this.groups.values()].find(({ data }) => JSON.stringify(data) === name);
+    this.hold(same ? same.id : '');
+  }
+
+  /** Ask for the values of what is shown. */
+  ask() {
+    this.link.ask('look', { items: [...new Set([this.pointed, this.held])].filter(Boolean) });
+  }
+
+  /** @param {string} id @param {number[]} place */
+  point(id, place) {
+    this.place = place;
+    if (id !== this.pointed) {
+      this.pointed = id;
+      this.ask();
+    }
+    this.changed();
+  }
+
+  /** Hold a neuron or a connection; '' lets go. @param {string} id */
+  hold(id) {
+    this.held = id;
+    this.near = new Set(id ? this.around(id) : []);
+    this.ask();
+    this.changed();
+  }
+
+  /** The next neuron, or the one before. @param {number} by */
+  next(by) {
+    const neurons = [...this.groups.keys()].filter((id) => id[0] === 'n');
+    const at = neurons.indexOf(this.held);
+    if (neurons.length) this.hold(neurons[(at < 0 ? (by > 0 ? 0 : neurons.length - 1) : at + by + neurons.length) % neurons.length]);
+  }
+
+  /** What a neuron's inputs and outputs are, or a connection's ends. @param {string} id @returns {string[]} */
+  around(id) {
+    const { data } = /** @type {Group} */ (this.groups.get(id)), all = [...this.groups.values()];
+    const lines = data.neuron === undefined ? [this.groups.get(id)]
+      : all.filter((line) => line.data.from === data.neuron || line.data.to === data.neuron);
+    const ends = new Set(lines.flatMap((line) => (line ? [line.data.from, line.data.to] : [])));
+    const discs = all.filter((disc) => disc.data.neuron !== undefined && ends.has(disc.data.neuron));
+    return [id, ...[...lines, ...discs].map((group) => (group ? group.id : ''))];
+  }
+
+  /** @param {{values: Object<string, number | null>}} message */
+  take(message) {
+    this.values = message.values;
+    this.changed();
+  }
+
+  /** What is said of a neuron or a connection: name, activity or weight, delay, rule. @param {string} id @param {Look} look
+   * @returns {string} */
+  words(id, look) {
+    const group = this.groups.get(id);
+    if (!group) return '';
+    const [name, ...more] = group.title.split('\n'), { neuron, delay } = group.data;
+    const told = id in this.values ? [`${neuron === undefined ? 'weight' : 'activity'} ${signed(this.values[id])}`] : [];
+    if (delay !== undefined && !more.some((line) => line.startsWith('delay '))) told.push(`delay ${delay}`);
+    const item = Number(id.slice(1)) + (neuron === undefined ? 0 : look.widths.length);
+    const gone = look.kinds[item] & (this.link.scene ? this.link.scene.constants.isFaint : 0) ? ['lesioned'] : [];
+    return [name, ...told, ...more, ...gone].join('\n');
+  }
+
+  /** Show the tooltip beside what is pointed at, or else held. @param {Camera} camera @param {Look} look */
+  show(camera, look) {
+    const id = this.pointed || this.held, words = this.words(id, look), { tip } = this;
+    tip.hidden = !words;
+    if (!words) return;
+    if (tip.textContent !== words) tip.textContent = words;
+    const shapes = /** @type {Group} */ (this.groups.get(id)).shapes;
+    const [x, y] = this.pointed ? this.place : (id[0] === 'n' ? shapes[0] : shapes[1]).at, [left, top] = camera.origin;
+    const at = [left + x * camera.scale, top + y * camera.scale].map((pixel) => pixel / devicePixelRatio);
+    const room = [tip.offsetWidth, tip.offsetHeight];
+    const edge = camera.window.map((size) => size / devicePixelRatio);
+    // where there is no room to the right or below, it is to the left or above
+    const [across, down] = [0, 1].map((axis) => {
+      const beside = at[axis] + 14 + room[axis] > edge[axis] ? at[axis] - 14 - room[axis] : at[axis] + 14;
+      return Math.max(0, Math.min(beside, edge[axis] - room[axis]));
+    });
+    tip.style.transform = `translate(${Math.round(across)}px, ${Math.round(down)}px)`;
+  }
+}

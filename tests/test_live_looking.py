@@ -1,0 +1,124 @@
+"""Looking in the live page: the tooltip says what a neuron or a connection is, and what is held stands out."""
+
+from __future__ import annotations
+
+import asyncio
+import gzip
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from chromium import Page
+from PIL import Image
+from test_live_browser import pause, shown
+
+import neurovis_spec as nv
+from neurovis_spec.live.view import view_of
+
+pytestmark = pytest.mark.browser
+
+TIP = "document.querySelector('#tip')"
+
+
+def places(compiled: nv.CompiledNetwork) -> dict[str, tuple[float, float]]:
+    """Where the window of ``shown`` has each neuron, and the end of each connection."""
+    scene = json.loads(gzip.decompress(view_of(compiled, compiled.gains).content))
+    result = {}
+    for group in scene["groups"]:
+        name = group["data"].get("neuron") or group["data"].get("connection")
+        if name is not None:
+            at = group["shapes"][0 if "neuron" in group["data"] else 1]["at"]
+            if "neuron" not in group["data"]:  # a little before the tip of the arrow
+                along = group["shapes"][1]["along"]
+                at = [at[axis] - 8 * along[axis] for axis in (0, 1)]
+            result[name] = (at[0] * scene["density"], at[1] * scene["density"])
+    return result
+
+
+async def told(opened: Page, name: str) -> list[str]:
+    """What the tooltip says, once it is about this."""
+    await opened.until(f"!{TIP}.hidden && {TIP}.textContent.split('\\n')[0] == '{name}'")
+    await opened.until(f"/^(activity|weight) /m.test({TIP}.textContent)")
+    found = await opened.ask(f"{TIP}.textContent")
+    assert isinstance(found, str)
+    return found.split("\n")
+
+
+def test_a_pointer_is_told_name_value_delay_and_rule(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, compiled, _):
+            await opened.until("Number(document.querySelector('#told').textContent.split(' ')[1]) > 20")
+            step, at = await pause(opened), places(compiled)
+            run = compiled.run(step + 1)
+            await opened.point(*at["C1"])
+            words = await told(opened, "C1")
+            value = float(words[1].removeprefix("activity ").replace("−", "-"))
+            neuron = compiled.network.neurons.names.index("C1")
+            assert value == pytest.approx(run.snapshot(step).activity[neuron], rel=1e-5)
+            assert "tanh" in words
+            await opened.point(*at["K2 -> O"])
+            words = await told(opened, "K2 → O")
+            assert float(words[1].removeprefix("weight ").replace("−", "-")) == pytest.approx(
+                run.snapshot(step).weights[compiled.network.connection_index["K2 -> O"]], rel=1e-5
+            )
+            assert "delay 0" in words
+            assert "delta(rate=0.01, target=T)" in words
+            await opened.point(*at["C2 -> C1"])
+            words = await told(opened, "C2 → C1")
+            assert "delay 1" in words
+            assert words[1][len("weight ")] in "+−", "the sign is not told by colour alone"
+            await opened.point(2, 2)
+            await opened.until(f"{TIP}.hidden")
+
+    asyncio.run(main())
+
+
+def test_a_click_holds_until_escape_and_the_rest_recedes(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, compiled, _):
+            await pause(opened)
+            at = places(compiled)
+
+            async def colours(*names: str) -> list[tuple[int, ...]]:
+                """The colours of discs, above their labels."""
+                await opened.ask("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+                pixels = np.array(Image.open(io.BytesIO(await opened.shot())).convert("RGB"))
+                return [tuple(pixels[round(at[name][1]) - 13, round(at[name][0])].tolist()) for name in names]
+
+            before = await colours("K2", "O", "K5")
+            await opened.click(*at["K2"])
+            await told(opened, "K2")
+            await opened.point(2, 2)
+            await told(opened, "K2")
+            held = await colours("K2", "O", "K5")
+            assert held[:2] == before[:2], "its inputs and outputs stand out"
+            assert min(held[2]) > min(before[2]), "the rest recedes"
+            await opened.key("Escape")
+            await opened.until(f"{TIP}.hidden")
+            assert await colours("K2", "O", "K5") == before
+            await opened.click(*at["K2 -> O"])
+            await opened.point(2, 2)
+            await told(opened, "K2 → O")
+            held = await colours("K2", "O", "K5")
+            assert held[:2] == before[:2]
+            assert min(held[2]) > min(before[2])
+            await opened.click(2, 2)
+            await opened.until(f"{TIP}.hidden")
+
+    asyncio.run(main())
+
+
+def test_neurons_are_held_one_after_the_other_by_keys(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):
+            await opened.key("]")
+            await told(opened, "C1")
+            await opened.key("]")
+            await told(opened, "C2")
+            await opened.key("[")
+            await opened.key("[")
+            await told(opened, "T")
+
+    asyncio.run(main())
