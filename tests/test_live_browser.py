@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from chromium import Page, chromium
 from PIL import Image
-from test_browser import similarity
+from renderer_conformance import similarity
 
 import neurovis_spec as nv
 from neurovis_spec import pipeline
