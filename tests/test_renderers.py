@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -114,6 +115,7 @@ def test_a_pdf_is_as_large_on_paper_as_its_png() -> None:
     assert [side / 72 for side in size] == pytest.approx(inches, rel=0.01)
 
 
+@pytest.mark.filterwarnings("ignore:the picture's font")
 @pytest.mark.parametrize("words", ["", "ä→−₁ẞΔ", "漢字 🧠", "(a)\\<b>", "\x00\ud800", "e\u0301"])
 def test_any_text_can_be_drawn(words: str) -> None:
     """What the font does not have becomes its sign for that."""
@@ -135,3 +137,22 @@ def test_a_font_of_some_glyphs_is_read_back() -> None:
     assert sorted(number.values()) == list(range(len(number)))
     assert font.width("AVä", 20) == pytest.approx(sum(font.advance(font.glyph(c)) for c in "AVä") / 50)
     small.seek(0)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".pdf", ".mp4", ".gif"])
+def test_letters_that_the_font_cannot_set_are_told(suffix: str) -> None:
+    def draw(words: str) -> None:
+        film = short_film(2)
+        scene = Scene(100, 40, THEMES["default"], words, (Group((Text((5, 20), words, 12, "#000000"),)),))
+        if suffix in (".png", ".pdf"):
+            (PdfRenderer() if suffix == ".pdf" else PillowRenderer()).draw(scene, suffix)
+        else:
+            groups = (*film.scene.groups, *scene.groups)
+            shown = replace(film, scene=replace(film.scene, groups=groups))
+            (VideoRenderer() if suffix == ".mp4" else PillowRenderer()).animate(shown, suffix)
+
+    with pytest.warns(UserWarning, match="no glyphs for '字', '漢'; reversed are 'ב', 'ע'. An .svg shows them"):
+        draw("ä漢字 עב")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        draw("нейрон Δ→−₁ é")

@@ -23,8 +23,8 @@ from neurovis_spec.scene.parts import Changes, Part
 from neurovis_spec.scene.strips import SMALL, TITLE, Span
 from neurovis_spec.scene.ticks import ticks, words
 
-#: How high a plot is where nothing else is asked for, and at least.
-PLOT, LOWEST = 96.0, 24.0
+#: How high a plot is where nothing else is asked for.
+PLOT = 96.0
 #: The widest text at the end of a line, and how far it stands off.
 _LABEL, _OFF = 120.0, 14.0
 #: User units between ticks of the values, at least; texts at the ends of lines stand so far apart, if they can.

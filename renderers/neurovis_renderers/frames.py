@@ -13,6 +13,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from queue import SimpleQueue
 
 from neurovis_renderers.canvas import Pixels, paint
+from neurovis_renderers.lettering import warn_of_letters
 from neurovis_renderers.moving import Moving, Painter, TooDeepError
 from neurovis_spec.scene import Film, Progress, still
 
@@ -42,6 +43,8 @@ def all_frames(films: Iterator[Film], total: int, progress: Progress | None = No
     """The pictures of a film of ``total`` frames that comes in parts."""
     done = 0
     for film in films:
+        if not done:
+            warn_of_letters(film.scene)
         for picture in frames(film):
             done += 1
             if progress is not None:

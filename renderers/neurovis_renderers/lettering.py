@@ -7,6 +7,8 @@ same pixels everywhere; it is also the first that an SVG asks for.
 from __future__ import annotations
 
 import math
+import unicodedata
+import warnings
 from functools import lru_cache
 from pathlib import Path
 
@@ -14,7 +16,8 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from neurovis_renderers.coverage import Fragments, Size
-from neurovis_spec.scene import HALO, SUBSCRIPT_DROP, SUBSCRIPT_SIZE, Text
+from neurovis_renderers.truetype import read
+from neurovis_spec.scene import HALO, SUBSCRIPT_DROP, SUBSCRIPT_SIZE, Scene, Text
 
 #: Regular and bold.
 FONTS = tuple(Path(__file__).parent / "fonts" / name for name in ("DejaVuSans.ttf", "DejaVuSans-Bold.ttf"))
@@ -28,6 +31,23 @@ _FINER = 8
 def font(size: float, bold: bool) -> ImageFont.FreeTypeFont:
     """The font of this size in pixels."""
     return ImageFont.truetype(FONTS[bold], size, layout_engine=ImageFont.Layout.BASIC)
+
+
+def warn_of_letters(scene: Scene) -> None:
+    """Say which characters of a scene the font lacks, and which it sets from left to right that run the other way."""
+    shown = {c for shape in scene.shapes() if isinstance(shape, Text) for c in shape.text + shape.subscript}
+    lacking = sorted(c for c in shown if not c.isspace() and not read(FONTS[0]).glyph(c))
+    backward = sorted(c for c in shown.difference(lacking) if unicodedata.bidirectional(c) in ("R", "AL"))
+    parts = (("no glyphs for", lacking), ("reversed are", backward))
+    told = "; ".join(f"{what} {_some(some)}" for what, some in parts if some)
+    if told:
+        warnings.warn(f"the picture's font cannot set all letters: {told}. An .svg shows them", stacklevel=2)
+
+
+def _some(characters: list[str]) -> str:
+    """The first few of them."""
+    more = f" and {len(characters) - 3} more" if len(characters) > 3 else ""
+    return ", ".join(f"'{c}'" if c.isprintable() else f"U+{ord(c):04X}" for c in characters[:3]) + more
 
 
 def lettering(text: Text, size: Size, halo: bool = False) -> Fragments:

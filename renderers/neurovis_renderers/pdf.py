@@ -9,7 +9,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Sequence
 
-from neurovis_renderers.lettering import BOLD, FONTS
+from neurovis_renderers.lettering import BOLD, FONTS, warn_of_letters
 from neurovis_renderers.truetype import Font, read
 from neurovis_spec.scene import (
     HALO,
@@ -47,6 +47,7 @@ class PdfRenderer:
 
     def draw(self, scene: Scene, suffix: str) -> bytes:
         """The picture as a file of one page."""
+        warn_of_letters(scene)
         return _Page(scene).file()
 
     def animate(self, film: Film, suffix: str, progress: Progress | None = None) -> bytes:

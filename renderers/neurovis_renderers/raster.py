@@ -16,6 +16,7 @@ from PIL import Image
 from neurovis_renderers.canvas import paint
 from neurovis_renderers.films import gif, webp
 from neurovis_renderers.frames import all_frames
+from neurovis_renderers.lettering import warn_of_letters
 from neurovis_spec.scene import Film, Progress, RendererCapabilities, Scene
 
 #: pixels of all frames of a WebP: its encoder keeps them compressed until the end, some 50 MB for each 2^30
@@ -35,6 +36,7 @@ class PillowRenderer:
 
     def draw(self, scene: Scene, suffix: str) -> bytes:
         """The picture as a file."""
+        warn_of_letters(scene)
         picture = Image.fromarray(paint(scene))
         buffer = io.BytesIO()
         if suffix == ".webp":
