@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import io
 import pickle
-import resource
 import subprocess
 import sys
 import tempfile
@@ -75,11 +74,17 @@ def prepared(neurons: int, connections: int, folder: Path) -> Path:
 def measure_still(name: str, path: Path) -> None:
     """In a process of its own: seconds of the processor, MiB more than before, kB of the file."""
     scene: Scene = pickle.loads(path.with_suffix(".scene").read_bytes())
-    before, begun = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.process_time()
+    before, begun = most_memory(), time.process_time()
     data = STILLS[name](scene)
     seconds = time.process_time() - begun
-    grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
+    grown = most_memory() - before
     print(f"{seconds:8.2f} s {grown:7.0f} MiB {len(data) / 1000:8.0f} kB", end="")
+
+
+def most_memory() -> float:
+    """The most MiB that this process has held; getrusage knows of those of its parent, too."""
+    (line,) = (line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM"))
+    return int(line.split()[1]) / 1024
 
 
 def measure_film(name: str, path: Path) -> None:

@@ -44,7 +44,7 @@ from neurovis_spec.scene import (
 
 #: Half widths of lines are told apart to so much of a pixel.
 _STEP = np.float32(1 / 64)
-#: Where more than this share of the pixels change, all are drawn anew.
+#: Where more than this share of the pixels, or of what lies on them, changes, all are drawn anew.
 _MUCH = 0.4
 #: Fragments that are kept of a band.
 MOST_KEPT = 6_000_000
@@ -183,6 +183,11 @@ def _readable(theme: Theme, fill: int) -> int:
     """The colour of a text that can be read on a colour."""
     mask = (1 << LANE) - 1
     return packed(readable(theme, f"#{fill & mask:02x}{fill >> LANE & mask:02x}{fill >> 2 * LANE:02x}"))
+
+
+def _most(chosen: BoolArray) -> bool:
+    """Whether so many are chosen that it is quicker to draw all than to pick them out."""
+    return int(np.count_nonzero(chosen)) > _MUCH * len(chosen)
 
 
 class Band:
@@ -348,30 +353,31 @@ class _Painted:
             self._reshape(halves, self._moving.shaped)
             self._weigh(every)
         elif reshaped.any():
-            at = self._reshape(halves, reshaped)
-            changed[at - np.array(band.begins)[np.searchsorted(band.begins, at, side="right") - 1]] = True
+            changed[self._reshape(halves, reshaped)] = True
             self._weigh(np.flatnonzero(changed))
         self._new = False
         if recoloured.any():
             for begin, end in zip(band.begins, band.ends, strict=False):
                 changed[:end] |= recoloured[band.owners[begin : begin + end]]
-        count = int(np.count_nonzero(changed))
-        if count > _MUCH * len(changed):
+        if _most(changed):
             self._picture[band.pixels] = _words(self._sums(colours))
-        elif count:
+        elif changed.any():
             some = np.flatnonzero(changed)
             self._picture[band.pixels[some]] = _words(self._some_sums(some, colours))
 
     def _reshape(self, halves: Numbers, reshaped: BoolArray) -> IntArray:
-        """Give what is ``reshaped`` its width; where its fragments lie."""
+        """Give what is ``reshaped`` its width; the numbers of the pixels where it lies."""
         band, sheet = self._band, self._moving.sheet.with_halves(*halves)
-        chosen = np.flatnonzero(reshaped[band.strokes.owners])
-        lines = band.stroke_at[chosen]
-        self._shares[lines] = sheet.stroke_shares(band.strokes.only(chosen))
-        chosen = np.flatnonzero(reshaped[band.heads.owners])
-        ends = band.head_at[chosen]
-        self._shares[ends] = sheet.head_shares(band.heads.only(chosen))
-        return np.concatenate([lines, ends])
+        strokes, heads, lines, ends = band.strokes, band.heads, band.stroke_at, band.head_at
+        if not _most(chosen := reshaped[strokes.owners]):
+            which = np.flatnonzero(chosen)
+            strokes, lines = strokes.only(which), lines[which]
+        if not _most(chosen := reshaped[heads.owners]):
+            which = np.flatnonzero(chosen)
+            heads, ends = heads.only(which), ends[which]
+        self._shares[lines] = sheet.stroke_shares(strokes)
+        self._shares[ends] = sheet.head_shares(heads)
+        return np.concatenate([band.numbers[strokes.pixels], band.numbers[heads.pixels]])
 
     def _weigh(self, some: IntArray) -> None:
         """Work out how much is seen of each fragment in some pixels."""
