@@ -36,8 +36,11 @@ from neurovis_spec.scene import (
 from neurovis_spec.scene.lesions import FAINT
 
 
-def content(network: Network, scene: Scene, more: Mapping[str, float]) -> bytes:
-    """The scene and what a page must know of its network, as JSON, compressed; ``more`` are further constants."""
+def content(
+    network: Network, scene: Scene, more: Mapping[str, float], parameters: Sequence[Mapping[str, object]] = ()
+) -> bytes:
+    """The scene and what a page must know of its network, as JSON, compressed; ``more`` are further constants,
+    ``parameters`` those that can be set."""
     value = {
         "name": network.name,
         "title": scene.title,
@@ -48,6 +51,7 @@ def content(network: Network, scene: Scene, more: Mapping[str, float]) -> bytes:
         "dt": network.dt if network.dt_given else None,
         "discs": len(network.neurons),
         "lines": len(network.connections),
+        "parameters": [dict(entry) for entry in parameters],
         "inputs": [
             {"name": entry.name, "size": entry.size}
             for entry in network.inputs

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.live.declared import declared
 from neurovis_spec.live.drawing import content
 from neurovis_spec.live.source import Mask, Seen
 from neurovis_spec.runtime.recording import Snapshot
@@ -102,7 +103,8 @@ def view_of(compiled: CompiledNetwork, gains: Gains, theme: str | None = None, e
     drawn = gathered(network, settings.collapse)
     planned = plan(drawn, laid_out(drawn, compiled.drawn(engine).value), gains, settings)
     constants = {"levels": LEVELS, "fineness": FINENESS, "isBar": BAR, "isFaint": FAINT}
-    return View(drawn, gains, planned, content(drawn.network, _scene(planned, gains), constants))
+    scene = _scene(planned, gains)
+    return View(drawn, gains, planned, content(drawn.network, scene, constants, declared(compiled)))
 
 
 def _scene(planned: Plan, gains: Gains) -> Scene:

@@ -16,8 +16,10 @@ function signed(value) {
 
 /** What is pointed at and what is held, by the ids of their groups, '' for nothing. */
 export class Attention {
-  /** @param {Link} link @param {() => void} changed called when something else stands out */
-  constructor(link, changed) {
+  /** @param {Link} link @param {() => void} changed called when something else is to be seen
+   * @param {(group: Group | undefined) => void} taken called with what is held */
+  constructor(link, changed, taken) {
+    this.taken = taken;
     this.link = link;
     this.changed = changed;
     this.pointed = '';
@@ -62,6 +64,7 @@ export class Attention {
     this.held = id;
     this.near = new Set(id ? this.around(id) : []);
     this.ask();
+    this.taken(this.groups.get(id));
     this.changed();
   }
 

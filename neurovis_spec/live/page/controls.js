@@ -6,7 +6,7 @@
 /** @typedef {import('./protocol.js').Look} Look */
 
 /** @template {HTMLElement} T @param {string} id @returns {T} */
-const part = (id) => /** @type {T} */ (document.getElementById(id));
+export const part = (id) => /** @type {T} */ (document.getElementById(id));
 
 /** The bar below the picture. */
 export class Controls {

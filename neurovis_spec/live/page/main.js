@@ -4,10 +4,11 @@
 
 import { Attention } from './attention.js';
 import { Camera } from './camera.js';
-import { Controls } from './controls.js';
+import { Controls, part } from './controls.js';
 import { Drawing } from './draw.js';
 import { under } from './pick.js';
 import { Link } from './protocol.js';
+import { Turning } from './turning.js';
 
 const canvas = /** @type {HTMLCanvasElement} */ (document.getElementById('picture'));
 const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d', { alpha: false }));
@@ -60,6 +61,7 @@ const link = new Link({
     }
     canvas.setAttribute('aria-label', scene.title);
     attention.use(scene);
+    turning.use(scene.parameters);
     redraw();
   },
   frame() {
@@ -67,8 +69,10 @@ const link = new Link({
     redraw();
   },
   text(message) {
-    if (message.type === 'status') controls.status(message);
-    else if (message.type === 'values') attention.take(message);
+    if (message.type === 'status') {
+      controls.status(message);
+      turning.status(message);
+    } else if (message.type === 'values') attention.take(message);
     else if (message.type === 'findings') controls.found(message);
     else if (message.type === 'refused') controls.tell(message.reason);
   },
@@ -78,7 +82,8 @@ const link = new Link({
   },
 });
 const controls = new Controls(link);
-const attention = new Attention(link, redraw);
+const turning = new Turning(link, part);
+const attention = new Attention(link, redraw, (group) => turning.hold(group));
 
 new ResizeObserver(resize).observe(canvas);
 canvas.addEventListener('wheel', (event) => {
@@ -110,6 +115,7 @@ Object.assign(controls.keys, {
   '+': () => { camera.closer(1.25, camera.window[0] / 2, camera.window[1] / 2); redraw(); },
   '-': () => { camera.closer(0.8, camera.window[0] / 2, camera.window[1] / 2); redraw(); },
   0: () => { camera.fit(); redraw(); },
+  t: () => turning.toggle(),
   Escape: () => attention.hold(''),
   ']': () => attention.next(1),
   '[': () => attention.next(-1),

@@ -14,7 +14,7 @@ const NEAR = 5;
  * @param {number} x @param {number} y @returns {string} */
 export function under(context, drawing, camera, look, x, y) {
   const [across, down] = camera.unit(x, y), near = (NEAR * devicePixelRatio) / camera.scale;
-  for (const { index, shape } of drawing.discs.toReversed()) {
+  for (const { index, shape } of drawing.discs.slice().reverse()) {
     const reach = Math.max(shape.radius, near);
     if (Math.hypot(across - shape.at[0], down - shape.at[1]) <= reach) return `n${index}`;
   }

@@ -8,8 +8,10 @@
  *   onDisc: boolean, upward: boolean, columns: number, rows: number, pixels: string}} Shape */
 /** @typedef {{id: string, data: Object<string, string>, title: string, shapes: Shape[]}} Group */
 /** @typedef {Object<string, any>} Theme */
+/** @typedef {{name: string, value: number, low: number | null, high: number | null, description: string}} Declared */
+/** @typedef {{step: number, type: string, [member: string]: any}} Turned */
 /** @typedef {{version: number, name: string, title: string, width: number, height: number, density: number,
- *   theme: Theme, dt: number | null, discs: number, lines: number, inputs: {name: string, size: number}[],
+ *   theme: Theme, dt: number | null, discs: number, lines: number, parameters: Declared[], inputs: {name: string, size: number}[],
  *   constants: Object<string, any>, groups: Group[]}} Scene */
 /** @typedef {{serial: number, step: number, first: number, last: number, caption: string, discs: Int8Array,
  *   lines: Int8Array, widths: Uint16Array, glows: Uint16Array, kinds: Uint8Array}} Look */

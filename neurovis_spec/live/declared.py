@@ -1,0 +1,33 @@
+"""Declared: the parameters that can be set in a run, as a page gets them.
+
+In: a compiled network. Out: for each its name, the value that it begins with, its bounds where it has some, and its
+description.
+"""
+
+from __future__ import annotations
+
+import math
+
+from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.settable import Dependent
+
+
+def declared(compiled: CompiledNetwork) -> list[dict[str, object]]:
+    """The parameters in the order written; bounds that follow other parameters are as these begin."""
+    network, written = compiled.network, compiled.spec.parameters
+    settable = network.settable
+    result: list[dict[str, object]] = []
+    for name, value in network.parameters.items():
+        if name not in network.structural:
+            slot = settable.slots[settable.index[name]]
+            low, high = (_bound(bound, settable.parameters) for bound in (slot.low, slot.high))
+            about = written[name].description if name in written else None
+            result.append({"name": name, "value": value, "low": low, "high": high, "description": about or ""})
+    return result
+
+
+def _bound(bound: float | Dependent, parameters: FloatArray) -> float | None:
+    """A bound, None where there is none."""
+    number = bound if isinstance(bound, float) else float(bound.values(parameters))
+    return number if math.isfinite(number) else None

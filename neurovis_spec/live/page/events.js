@@ -1,0 +1,73 @@
+/**
+ * Events: what was turned, as the `events:` of a spec, and what takes a turn back.
+ */
+
+/** @typedef {import('./protocol.js').Declared} Declared */
+/** @typedef {import('./protocol.js').Turned} Turned */
+
+/** A name or a text in a flow of YAML. @param {string} text @returns {string} */
+const plain = (text) => (/^[\w. >()-]+$/.test(text) ? text : JSON.stringify(text));
+
+/** The events that do what was turned: of what is turned twice at one step the last counts. @param {Turned[]} turned
+ * @returns {string} */
+export function eventsOf(turned) {
+  /** @type {Map<string, {at: number, entry: Turned}>} */
+  const last = new Map();
+  /** @type {{at: number, words: string}[]} */
+  const events = [];
+  for (const entry of turned) {
+    const at = entry.step + 1, what = { lesion: 'part', mend: 'part', hold: 'clamp', release: 'clamp' }[entry.type] || entry.type;
+    const of = entry.part || entry.neurons || entry.connections || entry.name || '';
+    if (entry.type === 'set') {
+      for (const [name, value] of Object.entries(entry.values)) {
+        last.set(`${at} set ${name}`, { at, entry: { ...entry, values: { [name]: value } } });
+      }
+    } else {
+      last.set(`${at} ${what} ${of}`, { at, entry });
+    }
+  }
+  const all = [...last.values()];
+  all.forEach(({ at, entry }, place) => {
+    const { neurons, type } = entry;
+    if (type === 'set') {
+      const [[name, value]] = Object.entries(entry.values);
+      events.push({ at, words: `{at: ${at}, set: {${plain(name)}: ${value}}}` });
+    } else if (type === 'hold') {
+      const end = all.slice(place + 1).find((other) => other.entry.neurons === neurons);
+      events.push({ at, words: `{from: ${at}, ${end ? `to: ${end.at}, ` : ''}clamp: {${plain(neurons)}: ${entry.value}}}` });
+    } else if (type === 'lesion' || type === 'mend') {
+      events.push({ at, words: `{at: ${at}, ${type}: ${plain(entry.part)}}` });
+    } else if (type === 'learn') {
+      events.push({ at, words: `{at: ${at}, learning: {${plain(entry.connections)}: ${entry.on}}}` });
+    }
+  });
+  return events.length ? `events:\n${events.map(({ words }) => `  - ${words}\n`).join('')}` : '';
+}
+
+/** The message that takes a turn back from the step that is shown on. @param {Turned[]} turned @param {number} place
+ * @param {Declared[]} declared @returns {{type: string, [member: string]: any}} */
+export function takenBack(turned, place, declared) {
+  const { type, part, neurons, connections, on, name, values } = turned[place], before = turned.slice(0, place).reverse();
+  switch (type) {
+    case 'set': {
+      /** @param {string} one @returns {number} */
+      const earlier = (one) => {
+        const set = before.find((entry) => entry.type === 'set' && one in entry.values);
+        return set ? set.values[one] : (declared.find((entry) => entry.name === one) || { value: 0 }).value;
+      };
+      return { type, values: Object.fromEntries(Object.keys(values).map((one) => [one, earlier(one)])) };
+    }
+    case 'hold':
+    case 'release': {
+      const held = before.find((entry) => entry.neurons === neurons);
+      return held && held.type === 'hold' ? { type: 'hold', neurons, value: held.value } : { type: 'release', neurons };
+    }
+    case 'lesion': return { type: 'mend', part };
+    case 'mend': return { type: 'lesion', part };
+    case 'learn': return { type, connections, on: !on };
+    default: {
+      const fed = before.find((entry) => entry.type === 'feed' && entry.name === name);
+      return { type, name, values: fed ? fed.values : [] };
+    }
+  }
+}
