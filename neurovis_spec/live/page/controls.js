@@ -4,6 +4,7 @@
 
 /** @typedef {import('./protocol.js').Link} Link */
 /** @typedef {import('./protocol.js').Look} Look */
+/** @typedef {import('./keys.js').Keys} Keys */
 
 /** @template {HTMLElement} T @param {string} id @returns {T} */
 export const part = (id) => /** @type {T} */ (document.getElementById(id));
@@ -32,8 +33,13 @@ export class Controls {
     for (const [id, action] of Object.entries(actions)) part(id).onclick = action;
     this.speed.onchange = () => link.ask('speed', { value: this.speed.value });
     this.scrub.oninput = () => link.ask('seek', { step: Number(this.scrub.value) });
-    /** @type {Object<string, () => void>} */
-    this.keys = { ' ': actions.play, ArrowRight: actions.step, ArrowLeft: actions.back, Home: actions.restart };
+    /** @type {Keys} */
+    this.keys = {
+      ' ': ['play or pause', actions.play],
+      ArrowRight: ['one step on', actions.step],
+      ArrowLeft: ['one step back', actions.back],
+      Home: ['restart', actions.restart],
+    };
     addEventListener('keydown', (event) => this.key(event));
   }
 
@@ -42,9 +48,10 @@ export class Controls {
     const at = /** @type {Element} */ (event.target);
     if (event.ctrlKey || event.metaKey || event.altKey || at.closest('input, select, textarea')) return;
     if (event.key === ' ' && at.closest('button')) return;
-    const action = this.keys[event.key];
-    if (action) {
-      action();
+    if (at.closest('dialog') && event.key !== '?') return;
+    const known = this.keys[event.key];
+    if (known) {
+      known[1]();
       event.preventDefault();
     }
   }

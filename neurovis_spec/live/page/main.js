@@ -6,6 +6,7 @@ import { Attention } from './attention.js';
 import { Camera } from './camera.js';
 import { Controls, part } from './controls.js';
 import { Drawing } from './draw.js';
+import { listKeys } from './keys.js';
 import { under } from './pick.js';
 import { Link } from './protocol.js';
 import { Turning } from './turning.js';
@@ -41,17 +42,27 @@ function show() {
   }
 }
 
+/** Show nothing but the background, which a canvas has as black. */
+function blank() {
+  context.setTransform(1, 0, 0, 1, 0, 0);
+  context.globalAlpha = 1;
+  context.fillStyle = getComputedStyle(document.body).backgroundColor;
+  context.fillRect(0, 0, canvas.width, canvas.height);
+}
+
 /** Fill the window, a pixel a pixel. */
 function resize() {
   const box = canvas.getBoundingClientRect();
   density = devicePixelRatio;
   camera.window = [Math.max(1, Math.round(box.width * density)), Math.max(1, Math.round(box.height * density))];
   [canvas.width, canvas.height] = camera.window;
+  blank();
   redraw();
 }
 
 const link = new Link({
   scene(scene) {
+    const first = !drawing;
     drawing = new Drawing(scene);
     camera.size = [scene.width, scene.height];
     document.title = `${scene.title} – NeuroVis`;
@@ -59,6 +70,7 @@ const link = new Link({
     for (const [name, of] of Object.entries(names)) {
       document.documentElement.style.setProperty(`--${name}`, scene.theme[of]);
     }
+    if (first) blank();
     canvas.setAttribute('aria-label', scene.title);
     attention.use(scene);
     turning.use(scene.parameters);
@@ -111,12 +123,19 @@ canvas.addEventListener('pointermove', (event) => {
   camera.move(event.movementX * density, event.movementY * density);
   redraw();
 });
+/** List the keys, or close the list. */
+function help() {
+  listKeys(/** @type {HTMLDialogElement} */ (part('keys')), controls.keys);
+}
+part('help').onclick = help;
+part('shut').onclick = help;
 Object.assign(controls.keys, {
-  '+': () => { camera.closer(1.25, camera.window[0] / 2, camera.window[1] / 2); redraw(); },
-  '-': () => { camera.closer(0.8, camera.window[0] / 2, camera.window[1] / 2); redraw(); },
-  0: () => { camera.fit(); redraw(); },
-  t: () => turning.toggle(),
-  Escape: () => attention.hold(''),
-  ']': () => attention.next(1),
-  '[': () => attention.next(-1),
+  '+': ['come closer', () => { camera.closer(1.25, camera.window[0] / 2, camera.window[1] / 2); redraw(); }],
+  '-': ['go further away', () => { camera.closer(0.8, camera.window[0] / 2, camera.window[1] / 2); redraw(); }],
+  0: ['see all of it', () => { camera.fit(); redraw(); }],
+  t: ['open or close the panel for turning', () => turning.toggle()],
+  Escape: ['let go of what is held', () => attention.hold('')],
+  ']': ['hold the next neuron', () => attention.next(1)],
+  '[': ['hold the neuron before', () => attention.next(-1)],
+  '?': ['list the keys, or close the list', help],
 });
