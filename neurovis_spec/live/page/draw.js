@@ -150,6 +150,7 @@ export class Drawing {
     }
     if (id === this.held) {
       const { at, radius } = disc.shape;
+      context.globalAlpha = 1;
       context.strokeStyle = this.scene.theme.ink;
       context.lineWidth = 2;
       context.beginPath();
