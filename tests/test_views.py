@@ -608,3 +608,15 @@ def test_names_that_begin_alike_are_told_apart_in_every_view(tmp_path: Path) -> 
         said = ["".join(text.itertext()) for text in root.iter(NS + "text")]
         cut = [words for words in said if "…" in words and "±" not in words]
         assert len(set(cut)) == 2, (view, said)
+
+
+def test_a_matrix_leaves_out_weak_connections_and_says_so(tmp_path: Path) -> None:
+    text = "neurovis: 1\nname: x\nneurons: {A: {count: 3, bias: 1}, O: {}}\n"
+    network = nv.compile_text(f"{text}connections: {{A1 -> O: 0.5, A2 -> O: 0.01, A3 -> O: -0.02}}\n")
+    network.render(tmp_path / "x.svg", step=2, view="matrix", min_weight=0.1)
+    root = ET.parse(tmp_path / "x.svg").getroot()
+    said = " ".join("".join(words.itertext()) for words in root.iter(NS + "text"))
+    assert "without 2 of 3 connections with |w| < 0.1" in said
+    assert [g.attrib["data-cell"] for g in root.iter(NS + "g") if "data-cell" in g.attrib] == ["A1 -> O"]
+    network.render(tmp_path / "x.svg", step=2, view="matrix", min_weight=1)
+    assert "every |w| is below 1" in (tmp_path / "x.svg").read_text().replace("&lt;", "<")

@@ -58,7 +58,7 @@ def figure(
     traces and weights do not need, ``glyphs`` those of the picture of the network where something in it is collapsed.
     Raises RecordingError where the recording lacks what they show, KeyError for an unknown theme."""
     drawn = any(panel.view == "network" for panel in panels)
-    maker = Maker(network, layout, shots, gains, drawn and settings.legend)
+    maker = Maker(network, layout, shots, gains, drawn and settings.legend, settings.min_weight)
     others = {number: maker.block(panel) for number, panel in enumerate(panels) if panel.view != "network"}
     title = _title(network, settings)
     head = HEADER + _TOP if title is not None else _TOP

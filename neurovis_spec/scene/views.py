@@ -32,6 +32,7 @@ from neurovis_spec.scene.scales import Scale, scale_of
 from neurovis_spec.scene.series import chosen, full_name, kind_of, short_name, values_of
 from neurovis_spec.scene.shots import Shots
 from neurovis_spec.scene.strips import SMALL, Span
+from neurovis_spec.scene.texts import number
 from neurovis_spec.scene.traces import PLOT, Trace, Traces
 
 #: The most curves of a view that names them, and of one that chooses them.
@@ -184,6 +185,8 @@ class Maker:
     gains: Gains | None
     #: whether the page has a legend
     explained: bool
+    #: connections whose weight stays below are left out of a matrix, as they are of the network's picture
+    min_weight: float | None = None
 
     def block(self, panel: Panel) -> Block:
         """A view other than the network's picture. Raises RecordingError where the recording lacks what it shows."""
@@ -281,6 +284,15 @@ class Maker:
         targets = everyone if shown is None else np.unique(ends.targets[connections]).tolist()
         snapshots = self.snapshots()
         weights = np.stack([snapshot.weights[connections] for snapshot in snapshots])
+        title = f"source (rows) × target (columns) · {len(connections):,} connections"
+        if self.min_weight is not None:
+            strong = ~(np.abs(weights) < self.min_weight).all(axis=0)
+            if not strong.all():
+                weak = f"{np.count_nonzero(~strong):,} of {len(connections):,} connections"
+                title = f"source (rows) × target (columns) · without {weak} with |w| < {number(self.min_weight)}"
+            connections, weights = connections[strong], weights[:, strong]
+            if not len(connections):
+                return Note(f"every |w| is below {number(self.min_weight)}")
         full, used = _full_at(weights, self.gains.thickness[connections], self.gains.thickness_scales)
         with np.errstate(over="ignore", invalid="ignore"):
             values = np.clip(weights / full, -1.0, 1.0)
@@ -290,7 +302,6 @@ class Maker:
         low[connections], high[connections] = lows, highs
         titles = tooltips(network, self.gains, activity, np.stack([low, high]))[1]
         scale = scale_of("weight", used)
-        title = f"source (rows) × target (columns) · {len(connections):,} connections"
         rows, columns = (order_of(network, self.layout, some) for some in (sources, targets))
         return Grid(Cells(network, rows, columns, connections, np.nan_to_num(values), scale, titles, title))
 
