@@ -8,7 +8,7 @@ delay have beads; else those of several steps.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.scene.geometry import Point, point_at
@@ -41,13 +41,15 @@ def bead(centre: Point, radius: float, theme: Theme) -> Rectangle:
     return Rectangle(corner, 2 * radius, 2 * radius, radius, theme.background, theme.muted, 0.4 * radius)
 
 
-def beads(network: Network, lines: Sequence[Line], disc: float, theme: Theme) -> dict[int, Rectangle]:
-    """By connection; ``disc`` is the radius of neurons."""
+def beads(network: Network, lines: Mapping[int, Line], disc: float, theme: Theme) -> dict[int, Rectangle]:
+    """By connection, of those that have a line; ``disc`` is the radius of neurons."""
     if not visible(disc):
         return {}
     radius = min(3.2, max(_SMALLEST, 0.16 * disc))
     found: dict[int, Point] = {}
     for index in delayed(network):
+        if index not in lines:
+            continue
         line = lines[index].points
         places = [point_at(line, share * (len(line) - 1) / 3) for share in _PLACES]
         free = (

@@ -68,7 +68,8 @@ class Plan:
     sizes: Mapping[int, int]
     counts: Mapping[int, int]
     #: of every connection; those that are drawn are in ``order``
-    lines: tuple[Line, ...]
+    #: of the connections that are drawn
+    lines: Mapping[int, Line]
     order: tuple[int, ...]
     #: on connections whose signal takes several steps, by index
     beads: Mapping[int, Rectangle]
@@ -124,10 +125,10 @@ def plan(
     radius = RADIUS * frame.scale
     gap, head = min(1.5, 0.1 * radius), _head(radius)
     ends = np.stack([radii[network.connections.sources], radii[network.connections.targets]], axis=1)
-    lines = trimmed([frame.map(route) for route in routes], ends, gap, head)
-    reaches, dots_of = _reaches(network, gains, frame.widest), _dots(lines)
     kept = np.flatnonzero(seen.lines).tolist()
-    obstacles = Obstacles([dots_of[i] for i in kept], [reaches[i] for i in kept], centres, radii)
+    trim = trimmed([frame.map(routes[index]) for index in kept], ends[kept], gap, head)
+    lines, reaches = dict(zip(kept, trim, strict=True)), _reaches(network, gains, frame.widest)
+    obstacles = Obstacles(_dots(trim), [reaches[index] for index in kept], centres, radii)
     dots = [(teacher, dotted(teacher, centres, radius, gap, head, obstacles)) for teacher in teachers]
     for points in _dots([line for _, line in dots]):
         obstacles.add_line(points)
@@ -163,7 +164,7 @@ def plan(
         centres=tuple(spots),
         sizes=sizes,
         counts={line: count for line, count in enumerate(drawn.counts.tolist()) if drawn.sheaf[line]},
-        lines=tuple(lines),
+        lines=lines,
         order=_order(network, encoding.thickness(network.connections.weights, gains.thickness), seen.lines),
         beads=delays.beads(network, lines, radius, theme),
         lesions=lesions_of(network),
@@ -185,7 +186,7 @@ def _in_user_units(made: Plan, unit: float) -> Plan:
         radii=tuple(unit * radius for radius in made.radii),
         rings=tuple(unit * ring for ring in made.rings),
         centres=tuple(at(centre, unit) for centre in made.centres),
-        lines=tuple(scaled_line(line, unit) for line in made.lines),
+        lines={index: scaled_line(line, unit) for index, line in made.lines.items()},
         beads={index: scaled_rectangle(bead, unit) for index, bead in made.beads.items()},
         labels=tuple(scaled_label(label, unit) for label in made.labels),
         back=tuple(scaled_group(group, unit) for group in made.back),
