@@ -40,8 +40,6 @@ if TYPE_CHECKING:
     from neurovis_spec.scene.gains import Gains
     from neurovis_spec.scene.panels import View
 
-#: Frames a second where the spec writes no dt, and the most there are.
-DEFAULT_FPS, MOST_FPS = 25.0, 60.0
 #: Frames of a film that are held at once, and how many numbers they are about.
 _FEWEST_AT_ONCE, _MOST_AT_ONCE, _NUMBERS_AT_ONCE = 16, 512, 4_000_000
 #: The largest SVG, in bytes, with as many connections as there are.
@@ -400,7 +398,7 @@ class CompiledNetwork:
         reference, before anything is run.
         """
         from neurovis_spec.runtime.simulation import Simulation
-        from neurovis_spec.scene.film_size import check_film, thinned
+        from neurovis_spec.scene.film_size import check_film, frames_a_second, thinned
         from neurovis_spec.scene.renderers import renderer_for
         from neurovis_spec.snapshots import in_parts, snapshots_from, snapshots_of_run, steps_from
 
@@ -411,7 +409,7 @@ class CompiledNetwork:
         most = None if frames is None else arguments.integer("frames", frames, 1, _MOST_STEPS)
         capabilities = renderer_for(suffix := place.suffix.lower(), moving=True).capabilities
         if fps is None:
-            fps = min(1 / self.network.dt, MOST_FPS) if self.network.dt_given else DEFAULT_FPS
+            fps = frames_a_second(self.network)
         if not (math.isfinite(arguments.number("fps", fps)) and fps > 0):
             raise ValueError(f"frames a second are above 0, not {fps}")
         panels = self._panels(view)
@@ -472,14 +470,15 @@ class CompiledNetwork:
         """How it is to be drawn; and the same network, whose gains are those of what is collapsed."""
         from neurovis_spec.scene.excerpt import excerpted
 
-        settings = excerpted(self.network, self._settings(theme), excerpt)
+        settings = excerpted(self.network, self.settings_for(theme), excerpt)
         if not _shows(panels, "network"):
             settings = replace(settings, collapse=())
         if settings.collapse == self.network.render.collapse:
             return self, settings
         return replace(self, network=replace(self.network, render=settings)), settings
 
-    def _settings(self, theme: str | None) -> RenderSettings:
+    def settings_for(self, theme: str | None) -> RenderSettings:
+        """How it is drawn, in a theme of this name. Raises OutputError for one that there is not."""
         from neurovis_spec.scene.renderers import RendererError
         from neurovis_spec.themes import THEMES
 

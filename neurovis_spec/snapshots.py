@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.columns import columns_of
 from neurovis_spec.runtime.inputs import InputError
@@ -81,20 +80,14 @@ def snapshots_of_run(run: Simulation, start: int, steps: int, every: int) -> Ite
     """The same of a run that is made while they are asked for, so that there may be any number of them."""
     network = run.network
     fading, seen = Fading(network), None
-    before, weights = None, _weights(run)
+    before, weights = None, run.connection_weights
     for step in range(start + steps):
         run.step()
         if fading:
             seen = fading.follow(np.array([step]), run.activity[None])
         if step >= start and (step - start) % every == 0:
             yield Snapshot(step, run.activity, weights, before, seen)
-        before, weights = weights, _weights(run) if len(network.changing) else weights
-
-
-def _weights(run: Simulation) -> FloatArray:
-    result = run.network.connections.weights.copy()
-    result[run.network.changing] = run.weights
-    return result
+        before, weights = weights, run.connection_weights if len(network.changing) else weights
 
 
 def in_parts(snapshots: Iterable[Snapshot], many: int) -> Iterator[list[Snapshot]]:

@@ -15,10 +15,11 @@ import numpy as np
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Connections, Group, Network, Neurons
 from neurovis_spec.compiler.program import Plasticity, Rule
-from neurovis_spec.compiler.wishes import LayoutSettings, RenderSettings
+from neurovis_spec.compiler.wishes import LayoutSettings, RenderSettings, StatedGain
 from neurovis_spec.layout.model import Layout, Point, Route
 from neurovis_spec.runtime.recording import Snapshot
-from neurovis_spec.scene.reached import Reached, reached_by
+from neurovis_spec.scene.gains import Gains, choose_gains
+from neurovis_spec.scene.reached import Reached, nothing, reached_by
 
 
 @dataclass(frozen=True)
@@ -225,3 +226,14 @@ def _layout_1(made: Network) -> Layout:
             routes[f"{rhythm} -> {kernel}"] = downward(positions[rhythm], positions[kernel])
         routes[f"{kernel} -> O"] = downward(positions[kernel], positions["O"])
     return Layout(made.name, "by hand", positions, routes)
+
+
+def plain_gains(network: Network, activity: float, signal: float, thickness: float, change: float) -> Gains:
+    """One gain of each sort for all."""
+    stated = RenderSettings(
+        activity=(StatedGain(activity),),
+        signal=(StatedGain(signal),),
+        thickness=(StatedGain(thickness),),
+        change=(StatedGain(change),),
+    )
+    return choose_gains(network, stated, nothing(network))

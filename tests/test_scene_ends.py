@@ -8,7 +8,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
-from hand_networks import C, Case, numbered, straight_layout, use_case_1
+from hand_networks import C, Case, numbered, plain_gains, straight_layout, use_case_1
 from hand_networks import network as made_of
 from neurovis_renderers.animated_svg import AnimatedSvgRenderer
 from neurovis_renderers.raster import PillowRenderer
@@ -20,7 +20,7 @@ from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.scene import Arrowhead, Film, Scene, Spline, Text, still
 from neurovis_spec.scene.encode import encode
 from neurovis_spec.scene.film import film
-from neurovis_spec.scene.gains import choose_gains, plain_gains
+from neurovis_spec.scene.gains import choose_gains
 from neurovis_spec.scene.model import ended
 
 NS = "{http://www.w3.org/2000/svg}"

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hand_networks import C, Case, G, loop, network, numbered, straight, straight_layout, use_case_1
+from hand_networks import C, Case, G, loop, network, numbered, plain_gains, straight, straight_layout, use_case_1
 
 import neurovis_spec as nv
 from neurovis_spec import pipeline
@@ -20,7 +20,7 @@ from neurovis_spec.layout.model import Layout, Point
 from neurovis_spec.scene import Arrowhead, Disc, Group, Rectangle, Scene, Spline, Text, legend, still, texts
 from neurovis_spec.scene.encode import encode
 from neurovis_spec.scene.film import film
-from neurovis_spec.scene.gains import choose_gains, plain_gains
+from neurovis_spec.scene.gains import choose_gains
 from neurovis_spec.scene.geometry import Rect, overlap, sample, samples
 from neurovis_spec.scene.legend_entry import Entry
 from neurovis_spec.scene.legend_scales import nice_weights

@@ -8,7 +8,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
-from hand_networks import C, Case, G, network, straight_layout, use_case_1
+from hand_networks import C, Case, G, network, plain_gains, straight_layout, use_case_1
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from neurovis_renderers.markup import escape, exact, num, path
@@ -17,7 +17,6 @@ from neurovis_renderers.svg import SvgRenderer
 from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.scene import encoding
 from neurovis_spec.scene.encode import encode
-from neurovis_spec.scene.gains import plain_gains
 from neurovis_spec.scene.themes import THEMES, channels
 
 NS = "{http://www.w3.org/2000/svg}"

@@ -12,7 +12,6 @@ import hashlib
 import re
 import socket
 import time
-from collections.abc import Awaitable, Callable
 from pathlib import Path
 from weakref import WeakSet
 
@@ -30,8 +29,6 @@ MOST_CLIENTS, MOST_CONNECTIONS = 128, 256
 ASKING, SENDING, PINGS = 10.0, 15.0, 20.0
 #: Messages a second that a client may send in the long run, and at once.
 RATE, BURST = 200, 400
-
-Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 def page() -> str:

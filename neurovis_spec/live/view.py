@@ -99,7 +99,7 @@ class View:
 def view_of(compiled: CompiledNetwork, gains: Gains, theme: str | None = None, engine: str | None = None) -> View:
     """How a compiled network is drawn. Raises LayoutRefusalError, RendererError."""
     network = compiled.network
-    settings = network.render if theme is None else replace(network.render, theme=theme, colours=())
+    settings = compiled.settings_for(theme)
     drawn = gathered(network, settings.collapse)
     planned = plan(drawn, laid_out(drawn, compiled.drawn(engine).value), gains, settings)
     constants = {"levels": LEVELS, "fineness": FINENESS, "isBar": BAR, "isFaint": FAINT}

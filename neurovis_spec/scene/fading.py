@@ -15,11 +15,10 @@ import numpy as np
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.recording import Recording, Snapshot
+from neurovis_spec.scene.film_size import frames_a_second
 
 #: Seconds of a film in which the trace of a spike fades to 1/e, where the spec does not say; and the least steps.
 _SECONDS, _STEPS = 0.2, 2.0
-#: Frames a second of a film at most, and where the spec writes no dt: a frame is a step.
-_MOST_FPS, _FPS = 60.0, 25.0
 #: A trace that is fainter than this share cannot be told from nothing, nor can two pictures that differ by it.
 _FAINTEST = 1e-5
 #: Rows looked at together.
@@ -31,8 +30,7 @@ def seconds_of(network: Network) -> FloatArray:
 
     Without a word of the spec those that spike have one.
     """
-    fps = min(1 / network.dt, _MOST_FPS) if network.dt_given else _FPS
-    usual = network.dt * max(_STEPS, _SECONDS * fps)
+    usual = network.dt * max(_STEPS, _SECONDS * frames_a_second(network))
     result = np.zeros(len(network.neurons))
     for group in network.neurons.groups:
         if group.spikes:

@@ -35,6 +35,15 @@ def check_film(network: Network, frames: int, suffix: str, capabilities: Rendere
         raise RendererError(message, hint)
 
 
+#: Frames a second of a film at most, and where the spec writes no dt.
+_MOST_FPS, _FPS = 60.0, 25.0
+
+
+def frames_a_second(network: Network) -> float:
+    """How fast a film is where nobody has said so: a frame is a step."""
+    return min(1 / network.dt, _MOST_FPS) if network.dt_given else _FPS
+
+
 #: The most frames of a film where nobody has said how many.
 MOST_FRAMES = 3000
 

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.wishes import RenderSettings, StatedGain
 from neurovis_spec.scene.called import Names, names_of, unit_of
-from neurovis_spec.scene.reached import Reached, nothing
+from neurovis_spec.scene.reached import Reached
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 IntArray: TypeAlias = npt.NDArray[np.int64]
@@ -87,17 +87,6 @@ class Gains:
             thickness_scales=cut(self.thickness_scales),
             change_scales=cut(self.change_scales),
         )
-
-
-def plain_gains(network: Network, activity: float, signal: float, thickness: float, change: float) -> Gains:
-    """One gain of each sort for all."""
-    stated = RenderSettings(
-        activity=(StatedGain(activity),),
-        signal=(StatedGain(signal),),
-        thickness=(StatedGain(thickness),),
-        change=(StatedGain(change),),
-    )
-    return choose_gains(network, stated, nothing(network))
 
 
 def in_pages(gains: Gains, unit: float) -> Gains:

@@ -45,16 +45,6 @@ def panels_of(network: Network, wanted: View | Sequence[View] | None) -> tuple[P
     return () if [panel.view for panel in panels] == ["network"] else panels
 
 
-def timed(panels: Sequence[Panel]) -> bool:
-    """Whether one of them is over time."""
-    return any(panel.view in ("traces", "raster", "weights") for panel in panels)
-
-
-def laid_out(panels: Sequence[Panel]) -> bool:
-    """Whether one of them needs to know where the neurons are; the network alone does."""
-    return not panels or any(panel.view in ("network", "matrix") for panel in panels)
-
-
 def _one(network: Network, own: Sequence[Panel], wanted: View) -> Iterator[Panel]:
     for name, references in _taken_apart(wanted):
         if name not in VIEWS:
