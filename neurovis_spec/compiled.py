@@ -451,8 +451,8 @@ class CompiledNetwork:
 
             wide = len(self.network.neurons) + 3 * len(self.network.connections)
             many = max(_FEWEST_AT_ONCE, min(_MOST_AT_ONCE, _NUMBERS_AT_ONCE // wide))
-            part = partial(pipeline.moving, self.network, layout, gains=gains, settings=settings, fps=fps)
-            films = map(part, in_parts(snapshots, many))
+            parts = in_parts(snapshots, many)
+            films = pipeline.moving_in_parts(self.network, layout, parts, gains, settings, fps)
 
         def draw(settings: RenderSettings) -> tuple[Scene, bytes]:
             made = film(settings)

@@ -13,7 +13,7 @@ What the first four find at fault goes into Findings, all at once; ``Findings.ch
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
@@ -207,6 +207,20 @@ def moving(
     from neurovis_spec.scene.film import film
 
     return film(network, layout, snapshots, gains, settings, fps)
+
+
+def moving_in_parts(
+    network: Network,
+    layout: Layout,
+    parts: Iterable[Collection[Snapshot]],
+    gains: Gains,
+    settings: RenderSettings,
+    fps: float,
+) -> Iterator[Film]:
+    """The same, each part made when it is asked for."""
+    from neurovis_spec.scene.film import films
+
+    return films(network, layout, parts, gains, settings, fps)
 
 
 def shot_of(network: Network, recording: Recording, step: int | None, window: int | None) -> Shots:

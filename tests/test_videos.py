@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,7 +27,11 @@ from test_raster import short_film
 
 from neurovis_spec import api, compiled, pipeline
 from neurovis_spec.cli.commands import neurovis
-from neurovis_spec.scene import Film, still
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.layout.model import Layout
+from neurovis_spec.runtime.recording import Snapshot
+from neurovis_spec.scene import Film, film, still
+from neurovis_spec.scene import plan as scene_plan
 from neurovis_spec.scene.film_size import thinned
 from neurovis_spec.scene.renderers import RendererError
 
@@ -109,7 +113,6 @@ def test_a_video_says_its_colours_and_its_fragments(spec: Path, tmp_path: Path) 
     assert len(decoded(path)) == 60
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="there is no SIGKILL")
 def test_a_film_that_is_killed_can_be_played(spec: Path, tmp_path: Path) -> None:
     (tmp_path / "touch.csv").write_text("touch\n0.1\n", encoding="utf-8")
     command = [sys.executable, "-m", "neurovis_spec", "animate", str(spec), "-o", "film.mp4", "--steps", "100000"]
@@ -222,13 +225,17 @@ def test_a_film_is_made_of_parts_that_hold_few_frames(
     """So memory does not grow with the frames; what is shown is the same, from a run and from a recording."""
     network, held = api.compile(spec), list[int]()
     network.animate(tmp_path / f"whole{suffix}", fps=50, steps=40)
-    moving = pipeline.moving
+    moving = pipeline.moving_in_parts
 
-    def counted(*arguments: object, **more: object) -> object:
-        held.append(len(arguments[2]))  # type: ignore[arg-type]
-        return moving(*arguments, **more)  # type: ignore[arg-type]
+    def seen(parts: Iterable[Collection[Snapshot]]) -> Iterator[Collection[Snapshot]]:
+        for part in parts:
+            held.append(len(part))
+            yield part
 
-    monkeypatch.setattr(pipeline, "moving", counted)
+    def counted(network: Network, layout: Layout, parts: Iterable[Collection[Snapshot]], *more: object) -> object:
+        return moving(network, layout, seen(parts), *more)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(pipeline, "moving_in_parts", counted)
     monkeypatch.setattr(compiled, "_MOST_AT_ONCE", 25)
     network.animate(tmp_path / f"parts{suffix}", fps=50, steps=40)
     assert held == [25, 15]
@@ -315,3 +322,20 @@ def test_a_film_in_memory_is_the_one_in_a_file() -> None:
     filmed, file = short_film(), io.BytesIO()
     VideoRenderer().stream(iter([filmed]), filmed.frames, ".mp4", file)
     assert len(file.getvalue()) == pytest.approx(len(VideoRenderer().animate(filmed, ".mp4")), rel=0.01)
+
+
+@pytest.mark.parametrize(("changes", "plans"), [("", 1), (", plasticity: {oja: {rate: 0.1}}", 3)])
+def test_what_stays_the_same_is_planned_anew_only_where_other_weights_are_reached(
+    changes: str, plans: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = "neurovis: 1\nname: x\nneurons: {A: {bias: 1}, B: {}}\n"
+    network = api.compile_text(f"{text}connections: {{A -> B: {{weight: 0.5{changes}}}}}\n")
+    whole, calls = network.network, list[object]()
+    plan = scene_plan.plan
+    monkeypatch.setattr(film, "plan", lambda *given: calls.append(given) or plan(*given))  # type: ignore[func-returns-value]
+    steps = [network.run(9).snapshot(step) for step in range(9)]
+    parts = [steps[:3], steps[3:6], steps[6:]]
+    made = list(film.films(whole, network.layout().value, parts, network.gains, whole.render, 10.0))
+    assert len(calls) == plans
+    alone = [film.film(whole, network.layout().value, part, network.gains, whole.render, 10.0) for part in parts]
+    assert [one.scene for one in made] == [one.scene for one in alone]

@@ -6,7 +6,7 @@ of one frame, the same picture as ``encode`` makes of that step.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
 from itertools import islice
 from typing import TYPE_CHECKING
@@ -18,7 +18,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.scene.caption import caption
-from neurovis_spec.scene.collapse import gathered
+from neurovis_spec.scene.collapse import Gathered, gathered
 from neurovis_spec.scene.encode import CAPTION, Looks, lesions_by_id, looks, paint, tooltips
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.gathered_layout import laid_out
@@ -37,7 +37,7 @@ from neurovis_spec.scene.model import (
     ended,
     shifted,
 )
-from neurovis_spec.scene.plan import plan
+from neurovis_spec.scene.plan import Plan, plan
 from neurovis_spec.scene.themes import colours, readable
 
 if TYPE_CHECKING:
@@ -55,15 +55,37 @@ def film(
 ) -> Film:
     """One frame a snapshot, ``fps`` frames a second, without a stated size at least ``narrowest`` wide (page units).
     Raises ValueError without a snapshot."""
-    drawn, whole = gathered(network, settings.collapse), network
-    network, frames = drawn.network, len(snapshots)
+    return next(films(network, layout, [snapshots], gains, settings, fps, narrowest))
+
+
+def films(
+    network: Network,
+    layout: Layout,
+    parts: Iterable[Collection[Snapshot]],
+    gains: Gains,
+    settings: RenderSettings,
+    fps: float,
+    narrowest: float = 0.0,
+) -> Iterator[Film]:
+    """The same for a film that comes in parts, each made when it is asked for. What stays the same is planned anew only
+    where other weights are reached. Raises ValueError for a part without a snapshot."""
+    drawn = gathered(network, settings.collapse)
+    placed, planned, reached = laid_out(drawn, layout), None, np.zeros(0)
+    for snapshots in parts:
+        if not len(snapshots):
+            raise ValueError("a film has at least one frame")
+        peaks = np.zeros(len(drawn.network.connections))
+        for snapshot in snapshots if len(network.changing) else islice(snapshots, 1):
+            peaks = np.fmax(peaks, np.abs(drawn.snapshot(snapshot).weights))
+        if planned is None or not np.array_equal(peaks, reached):
+            planned, reached = plan(drawn, placed, gains, settings, peaks, narrowest), peaks
+        yield _filmed(drawn, planned, snapshots, gains, fps)
+
+
+def _filmed(drawn: Gathered, planned: Plan, snapshots: Collection[Snapshot], gains: Gains, fps: float) -> Film:
+    """Snapshots by a plan."""
+    network, whole, frames = drawn.network, drawn.whole, len(snapshots)
     neurons, connections = len(network.neurons), len(network.connections)
-    if not frames:
-        raise ValueError("a film has at least one frame")
-    peaks = np.zeros(connections)
-    for snapshot in snapshots if len(whole.changing) else islice(snapshots, 1):
-        peaks = np.fmax(peaks, np.abs(drawn.snapshot(snapshot).weights))
-    planned = plan(drawn, laid_out(drawn, layout), gains, settings, peaks, narrowest)
     fill_values, line_values = np.empty((frames, neurons)), np.empty((frames, connections))
     widths, glows = np.empty((2, frames, connections))
     bars = np.empty((frames, connections), np.bool_)
