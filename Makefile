@@ -3,11 +3,12 @@
 #   make demo       makes .venv, installs, and runs the main job into demo/
 #   make test       every check that needs Python alone
 #   make gallery    draws the examples into docs/pictures and writes docs/gallery.md; needs graphviz' dot
-#   make test-all   the tests that need Chromium, graphviz' dot, gcc and g++, or start a cluster; fails without them
+#   make test-all   what needs Chromium, graphviz' dot, gcc and g++, node, or starts a cluster; fails without them
 #   make fuzz       20,000 broken specs and 5,000 expressions (FUZZ_ARGS=... for more), two or three minutes
 #   make layouts    layouts beside dot's, sfdp's and networkx' (LAYOUTS_ARGS="--all --graphs FOLDER" for more)
 #   make docs       writes the generated parts of docs/ anew
 #   make page       puts the page of the live view together from its modules
+#   make page-check checks its JavaScript: types and lint; needs node and npm
 #
 # PYTHON=... names another interpreter to make .venv with, PYTEST_ARGS=... adds to pytest's arguments.
 
@@ -18,9 +19,10 @@ PYTEST_ARGS ?=
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+NPM := npm --no-audit --no-fund --no-package-lock --loglevel=error
 ELSEWHERE := browser or dot or compiler or cluster
 
-.PHONY: help install demo gallery test test-all needs fuzz layouts docs page format clean
+.PHONY: help install demo gallery test test-all needs fuzz layouts docs page page-check format clean
 .DELETE_ON_ERROR:
 
 help:
@@ -61,7 +63,7 @@ test: $(VENV)/tested
 	$(BIN)/lint-imports
 	$(BIN)/python -m pytest -n auto -m "not ($(ELSEWHERE))" $(PYTEST_ARGS)
 
-test-all: needs $(VENV)/tested
+test-all: needs $(VENV)/tested page-check
 	$(BIN)/python -m pytest -m "$(ELSEWHERE)" $(PYTEST_ARGS)
 
 # Skipping would hide that nothing was tested: what is missing is an error.
@@ -70,9 +72,18 @@ needs:
 	for browser in chromium chromium-browser google-chrome; do command -v $$browser >/dev/null && break; done \
 	  || missing="$$missing Chromium (apt-get install chromium);"; \
 	command -v dot >/dev/null || missing="$$missing dot (apt-get install graphviz);"; \
+	command -v npm >/dev/null || missing="$$missing node and npm (apt-get install nodejs npm);"; \
 	command -v gcc >/dev/null || missing="$$missing a C compiler (apt-get install gcc libc6-dev);"; \
 	command -v g++ >/dev/null || missing="$$missing a C++ compiler (apt-get install g++);"; \
 	test -z "$$missing" || { echo "make test-all needs what is not here:$$missing" >&2; exit 1; }
+
+node_modules/made: package.json
+	@echo "installing what checks the page's JavaScript"
+	@$(NPM) install --silent
+	@touch $@
+
+page-check: node_modules/made
+	$(NPM) run --silent check
 
 fuzz: $(VENV)/tested
 	$(BIN)/python benchmarks/fuzzing.py $(FUZZ_ARGS)
@@ -93,4 +104,4 @@ format: $(VENV)/tested
 	$(BIN)/ruff format .
 
 clean:
-	rm -rf $(VENV) demo build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) node_modules demo build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -30,7 +30,7 @@ function redraw() {
 function show() {
   asked = false;
   const { look } = link;
-  if (!drawing || !look || !look.serial) return;
+  if (!drawing || !look?.serial) return;
   if (density !== devicePixelRatio) resize();
   [drawing.near, drawing.held] = [attention.near, attention.held];
   drawing.draw(context, camera, look);
