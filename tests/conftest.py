@@ -6,8 +6,10 @@ from __future__ import annotations
 import pytest
 from hypothesis import settings
 
-# How long an example takes says something of the machine, not of the program.
-settings.register_profile("untimed", deadline=None)
+# How long an example takes says something of the machine, not of the program. The examples are the same in each run, so
+# that a change is judged by what it changes; --hypothesis-profile=explore looks for new ones.
+settings.register_profile("explore", deadline=None)
+settings.register_profile("untimed", deadline=None, derandomize=True)
 settings.load_profile("untimed")
 
 
