@@ -46,6 +46,8 @@ def main() -> int:
     print("\nThe same by hand, in the checkout (neurovis is .venv/bin/neurovis):")
     for _, file, command in STAGES:
         print(f"  neurovis {command}" + (f" > {file}" if _prints(command) else ""))
+    print("\nThe same while it runs, to be turned by hand, in the browser:")
+    print("  .venv/bin/pip install '.[live]' && .venv/bin/neurovis live specs/cpg_rbf.yaml --open")
     return 0
 
 
