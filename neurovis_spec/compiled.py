@@ -713,6 +713,9 @@ class NetworkLayout:
     compiled: CompiledNetwork
     value: Layout
 
+    def __repr__(self) -> str:
+        return repr(self.value)
+
     @property
     def engine(self) -> str:
         """The engine that made it."""

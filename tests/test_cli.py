@@ -506,7 +506,8 @@ def test_new_writes_a_spec_that_goes_all_the_way(folder: Path) -> None:
 @pytest.mark.parametrize("example", [*sorted(SPECS.glob("*.yaml")), HEXAPOD], ids=lambda path: path.stem)
 def test_new_from_an_example_is_that_example_under_another_name(folder: Path, example: Path) -> None:
     good("new", "mine", "--from", example.stem)
-    mine, theirs = nv.compile("mine.yaml"), nv.compile(example)
+    mine = nv.compile("mine/mine.yaml" if example.parent.name == example.stem else "mine.yaml")
+    theirs = nv.compile(example)
     assert mine.name == "mine"
     np.testing.assert_array_equal(mine.run(50).activity, theirs.run(50).activity)
 
@@ -529,8 +530,9 @@ def test_new_may_share_the_data_of_an_example(folder: Path) -> None:
 
 def test_new_copies_what_an_example_includes(folder: Path) -> None:
     tables = [str(Path("data", f"{name}.csv")) for name in ("obstacle", "floor_left", "floor_right")]
-    assert good("new", "one", "--from", "hexapod").split() == ["one.yaml", str(Path("modules", "leg.yaml")), *tables]
-    assert good("new", "two", "--from", "hexapod").split() == ["two.yaml"]
+    one = [str(Path("one", name)) for name in ("one.yaml", str(Path("modules", "leg.yaml")), *tables)]
+    assert good("new", "one", "--from", "hexapod").split() == one
+    assert good("new", "two", "--from", "hexapod").split() == [name.replace("one", "two") for name in one]
 
 
 # The process

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import pickle
 import warnings
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import ClassVar, cast
 
 import numpy as np
@@ -446,3 +448,47 @@ def test_recordings_of_another_network_are_refused() -> None:
     fewer = replace(network, connections=build([], [Link(0, 0)]).connections, plasticity=(), blocks=(), program=())
     with pytest.raises(RecordingError, match="has no connection 'K1 -> O'"):
         record(fewer, 1, start=record(network, 2))
+
+
+@pytest.mark.parametrize("backend", BOTH)
+def test_a_pickled_simulation_goes_on_where_it_was(backend: str) -> None:
+    network = cpg_rbf()
+    simulation = Simulation(network, backend)
+    for _ in range(7):
+        simulation.step()
+    simulation.lesion("K3")
+    copy = pickle.loads(pickle.dumps(simulation))
+    assert isinstance(copy, Simulation)
+    for _ in range(9):
+        copy.step()
+        simulation.step()
+        np.testing.assert_array_equal(copy.activity, simulation.activity)
+    np.testing.assert_array_equal(copy.weights, simulation.weights)
+    assert copy.k == simulation.k == 16
+    copy.reset()
+    assert copy.k == 0
+    assert not copy.lesioned[0].any()
+
+
+def test_what_a_run_and_a_layout_are_fits_on_a_line() -> None:
+    compiled = nv.compile_text("neurovis: 1\nname: x\nneurons: {A: {count: 3, bias: 1}}")
+    shown = repr(compiled.run(5)), repr(compiled.layout())
+    assert shown == (
+        "<Recording of 'x': steps 0 to 4, 5 rows; 3 neurons, 0 connections of which 0 learn>",
+        "<Layout of 'x' by layered: 3 positions, 0 routes>",
+    )
+
+
+def test_a_picture_into_no_folder_names_the_folder(tmp_path: Path) -> None:
+    compiled = nv.compile_text("neurovis: 1\nname: x\nneurons: {A: {bias: 1}}")
+    with pytest.raises(FileNotFoundError, match=r"there is no folder: .*nowhere"):
+        compiled.render(tmp_path / "nowhere" / "x.svg")
+
+
+@pytest.mark.parametrize("backend", BOTH)
+def test_a_rule_of_no_connections_runs(backend: str) -> None:
+    text = (
+        "neurovis: 1\nname: x\nneurons: {A: {count: 2, bias: 1}}\n"
+        "connections: {A -> A: {pattern: {random: {probability: 0.0001}}, plasticity: hebbian}}"
+    )
+    assert nv.compile_text(text).run(3, backend=backend)["A"].tolist() == [[1.0, 1.0]] * 3

@@ -60,7 +60,7 @@ def _examples() -> Iterable[str]:
 def command(name: str, example: str | None) -> None:
     """Write a commented starter spec NAME.yaml, or a copy of an example.
 
-    Nothing is overwritten.
+    An example with a folder of its own gets one, NAME/NAME.yaml. Nothing is overwritten.
     """
     if example == "list":
         click.echo("\n".join(examples_at_hand()))
@@ -74,6 +74,8 @@ def command(name: str, example: str | None) -> None:
         text = package_files("neurovis_spec.cli").joinpath("starter.yaml").read_text(encoding="utf-8")
         wanted = {target: text.replace("starter.", f"{target.stem}.").encode()}
     else:
+        if examples_at_hand()[example].name == example:  # a folder of its own
+            target = target.parent / target.stem / target.name
         wanted = copies(example, target)
     wanted[target] = _NAME_LINE.sub(f"name: {target.stem}", wanted[target].decode(), count=1).encode()
     write_new(wanted, target)

@@ -31,6 +31,8 @@ Value: TypeAlias = float | FloatArray
 
 #: Names that an expression may always use.
 ALWAYS = (*CONSTANTS, "dt")
+#: A number this close to an integer is that integer.
+NEAR_INTEGER = 1e-9
 #: Names that mean something elsewhere, and why not here.
 _ELSEWHERE: Mapping[str, str] = {
     "k": "the step is known in a run; this value is worked out once, before it",
@@ -316,9 +318,11 @@ class Constants:
         value = self.scalar(formula, structural=structural)
         if value is None:
             return None
-        if value != math.floor(value):
-            self.findings.error("not-an-integer", formula.span, f"{what} must be an integer, this is {value:g}")
+        nearest = round(value)
+        if abs(value - nearest) > NEAR_INTEGER:  # 0.0003/dt is an integer up to rounding
+            self.findings.error("not-an-integer", formula.span, f"{what} must be an integer, this is {value:.15g}")
             return None
+        value = nearest
         if not least <= value <= most:
             bound = f"at least {least}" if value < least else f"at most {most:,}"
             self.findings.error("out-of-range", formula.span, f"{what} must be {bound}, this is {value:.15g}")

@@ -20,7 +20,7 @@ from neurovis_spec.compiler.ends import Ends
 from neurovis_spec.compiler.learning import Learning, Wired, learning_of
 from neurovis_spec.compiler.limits import Limits, amount
 from neurovis_spec.compiler.matrices import Grid, grid_of
-from neurovis_spec.compiler.patterns import all_to_all, pairs_of
+from neurovis_spec.compiler.patterns import all_to_all, is_drawn, pairs_of
 from neurovis_spec.compiler.populate import Population
 from neurovis_spec.compiler.references import Directory
 from neurovis_spec.compiler.scale import Scaled, look_at_scale, scaled
@@ -125,7 +125,14 @@ class EntryBuilder:
             centre = self._grid(body.centre, "centre") if isinstance(body.centre, (Rows, FileReference)) else None
         shape = self._shape(centre)
         if shape is not None and findings.errors == sound and not len(shape.i):
-            findings.error("no-connection", self.key.span, "this entry makes no connection at all")
+            # whether a spec is valid must not depend on its seed
+            if body.pattern is not None and is_drawn(body.pattern, self.constants):
+                message = "this entry draws no connection at all"
+                findings.warning(
+                    "nothing-drawn", self.key.span, message, "another seed, or a larger probability, draws some"
+                )
+            else:
+                findings.error("no-connection", self.key.span, "this entry makes no connection at all")
         if findings.errors > sound or (shape is not None and not self._fits(len(shape.i))):
             shape = None
         with self.constants.following() as weighted:
@@ -141,6 +148,8 @@ class EntryBuilder:
             return None
         if self.sources is None or self.targets is None or body.lost:
             return None
+        if not len(shape.i):  # there is nothing that a rule would change
+            learning = None
         delays = np.full(len(shape.i), 0 if delay is None else delay, dtype=np.int64)
         if shape.delays is not None:
             delays = np.where(shape.delays >= 0, shape.delays, delays)

@@ -127,6 +127,14 @@ def least_pairs(name: str, n: int, m: int, values: Mapping[str, float]) -> int:
     return int(each) * ends if each <= others else 0
 
 
+def is_drawn(choice: Choice, constants: Constants) -> bool:
+    """Whether chance decides which pairs a valid pattern makes."""
+    if choice.name.value != "random":
+        return False
+    formulas = [formula_of(entry.value, constants.findings) for entry in choice.settings]
+    return any(formula is not None and constants.scalar(formula) for formula in formulas)
+
+
 def _settings(name: str, choice: Choice, findings: Findings) -> dict[str, Formula]:
     """The formulas of the settings; each of them has to be there."""
     allowed = SETTINGS[name]

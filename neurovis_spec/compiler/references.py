@@ -64,8 +64,9 @@ class Directory:
         if dot:
             return self._hint_of_instance(head, rest)
         hint = suggest(name, few(name, self.known), "groups and neurons")
-        if not self.known and self.instances:
-            hint = suggest(name, few(name, tuple(self.instances)), "instances")
+        if self.instances and not nearest(name, few(name, self.known)):
+            inside = few(name, tuple(self.instances))
+            hint = suggest(name, inside, "instances") if not self.known or nearest(name, inside) else hint
         stem = name.rstrip("0123456789")
         if stem in self.first and stem != name:
             first = self.first[stem]

@@ -14,7 +14,7 @@ from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language import composer_marks as marks
 from neurovis_spec.language.reader_characters import FORBIDDEN, REPLACEMENT, Lines, character_name
 from neurovis_spec.language.scalars import NumberRangeError
-from neurovis_spec.language.source import Entry, Mapping, Node, Scalar
+from neurovis_spec.language.source import Entry, Mapping, Node, Scalar, Sequence
 
 DEEPEST: Final = 64
 _MOST_FINDINGS: Final = 1000
@@ -128,7 +128,11 @@ class Refusals:
         if span.line != span.end_line:
             span = Span(span.file, span.line, span.column, span.line, span.column + 1)
         kind = "a mapping" if isinstance(key, Mapping) else "a list"
-        self._error("key-not-text", span, f"a key is a text, not {kind}")
+        hint = None
+        if isinstance(key, Sequence) and all(isinstance(item, Scalar) for item in key.items):
+            names = [str(item.value) for item in key.items if isinstance(item, Scalar)]
+            hint = f"several neurons in one key are joined with '+': {_short(' + '.join(names))}" if names else None
+        self._error("key-not-text", span, f"a key is a text, not {kind}", hint)
 
     def cut_text(self, whole: Scalar, first: str) -> None:
         """Refuse a text that commas have cut; ``first`` is what stands before the first of them."""

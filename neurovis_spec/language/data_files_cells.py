@@ -128,8 +128,12 @@ def number_of(cell: str, row: int, column: int) -> float:
         raise CellError("not-finite", f"{place}: {quoted(cell)} is beyond double precision", at=at)
     if _NOT_FINITE.fullmatch(cell):
         raise CellError("not-finite", f"{place}: '{cell}' is not finite", EMPTY_CELL, at)
-    hint = "columns are separated by commas" if ";" in cell or "\t" in cell else None
-    raise CellError("file-format", f"{place}: {quoted(cell)} is no number", hint, at)
+    raise CellError("file-format", f"{place}: {quoted(cell)} is no number", separated(cell), at)
+
+
+def separated(cell: str) -> str | None:
+    """A hint, where a cell seems to be several that something else than commas separates."""
+    return "columns are separated by commas" if ";" in cell or "\t" in cell else None
 
 
 def counted(cells: int) -> str:

@@ -28,6 +28,7 @@ from neurovis_spec.language.data_files_cells import (
     number_of,
     numbers_in,
     numbers_of,
+    separated,
 )
 from neurovis_spec.language.data_files_header import numbers_columns
 from neurovis_spec.language.data_files_table import CellError, Faults, Room, Table, check_cells
@@ -128,7 +129,8 @@ def _parsed(data: bytes, room: Room | None) -> Table:
 
 def _table(numbers: NDArray[np.float64], width: int, header: tuple[str, ...] | None) -> Table:
     if not len(numbers):
-        raise CellError("file-format", "there is a header but no row of numbers")
+        hint = next(filter(None, map(separated, header or ())), None)
+        raise CellError("file-format", "there is a header but no row of numbers", hint)
     values = numbers.reshape(-1, width)
     return Table(values, ~np.isnan(values), header)
 

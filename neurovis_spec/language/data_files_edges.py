@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from neurovis_spec.diagnostics import nearest
-from neurovis_spec.language.data_files_cells import counted, number_of, numbers_of
+from neurovis_spec.language.data_files_cells import counted, number_of, numbers_of, separated
 from neurovis_spec.language.data_files_csv import NO_COMMENT, Row, batches, plain_lines, read_rows
 from neurovis_spec.language.data_files_table import CellError, Faults, Room, quoted
 
@@ -101,6 +101,8 @@ def _columns(header: Row) -> dict[str, int]:
             hint = f"did you mean '{close[0]}'?" if close else "the columns are from, to, weight and perhaps delay"
             if name.startswith("#"):
                 hint = NO_COMMENT
+            elif separated(name):
+                hint = f"{separated(name)}; {_hint()}"
             raise CellError("file-format", f"row 1, column {column}: no column is called {quoted(name)}", hint)
         if names.index(name) != column - 1:
             raise CellError("file-format", f"row 1, column {column}: '{name}' is there twice")

@@ -47,10 +47,11 @@ def _read(
     free = {name: None for name in known if data.entry(name) is None}  # what is there already is not meant
     for entry in data.entries:
         name, span = entry.name, entry.key.span
-        foreign = None if name in known else words.foreign(name)
+        foreign = None if name in known else words.foreign(name) or _joined(name, known)
         right = None
         if foreign is not None:
             findings.error("unknown-key", span, *foreign)
+            perhaps.update({name.partition(":")[0]} & set(known))
         elif name not in known and findings.errors >= _MOST_HINTS:
             findings.error("unknown-key", span, _unknown(name))
         elif name not in known:
@@ -66,6 +67,14 @@ def _read(
         if right is not None:
             del free[right]
         yield entry if right is None else Entry(entry.key._replace(value=right, inner=None, written=None), entry.value)
+
+
+def _joined(name: str, known: Collection[str]) -> tuple[str, str] | None:
+    """What is said of ``key:value``, which YAML reads as one word: a message and a hint."""
+    key, colon, value = name.partition(":")
+    if not colon or key not in known:
+        return None
+    return _unknown(name), f"a blank belongs behind the colon: {shown(key)}: {shown(value)}"
 
 
 def _unknown(name: str) -> str:

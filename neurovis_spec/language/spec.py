@@ -56,6 +56,8 @@ class Spec(Library):
     def _without(cls, name: str, data: Mapping) -> str | None:
         if name == "name" and is_library(data):
             return "this is a file to be included: a spec uses what it holds with include: [FILE]"
+        if name == "neurovis":
+            return f"add the version of the language: neurovis: {LANGUAGE_VERSION}"
         return None
 
 

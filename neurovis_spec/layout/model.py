@@ -116,6 +116,10 @@ class Layout:
     positions: Mapping[str, Point]
     routes: Mapping[str, Route]
 
+    def __repr__(self) -> str:
+        sizes = f"{len(self.positions):,} positions, {len(self.routes):,} routes"
+        return f"<Layout of {self.network!r} by {self.engine}: {sizes}>"
+
 
 @dataclass(frozen=True, slots=True)
 class Capabilities:

@@ -7,6 +7,7 @@ to take: it gets all at the end.
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import shutil
@@ -51,8 +52,11 @@ def replacing(path: str | os.PathLike[str], kind: Kind = "neurovis-new") -> Iter
 
 
 def written_to(path: str | os.PathLike[str]) -> Path:
-    """The file that a path stands for, links followed. Raises OSError for a folder, a pipe, a block device."""
+    """The file that a path stands for, links followed. Raises OSError for a folder, a pipe, a block device, and where
+    there is no folder to write it into."""
     target = Path(os.path.realpath(path))
+    if not target.parent.is_dir():
+        raise FileNotFoundError(errno.ENOENT, "there is no folder", os.path.dirname(path))  # noqa: PTH120
     if target.exists() and not target.is_file() and not target.is_char_device():
         raise OSError(f"{path} is not a regular file")
     return target

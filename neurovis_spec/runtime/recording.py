@@ -132,6 +132,11 @@ class Recording:
                       self.lesioned_connections, self.states):  # fmt: skip
             frozen(array)
 
+    def __repr__(self) -> str:
+        steps = f"steps {self.step[0]} to {self.step[-1]}, {len(self):,} rows" if len(self) else "no rows"
+        sizes = f"{len(self.neurons):,} neurons, {len(self.sources):,} connections of which {len(self.plastic):,} learn"
+        return f"<Recording of {self.network or 'a network'!r}: {steps}; {sizes}>"
+
     def __len__(self) -> int:
         return len(self.step)
 

@@ -57,12 +57,17 @@ class Simulation:
         inputs: Mapping[str, npt.ArrayLike] | None = None,
     ) -> None:
         self.network = network
+        self._backend, self._inputs = backend, inputs
         self._stepper = prepare(network, backend)
         self._reader = InputReader(network, inputs, lambda first, rows: self._watch.given(first, rows))
         self._controls = Controls(network)
         self._begin = initial_state(network) if start is None else resumed_state(network, start)
         self._apply(self._begin)
         self.reset()
+
+    def __reduce__(self) -> tuple[Callable[..., Simulation], tuple[object, ...]]:
+        """A copy, in another process, goes on from here; code that was made for the network is made there anew."""
+        return _resumed, (self.network, self._backend, self._inputs, self._begin, self._state)
 
     @cached_property
     def _names(self) -> Names:
@@ -265,6 +270,20 @@ class Simulation:
         self._state = state.copy()
         self._apply(self._state)
         self._reader.use(self._state)
+
+
+def _resumed(
+    network: Network,
+    backend: str | Backend | None,
+    inputs: Mapping[str, npt.ArrayLike] | None,
+    begin: State,
+    state: State,
+) -> Simulation:
+    """A simulation whose run began with one state, at another."""
+    simulation = Simulation(network, backend, inputs=inputs)
+    simulation._begin, simulation._state = begin, state
+    simulation._reader.use(state)
+    return simulation
 
 
 def _reader(network: Network, output: Output) -> Callable[[State], np.float64 | FloatArray]:
