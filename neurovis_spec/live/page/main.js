@@ -8,6 +8,7 @@ import { Controls, part } from './controls.js';
 import { Drawing } from './draw.js';
 import { listKeys } from './keys.js';
 import { under } from './pick.js';
+import { Pointer } from './pointer.js';
 import { Link } from './protocol.js';
 import { Turning } from './turning.js';
 
@@ -98,30 +99,12 @@ const turning = new Turning(link, part);
 const attention = new Attention(link, redraw, (group) => turning.hold(group));
 
 new ResizeObserver(resize).observe(canvas);
-canvas.addEventListener('wheel', (event) => {
-  camera.closer(Math.exp(-event.deltaY / 400), event.offsetX * density, event.offsetY * density);
-  event.preventDefault();
-  redraw();
-}, { passive: false });
-/** The neuron or the connection under a pointer. @param {PointerEvent} event @returns {string} */
-function pointed(event) {
-  const { look } = link;
-  return drawing && look ? under(context, drawing, camera, look, event.offsetX * density, event.offsetY * density) : '';
-}
-let dragged = 0;
-canvas.addEventListener('pointerdown', () => { dragged = 0; });
-canvas.addEventListener('pointerup', (event) => { if (dragged < 5 && event.button === 0) attention.hold(pointed(event)); });
-canvas.addEventListener('pointerleave', () => attention.point('', [0, 0]));
-canvas.addEventListener('pointermove', (event) => {
-  if (event.buttons !== 1) {
-    const id = pointed(event);
-    canvas.style.cursor = id ? 'pointer' : '';
-    attention.point(id, camera.unit(event.offsetX * density, event.offsetY * density));
-    return;
-  }
-  dragged += Math.abs(event.movementX) + Math.abs(event.movementY);
-  camera.move(event.movementX * density, event.movementY * density);
-  redraw();
+new Pointer(canvas, camera, attention, {
+  pointed(x, y) {
+    const { look } = link;
+    return drawing && look ? under(context, drawing, camera, look, x, y) : '';
+  },
+  redraw,
 });
 /** List the keys, or close the list. */
 function help() {
