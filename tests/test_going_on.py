@@ -104,6 +104,18 @@ def test_what_was_lesioned_stays_so(tmp_path: Path) -> None:
     assert simulation.activity.tolist() == [1.0, 2.0, 1.0]
 
 
+def test_what_a_lesioned_connection_carried_is_not_under_way(tmp_path: Path) -> None:
+    text = HEAD + "neurons: {A: {bias: g}, B: {}}\nconnections: {A -> B: {delay: 2}}\n"
+    recording = nv.compile_text(text + "events: [{at: 1, lesion: A -> B}]").run(5)
+    simulation = nv.compile_text(text).simulator(start=saved(recording, tmp_path))
+    simulation.mend("A -> B")
+    found = []
+    for _ in range(4):
+        simulation.step()
+        found.append(simulation.activity[1])
+    assert found == [0.0, 0.0, 1.0, 1.0]
+
+
 @pytest.mark.parametrize("backend", ["reference", "numpy"])
 def test_random_numbers_go_on(backend: str, tmp_path: Path) -> None:
     network = nv.compile_text(HEAD + "neurons: {A: {count: 2, noise: 'normal(0, g)'}, B: {noise: 'uniform(0, k + 1)'}}")

@@ -220,6 +220,26 @@ def test_an_edited_comment_changes_nothing() -> None:
         assert same(other.seen(), seen[other.step])
 
 
+def test_what_was_lesioned_for_a_while_has_nothing_under_way_in_an_edited_network_either() -> None:
+    source, known = SimulatedSource(network().simulator()), SimulatedSource(network().simulator())
+    for one in (source, known):
+        one.go(0)
+        while one.step < 10:
+            one.advance()
+        one.turn(Lesion("A3 -> A1"))
+        while one.step < 20:
+            one.advance()
+        one.turn(Lesion("A2 -> A1"))
+    other = carried(source, network(SPEC + "# a comment\n").simulator())
+    for one in (other, known):
+        one.turn(Mend("A2 -> A1"))
+        one.turn(Mend("A3 -> A1"))
+    for _ in range(5):
+        other.advance()
+        known.advance()
+        assert same(other.seen(), known.seen())
+
+
 def test_an_edited_network_goes_on_at_its_step_with_what_it_has_learned() -> None:
     source = SimulatedSource(network().simulator())
     driven(source, 60)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import cast
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 import neurovis_spec as nv
-from neurovis_spec.runtime.simulation import ParameterError
+from neurovis_spec.runtime.simulation import ParameterError, Simulation
 from neurovis_spec.runtime.state import State
 
 HEAD = "neurovis: 1\nname: x\nseed: 3\nparameters: {p: 0.5, q: 2*p, r: {value: 0.25, min: 0, max: 4}}\n"
@@ -234,6 +235,45 @@ def test_what_is_clamped_lesioned_and_stopped_by_hand_is_as_by_events(backend: s
     assert expected["B1"][3:7].tolist() == [0.0] * 4
     assert expected["B1"][7] == 0.0  # nothing was sent while it was lesioned
     assert expected["B1"][9] > 0
+
+
+@BACKENDS
+def test_a_lesion_that_is_mended_before_a_step_is_none(backend: str, tmp_path: Path) -> None:
+    """What is under way is lost when a step is made without it, and not before."""
+    network = nv.compile_text(
+        HEAD + "neurons: {A: {count: 2, bias: 1}, B: {}}\n"
+        "connections: {A1 -> B: {weight: 1, delay: 3}, A2 -> B: {weight: 10, delay: 3}}\n"
+    )
+
+    def made(turns: Mapping[int, Callable[[Simulation], object]]) -> list[float]:
+        simulation, found = network.simulator(backend), []
+        for k in range(12):
+            if k in turns:
+                turns[k](simulation)
+            simulation.step()
+            found.append(float(simulation.activity[2]))
+        return found
+
+    def twice(simulation: Simulation) -> None:
+        for part in ("A2", "A2 -> B", "B", "A1 -> B"):
+            simulation.lesion(part)
+            simulation.mend(part)
+        simulation.lesion("A2")
+        simulation.save_state(tmp_path / "x.state")
+        simulation.restore(tmp_path / "x.state")
+        simulation.mend("A2")
+
+    whole = made({})
+    assert whole == [0.0] * 3 + [11.0] * 9
+    assert made(dict.fromkeys(range(12), twice)) == whole
+
+    def stepped(simulation: Simulation) -> None:
+        simulation.mend("A2")
+        twice(simulation)
+
+    lost = [0.0] * 3 + [11.0] * 2 + [1.0] * 4 + [11.0] * 3
+    assert made({5: lambda one: one.lesion("A2"), 6: lambda one: one.mend("A2")}) == lost
+    assert made({5: lambda one: one.lesion("A2"), 6: stepped}) == lost
 
 
 @BACKENDS

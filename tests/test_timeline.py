@@ -100,7 +100,7 @@ def test_what_is_carried_on_is_what_each_step_gives_by_itself(changes: list[Chan
     assert [change.at for change in network.changes] == sorted({at for _, at, *_ in changes} | ends)
     state, controls = initial_state(network), Controls(network)
     for change in network.changes:
-        controls.apply(state.conditions, state.weights, state.signals, change)
+        controls.apply(state, change)
         check(state, changes, change.at)
 
 

@@ -9,13 +9,14 @@ of the new spec and what was turned by hand make of them by this step.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 
 import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.simulated import SimulatedSource
-from neurovis_spec.live.source import Turned
+from neurovis_spec.live.source import SourceError, Turned
 from neurovis_spec.live.turns import Feed, turn
 from neurovis_spec.runtime.signals import signal_layout
 from neurovis_spec.runtime.simulation import Simulation
@@ -25,17 +26,21 @@ from neurovis_spec.runtime.state import State
 def carried(old: SimulatedSource, simulation: Simulation) -> SimulatedSource:
     """The source that goes on where ``old`` stands, which nobody uses after that; from the beginning where the two
     networks have no neuron in common."""
-    was, network, turned, fed = old.network, simulation.network, old.turned, old.fed
+    was, network, turned, step = old.network, simulation.network, old.turned, old.step
     if not set(was.neurons.names) & set(network.neurons.names):
         return SimulatedSource(simulation)
     origin, then = simulation.state(), old.leave()
     sizes = {entry.name: entry.size for entry in network.inputs}
-    done = _replay(simulation, then.k, turned, sizes)
+    done = _replay(simulation, then.k, [entry for entry in turned if entry.step < step], sizes)
     state = simulation.state()
     _carry(was, then, network, state)
     simulation.restore(state)
-    kept = {name: values for name, values in fed.items() if sizes.get(name) == len(values)}
-    return SimulatedSource(simulation, state, done, kept, origin)
+    kept = {name: values for name, values in old.fed.items() if sizes.get(name) == len(values)}
+    source = SimulatedSource(simulation, state, done, kept, origin)
+    for entry in (entry for entry in turned if entry.step == step):
+        with suppress(SourceError):  # of what is no longer there
+            source.turn(entry.turn)
+    return source
 
 
 def _replay(simulation: Simulation, k: int, turned: Sequence[Turned], inputs: Mapping[str, int]) -> list[Turned]:
@@ -44,12 +49,12 @@ def _replay(simulation: Simulation, k: int, turned: Sequence[Turned], inputs: Ma
     events = [(change.at, 0, None) for change in simulation.network.changes if change.at <= k]
     done = []
     for at, _, entry in sorted([*events, *((entry.step + 1, 1, entry) for entry in turned)], key=lambda item: item[:2]):
+        state = simulation.state()
+        state.k = at
+        simulation.restore(state)  # the events of this step apply
+        if entry is None:
+            continue
         try:
-            if entry is None:
-                state = simulation.state()
-                state.k = at
-                simulation.restore(state)
-                continue
             if not isinstance(entry.turn, Feed):
                 turn(simulation, entry.turn)
             elif entry.turn.name not in inputs:

@@ -83,7 +83,7 @@ class Exported:
                 if _only_sets(change):
                     continue
                 # what is set changes nothing of this; it is done in C
-                controls.apply(state.conditions, state.weights, state.signals, change._replace(parameters=()))
+                controls.apply(state, change._replace(parameters=()))
                 phases.append(self._phase(change.at, state))
         return phases
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import zipfile
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -77,7 +78,9 @@ def load_state(network: Network, path: Path) -> State:
             state.begun, state.continued = _whole(about, "begun", -1), about.get("continued") is True
             _clamp_again(network, state, archive, size)
     controls = Controls(network)
-    controls.restructure(state.conditions)
+    controls.restructure(state)
+    now = state.conditions
+    now.structure = replace(now.structure, since=found["gone_since"].astype(np.int64))
     return state
 
 
@@ -98,6 +101,7 @@ def _arrays(state: State) -> dict[str, Array]:
         "held_value": now.held.value,
         "lesioned_neurons": now.lesioned_neurons.astype(np.uint8),
         "lesioned_connections": now.lesioned_connections.astype(np.uint8),
+        "gone_since": now.structure.since,
         "paused": now.paused.astype(np.uint8),
     }
 

@@ -28,11 +28,12 @@ Mask = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Structure:
-    """Which connections a step leaves out: ``gone`` (m,) those that are lesioned, or one of whose ends is, and
-    ``still`` (m,) those whose rule is not carried out. A backend that has made code for one structure makes it anew
-    where that of a State is another object."""
+    """Which connections a step leaves out: ``gone`` (m,) those that are lesioned, or one of whose ends is, ``since``
+    (m,) the step from which each of them is, and ``still`` (m,) those whose rule is not carried out. A backend that has
+    made code for one structure makes it anew where that of a State is another object."""
 
     gone: Mask
+    since: IntArray
     still: Mask
 
     @property
@@ -83,7 +84,8 @@ def first_conditions(network: Network) -> Conditions:
     n, m = len(network.neurons), len(network.connections)
     settable = network.settable
     nothing = np.zeros(m, dtype=np.bool_)
-    nothing.flags.writeable = False
+    never = np.zeros(m, dtype=np.int64)
+    nothing.flags.writeable = never.flags.writeable = False
     return Conditions(
         parameters=settable.parameters.copy(),
         chosen=np.zeros(len(settable.slots), dtype=np.bool_),
@@ -92,7 +94,7 @@ def first_conditions(network: Network) -> Conditions:
         lesioned_neurons=np.zeros(n, dtype=np.bool_),
         lesioned_connections=np.zeros(m, dtype=np.bool_),
         paused=np.zeros(m, dtype=np.bool_),
-        structure=Structure(nothing, nothing),
+        structure=Structure(nothing, never, nothing),
     )
 
 
@@ -113,7 +115,7 @@ class Controls:
             return False
         state.begun = state.k
         with np.errstate(all="ignore"):
-            self.apply(state.conditions, state.weights, state.signals, change)
+            self.apply(state, change)
         return True
 
     def set(self, now: Conditions, weights: FloatArray, values: Mapping[int, float]) -> None:
@@ -127,21 +129,22 @@ class Controls:
             now.held.follow(patch.changed, now.parameters)
             self.hold(now)
 
-    def apply(self, now: Conditions, weights: FloatArray, signals: FloatArray, change: Change) -> None:
+    def apply(self, state: State, change: Change) -> None:
         """What the events of a step change; all or nothing. Raises PatchError, which it cannot where nothing was set
         but by the events before."""
-        self.set_parameters(now, weights, change)
+        now = state.conditions
+        self.set_parameters(now, state.weights, change)
         if change.released or change.clamps:
             now.held.end(change.released, now.parameters)
             for clamp in change.clamps:
                 now.held.begin(clamp, now.parameters)
             self.hold(now)
         if len(change.mended_neurons) or len(change.mended_connections):
-            self.mend(now, signals, change.mended_neurons, change.mended_connections)
+            self.mend(state, change.mended_neurons, change.mended_connections)
         if len(change.lesioned_neurons) or len(change.lesioned_connections):
-            self.lesion(now, change.lesioned_neurons, change.lesioned_connections)
+            self.lesion(state, change.lesioned_neurons, change.lesioned_connections)
         for members, on in change.learning:
-            self.learn(now, members, on)
+            self.learn(state, members, on)
 
     def set_parameters(self, now: Conditions, weights: FloatArray, change: Change) -> None:
         """Set the parameters that the events of a step set. Raises PatchError."""
@@ -149,31 +152,33 @@ class Controls:
             values = {slot: float(formula.values(now.parameters)) for slot, formula in change.parameters}
             self.set(now, weights, values)
 
-    def lesion(self, now: Conditions, neurons: IntArray, connections: IntArray) -> None:
+    def lesion(self, state: State, neurons: IntArray, connections: IntArray) -> None:
         """Neurons and connections are silent from now on."""
-        now.lesioned_neurons[neurons] = True
-        now.lesioned_connections[connections] = True
-        self.restructure(now)
+        state.conditions.lesioned_neurons[neurons] = True
+        state.conditions.lesioned_connections[connections] = True
+        self.restructure(state)
 
-    def mend(self, now: Conditions, signals: FloatArray, neurons: IntArray, connections: IntArray) -> None:
-        """The opposite of a lesion: what has been silent takes part again. It has sent nothing meanwhile: ``signals``
-        under way are 0."""
+    def mend(self, state: State, neurons: IntArray, connections: IntArray) -> None:
+        """The opposite of a lesion: what has been silent takes part again. What was left out of a step has nothing
+        under way: it has lost that, and sent nothing meanwhile. A lesion that is mended before a step is none."""
+        now = state.conditions
         now.lesioned_neurons[neurons] = False
         now.lesioned_connections[connections] = False
-        before = now.structure.gone
-        self.restructure(now)
-        self._clear(signals, np.flatnonzero(before & ~now.structure.gone))
+        before = now.structure
+        self.restructure(state)
+        self.clear(state, np.flatnonzero(before.gone & (before.since < state.k) & ~now.structure.gone))
 
-    def _clear(self, signals: FloatArray, connections: IntArray) -> None:
+    def clear(self, state: State, connections: IntArray) -> None:
+        """Nothing is under way on these connections."""
         offsets, delays = signal_layout(self.network).offsets, self.network.connections.delays
         for connection in connections.tolist():
             if delays[connection]:
-                signals[offsets[connection] : offsets[connection] + delays[connection]] = 0.0
+                state.signals[offsets[connection] : offsets[connection] + delays[connection]] = 0.0
 
-    def learn(self, now: Conditions, connections: IntArray, on: bool) -> None:
+    def learn(self, state: State, connections: IntArray, on: bool) -> None:
         """Switch the rules of connections on or off; weights and states of a rule that is off stay as they are."""
-        now.paused[connections] = not on
-        self.restructure(now)
+        state.conditions.paused[connections] = not on
+        self.restructure(state)
 
     def hold(self, now: Conditions) -> None:
         """Work out what is held in each block."""
@@ -188,12 +193,13 @@ class Controls:
             holds.append((own, values[own]) if len(own) else None)
         now.holds = tuple(holds)
 
-    def restructure(self, now: Conditions) -> None:
+    def restructure(self, state: State) -> None:
         """Work out what a step leaves out."""
-        connections = self.network.connections
+        connections, now = self.network.connections, state.conditions
         silent = now.lesioned_neurons
         gone = silent[connections.sources] | silent[connections.targets] | now.lesioned_connections
         still = gone | now.paused
         if not (np.array_equal(gone, now.structure.gone) and np.array_equal(still, now.structure.still)):
-            now.structure = Structure(gone, still)
+            since = np.where(gone & ~now.structure.gone, state.k, now.structure.since)
+            now.structure = Structure(gone, since, still)
         self.hold(now)

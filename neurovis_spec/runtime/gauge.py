@@ -40,7 +40,7 @@ def over(text: str, network: Network, recording: Recording) -> FloatArray:
     for begin, end in pairwise(edges):
         while changes and changes[0].at <= begin:
             with np.errstate(all="ignore"):
-                controls.apply(state.conditions, state.weights, state.signals, changes.popleft())
+                controls.apply(state, changes.popleft())
         rows = slice(begin - first, end - first)
         parts.append(meter.rows(recording.activity[rows], state.conditions.parameters, states[rows]))
     return np.concatenate(parts)

@@ -48,6 +48,7 @@ def resumed_state(network: Network, recording: Recording) -> State:
         weights = state.weights.copy()
         weights[same] = recording.all_weights(row)[recorded]
         _send(network, state, -ago, recording.activity[row][order], weights)
+    controls.clear(state, np.flatnonzero(state.conditions.structure.gone))
     state.activity = recording.activity[-1][order]
     state.weights[places] = recording.weights_after[columns]
     return state
@@ -84,7 +85,7 @@ def _lesion_again(network: Network, recording: Recording, state: State, controls
     connections = [network.connection_index[name] for name in names if name in network.connection_index]
     if neurons or connections:
         found = (np.array(places, dtype=np.int64) for places in (neurons, connections))
-        controls.lesion(state.conditions, *found)
+        controls.lesion(state, *found)
 
 
 def _last_rows(recording: Recording, depth: int) -> list[tuple[int, int]]:

@@ -201,14 +201,15 @@ class Simulation:
         for part in parts:
             self._parts(part)
         for part in parts:
-            self._controls.lesion(self._state.conditions, *self._parts(part))
+            self._controls.lesion(self._state, *self._parts(part))
 
     def mend(self, *parts: str) -> None:
-        """Undo lesions of neurons or connections: from step k on they take part again. Raises KeyError."""
+        """Undo lesions of neurons or connections: from step k on they take part again. What was under way on them is
+        lost, but where no step was made without them. Raises KeyError."""
         for part in parts:
             self._parts(part)
         for part in parts:
-            self._controls.mend(self._state.conditions, self._state.signals, *self._parts(part))
+            self._controls.mend(self._state, *self._parts(part))
 
     def learning(self, connections: str, on: bool = True) -> None:
         """Carry out the rules of connections (``K -> O``) from step k on, or stop them: weights and states of rules
@@ -216,7 +217,7 @@ class Simulation:
         _, members = self._parts(connections)
         if not len(members) or not (self.network.connections.rules[members] >= 0).any():
             raise UnknownNameError(f"there is no rule at '{connections}'")
-        self._controls.learn(self._state.conditions, members, arguments.truth("on", on))
+        self._controls.learn(self._state, members, arguments.truth("on", on))
 
     def _neurons(self, text: str) -> IntArray:
         found = self._names.find(arguments.text("reference", text))
