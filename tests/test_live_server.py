@@ -353,6 +353,7 @@ BROKEN: list[str | bytes] = [
     *(json.dumps({"type": "lesion", "part": "x" * 5000}), '{"type": "learn", "connections": "A -> B", "on": 1}'),
     *('{"type": "look", "items": "n1"}', '{"type": "look", "items": ["x1"]}', '{"type": "look", "items": ["n1", 2]}'),
     *(json.dumps({"type": "look", "items": ["n1"] * 65}), '{"type": "look", "items": ["n-1"]}'),
+    *('{"type": "set", "values": {"pull": 1}, "moving": 1}', '{"type": "lesion", "part": "B", "moving": true}'),
     *(b"", b"\x00", b"\x00" * 5, b"\x00" * 1000, '{"type": "pl\x00ay"}', '{"type": "step", "by": ' + "9" * 5000 + "}"),
 ]
 

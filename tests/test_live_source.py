@@ -9,8 +9,9 @@ import neurovis_spec as nv
 from neurovis_spec.live.carry import carried
 from neurovis_spec.live.past import EVERY, Kept, Past
 from neurovis_spec.live.recorded import RecordedSource
+from neurovis_spec.live.rules import rules
 from neurovis_spec.live.simulated import SimulatedSource
-from neurovis_spec.live.source import Reach, Seen, SourceError
+from neurovis_spec.live.source import Reach, Seen, SourceError, Turned
 from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set, Turn
 from neurovis_spec.scene.fading import Fading, snapshots_of
 
@@ -201,6 +202,78 @@ def test_a_recording_is_gone_through_row_by_row() -> None:
         source.branch()
     with pytest.raises(SourceError):
         source.turn(Lesion("B"))
+
+
+def test_of_values_given_while_one_is_dragged_or_at_one_step_the_last_is_the_turn() -> None:
+    source = SimulatedSource(network().simulator())
+    for value in (0.3, 0.4, 0.6):
+        source.turn(Set({"pull": value}, moving=True))
+        source.advance()
+    source.turn(Set({"pull": 0.9}))
+    assert [*source.turned] == [Turned(3, Set({"pull": 0.9}))]
+    source.turn(Set({"pull": 1.0}))
+    assert [*source.turned] == [Turned(3, Set({"pull": 1.0}))]
+    source.turn(Set({"mix": 1.0}))
+    source.advance()
+    source.turn(Set({"mix": 2.0}))
+    for value in (0.1, 0.2):
+        source.turn(Hold("B", value, moving=True))
+        source.advance()
+    source.turn(Feed("push", (1.0,)))
+    assert [*source.turned][1:] == [
+        Turned(3, Set({"mix": 1.0})), Turned(4, Set({"mix": 2.0})),
+        Turned(5, Hold("B", 0.2, moving=True)), Turned(6, Feed("push", (1.0,))),
+    ]  # fmt: skip
+    source.go(1)
+    assert [*source.turned] == [Turned(1, Set({"pull": 0.4}, moving=True))]
+    assert source.parameters["pull"] == 0.4
+    source.go(2)
+    source.advance()
+    assert source.parameters["pull"] == 1.0
+
+
+def test_it_says_what_is_fed_and_which_rules_are_carried_out() -> None:
+    source = SimulatedSource(network().simulator())
+    assert source.learning == {"A -> B": True}
+    source.advance()
+    source.turn(Feed("push", (0.5,)))
+    source.turn(Learn("A1 -> B", False))
+    assert source.fed == {"push": (0.5,)}
+    assert source.learning == {"A -> B": None}
+    source.advance()
+    source.turn(Learn("A -> B", False))
+    assert source.learning == {"A -> B": False}
+    source.go(0)
+    assert (source.fed, source.learning) == ({}, {"A -> B": True})
+
+
+MANY_RULES = """neurovis: 1
+name: rules
+modules:
+  leg: {neurons: {K: {count: 2}, O: {}}, connections: {K -> O: {plasticity: {hebbian: {rate: 0.1}}}, O -> K: 1}}
+neurons: {A: {}, B: {}, C: {count: 3}}
+instances: {left: {module: leg, count: 2}, right: {module: leg}}
+connections:
+  - A -> B: {plasticity: {hebbian: {rate: 0.1}}}
+  - A -> B: {plasticity: {oja: {rate: 0.1}}}
+  - A -> left1.K: {pattern: all_to_all, plasticity: {oja: {rate: 0.1}}}
+  - A + C1..C2 -> left.K: {pattern: all_to_all, plasticity: {oja: {rate: 0.1}}}
+  - B -> C: {pattern: all_to_all}
+"""
+
+
+def test_each_rule_has_a_reference_that_stops_it() -> None:
+    compiled = network(MANY_RULES)
+    found = rules(compiled.network)
+    assert [rule.connections for rule in found] == [
+        "A -> B", "A -> left1.K", "A + C1..C2 -> left.K",
+        "left1.K -> left1.O", "left2.K -> left2.O", "right.K -> right.O",
+    ]  # fmt: skip
+    assert found[0].written == "hebbian(rate=0.1); oja(rate=0.1)"
+    for rule in found:
+        source = SimulatedSource(compiled.simulator())
+        source.turn(Learn(rule.connections, False))
+        assert source.learning[rule.connections] is False
 
 
 def test_an_edited_comment_changes_nothing() -> None:

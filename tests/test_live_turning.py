@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from chromium import Page
-from test_live_browser import SPECS, pause, shown
+from test_live_browser import SPECS, STEP, pause, shown
 from test_live_looking import TIP, places, told
 
 import neurovis_spec as nv
@@ -25,11 +25,11 @@ EVENTS = "document.querySelector('#events').value"
 def test_what_is_declared_has_its_bounds_and_description() -> None:
     head = "neurovis: 1\nname: x\n"
     given = "parameters: {a: {value: 2, max: 3, description: the gain}, c: 3}\nneurons: {A: {count: c, bias: a}}\n"
-    assert declared(nv.compile_text(head + given)) == [
+    assert declared(nv.compile_text(head + given))["parameters"] == [
         {"name": "a", "value": 2.0, "low": None, "high": 3.0, "description": "the gain"}
     ]
     follows = "parameters: {a: 2, b: {value: 1, min: -a, max: 2*a}}\nneurons: {A: {bias: a + b}}\n"
-    assert declared(nv.compile_text(head + follows))[1] == {
+    assert declared(nv.compile_text(head + follows))["parameters"][1] == {
         "name": "b", "value": 1.0, "low": -2.0, "high": 4.0, "description": "",
     }  # fmt: skip
 
@@ -162,6 +162,133 @@ def test_the_events_that_are_copied_do_in_the_spec_what_was_done_by_hand(tmp_pat
                 value = float(words[1].removeprefix("activity ").replace("−", "-"))
                 index = again.network.neurons.names.index(name)
                 assert np.isclose(value, again.run(step + 1).snapshot(step).activity[index], rtol=1e-5, atol=1e-9)
+
+    asyncio.run(main())
+
+
+FED = """neurovis: 1
+name: fed
+time: {dt: 0.02}
+parameters: {pull: {value: 0.1, min: 0, max: 1}}
+inputs: {push: {size: 2, description: what the hands do}, wind: {}}
+neurons: {A: {count: 2, activation: tanh, input: push}, B: {activation: tanh, input: wind}}
+connections:
+  A1 -> B: {weight: 0.5, delay: 3, plasticity: {hebbian: {rate: 0.01}}}
+  A2 -> B: pull
+"""
+
+
+async def drag(opened: Page, name: str, *shares: float) -> None:
+    """Drag a slider to parts of its length, one after the other."""
+    script = f"(box => [box.x, box.y + box.height / 2, box.width])({name}.getBoundingClientRect())"
+    at = await opened.ask(script)
+    assert isinstance(at, list)
+
+    async def mouse(kind: str, share: float) -> None:
+        await opened.call(
+            "Input.dispatchMouseEvent", type=kind, x=at[0] + share * at[2], y=at[1], button="left", buttons=1,
+            clickCount=1,
+        )  # fmt: skip
+
+    await mouse("mousePressed", shares[0])
+    for share in shares:
+        await mouse("mouseMoved", share)
+        await asyncio.sleep(0.08)
+    await mouse("mouseReleased", shares[-1])
+
+
+def test_a_slider_that_is_dragged_while_it_plays_is_one_turn(tmp_path: Path) -> None:
+    async def main() -> None:
+        (tmp_path / "fed.yaml").write_text(FED)
+        async with shown(str(tmp_path / "fed.yaml"), tmp_path) as (opened, _, _):
+            await opened.size(1000, 800)
+            await opened.key("t")
+            seen = (
+                "window.seen = new Set(); new MutationObserver(() => window.seen.add("
+                f"{TURNED}.map(words => words.split(': ')[1]).join())).observe(turned, {{childList: true}})"
+            )
+            await opened.ask(f"{seen}; 0")
+            slider = "document.querySelector('#slider-pull')"
+            await drag(opened, slider, 0.2, 0.4, 0.6, 0.8)
+            await opened.until(f"{TURNED}.length == 1")
+            value = await opened.ask(f"{slider}.value")
+            assert 0.7 < float(str(value)) < 0.9
+            await turned(opened, f"pull = {value}")
+            past = await opened.ask("[...window.seen]")
+            assert isinstance(past, list)
+            assert len(past) >= 3, "it had its effect while it was dragged"
+            assert not any("," in row for row in past), "and was one turn all the time"
+            assert await opened.ask(f"{EVENTS}.split('\\n').length") == 3
+            here = await opened.ask(STEP)
+            await opened.until(f"{STEP} > {here} + 1")
+            await opened.ask("document.querySelector('#turned button').click()")
+            await turned(opened, "pull = 0.1", f"pull = {value}")
+
+    asyncio.run(main())
+
+
+def test_inputs_without_a_source_are_fed_by_sliders_until_they_are_reset(tmp_path: Path) -> None:
+    async def main() -> None:
+        (tmp_path / "fed.yaml").write_text(FED)
+        async with shown(str(tmp_path / "fed.yaml"), tmp_path) as (opened, _, _):
+            await opened.size(1000, 800)
+            await pause(opened)
+            await opened.key("t")
+            names = "[...document.querySelectorAll('#feeds label')].map(label => label.textContent).join()"
+            assert await opened.ask(names) == "push 1,push 2,wind"
+            assert await opened.ask("document.querySelector('#feeds small').textContent") == "what the hands do"
+            await opened.ask("((one) => { one.value = 0.5; one.onchange(); })(document.querySelector('#feed-push-2'))")
+            await turned(opened, "feed push = 0, 0.5")
+            await opened.ask("((one) => { one.value = -1; one.onchange(); })(document.querySelector('#feed-wind'))")
+            await turned(opened, "feed wind = -1", "feed push = 0, 0.5")
+            await opened.key("]")
+            await opened.key("]")
+            await opened.ask("document.querySelector('#step').click()")
+            await told(opened, "A2")
+            await opened.until(f"{TIP}.textContent.includes('activity +{np.tanh(0.5):.6g}\\n')")
+            two = "document.querySelector('#feed-push-2')"
+            await opened.ask(f"{two}.dispatchEvent(new Event('dblclick'))")
+            await turned(opened, "push from its source", "feed wind = -1", "feed push = 0, 0.5")
+            await opened.until(f"{two}.value == 0")
+            await opened.ask("document.querySelectorAll('#turned button')[1].click()")
+            await opened.until("document.querySelector('#feed-wind').value == 0")
+
+    asyncio.run(main())
+
+
+def test_rules_are_switched_off_and_on(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):
+            step = await pause(opened)
+            await opened.key("t")
+            one = "document.querySelector('#rules input')"
+            words = await opened.ask(f"{one}.parentNode.textContent")
+            assert words == " K -> O delta(rate=0.01, target=T)"
+            assert await opened.ask(f"{one}.checked")
+            await opened.ask(f"{one}.click()")
+            await turned(opened, "learning of K -> O off")
+            assert await opened.ask(EVENTS) == f"events:\n  - {{at: {step + 1}, learning: {{K -> O: false}}}}\n"
+            await opened.until(f"!{one}.checked")
+            await opened.ask("document.querySelector('#turned button').click()")
+            await turned(opened, "learning of K -> O on", "learning of K -> O off")
+            await opened.until(f"{one}.checked")
+
+    asyncio.run(main())
+
+
+def test_a_refusal_is_read_while_it_plays_until_something_else_is_done(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, access):
+            await opened.call("Page.navigate", url=access.url(owner=False))
+            said = "document.querySelector('#refusal')"
+            await opened.until(f"{said}?.hidden && {STEP} > 3")
+            await opened.key("Home")
+            await opened.until(f"{said}.textContent == 'this page only looks on'")
+            here = await opened.ask(STEP)
+            await opened.until(f"{STEP} > {here} + 30")
+            assert not await opened.ask(f"{said}.hidden")
+            await opened.key("Escape")
+            await opened.until(f"{said}.hidden")
 
     asyncio.run(main())
 

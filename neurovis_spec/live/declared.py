@@ -1,7 +1,7 @@
-"""Declared: the parameters that can be set in a run, as a page gets them.
+"""Declared: what can be turned in a run, as a page gets it.
 
-In: a compiled network. Out: for each its name, the value that it begins with, its bounds where it has some, and its
-description.
+In: a compiled network. Out: the parameters that can be set, each with its name, the value that it begins with, its
+bounds where it has some, and its description; the inputs without a source; and the rules that can be stopped.
 """
 
 from __future__ import annotations
@@ -11,9 +11,25 @@ import math
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.settable import Dependent
+from neurovis_spec.live.rules import rules
 
 
-def declared(compiled: CompiledNetwork) -> list[dict[str, object]]:
+def declared(compiled: CompiledNetwork) -> dict[str, list[dict[str, object]]]:
+    """All that can be turned."""
+    network, written = compiled.network, compiled.spec.inputs
+    inputs = [entry for entry in network.inputs if entry.expression is None and entry.table is None]
+    return {
+        "parameters": parameters(compiled),
+        "inputs": [
+            {"name": entry.name, "size": entry.size, "description": "" if about is None else about.value}
+            for entry in inputs
+            for about in (written[entry.name].description if entry.name in written else None,)
+        ],
+        "rules": [{"connections": rule.connections, "rule": rule.written} for rule in rules(network)],
+    }
+
+
+def parameters(compiled: CompiledNetwork) -> list[dict[str, object]]:
     """The parameters in the order written; bounds that follow other parameters are as these begin."""
     network, written = compiled.network, compiled.spec.parameters
     settable = network.settable

@@ -11,6 +11,7 @@ import gzip
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from types import MappingProxyType
 
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.scene import (
@@ -37,10 +38,10 @@ from neurovis_spec.scene.lesions import FAINT
 
 
 def content(
-    network: Network, scene: Scene, more: Mapping[str, float], parameters: Sequence[Mapping[str, object]] = ()
+    network: Network, scene: Scene, more: Mapping[str, float], declared: Mapping[str, object] = MappingProxyType({})
 ) -> bytes:
     """The scene and what a page must know of its network, as JSON, compressed; ``more`` are further constants,
-    ``parameters`` those that can be set."""
+    ``declared`` what can be turned."""
     value = {
         "name": network.name,
         "title": scene.title,
@@ -51,12 +52,7 @@ def content(
         "dt": network.dt if network.dt_given else None,
         "discs": len(network.neurons),
         "lines": len(network.connections),
-        "parameters": [dict(entry) for entry in parameters],
-        "inputs": [
-            {"name": entry.name, "size": entry.size}
-            for entry in network.inputs
-            if entry.expression is None and entry.table is None
-        ],
+        **declared,
         "constants": {
             "families": list(FAMILIES), "halo": HALO, "subscriptDrop": SUBSCRIPT_DROP, "subscriptSize": SUBSCRIPT_SIZE,
             "headOfLength": HEAD_OF_LENGTH, "headOfWidth": HEAD_OF_WIDTH, "headMore": HEAD_MORE,

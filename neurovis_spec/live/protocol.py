@@ -82,6 +82,8 @@ def status_message(status: Status, owner: bool) -> str:
         owner=owner,
         can=asdict(status.capabilities),
         parameters={name: value for name, value in status.parameters.items() if math.isfinite(value)},
+        fed={name: list(values) for name, values in status.fed.items()},
+        learning=dict(status.learning),
         turned=[_turned(entry) for entry in status.turned[-_LISTED:]],
         events=list(status.events[:_LISTED]),
     )
@@ -156,9 +158,9 @@ def command_of(text: str) -> Command | LookAt:
     if wanted is None:
         raise ProtocolError("the type of the message is unknown")
     checks, make = wanted
-    if set(message) != set(checks):
+    if not set(checks) - _OPTIONAL <= set(message) <= set(checks):
         raise ProtocolError(f"a message '{kind}' has other members")
-    return make(**{name: check(message[name]) for name, check in checks.items()})
+    return make(**{name: checks[name](value) for name, value in message.items()})
 
 
 def _no_constant(name: str) -> object:
@@ -228,13 +230,15 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "restart": ({}, Restart),
     "branch": ({}, Branch),
     "speed": ({"value": _speed}, Speed),
-    "set": ({"values": _values}, Set),
-    "feed": ({"name": _name, "values": _numbers}, Feed),
-    "hold": ({"neurons": _name, "value": _number}, Hold),
+    "set": ({"values": _values, "moving": _truth}, Set),
+    "feed": ({"name": _name, "values": _numbers, "moving": _truth}, Feed),
+    "hold": ({"neurons": _name, "value": _number, "moving": _truth}, Hold),
     "release": ({"neurons": _name}, Release),
     "lesion": ({"part": _name}, Lesion),
     "mend": ({"part": _name}, Mend),
     "learn": ({"connections": _name, "on": _truth}, Learn),
 }
+#: Members that a message need not have.
+_OPTIONAL: Final = {"moving"}
 #: The types of the messages that a client may send, for the tests of the documentation.
 MESSAGES: Final = tuple(_MESSAGES)

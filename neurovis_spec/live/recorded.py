@@ -53,6 +53,16 @@ class RecordedSource:
         """Nothing can be set."""
         return {}
 
+    @property
+    def fed(self) -> dict[str, tuple[float, ...]]:
+        """Nothing is given by hand."""
+        return {}
+
+    @property
+    def learning(self) -> dict[str, bool | None]:
+        """No rule can be stopped."""
+        return {}
+
     def seen(self) -> Seen:
         """What is seen of the step that it stands at."""
         neurons, connections = np.zeros(len(self.network.neurons), bool), np.zeros(len(self.network.connections), bool)

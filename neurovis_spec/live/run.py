@@ -31,6 +31,8 @@ class Status:
     ended: bool
     capabilities: Capabilities
     parameters: Mapping[str, float]
+    fed: Mapping[str, tuple[float, ...]]
+    learning: Mapping[str, bool | None]
     turned: tuple[Turned, ...]
     events: tuple[int, ...]
 
@@ -228,6 +230,8 @@ class Run:
             ended=self._ended,
             capabilities=source.capabilities,
             parameters=source.parameters,
+            fed=source.fed,
+            learning=source.learning,
             turned=source.turned,
             events=self._events(),
         )

@@ -16,8 +16,9 @@ import numpy as np
 
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.past import EVERY, ROOM, Kept, Past
+from neurovis_spec.live.rules import rules
 from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned
-from neurovis_spec.live.turns import Feed, Turn, turn
+from neurovis_spec.live.turns import Feed, Hold, Set, Turn, same_value, turn
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.runtime.simulation import ParameterError, Simulation
 from neurovis_spec.runtime.state import State
@@ -40,6 +41,7 @@ class SimulatedSource:
         room: int = ROOM,
     ) -> None:
         self.network: Network = simulation.network
+        self._rules = rules(self.network)
         self._simulation, self._room = simulation, room
         self._origin = simulation.state() if origin is None else origin
         self._begin(self._origin if begin is None else begin, turned, fed or {})
@@ -48,6 +50,7 @@ class SimulatedSource:
         self._past = Past(self._room)
         self._fading = Fading(self.network)
         self._fed, self._turned = dict(fed), list(turned)
+        self._listed: tuple[list[Turned], tuple[Turned, ...]] = ([], ())
         self._started = self._last = state.k
         self._simulation.restore(state)
         self._keep()
@@ -68,7 +71,10 @@ class SimulatedSource:
     @property
     def turned(self) -> tuple[Turned, ...]:
         """The turns taken on the way to the step that it stands at."""
-        return tuple(self._turned[: bisect_right(self._turned, self.step, key=attrgetter("step"))])
+        taken = self._turned[: bisect_right(self._turned, self.step, key=attrgetter("step"))]
+        if len(self._listed[0]) != len(taken):
+            self._listed = taken, _without_ways(taken)
+        return self._listed[1]
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -80,6 +86,13 @@ class SimulatedSource:
     def fed(self) -> Mapping[str, tuple[float, ...]]:
         """What is fed to inputs."""
         return self._fed
+
+    @property
+    def learning(self) -> Mapping[str, bool | None]:
+        """Whether the rules of the network are carried out, by their connections; None where some are."""
+        stopped = self._simulation.stopped
+        off = {rule.connections: stopped[rule.members] for rule in self._rules}
+        return {name: None if some.any() and not some.all() else not some.any() for name, some in off.items()}
 
     def leave(self) -> State:
         """The state from which the step that it stands at is made; nobody uses this source after that."""
@@ -137,7 +150,8 @@ class SimulatedSource:
         """Forget what came after the step that it stands at."""
         self._past.cut(self._simulation.k)
         self._last = self.step
-        self._turned = list(self.turned)
+        self._turned = [entry for entry in self._turned if entry.step <= self.step]
+        self._listed = [], ()
 
     def turn(self, what: Turn) -> None:
         """Take a turn, from the next step on. Raises SourceError."""
@@ -150,6 +164,8 @@ class SimulatedSource:
             raise SourceError(str(error)) from None
         self.branch()
         self._keep()
+        if self._turned and self._turned[-1].step == self.step and same_value(self._turned[-1].turn, what):
+            self._turned.pop()
         self._turned.append(Turned(self.step, what))
         self._seen = Seen(self._seen.snapshot, *self._simulation.lesioned)
 
@@ -183,3 +199,14 @@ class SimulatedSource:
         activity = run.activity
         seen = self._fading.follow(np.array([step]), activity[None]) if self._fading else None
         return Seen(Snapshot(step, activity, weights, previous, seen), *lesioned)
+
+
+def _without_ways(turned: Sequence[Turned]) -> tuple[Turned, ...]:
+    """Turns, of values that were dragged those in which a drag has ended so far."""
+    pairs = zip(turned, [*turned[1:], None], strict=True)
+    return tuple(one for one, after in pairs if after is None or not _on_its_way(one.turn, after.turn))
+
+
+def _on_its_way(turn: Turn, after: Turn) -> bool:
+    """Whether a value was being dragged when the next one was given."""
+    return isinstance(turn, Set | Feed | Hold) and turn.moving and same_value(turn, after)

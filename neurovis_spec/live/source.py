@@ -6,6 +6,7 @@ where it can, and takes turns where it can. ``simulated`` and ``recorded`` are t
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
@@ -51,7 +52,8 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class Turned:
-    """A turn that was taken after ``step`` was shown: it has its effect from the next one on."""
+    """A turn that was taken after ``step`` was shown: it has its effect from the next one on. Of values that were given
+    to one thing at one step, or while it was dragged, the last is the turn."""
 
     step: int
     turn: Turn
@@ -81,6 +83,16 @@ class Source(Protocol):
     @property
     def parameters(self) -> dict[str, float]:
         """The parameters that can be set, as they are now."""
+        ...
+
+    @property
+    def fed(self) -> Mapping[str, tuple[float, ...]]:
+        """What inputs are given by hand."""
+        ...
+
+    @property
+    def learning(self) -> Mapping[str, bool | None]:
+        """Whether the rules of the network are carried out, by their connections; None where some are."""
         ...
 
     def seen(self) -> Seen:

@@ -1,6 +1,7 @@
 """Turns: what somebody changes by hand while a network runs.
 
-In: names and values, as a client sends them. Out: frozen values that a Simulation is turned by.
+In: names and values, as a client sends them. Out: frozen values that a Simulation is turned by. While somebody drags a
+value it is ``moving``: what is dragged from one value to another is one turn, to where it ends.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ class Set:
     """Parameters have other values from now on."""
 
     values: Mapping[str, float]
+    moving: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +27,7 @@ class Feed:
 
     name: str
     values: tuple[float, ...] = ()
+    moving: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +36,7 @@ class Hold:
 
     neurons: str
     value: float
+    moving: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +69,18 @@ class Learn:
 
 
 Turn: TypeAlias = Set | Feed | Hold | Release | Lesion | Mend | Learn
+
+
+def same_value(one: Turn, other: Turn) -> bool:
+    """Whether both give a value to the same thing."""
+    match one, other:
+        case (Set(), Set()):
+            return one.values.keys() == other.values.keys()
+        case (Feed(), Feed()):
+            return one.name == other.name
+        case (Hold(), Hold()):
+            return one.neurons == other.neurons
+    return False
 
 
 def turn(simulation: Simulation, what: Set | Hold | Release | Lesion | Mend | Learn) -> None:

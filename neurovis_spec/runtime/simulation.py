@@ -115,6 +115,11 @@ class Simulation:
         return now.lesioned_neurons.copy(), now.structure.gone.copy()
 
     @property
+    def stopped(self) -> npt.NDArray[np.bool_]:
+        """Of which connections (m,) the rules are stopped from step k on, a copy."""
+        return self._state.conditions.paused.copy()
+
+    @property
     def parameters(self) -> Mapping[str, float]:
         """The parameters of the spec, as they are for the next step."""
         slots = self.network.settable.index

@@ -10,6 +10,7 @@ import { listKeys } from './keys.js';
 import { under } from './pick.js';
 import { Pointer } from './pointer.js';
 import { Link } from './protocol.js';
+import { Refusal } from './refusal.js';
 import { Turning } from './turning.js';
 
 const canvas = /** @type {HTMLCanvasElement} */ (document.getElementById('picture'));
@@ -74,7 +75,7 @@ const link = new Link({
     if (first) blank();
     canvas.setAttribute('aria-label', scene.title);
     attention.use(scene);
-    turning.use(scene.parameters);
+    turning.use(scene);
     redraw();
   },
   frame() {
@@ -87,7 +88,7 @@ const link = new Link({
       turning.status(message);
     } else if (message.type === 'values') attention.take(message);
     else if (message.type === 'findings') controls.found(message);
-    else if (message.type === 'refused') controls.tell(message.reason);
+    else if (message.type === 'refused') refusal.tell(message.reason);
   },
   link(open) {
     if (open) attention.ask();
@@ -96,6 +97,7 @@ const link = new Link({
 });
 const controls = new Controls(link);
 const turning = new Turning(link, part);
+const refusal = new Refusal(part('refusal'));
 const attention = new Attention(link, redraw, (group) => turning.hold(group));
 
 new ResizeObserver(resize).observe(canvas);

@@ -1,11 +1,12 @@
 /**
- * Sliders: the parameters that a spec declares, within their bounds.
+ * Sliders: numbers within their bounds, each with a slider, a field and a description.
  */
 
 /** @typedef {import('./protocol.js').Declared} Declared */
-/** @typedef {import('./protocol.js').Link} Link */
+/** What is called when a number is given: with null it is as at the beginning; while it is dragged it is moving.
+ * @typedef {(value: number | null, moving: boolean) => void} Given */
 
-/** The least time between two settings while a slider is dragged, in milliseconds. */
+/** The least time between two numbers while a slider is dragged, in milliseconds. */
 const BETWEEN = 50;
 
 /** Where a slider goes: the bounds, and where there is none as far from the value as 0 is, or by 1.
@@ -15,31 +16,30 @@ function range({ value, low, high }) {
   return [least, high === null ? Math.max(value + reach, least + reach) : high];
 }
 
-/** A slider and a field for each parameter; a double click on the slider resets. */
+/** Rows of sliders; a double click on one, or Delete, resets. */
 export class Sliders {
-  /** @param {Link} link @param {HTMLElement} place */
-  constructor(link, place) {
-    this.link = link;
+  /** @param {HTMLElement} place */
+  constructor(place) {
     this.place = place;
     /** @type {Map<string, HTMLInputElement[]>} */
     this.inputs = new Map();
     this.sent = 0;
   }
 
-  /** Another network. @param {Declared[]} declared */
-  use(declared) {
+  /** No rows. */
+  clear() {
     this.inputs.clear();
-    this.place.replaceChildren(...declared.map((entry) => this.row(entry)));
+    this.place.replaceChildren();
   }
 
-  /** @param {Declared} entry @returns {HTMLElement} */
-  row(entry) {
+  /** A row. @param {Declared} entry @param {string} id @param {Given} given */
+  add(entry, id, given) {
     const { name, value, description } = entry, [min, max] = range(entry);
     const row = document.createElement('div'), label = document.createElement('label'), about = document.createElement('small');
     const [slider, field] = ['range', 'number'].map((type) => Object.assign(document.createElement('input'), { type, step: 'any' }));
     row.className = 'slider';
-    slider.id = `slider-${name}`;
-    [slider.min, slider.max, slider.title] = [String(min), String(max), 'a double click resets'];
+    slider.id = id;
+    [slider.min, slider.max, slider.title] = [String(min), String(max), 'a double click or Delete resets'];
     if (entry.low !== null) field.min = String(entry.low);
     if (entry.high !== null) field.max = String(entry.high);
     label.htmlFor = slider.id;
@@ -49,23 +49,20 @@ export class Sliders {
     slider.value = field.value = String(value);
     slider.oninput = () => {
       field.value = slider.value;
-      if (performance.now() - this.sent > BETWEEN) this.set(name, slider.value);
+      if (performance.now() - this.sent < BETWEEN) return;
+      this.sent = performance.now();
+      given(Number(slider.value), true);
     };
-    slider.onchange = () => this.set(name, slider.value);
-    field.onchange = () => { if (field.value && field.checkValidity()) this.set(name, field.value); };
-    slider.ondblclick = () => this.set(name, String(value));
+    slider.onchange = () => given(Number(slider.value), false);
+    field.onchange = () => { if (field.value && field.checkValidity()) given(Number(field.value), false); };
+    slider.ondblclick = () => given(null, false);
+    slider.onkeydown = (event) => { if (event.key === 'Delete') given(null, false); };
     row.append(label, document.createElement('span'), slider, field, ...(description ? [about] : []));
     this.inputs.set(name, [slider, field]);
-    return row;
+    this.place.append(row);
   }
 
-  /** @param {string} name @param {string} value */
-  set(name, value) {
-    this.sent = performance.now();
-    this.link.ask('set', { values: { [name]: Number(value) } });
-  }
-
-  /** Show what the parameters are now, but where one is being set. @param {Object<string, number>} values */
+  /** Show what the numbers are now, but where one is being given. @param {Object<string, number>} values */
   show(values) {
     for (const [name, inputs] of this.inputs) {
       if (!(name in values) || inputs[0].matches(':active') || document.activeElement === inputs[1]) continue;

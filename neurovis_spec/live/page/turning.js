@@ -1,13 +1,16 @@
 /**
- * Turning: parameters, clamps and lesions by hand; what was turned, listed, taken back, and copied for the spec.
+ * Turning: parameters, inputs, rules, clamps and lesions by hand; what was turned, listed, taken back, and copied for the spec.
  */
 
 import { eventsOf, takenBack } from './events.js';
+import { Feeds } from './feeds.js';
+import { Rules } from './rules.js';
 import { Sliders } from './sliders.js';
 
 /** @typedef {import('./protocol.js').Declared} Declared */
 /** @typedef {import('./protocol.js').Group} Group */
 /** @typedef {import('./protocol.js').Link} Link */
+/** @typedef {import('./protocol.js').Scene} Scene */
 /** @typedef {import('./protocol.js').Turned} Turned */
 
 /** A turn in words. @param {Turned} turn @returns {string} */
@@ -29,7 +32,10 @@ export class Turning {
     this.link = link;
     this.find = find;
     this.panel = find('turning');
-    this.sliders = new Sliders(link, find('sliders'));
+    this.sliders = new Sliders(find('sliders'));
+    this.feeds = new Feeds(link, find('feeds'));
+    this.rules = new Rules(link, find('rules'));
+    this.shown = '';
     /** @type {Declared[]} */
     this.declared = [];
     this.ref = '';
@@ -49,10 +55,22 @@ export class Turning {
     if (this.panel.hidden) this.find('picture').focus();
   }
 
-  /** Another network. @param {Declared[]} declared */
-  use(declared) {
-    this.declared = declared;
-    this.sliders.use(declared);
+  /** Another network. @param {Scene} scene */
+  use({ parameters, inputs, rules }) {
+    const shown = JSON.stringify([parameters, inputs, rules]);
+    if (shown === this.shown) return;
+    this.shown = shown;
+    this.declared = parameters;
+    this.sliders.clear();
+    for (const entry of parameters) {
+      this.sliders.add(entry, `slider-${entry.name}`, (value, moving) => {
+        this.link.ask('set', { values: { [entry.name]: value ?? entry.value }, moving });
+      });
+    }
+    this.feeds.use(inputs);
+    this.rules.use(rules);
+    this.find('inputs').hidden = !inputs.length;
+    this.find('learning').hidden = !rules.length;
   }
 
   /** A neuron or a connection is held, or nothing. @param {Group | undefined} group */
@@ -69,28 +87,28 @@ export class Turning {
   status(status) {
     /** @type {HTMLFieldSetElement} */ (this.find('turns')).disabled = !status.owner || !status.can.turns;
     this.sliders.show(status.parameters);
+    this.feeds.show(status.fed);
+    this.rules.show(status.learning);
     this.list(status.turned);
     /** @type {HTMLTextAreaElement} */ (this.find('events')).value = eventsOf(status.turned);
   }
 
-  /** List what was turned, the latest first; settings of one parameter in a row are one. @param {Turned[]} turned */
+  /** List what was turned, the latest first. @param {Turned[]} turned */
   list(turned) {
-    const list = this.find('turned'), focused = list.contains(document.activeElement), rows = [];
-    for (let last = turned.length - 1, first; last >= 0; last = first - 1) {
-      const names = (/** @type {Turned} */ entry) => (entry.type === 'set' ? Object.keys(entry.values).join() : NaN);
-      for (first = last; first > 0 && names(turned[first - 1]) === names(turned[last]); first--);
-      const row = document.createElement('li'), undo = document.createElement('button'), from = first;
-      const words = `step ${turned[last].step + 1}: ${told(turned[last])}`;
+    const list = this.find('turned'), focused = list.contains(document.activeElement);
+    const rows = turned.map((entry, place) => {
+      const row = document.createElement('li'), undo = document.createElement('button');
+      const words = `step ${entry.step + 1}: ${told(entry)}`;
       undo.textContent = 'undo';
       undo.setAttribute('aria-label', `undo ${words}`);
       undo.onclick = () => {
-        const { type, ...more } = takenBack(turned, from, this.declared);
+        const { type, ...more } = takenBack(turned, place, this.declared);
         this.link.ask(type, more);
       };
       row.append(words, undo);
-      rows.push(row);
-    }
-    list.replaceChildren(...rows);
+      return row;
+    });
+    list.replaceChildren(...rows.reverse());
     if (focused) (list.querySelector('button') || this.find('copy')).focus();
   }
 

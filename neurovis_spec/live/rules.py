@@ -1,0 +1,49 @@
+"""Rules: the connections that learn, as they are told to learn or not.
+
+In: a network. Out: for each entry with a rule what names its connections in a run, its rule, and its members.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from neurovis_spec.compiler.arrays import IntArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.runtime.names import Found, names_of
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rule:
+    """The rules at ``connections``, a reference: as they are written, and the ``members`` that they are of."""
+
+    connections: str
+    written: str
+    members: IntArray
+
+
+def rules(network: Network) -> tuple[Rule, ...]:
+    """The rules in the order of the spec; what one reference names has one."""
+    connections = network.connections
+    found: dict[str, tuple[list[str], IntArray]] = {}
+    for number, (name, written) in enumerate(zip(connections.entries, connections.learns, strict=True)):
+        members = np.flatnonzero((connections.entry == number) & (connections.rules >= 0))
+        if written is not None and len(members):
+            reference = _reference(network, name, members)
+            words, others = found.get(reference, ([], members[:0]))
+            found[reference] = ([*words, written], np.union1d(others, members))
+    return tuple(Rule(name, "; ".join(dict.fromkeys(words)), members) for name, (words, members) in found.items())
+
+
+def _reference(network: Network, name: str, members: IntArray) -> str:
+    """What names the connections of an entry; one of a module says the instance of its source alone."""
+    plain = name.partition(" (")[0]
+    source, _, target = (part.strip() for part in plain.partition("->"))
+    inside, _, _ = source.rpartition(".")
+    known, wanted = names_of(network), set(network.connections.targets[members].tolist())
+    for one in (target, " + ".join(f"{inside}.{part.strip()}" for part in target.split("+"))):
+        ends = known.find(one)
+        if isinstance(ends, Found) and wanted <= set(ends.neurons):
+            return f"{source} -> {one}"
+    return network.connection_names[int(members[0])] if len(members) == 1 else plain
