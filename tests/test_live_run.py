@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import math
 import time
 from collections.abc import Callable, Iterator
@@ -10,8 +11,9 @@ import numpy as np
 import pytest
 
 import neurovis_spec as nv
+from neurovis_spec.live.appearance import Appearance
 from neurovis_spec.live.clock import Clock
-from neurovis_spec.live.commands import Branch, Command, Event, Pause, Play, Restart, Seek, Speed, Step
+from neurovis_spec.live.commands import Branch, Command, Draw, Event, Pause, Play, Restart, Seek, Speed, Step
 from neurovis_spec.live.recorded import RecordedSource
 from neurovis_spec.live.run import Run, Shown
 from neurovis_spec.live.simulated import SimulatedSource
@@ -173,3 +175,28 @@ def test_a_look_is_the_picture_of_its_step(driven: Driven) -> None:
         gone = step >= 30
         assert faint == [False, gone, False, False, gone, False, False, gone, False, False]
         assert look.caption == f"step {step} · {step * 0.05:.2f} s"
+
+
+def test_it_is_drawn_otherwise_beside_the_run_which_goes_on(driven: Driven) -> None:
+    before = driven.ask(Step(5))
+    wanted = Appearance("dark", activity=0.5, thickness=2.0)
+    driven.run.ask(Draw(Appearance("print")))
+    driven.run.ask(Draw(wanted))
+    assert driven.ask().status.appearance == wanted, "it is what is wanted as soon as it is asked for"
+    after = driven.until(lambda shown: shown.view.appearance == wanted)
+    assert after.look.step == before.look.step
+    assert after.view.plan.theme.background != before.view.plan.theme.background
+    assert np.abs(after.look.discs[0] - before.look.discs[0] / 2) <= 1
+    widths = before.look.widths > FINENESS
+    assert widths.any()
+    assert np.abs(after.look.widths[widths] - 2.0 * before.look.widths[widths]).max() <= 2
+    words = gzip.decompress(after.view.content).decode()
+    assert after.view.gains.activity_scales[0].gain == 0.5
+    assert '"2"' in words, "the legend says how far a colour goes"
+    driven.run.change(lambda source: (source, VIEW))
+    again = driven.until(lambda shown: shown.view.appearance == wanted and shown.view is not after.view)
+    assert again.status.appearance == wanted
+    driven.run.ask(Draw(Appearance()))
+    plain = driven.until(lambda shown: shown.view.appearance == Appearance())
+    assert plain.view.content == VIEW.content
+    assert np.array_equal(plain.look.discs, before.look.discs)

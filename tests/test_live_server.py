@@ -340,6 +340,7 @@ def test_a_viewer_looks_on_and_can_ask_for_nothing() -> None:
     served(test)
 
 
+DRAW = {"type": "draw", "theme": "", "activity": 1, "signal": 1, "thickness": 1, "change": 1}
 #: What no page of ours sends: no JSON, of another shape, out of range.
 BROKEN: list[str | bytes] = [
     *("", "x", "{", "[]", "null", "1", "{}", '{"type": 1}', '{"type": "eval"}', '{"type": ["play"]}', "[" * 5000),
@@ -353,6 +354,8 @@ BROKEN: list[str | bytes] = [
     *(json.dumps({"type": "lesion", "part": "x" * 5000}), '{"type": "learn", "connections": "A -> B", "on": 1}'),
     *('{"type": "look", "items": "n1"}', '{"type": "look", "items": ["x1"]}', '{"type": "look", "items": ["n1", 2]}'),
     *(json.dumps({"type": "look", "items": ["n1"] * 65}), '{"type": "look", "items": ["n-1"]}'),
+    *(json.dumps(DRAW | {"theme": "x"}), json.dumps(DRAW | {"signal": 0}), json.dumps(DRAW | {"change": 65})),
+    *(json.dumps(DRAW | {"activity": True}), '{"type": "draw", "theme": ""}', json.dumps(DRAW | {"theme": None})),
     *('{"type": "set", "values": {"pull": 1}, "moving": 1}', '{"type": "lesion", "part": "B", "moving": true}'),
     *(b"", b"\x00", b"\x00" * 5, b"\x00" * 1000, '{"type": "pl\x00ay"}', '{"type": "step", "by": ' + "9" * 5000 + "}"),
 ]

@@ -14,6 +14,7 @@ from test_live_looking import TIP, places, told
 
 import neurovis_spec as nv
 from neurovis_spec.live.declared import declared
+from neurovis_spec.themes import THEMES
 
 pytestmark = pytest.mark.browser
 
@@ -248,7 +249,7 @@ def test_inputs_without_a_source_are_fed_by_sliders_until_they_are_reset(tmp_pat
             await opened.until(f"{TIP}.textContent.includes('activity +{np.tanh(0.5):.6g}\\n')")
             two = "document.querySelector('#feed-push-2')"
             await opened.ask(f"{two}.dispatchEvent(new Event('dblclick'))")
-            await turned(opened, "push from its source", "feed wind = -1", "feed push = 0, 0.5")
+            await turned(opened, "feed push no more", "feed wind = -1", "feed push = 0, 0.5")
             await opened.until(f"{two}.value == 0")
             await opened.ask("document.querySelectorAll('#turned button')[1].click()")
             await opened.until("document.querySelector('#feed-wind').value == 0")
@@ -293,10 +294,38 @@ def test_a_refusal_is_read_while_it_plays_until_something_else_is_done(tmp_path:
     asyncio.run(main())
 
 
+def test_the_theme_and_the_gains_are_chosen_while_it_runs(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, compiled, _):
+            await opened.click(*places(compiled)["K2 -> O"])
+            await opened.key("t")
+            theme, gain = (f"document.querySelector('#{name}')" for name in ("theme", "gain-thickness"))
+            assert await opened.ask(f"[...{theme}.options].map(one => one.value)") == ["", *THEMES]
+            back = "getComputedStyle(document.body).backgroundColor"
+            before = await opened.ask(back)
+            await opened.ask(f"{theme}.value = 'dark'; {theme}.onchange()")
+            await opened.until(f"{back} != '{before}' && {theme}.value == 'dark'")
+            tip = f"{TIP}.textContent.includes"
+            await opened.until(f"{tip}('thickness 10') && {gain}.value == '0'")
+            await opened.ask(f"{gain}.value = 2; {gain}.oninput(); {gain}.onchange()")
+            await opened.until(f"{gain}.ariaValueText == '4'")
+            assert await opened.ask(f"{gain}.parentNode.querySelector('[type=number]').value") == "4"
+            await opened.until(f"{tip}('thickness 40')")
+            await opened.ask(f"{gain}.dispatchEvent(new Event('dblclick'))")
+            await opened.until(f"{tip}('thickness 10') && {gain}.value == '0'")
+            await opened.call("Page.reload")
+            await opened.until(f"{theme}?.value == 'dark'")
+            await opened.ask(f"{theme}.value = ''; {theme}.onchange()")
+            await opened.until(f"{back} == '{before}'")
+
+    asyncio.run(main())
+
+
 def test_a_viewer_turns_nothing(tmp_path: Path) -> None:
     async def main() -> None:
         async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, access):
             await opened.call("Page.navigate", url=access.url(owner=False))
             await opened.until("document.querySelector('#turns')?.disabled")
+            assert await opened.ask("document.querySelector('#drawn').disabled")
 
     asyncio.run(main())

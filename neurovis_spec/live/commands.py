@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from neurovis_spec.live.appearance import Appearance
 from neurovis_spec.live.turns import Turn
 
 
@@ -64,4 +65,11 @@ class Present:
     """Show what is to be seen: somebody has come who has seen nothing."""
 
 
-Command: TypeAlias = Present | Play | Pause | Step | Seek | Event | Restart | Branch | Speed | Turn
+@dataclass(frozen=True, slots=True)
+class Draw:
+    """The picture is drawn otherwise, for all who look on."""
+
+    appearance: Appearance
+
+
+Command: TypeAlias = Present | Draw | Play | Pause | Step | Seek | Event | Restart | Branch | Speed | Turn

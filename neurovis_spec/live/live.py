@@ -20,6 +20,7 @@ from neurovis_spec.findings import show_text
 from neurovis_spec.interrupts import ENDING, Ended
 from neurovis_spec.layout.model import LayoutRefusalError
 from neurovis_spec.live.access import Access
+from neurovis_spec.live.appearance import AS_IT_IS, Appearance
 from neurovis_spec.live.carry import carried
 from neurovis_spec.live.hub import Hub
 from neurovis_spec.live.protocol import findings_message
@@ -50,9 +51,9 @@ class Show:
         """The source and its view. Raises RecordingError, BackendError, LayoutRefusalError."""
         return self._source(compiled), self._view(compiled)
 
-    def changed(self, compiled: CompiledNetwork) -> Change:
+    def changed(self, compiled: CompiledNetwork, appearance: Appearance = AS_IT_IS) -> Change:
         """What shows an edited network at the step that is shown. Raises as ``stage`` does."""
-        view = self._view(compiled)
+        view = self._view(compiled, appearance)
         if self.recording is not None:
             recorded = RecordedSource(compiled.network, self.recording)
 
@@ -74,8 +75,8 @@ class Show:
             return RecordedSource(compiled.network, self.recording)
         return SimulatedSource(compiled.simulator(self.backend, start=self.start))
 
-    def _view(self, compiled: CompiledNetwork) -> View:
-        return view_of(compiled, compiled.gains_for(self.recording), self.theme, self.engine)
+    def _view(self, compiled: CompiledNetwork, appearance: Appearance = AS_IT_IS) -> View:
+        return view_of(compiled, compiled.gains_for(self.recording), self.theme, self.engine, appearance)
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -116,7 +117,7 @@ class Edits:
     def _edited(self) -> Iterable[Path]:
         try:
             compiled = self._compile()
-            change = self._show.changed(compiled)
+            change = self._show.changed(compiled, self._run.appearance)
         except SpecError as error:
             self._tell(findings_message(show_text(error.diagnostics, error.sources), errors=True))
             return self._watched

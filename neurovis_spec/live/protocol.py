@@ -17,12 +17,14 @@ from typing import Final, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec.live.appearance import MOST, Appearance
 from neurovis_spec.live.clock import SPEEDS
-from neurovis_spec.live.commands import Branch, Command, Event, Pause, Play, Restart, Seek, Speed, Step
+from neurovis_spec.live.commands import Branch, Command, Draw, Event, Pause, Play, Restart, Seek, Speed, Step
 from neurovis_spec.live.run import Status
 from neurovis_spec.live.source import Reach, Turned
 from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set
 from neurovis_spec.live.view import Look
+from neurovis_spec.themes import THEMES
 
 #: The first byte of a binary message from the server.
 SCENE, FRAME = 1, 2
@@ -38,6 +40,8 @@ _MOST = (1 << 53) - 1
 _MANY = 1024
 #: The most items that a client is told of, and the id of one.
 _WATCHED, _ITEM = 64, re.compile(r"[nc][0-9]{1,9}", re.ASCII)
+#: The gains of Eqs. 2–5.
+_GAINS = ("activity", "signal", "thickness", "change")
 #: The most turns and events that are listed, the latest turns and the first events.
 _LISTED = 1000
 #: The most steps that are made at once.
@@ -86,6 +90,7 @@ def status_message(status: Status, owner: bool) -> str:
         learning=dict(status.learning),
         turned=[_turned(entry) for entry in status.turned[-_LISTED:]],
         events=list(status.events[:_LISTED]),
+        appearance=asdict(status.appearance),
     )
 
 
@@ -200,6 +205,23 @@ def _speed(value: object) -> float:
     return SPEEDS[value]
 
 
+def _theme(value: object) -> str:
+    if not isinstance(value, str) or (value and value not in THEMES):
+        raise ProtocolError(f"a theme is wanted: {', '.join(THEMES)}, or none")
+    return value
+
+
+def _factor(value: object) -> float:
+    number = _number(value)
+    if not 1 / MOST <= number <= MOST:
+        raise ProtocolError(f"a number from 1/{MOST:g} to {MOST:g} is wanted")
+    return number
+
+
+def _draw(theme: str, **gains: float) -> Draw:
+    return Draw(Appearance(theme, **gains))
+
+
 def _values(value: object) -> Mapping[str, float]:
     if not isinstance(value, dict) or not 0 < len(value) <= _MANY:
         raise ProtocolError("names with numbers are wanted")
@@ -229,6 +251,7 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "event": ({"by": _whole(-1, 1)}, Event),
     "restart": ({}, Restart),
     "branch": ({}, Branch),
+    "draw": ({"theme": _theme, **dict.fromkeys(_GAINS, _factor)}, _draw),
     "speed": ({"value": _speed}, Speed),
     "set": ({"values": _values, "moving": _truth}, Set),
     "feed": ({"name": _name, "values": _numbers, "moving": _truth}, Feed),

@@ -15,8 +15,9 @@ from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import TypeAlias
 
+from neurovis_spec.live.appearance import Appearance
 from neurovis_spec.live.clock import FRAMES, Clock
-from neurovis_spec.live.commands import Branch, Command, Event, Pause, Play, Present, Restart, Seek, Speed, Step
+from neurovis_spec.live.commands import Branch, Command, Draw, Event, Pause, Play, Present, Restart, Seek, Speed, Step
 from neurovis_spec.live.source import Capabilities, Reach, Seen, Source, SourceError, Turned
 from neurovis_spec.live.view import Look, View
 
@@ -35,6 +36,7 @@ class Status:
     learning: Mapping[str, bool | None]
     turned: tuple[Turned, ...]
     events: tuple[int, ...]
+    appearance: Appearance
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,6 +59,14 @@ Refuse: TypeAlias = Callable[[str], None]
 Change: TypeAlias = Callable[[Source], Stage]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Drawn:
+    """A view that was drawn otherwise."""
+
+    instead_of: View
+    view: View
+
+
 def _ignore(message: str) -> None:
     """Nobody is told."""
 
@@ -74,8 +84,10 @@ class Run:
         failed: Callable[[], object] = lambda: None,
     ) -> None:
         self._source, self._view, self._show, self._wanted, self._failed = source, view, show, wanted, failed
-        self._asked: SimpleQueue[tuple[Command | Change | None, Refuse]] = SimpleQueue()
+        self._asked: SimpleQueue[tuple[Command | Change | _Drawn | None, Refuse]] = SimpleQueue()
         self._playing, self._ended = True, False
+        #: how the picture is wanted, and whether it is being drawn so
+        self.appearance, self._drawing = view.appearance, False
         #: the step to go to, which is further than has been reached
         self._target: int | None = None
         self._clock = self._clock_of(source, 1.0)
@@ -138,7 +150,7 @@ class Run:
                 refuse(str(error))
             self._present()
 
-    def _carry_out(self, asked: Command | Change) -> None:
+    def _carry_out(self, asked: Command | Change | _Drawn) -> None:
         source, now = self._source, time.perf_counter()
         match asked:
             case Play():
@@ -160,15 +172,35 @@ class Run:
                 self._clock.start(now)
             case Branch():
                 source.branch()
+            case Draw():
+                self.appearance = asked.appearance
+                self._redraw()
+            case _Drawn():
+                self._drawing = False
+                if asked.instead_of is self._view:
+                    self._view = asked.view
+                self._redraw()
             case Present():
                 pass
             case _ if callable(asked):
                 self._source, self._view = asked(source)
+                self._redraw()
                 self._clock = self._clock_of(self._source, self._clock.speed)
                 self._clock.start(now)
                 self._ended, self._target = False, None
             case _:
                 source.turn(asked)
+
+    def _redraw(self) -> None:
+        """Have the picture drawn as it is wanted, beside the run, which goes on."""
+        view, wanted = self._view, self.appearance
+        if not self._drawing and view.appearance != wanted:
+            self._drawing = True
+
+            def draw() -> None:
+                self._asked.put((_Drawn(view, view.otherwise(wanted)), _ignore))
+
+            Thread(target=draw, name="live view", daemon=True).start()
 
     def _step(self, step: int) -> None:
         """To a step nearby, at once, so that of several steps asked for each is made."""
@@ -234,6 +266,7 @@ class Run:
             learning=source.learning,
             turned=source.turned,
             events=self._events(),
+            appearance=self.appearance,
         )
         seen = source.seen()
         return Shown(self._view, seen, self._view.look(seen), source.reach, status)

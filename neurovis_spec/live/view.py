@@ -6,13 +6,15 @@ Look: colours, widths and glows as small numbers, as fine as can be seen (Eqs. 2
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.live.appearance import AS_IT_IS, Appearance
 from neurovis_spec.live.declared import declared
 from neurovis_spec.live.drawing import content
 from neurovis_spec.live.source import Mask, Seen
@@ -24,6 +26,7 @@ from neurovis_spec.scene.encode import looks, paint, tooltips
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.gathered_layout import laid_out
 from neurovis_spec.scene.plan import Plan, plan
+from neurovis_spec.themes import THEMES
 
 #: A colour value of 1 as a number: between neighbours lie less than 1.2 of 255 levels of a colour.
 LEVELS = 127
@@ -56,6 +59,9 @@ class View:
     plan: Plan
     #: all that stays, as a page gets it
     content: bytes
+    appearance: Appearance
+    #: the same network, drawn otherwise
+    otherwise: Callable[[Appearance], View]
 
     def look(self, seen: Seen) -> Look:
         """What a step looks like."""
@@ -96,15 +102,23 @@ class View:
         return neurons, gone == drawn.counts
 
 
-def view_of(compiled: CompiledNetwork, gains: Gains, theme: str | None = None, engine: str | None = None) -> View:
+def view_of(
+    compiled: CompiledNetwork,
+    gains: Gains,
+    theme: str | None = None,
+    engine: str | None = None,
+    appearance: Appearance = AS_IT_IS,
+) -> View:
     """How a compiled network is drawn. Raises LayoutRefusalError, RendererError."""
     network = compiled.network
-    settings = compiled.settings_for(theme)
+    settings = compiled.settings_for(appearance.theme or theme)
     drawn = gathered(network, settings.collapse)
-    planned = plan(drawn, laid_out(drawn, compiled.drawn(engine).value), gains, settings)
+    seen = appearance.gains(gains)
+    planned = plan(drawn, laid_out(drawn, compiled.drawn(engine).value), seen, settings)
     constants = {"levels": LEVELS, "fineness": FINENESS, "isBar": BAR, "isFaint": FAINT}
-    scene = _scene(planned, gains)
-    return View(drawn, gains, planned, content(drawn.network, scene, constants, declared(compiled)))
+    scene = _scene(planned, seen)
+    words = content(drawn.network, scene, constants, {**declared(compiled), "themes": list(THEMES)})
+    return View(drawn, seen, planned, words, appearance, partial(view_of, compiled, gains, theme, engine))
 
 
 def _scene(planned: Plan, gains: Gains) -> Scene:

@@ -12,7 +12,7 @@
 /** @typedef {{step: number, type: string, [member: string]: any}} Turned */
 /** @typedef {{version: number, name: string, title: string, width: number, height: number, density: number,
  *   theme: Theme, dt: number | null, discs: number, lines: number, parameters: Declared[],
- *   inputs: {name: string, size: number, description: string}[], rules: {connections: string, rule: string}[],
+ *   inputs: {name: string, size: number, description: string}[], rules: {connections: string, rule: string}[], themes: string[],
  *   constants: Object<string, any>, groups: Group[]}} Scene */
 /** @typedef {{serial: number, step: number, first: number, last: number, caption: string, discs: Int8Array,
  *   lines: Int8Array, widths: Uint16Array, glows: Uint16Array, kinds: Uint8Array}} Look */

@@ -3,6 +3,8 @@
  */
 
 /** @typedef {import('./protocol.js').Declared} Declared */
+/** Of a number: what is declared; with `log`, its slider goes by factors.
+ * @typedef {Declared & {log?: boolean}} Row */
 /** What is called when a number is given: with null it is as at the beginning; while it is dragged it is moving.
  * @typedef {(value: number | null, moving: boolean) => void} Given */
 
@@ -23,6 +25,8 @@ export class Sliders {
     this.place = place;
     /** @type {Map<string, HTMLInputElement[]>} */
     this.inputs = new Map();
+    /** the names of those that go by factors @type {Set<string>} */
+    this.log = new Set();
     this.sent = 0;
   }
 
@@ -32,9 +36,10 @@ export class Sliders {
     this.place.replaceChildren();
   }
 
-  /** A row. @param {Declared} entry @param {string} id @param {Given} given */
+  /** A row. @param {Row} entry @param {string} id @param {Given} given */
   add(entry, id, given) {
-    const { name, value, description } = entry, [min, max] = range(entry);
+    const { name, value, description, log } = entry, [min, max] = range(entry).map(log ? Math.log2 : Number);
+    const slid = () => (log ? Number((2 ** Number(slider.value)).toPrecision(3)) : Number(slider.value));
     const row = document.createElement('div'), label = document.createElement('label'), about = document.createElement('small');
     const [slider, field] = ['range', 'number'].map((type) => Object.assign(document.createElement('input'), { type, step: 'any' }));
     row.className = 'slider';
@@ -46,27 +51,30 @@ export class Sliders {
     label.textContent = name;
     about.textContent = description;
     field.setAttribute('aria-label', `${name}, as a number`);
-    slider.value = field.value = String(value);
+    if (log) this.log.add(name);
     slider.oninput = () => {
-      field.value = slider.value;
+      field.value = String(slid());
       if (performance.now() - this.sent < BETWEEN) return;
       this.sent = performance.now();
-      given(Number(slider.value), true);
+      given(slid(), true);
     };
-    slider.onchange = () => given(Number(slider.value), false);
+    slider.onchange = () => given(slid(), false);
     field.onchange = () => { if (field.value && field.checkValidity()) given(Number(field.value), false); };
     slider.ondblclick = () => given(null, false);
     slider.onkeydown = (event) => { if (event.key === 'Delete') given(null, false); };
     row.append(label, document.createElement('span'), slider, field, ...(description ? [about] : []));
     this.inputs.set(name, [slider, field]);
     this.place.append(row);
+    this.show({ [name]: value });
   }
 
   /** Show what the numbers are now, but where one is being given. @param {Object<string, number>} values */
   show(values) {
     for (const [name, inputs] of this.inputs) {
       if (!(name in values) || inputs[0].matches(':active') || document.activeElement === inputs[1]) continue;
-      for (const input of inputs) input.value = String(values[name]);
+      const [slider, field] = inputs, value = values[name];
+      [slider.value, field.value] = [String(this.log.has(name) ? Math.log2(value) : value), String(value)];
+      slider.setAttribute('aria-valuetext', field.value);
     }
   }
 }

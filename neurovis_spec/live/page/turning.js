@@ -2,6 +2,7 @@
  * Turning: parameters, inputs, rules, clamps and lesions by hand; what was turned, listed, taken back, and copied for the spec.
  */
 
+import { Appearance } from './appearance.js';
 import { eventsOf, takenBack } from './events.js';
 import { Feeds } from './feeds.js';
 import { Rules } from './rules.js';
@@ -19,7 +20,7 @@ function told(turn) {
   switch (turn.type) {
     case 'set': return pairs(turn.values);
     case 'hold': return `clamp ${turn.neurons} = ${turn.value}`;
-    case 'feed': return turn.values.length ? `feed ${turn.name} = ${turn.values.join(', ')}` : `${turn.name} from its source`;
+    case 'feed': return turn.values.length ? `feed ${turn.name} = ${turn.values.join(', ')}` : `feed ${turn.name} no more`;
     case 'learn': return `learning of ${turn.connections} ${turn.on ? 'on' : 'off'}`;
     default: return `${turn.type} ${turn.neurons || turn.part}`;
   }
@@ -35,6 +36,7 @@ export class Turning {
     this.sliders = new Sliders(find('sliders'));
     this.feeds = new Feeds(link, find('feeds'));
     this.rules = new Rules(link, find('rules'));
+    this.appearance = new Appearance(link, /** @type {HTMLSelectElement} */ (find('theme')), find('gains'));
     this.shown = '';
     /** @type {Declared[]} */
     this.declared = [];
@@ -56,7 +58,8 @@ export class Turning {
   }
 
   /** Another network. @param {Scene} scene */
-  use({ parameters, inputs, rules }) {
+  use({ parameters, inputs, rules, themes }) {
+    this.appearance.use(themes);
     const shown = JSON.stringify([parameters, inputs, rules]);
     if (shown === this.shown) return;
     this.shown = shown;
@@ -86,6 +89,8 @@ export class Turning {
   /** @param {any} status */
   status(status) {
     /** @type {HTMLFieldSetElement} */ (this.find('turns')).disabled = !status.owner || !status.can.turns;
+    /** @type {HTMLFieldSetElement} */ (this.find('drawn')).disabled = !status.owner;
+    this.appearance.show(status.appearance);
     this.sliders.show(status.parameters);
     this.feeds.show(status.fed);
     this.rules.show(status.learning);
