@@ -12,7 +12,8 @@ import pytest
 
 from neurovis_spec.live.clock import SPEEDS
 from neurovis_spec.live.protocol import LARGEST, MESSAGES
-from neurovis_spec.live.server import ASKING, BURST, MOST_CLIENTS, MOST_CONNECTIONS, PINGS, RATE, page
+from neurovis_spec.live.server import ASKING, BURST, MOST_CLIENTS, MOST_CONNECTIONS, PINGS, RATE
+from neurovis_spec.live.shipped import page
 
 ROOT = Path(__file__).parents[1]
 MODULES = ROOT / "neurovis_spec/live/page"

@@ -131,7 +131,8 @@ def _show(
     import asyncio
 
     from neurovis_spec.live.access import Access
-    from neurovis_spec.live.live import Edits, Show, listen, serve
+    from neurovis_spec.live.live import Edits, listen, serve
+    from neurovis_spec.live.show import Show
 
     show = Show(recording, start, theme, engine, backend)
     stage = show.stage(network)

@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.live.protocol import frame_message, scene_message, status_message, values_message
+from neurovis_spec.live.protocol import frame_message, refused_message, scene_message, status_message, values_message
 from neurovis_spec.live.run import Shown
 
 #: Frames that a client may be sent before it has drawn them.
@@ -51,7 +51,7 @@ class Client:
 
 
 class Hub:
-    """The clients of a run. All methods but ``show`` and ``watched`` are called on the event loop."""
+    """The clients of a run. All methods but ``show``, ``watched`` and ``refuse`` are called on the event loop."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self._loop = loop
@@ -101,6 +101,10 @@ class Hub:
             self._findings = text
         for client in self._clients:
             client.tell(text)
+
+    def refuse(self, client: Client, reason: str) -> None:
+        """Tell a client why what it asked is not done; from any thread."""
+        self._loop.call_soon_threadsafe(client.tell, refused_message(reason))
 
     def look_at(self, client: Client, items: tuple[str, ...]) -> None:
         """A client wants values: now, and with each frame."""

@@ -10,9 +10,7 @@ import signal
 import socket
 import sys
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.diagnostics import Diagnostic, SpecError
@@ -20,63 +18,13 @@ from neurovis_spec.findings import show_text
 from neurovis_spec.interrupts import ENDING, Ended
 from neurovis_spec.layout.model import LayoutRefusalError
 from neurovis_spec.live.access import Access
-from neurovis_spec.live.appearance import AS_IT_IS, Appearance
-from neurovis_spec.live.carry import carried
 from neurovis_spec.live.hub import Hub
 from neurovis_spec.live.protocol import findings_message
-from neurovis_spec.live.recorded import RecordedSource
-from neurovis_spec.live.run import Change, Run, Stage
+from neurovis_spec.live.run import Run, Stage
 from neurovis_spec.live.server import Server
-from neurovis_spec.live.simulated import SimulatedSource
-from neurovis_spec.live.source import Source
-from neurovis_spec.live.view import View, view_of
+from neurovis_spec.live.show import Show
 from neurovis_spec.live.watch import Watch
 from neurovis_spec.runtime.recording import RecordingError
-
-if TYPE_CHECKING:
-    from neurovis_spec.runtime.recording import Recording
-
-
-@dataclass(frozen=True)
-class Show:
-    """What is shown, and how: a run, which may go on from ``start``, or a ``recording``."""
-
-    recording: Recording | None = None
-    start: Recording | None = None
-    theme: str | None = None
-    engine: str | None = None
-    backend: str | None = None
-
-    def stage(self, compiled: CompiledNetwork) -> Stage:
-        """The source and its view. Raises RecordingError, BackendError, LayoutRefusalError."""
-        return self._source(compiled), self._view(compiled)
-
-    def changed(self, compiled: CompiledNetwork, appearance: Appearance = AS_IT_IS) -> Change:
-        """What shows an edited network at the step that is shown. Raises as ``stage`` does."""
-        view = self._view(compiled, appearance)
-        if self.recording is not None:
-            recorded = RecordedSource(compiled.network, self.recording)
-
-            def same_row(old: Source) -> Stage:
-                recorded.go(old.step)
-                return recorded, view
-
-            return same_row
-        simulation = compiled.simulator(self.backend, start=self.start)
-
-        def same_step(old: Source) -> Stage:
-            assert isinstance(old, SimulatedSource)
-            return carried(old, simulation), view
-
-        return same_step
-
-    def _source(self, compiled: CompiledNetwork) -> Source:
-        if self.recording is not None:
-            return RecordedSource(compiled.network, self.recording)
-        return SimulatedSource(compiled.simulator(self.backend, start=self.start))
-
-    def _view(self, compiled: CompiledNetwork, appearance: Appearance = AS_IT_IS) -> View:
-        return view_of(compiled, compiled.gains_for(self.recording), self.theme, self.engine, appearance)
 
 
 def listen(host: str, port: int) -> socket.socket:

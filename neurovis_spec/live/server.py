@@ -12,7 +12,6 @@ import hashlib
 import re
 import socket
 import time
-from pathlib import Path
 from weakref import WeakSet
 
 from aiohttp import WSCloseCode, WSMsgType, web
@@ -20,8 +19,10 @@ from aiohttp import WSCloseCode, WSMsgType, web
 from neurovis_spec.live.access import PAGE, Access
 from neurovis_spec.live.commands import Present
 from neurovis_spec.live.hub import Client, Hub
-from neurovis_spec.live.protocol import LARGEST, LookAt, ProtocolError, acknowledged, command_of, refused_message
+from neurovis_spec.live.protocol import LARGEST, ProtocolError
+from neurovis_spec.live.reception import Reception
 from neurovis_spec.live.run import Run
+from neurovis_spec.live.shipped import page
 
 #: Websockets at once, and connections of any kind.
 MOST_CLIENTS, MOST_CONNECTIONS = 128, 256
@@ -29,11 +30,6 @@ MOST_CLIENTS, MOST_CONNECTIONS = 128, 256
 ASKING, SENDING, PINGS = 10.0, 15.0, 20.0
 #: Messages a second that a client may send in the long run, and at once.
 RATE, BURST = 200, 400
-
-
-def page() -> str:
-    """The page, as ``page/build.py`` has put it together."""
-    return (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
 
 
 def policy(html: str) -> str:
@@ -70,6 +66,7 @@ class Server:
 
     def __init__(self, access: Access, hub: Hub, run: Run) -> None:
         self._access, self._hub, self._run = access, hub, run
+        self._reception = Reception(hub, run)
         self._html = page()
         self._headers = headers(policy(self._html))
         self._streams: WeakSet[web.WebSocketResponse] = WeakSet()
@@ -171,11 +168,6 @@ class Server:
 
     async def _read(self, stream: web.WebSocketResponse, client: Client) -> None:
         """Take what a client sends; a message that no page of ours sends ends its connection."""
-        loop = asyncio.get_running_loop()
-
-        def refuse(reason: str) -> None:
-            loop.call_soon_threadsafe(client.tell, refused_message(reason))
-
         left, then = float(BURST), time.monotonic()
         async for message in stream:
             now = time.monotonic()
@@ -185,16 +177,8 @@ class Server:
                 await stream.close(code=WSCloseCode.POLICY_VIOLATION, message=b"too many messages")
                 return
             try:
-                if message.type is WSMsgType.BINARY:
-                    self._hub.drawn(client, acknowledged(message.data).serial)
-                elif message.type is WSMsgType.TEXT:
-                    command = command_of(message.data)
-                    if isinstance(command, LookAt):
-                        self._hub.look_at(client, command.items)
-                    elif client.owner:
-                        self._run.ask(command, refuse)
-                    else:
-                        client.tell(refused_message("this page only looks on"))
+                if message.type in (WSMsgType.BINARY, WSMsgType.TEXT):
+                    self._reception.take(client, message.data)
             except ProtocolError as error:
                 await stream.close(code=WSCloseCode.POLICY_VIOLATION, message=str(error).encode()[:120])
                 return

@@ -1,0 +1,63 @@
+"""Show: what a live view shows of a compiled network, and how.
+
+In: a recording or the start of a run, a theme, an engine, a backend. Out: of a compiled network its source and view.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.live.appearance import AS_IT_IS, Appearance
+from neurovis_spec.live.carry import carried
+from neurovis_spec.live.recorded import RecordedSource
+from neurovis_spec.live.run import Change, Stage
+from neurovis_spec.live.simulated import SimulatedSource
+from neurovis_spec.live.source import Source
+from neurovis_spec.live.view import View, view_of
+
+if TYPE_CHECKING:
+    from neurovis_spec.runtime.recording import Recording
+
+
+@dataclass(frozen=True)
+class Show:
+    """What is shown, and how: a run, which may go on from ``start``, or a ``recording``."""
+
+    recording: Recording | None = None
+    start: Recording | None = None
+    theme: str | None = None
+    engine: str | None = None
+    backend: str | None = None
+
+    def stage(self, compiled: CompiledNetwork) -> Stage:
+        """The source and its view. Raises RecordingError, BackendError, LayoutRefusalError."""
+        return self._source(compiled), self._view(compiled)
+
+    def changed(self, compiled: CompiledNetwork, appearance: Appearance = AS_IT_IS) -> Change:
+        """What shows an edited network at the step that is shown. Raises as ``stage`` does."""
+        view = self._view(compiled, appearance)
+        if self.recording is not None:
+            recorded = RecordedSource(compiled.network, self.recording)
+
+            def same_row(old: Source) -> Stage:
+                recorded.go(old.step)
+                return recorded, view
+
+            return same_row
+        simulation = compiled.simulator(self.backend, start=self.start)
+
+        def same_step(old: Source) -> Stage:
+            assert isinstance(old, SimulatedSource)
+            return carried(old, simulation), view
+
+        return same_step
+
+    def _source(self, compiled: CompiledNetwork) -> Source:
+        if self.recording is not None:
+            return RecordedSource(compiled.network, self.recording)
+        return SimulatedSource(compiled.simulator(self.backend, start=self.start))
+
+    def _view(self, compiled: CompiledNetwork, appearance: Appearance = AS_IT_IS) -> View:
+        return view_of(compiled, compiled.gains_for(self.recording), self.theme, self.engine, appearance)
