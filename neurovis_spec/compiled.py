@@ -30,6 +30,7 @@ from neurovis_spec.runtime.files import replacing
 if TYPE_CHECKING:
     from neurovis_spec.compiler.arrays import FloatArray
     from neurovis_spec.layout import Layout, Point, Route
+    from neurovis_spec.notebook.widget import LiveWidget
     from neurovis_spec.runtime.columns import Keep
     from neurovis_spec.runtime.record import Course
     from neurovis_spec.runtime.recording import Recording, Snapshot
@@ -145,6 +146,27 @@ class CompiledNetwork:
         course = self._course(steps, inputs, backend, every, until, keep)
         kept = None if checkpoint is None else arguments.path("checkpoint", checkpoint)
         return pipeline.simulate(self.network, course, start, progress, kept)
+
+    def live(
+        self,
+        recording: Recording | None = None,
+        *,
+        start: Recording | None = None,
+        theme: str | None = None,
+        engine: str | None = None,
+        backend: str | None = None,
+        play: bool = True,
+    ) -> LiveWidget:
+        """A widget for a notebook: the network while it runs, in real time, or a ``recording`` of it that plays. Its
+        parameters are traits: ``widget.mix = 0.4`` turns one, and one that is turned in the picture changes. ``start``
+        is a recording to go on from; with ``play`` it plays as soon as it is shown. Raises ImportError without the
+        extra ``jupyter``, and what ``layout``, ``run`` and ``simulator`` raise."""
+        from neurovis_spec.notebook.widget import live
+
+        _check(recording=recording, start=start, theme=theme, engine=engine, backend=backend)
+        if recording is not None and (start is not None or backend is not None):
+            raise ValueError("'start' and 'backend' are for a run, and a 'recording' is played: give one of the two")
+        return live(self, recording, start, theme, engine, backend, arguments.truth("play", play))
 
     def until(self, text: str) -> Until:
         """A measure that ends runs, ``rms(O - T, last=129) < 0.01``: its ``ending`` says how the last one ended. Raises

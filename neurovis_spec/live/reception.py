@@ -1,6 +1,6 @@
 """The reception: what a client's message does, however it came.
 
-In: a client's messages, which are trusted with nothing. Out: the hub and the run are asked, and what is refused is told.
+In: the messages of a client, who is trusted with nothing. Out: the hub and the run are asked; what is refused is told.
 """
 
 from __future__ import annotations

@@ -55,6 +55,8 @@ Stage: TypeAlias = tuple[Source, View]
 Show: TypeAlias = Callable[[Shown], None]
 #: Called with what was refused and why.
 Refuse: TypeAlias = Callable[[str], None]
+#: Called when what was asked is done.
+Done: TypeAlias = Callable[[], None]
 #: Gives what to show in place of a source, such as an edited network.
 Change: TypeAlias = Callable[[Source], Stage]
 
@@ -71,6 +73,10 @@ def _ignore(message: str) -> None:
     """Nobody is told."""
 
 
+def _nothing() -> None:
+    """Nobody waits."""
+
+
 class Run:
     """A live run; it plays from the start on. ``wanted`` says whether anybody looks on: else nothing is shown.
     ``failed`` is called where it cannot go on; ``failure`` says why."""
@@ -84,7 +90,7 @@ class Run:
         failed: Callable[[], object] = lambda: None,
     ) -> None:
         self._source, self._view, self._show, self._wanted, self._failed = source, view, show, wanted, failed
-        self._asked: SimpleQueue[tuple[Command | Change | _Drawn | None, Refuse]] = SimpleQueue()
+        self._asked: SimpleQueue[tuple[Command | Change | _Drawn | None, Refuse, Done]] = SimpleQueue()
         self._playing, self._ended = True, False
         #: how the picture is wanted, and whether it is being drawn so
         self.appearance, self._drawing = view.appearance, False
@@ -98,17 +104,17 @@ class Run:
         """Begin."""
         self._thread.start()
 
-    def ask(self, command: Command, refuse: Refuse = _ignore) -> None:
-        """Have a command carried out between two steps."""
-        self._asked.put((command, refuse))
+    def ask(self, command: Command, refuse: Refuse = _ignore, done: Done = _nothing) -> None:
+        """Have a command carried out between two steps; ``done`` is called after that, or ``refuse``."""
+        self._asked.put((command, refuse, done))
 
     def change(self, change: Change, refuse: Refuse = _ignore) -> None:
         """Have another network shown, from between two steps on."""
-        self._asked.put((change, refuse))
+        self._asked.put((change, refuse, _nothing))
 
     def end(self) -> None:
         """Stop, and wait until it has."""
-        self._asked.put((None, _ignore))
+        self._asked.put((None, _ignore, _nothing))
         self._thread.join(5.0)
 
     @staticmethod
@@ -139,7 +145,7 @@ class Run:
                 due = 0.0 if self._target is not None else self._clock.next()
                 wait = max(0.0, max(due, shown + 1 / FRAMES if self._target is None else 0.0) - time.perf_counter())
             try:
-                asked, refuse = self._asked.get(timeout=wait) if wait != 0.0 else self._asked.get_nowait()
+                asked, refuse, done = self._asked.get(timeout=wait) if wait != 0.0 else self._asked.get_nowait()
             except Empty:
                 return True
             if asked is None:
@@ -147,8 +153,11 @@ class Run:
             try:
                 self._carry_out(asked)
             except SourceError as error:
+                self._present()
                 refuse(str(error))
-            self._present()
+            else:
+                self._present()
+                done()
 
     def _carry_out(self, asked: Command | Change | _Drawn) -> None:
         source, now = self._source, time.perf_counter()
@@ -198,7 +207,7 @@ class Run:
             self._drawing = True
 
             def draw() -> None:
-                self._asked.put((_Drawn(view, view.otherwise(wanted)), _ignore))
+                self._asked.put((_Drawn(view, view.otherwise(wanted)), _ignore, _nothing))
 
             Thread(target=draw, name="live view", daemon=True).start()
 

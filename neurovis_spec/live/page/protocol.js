@@ -56,6 +56,34 @@ export function take(buffer, version, look) {
   return true;
 }
 
+/** What stands for the websocket where the page is in the frame of a notebook: the port that the frame is handed. */
+class Handed {
+  constructor() {
+    /** @type {number} */
+    this.readyState = WebSocket.CONNECTING;
+    this.binaryType = 'arraybuffer';
+    /** @type {MessagePort | null} */
+    this.port = null;
+    /** @type {() => void} */
+    this.onopen = () => {};
+    /** @type {() => void} */
+    this.onclose = () => {};
+    /** @type {(event: MessageEvent) => void} */
+    this.onmessage = () => {};
+    addEventListener('message', (event) => {
+      [this.port] = event.ports;
+      this.readyState = WebSocket.OPEN;
+      this.onopen();
+      this.port.onmessage = (message) => this.onmessage(message);
+    }, { once: true });
+  }
+
+  /** @param {string | Uint32Array<ArrayBuffer>} data */
+  send(data) {
+    if (this.port) this.port.postMessage(data);
+  }
+}
+
 /** A connection that is made again whenever it is lost. */
 export class Link {
   /** @param {Listener} listener */
@@ -65,7 +93,7 @@ export class Link {
     this.scene = null;
     /** @type {Look | null} */
     this.look = null;
-    /** @type {WebSocket | null} */
+    /** @type {WebSocket | Handed | null} */
     this.socket = null;
     this.wait = 250;
     this.work = Promise.resolve();
@@ -76,7 +104,8 @@ export class Link {
   open() {
     const token = new URLSearchParams(location.search).get('token') || '';
     const scheme = location.protocol === 'https:' ? 'wss' : 'ws';
-    const socket = new WebSocket(`${scheme}://${location.host}/live?token=${encodeURIComponent(token)}`);
+    const url = `${scheme}://${location.host}/live?token=${encodeURIComponent(token)}`;
+    const socket = location.protocol === 'about:' ? new Handed() : new WebSocket(url);
     socket.binaryType = 'arraybuffer';
     socket.onopen = () => {
       this.wait = 250;
