@@ -145,7 +145,9 @@ class CompiledNetwork:
         keep = replace(_keep(states, neurons, weights), last=arguments.truth("last", last))
         course = self._course(steps, inputs, backend, every, until, keep)
         kept = None if checkpoint is None else arguments.path("checkpoint", checkpoint)
-        return pipeline.simulate(self.network, course, start, progress, kept)
+        from neurovis_spec.notebook.recording import played
+
+        return played(pipeline.simulate(self.network, course, start, progress, kept), self)
 
     def live(
         self,
@@ -624,8 +626,7 @@ class CompiledNetwork:
     def _repr_svg_(self) -> str:
         """The network at the last step of its default run, for a notebook."""
         snapshot, gains = self._snapshot()
-        scene = pipeline.picture(self.network, self._layout, snapshot, gains, self.network.render)
-        return pipeline.draw(scene, ".svg").decode()
+        return _svg(self.network, self._layout, snapshot, gains)
 
 
 #: pixels of an inch where a user unit is one pixel, and the most that are drawn of a picture
@@ -687,6 +688,16 @@ def _bounded(draw: Callable[[RenderSettings], tuple[Scene, bytes]], settings: Re
             scene, content = draw(replace(settings, most=lines))
     _note(scene)
     return content
+
+
+def _svg(network: Network, layout: Layout, snapshot: Snapshot, gains: Gains) -> str:
+    """The picture of a step for a notebook, which is to be no larger than one in a file."""
+
+    def draw(settings: RenderSettings) -> tuple[Scene, bytes]:
+        scene = pipeline.picture(network, layout, snapshot, gains, settings)
+        return scene, pipeline.draw(scene, ".svg")
+
+    return _bounded(draw, network.render, ".svg").decode()
 
 
 def _noting(films: Iterator[Film]) -> Iterator[Film]:
@@ -783,8 +794,7 @@ class NetworkLayout:
 
         network = self.compiled.network
         snapshot = Snapshot(0, np.zeros(len(network.neurons)), network.connections.weights, None)
-        scene = pipeline.picture(network, self.value, snapshot, self.compiled.gains, network.render)
-        return pipeline.draw(scene, ".svg").decode()
+        return _svg(network, self.value, snapshot, self.compiled.gains)
 
 
 def _shows(panels: Sequence[Panel], *views: str) -> bool:

@@ -53,6 +53,12 @@ class SpecError(Exception):
         self.sources: Mapping[str, str] = dict(sources or {})
         super().__init__("\n".join(headline(d) for d in self.diagnostics))
 
+    def _render_traceback_(self) -> list[str]:
+        """What a notebook shows: the findings with their lines, as the command line does, and no traceback."""
+        from neurovis_spec.findings import show_text
+
+        return [show_text(self.diagnostics, self.sources)]
+
 
 @dataclass(slots=True)
 class Findings:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import json
+import pickle
 import subprocess
 import sys
 import threading
@@ -11,14 +13,17 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
 import traitlets
+from IPython.core.formatters import DisplayFormatter
 
 import neurovis_spec as nv
 from neurovis_spec.live.protocol import FRAME, SCENE
+from neurovis_spec.notebook.recording import PlayedRecording
 from neurovis_spec.notebook.session import MOST
 from neurovis_spec.notebook.widget import LiveWidget
-from neurovis_spec.runtime.recording import RecordingError
+from neurovis_spec.runtime.recording import Recording, RecordingError
 
 ROOT = Path(__file__).parents[1]
 SPEC = """neurovis: 1
@@ -211,6 +216,55 @@ def test_what_cannot_be_shown_is_refused_when_it_is_asked_for() -> None:
         network.live(network.run(3), start=network.run(3))
     with pytest.raises(TypeError, match="recording"):
         network.live(3)  # type: ignore[arg-type]
+
+
+WIDGET = "application/vnd.jupyter.widget-view+json"
+
+
+def displayed(value: object) -> dict[str, object]:
+    """What IPython shows of a value, by kind."""
+    formatter = DisplayFormatter(active_types=["text/plain", "image/svg+xml"])
+    found, _ = formatter.format(value)  # type: ignore[no-untyped-call]
+    assert isinstance(found, dict)
+    return found
+
+
+def test_a_recording_shows_itself_with_play_and_scrubber_and_its_traces_beside() -> None:
+    network = nv.compile_text(SPEC)
+    recording = network.run(20)
+    shown = displayed(recording)
+    assert set(shown) == {WIDGET, "image/svg+xml", "text/plain"}
+    assert shown["text/plain"] == "<recording of cell: 20 steps of 2 neurons, 0 changing weights>"
+    assert displayed(recording)[WIDGET] == shown[WIDGET]
+    assert isinstance(recording, PlayedRecording)
+    widget = recording._widget
+    assert widget is not None
+    it = Notebook(widget)
+    it.say("a", open=True)
+    until(lambda: SCENE in it.kinds("a"))
+    assert not widget.playing
+    widget.close()
+
+
+def test_what_cannot_be_played_shows_its_traces() -> None:
+    network = nv.compile_text(SPEC)
+    for recording in (network.run(20, neurons="A"), network.run(0)):
+        assert set(displayed(recording)) == {"image/svg+xml", "text/plain"}
+
+
+def test_a_recording_is_copied_and_pickled_without_its_network() -> None:
+    recording = nv.compile_text(SPEC).run(20)
+    for again in (pickle.loads(pickle.dumps(recording)), copy.copy(recording)):
+        assert type(again) is Recording
+        assert np.array_equal(again["B"], recording["B"])
+
+
+def test_a_notebook_shows_findings_in_place_of_a_traceback() -> None:
+    with pytest.raises(nv.SpecError) as found:
+        nv.compile_text(SPEC.replace("tanh", "tanhh"))
+    (told,) = found.value._render_traceback_()
+    assert "did you mean 'tanh'?" in told
+    assert "^^^^^" in told
 
 
 def test_without_anywidget_it_says_what_to_install() -> None:

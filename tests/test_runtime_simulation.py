@@ -474,8 +474,8 @@ def test_what_a_run_and_a_layout_are_fits_on_a_line() -> None:
     compiled = nv.compile_text("neurovis: 1\nname: x\nneurons: {A: {count: 3, bias: 1}}")
     shown = repr(compiled.run(5)), repr(compiled.layout())
     assert shown == (
-        "<Recording of 'x': steps 0 to 4, 5 rows; 3 neurons, 0 connections of which 0 learn>",
-        "<Layout of 'x' by layered: 3 positions, 0 routes>",
+        "<recording of x: 5 steps of 3 neurons, 0 changing weights>",
+        "<layout of x by layered: 3 positions, 0 routes>",
     )
 
 

@@ -118,7 +118,7 @@ class Layout:
 
     def __repr__(self) -> str:
         sizes = f"{len(self.positions):,} positions, {len(self.routes):,} routes"
-        return f"<Layout of {self.network!r} by {self.engine}: {sizes}>"
+        return f"<layout of {self.network} by {self.engine}: {sizes}>"
 
 
 @dataclass(frozen=True, slots=True)

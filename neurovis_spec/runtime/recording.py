@@ -73,7 +73,7 @@ class After:
     lesioned_connections: IntArray = field(default_factory=_no_indices)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Recording:
     """A run of a network with n neurons and m connections, p of which can change.
 
@@ -133,9 +133,12 @@ class Recording:
             frozen(array)
 
     def __repr__(self) -> str:
-        steps = f"steps {self.step[0]} to {self.step[-1]}, {len(self):,} rows" if len(self) else "no rows"
-        sizes = f"{len(self.neurons):,} neurons, {len(self.sources):,} connections of which {len(self.plastic):,} learn"
-        return f"<Recording of {self.network or 'a network'!r}: {steps}; {sizes}>"
+        activities, weights, states = self.widths
+        more = f", {states} states" if states else ""
+        return (
+            f"<recording of {self.network or 'a network'}: {len(self)} steps of {activities} neurons, "
+            f"{weights} changing weights{more}>"
+        )
 
     def __len__(self) -> int:
         return len(self.step)
