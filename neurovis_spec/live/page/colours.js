@@ -5,7 +5,7 @@
 /** @typedef {import('./protocol.js').Theme} Theme */
 
 /** Red, green and blue of `#rrggbb`. @param {string} colour @returns {number[]} */
-function channels(colour) {
+export function channels(colour) {
   return [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
 }
 
@@ -22,16 +22,17 @@ function contrast(one, other) {
 }
 
 /** The colours of all levels from −levels to levels, and of text on a disc of each.
- * @param {Theme} theme @param {number} levels @returns {{fills: string[], texts: string[]}} */
+ * @param {Theme} theme @param {number} levels @returns {{fills: string[], texts: string[], channels: number[][]}} */
 export function palette(theme, levels) {
   const [negative, zero, positive] = [theme.negative, theme.zero, theme.positive].map(channels);
-  const fills = [], texts = [];
+  const fills = [], texts = [], all = [];
   for (let level = -levels; level <= levels; level++) {
     const end = level < 0 ? negative : positive, share = Math.abs(level) / levels;
     const rgb = zero.map((from, at) => Math.round(from + (end[at] - from) * share));
     const light = contrast(channels(theme.light), rgb);
+    all.push(rgb);
     fills.push(`rgb(${rgb.join(',')})`);
     texts.push(light >= 3.5 || light >= contrast(channels(theme.dark), rgb) ? theme.light : theme.dark);
   }
-  return { fills, texts };
+  return { fills, texts, channels: all };
 }

@@ -2,7 +2,9 @@
  * Drawing: a scene and a look on a canvas, the same picture as the renderers make.
  */
 
-import { palette } from './colours.js';
+import { channels, palette } from './colours.js';
+import { flattened, packed } from './coverage.js';
+import { Mosaic } from './mosaic.js';
 
 /** @typedef {import('./protocol.js').Scene} Scene */
 /** @typedef {import('./protocol.js').Shape} Shape */
@@ -10,8 +12,18 @@ import { palette } from './colours.js';
 /** @typedef {import('./protocol.js').Look} Look */
 /** @typedef {import('./camera.js').Camera} Camera */
 /** @typedef {CanvasRenderingContext2D} Context */
-/** @typedef {{index: number, path: Path2D, box: number[], head: Shape, rest: Shape[]}} Line */
-/** @typedef {{index: number, shape: Shape, rest: Shape[]}} Disc */
+/** @typedef {import('./coverage.js').Coverage} Coverage */
+/** @typedef {import('./coverage.js').Chain} Chain */
+/** @typedef {import('./coverage.js').Tile} Tile */
+/** @typedef {import('./coverage.js').Round} Round */
+/** @typedef {import('./coverage.js').Sizes} Sizes */
+/** A line as it was laid out: from these points, as this chain, in these tiles, which have room for this reach.
+ * @typedef {{points: number[], end: Shape, chain: Chain, tiles: Tile[], reach: number, room: number, width: number,
+ *   glow: number, bar: boolean, share: number}} LaidLine */
+/** What lies otherwise when another `points`, `head` or `at` is put in place of the one before.
+ * @typedef {{id: string, index: number, points: number[], path: Path2D, box: number[], head: Shape, rest: Shape[],
+ *   laid: LaidLine | null}} Line */
+/** @typedef {{id: string, index: number, shape: Shape, rest: Shape[], laid: (Round & {tiles: Tile[]}) | null}} Disc */
 
 /** The path of a cubic spline. @param {number[]} points @returns {Path2D} */
 function spline(points) {
@@ -33,8 +45,19 @@ function around(points) {
   return box;
 }
 
+/** A colour as one number. @param {string} colour as #rrggbb @returns {number} */
+const whole = (colour) => packed(channels(colour));
+
+/** Where a camera is. @param {Camera} camera @returns {string} */
+const layoutOf = (camera) => [...camera.window, camera.scale, ...camera.origin].join(' ');
+
 /** How much is seen of what recedes, where something is held. */
 const RECEDING = 0.12;
+/** Milliseconds of a frame in which tiles are worked out; a picture that takes longer is shown as it was, moved, while
+ * the camera moves, for so many times as long. */
+const BUDGET = 10, SLOW = 30, PATIENCE = 3;
+/** How much further than it needs a line is looked for, in pixels, so that it may become wider. */
+const SPARE = 2;
 
 /** Draws one scene. */
 export class Drawing {
@@ -55,22 +78,39 @@ export class Drawing {
     /** @type {Shape | null} */
     this.caption = null;
     for (const group of scene.groups) this.sort(group);
-    /** @type {HTMLCanvasElement[]} */
-    this.layers = [];
+    this.colours = { glow: whole(scene.theme.glow), light: whole(scene.theme.light), dark: whole(scene.theme.dark) };
+    this.fills = this.palette.channels.map(packed);
+    this.inks = this.palette.texts.map(whole);
+    /** pictures of what stays: behind everything, between lines and discs, on discs, before everything
+     * @type {Object<string, Uint8ClampedArray | null>} */
+    this.pictures = { back: null, between: null, words: null, front: null };
+    /** @type {Mosaic | null} */
+    this.mosaic = null;
     /** the ids of what stands out; where there are none, all does @type {Set<string>} */
     this.near = new Set();
     this.held = '';
-    this.layout = '';
+    /** where the camera was when this was laid out, and when it was last asked for */
+    this.layout = this.asked = '';
+    /** what pictures were drawn for */
+    this.dressed = '';
+    /** when it was laid out, and how long that took */
+    this.since = this.cost = 0;
+    /** the latest picture, while the camera moves @type {HTMLCanvasElement | null} */
+    this.shot = null;
+    this.seen = { scale: 1, origin: [0, 0] };
+    /** how often discs were moved by hand */
+    this.moves = 0;
   }
 
   /** Put a group where it belongs. @param {Group} group */
   sort(group) {
     const { id, shapes, data } = group;
     if (data.neuron !== undefined) {
-      this.discs.push({ index: Number(id.slice(1)), shape: shapes[0], rest: shapes.slice(1) });
+      this.discs.push({ id, index: Number(id.slice(1)), shape: shapes[0], rest: shapes.slice(1), laid: null });
     } else if (data.connection !== undefined) {
       const { points } = shapes[0], index = Number(id.slice(1));
-      this.lines.push({ index, path: spline(points), box: around(points), head: shapes[1], rest: shapes.slice(2) });
+      const rest = shapes.slice(2), path = spline(points);
+      this.lines.push({ id, index, points, path, box: around(points), head: shapes[1], rest, laid: null });
     } else if (id === 'caption') {
       this.caption = shapes[0];
     } else {
@@ -78,39 +118,79 @@ export class Drawing {
     }
   }
 
-  /** Draw a look. @param {Context} context @param {Camera} camera @param {Look} look */
+  /** Draw a look; true where there is more to be drawn in the next frame.
+   * @param {Context} context @param {Camera} camera @param {Look} look @returns {boolean} */
   draw(context, camera, look) {
-    this.prepare(camera);
-    context.setTransform(1, 0, 0, 1, 0, 0);
+    const begun = performance.now(), layout = layoutOf(camera), moving = layout !== this.asked;
+    this.asked = layout;
+    if (moving && this.layout && this.cost > SLOW && begun - this.since < PATIENCE * this.cost && this.mosaic
+      && this.mosaic.image.width === camera.window[0] && this.mosaic.image.height === camera.window[1]) {
+      this.preview(context, camera);
+      return true;
+    }
+    const anew = this.prepare(camera), mosaic = /** @type {Mosaic} */ (this.mosaic);
+    this.lay(camera, look);
+    this.dress(camera, look);
+    const left = mosaic.work((coverage, tile) => this.fill(coverage, tile), anew ? Infinity : begun + BUDGET);
+    mosaic.blend();
+    context.putImageData(mosaic.image, 0, 0);
     context.globalAlpha = 1;
-    context.drawImage(this.layers[0], 0, 0);
-    this.place(context, camera);
-    for (const line of this.lines) this.line(context, line, look);
-    for (const disc of this.discs) this.disc(context, disc, look);
-    context.globalAlpha = 1;
-    context.setTransform(1, 0, 0, 1, 0, 0);
-    context.drawImage(this.layers[1], 0, 0);
     this.place(context, camera);
     if (this.caption) this.text(context, { ...this.caption, text: look.caption }, this.caption.fill);
+    if (anew) {
+      this.since = performance.now();
+      this.cost = this.since - begun;
+      this.shot = null;
+    }
+    return left;
   }
 
-  /** Draw what stays, where the camera has moved. @param {Camera} camera */
+  /** Show the latest picture where the camera would see it. @param {Context} context @param {Camera} camera */
+  preview(context, camera) {
+    const [width, height] = camera.window, { scale, origin } = this.seen, by = camera.scale / scale;
+    if (!this.shot) {
+      this.shot = document.createElement('canvas');
+      [this.shot.width, this.shot.height] = camera.window;
+      /** @type {Context} */ (this.shot.getContext('2d')).drawImage(context.canvas, 0, 0);
+    }
+    context.setTransform(1, 0, 0, 1, 0, 0);
+    context.globalAlpha = 1;
+    context.fillStyle = this.scene.theme.background;
+    context.fillRect(0, 0, width, height);
+    const [left, top] = camera.origin.map((at, axis) => at - origin[axis] * by);
+    context.drawImage(this.shot, left, top, width * by, height * by);
+  }
+
+  /** Lay everything out anew where the camera has moved; whether it had. @param {Camera} camera @returns {boolean} */
   prepare(camera) {
-    const layout = [...camera.window, camera.scale, ...camera.origin].join(' ');
-    if (layout === this.layout) return;
+    const layout = layoutOf(camera);
+    if (layout === this.layout) return false;
     this.layout = layout;
-    this.layers = [this.back, this.front].map((groups, at) => {
-      const layer = document.createElement('canvas');
-      [layer.width, layer.height] = camera.window;
-      const context = /** @type {Context} */ (layer.getContext('2d'));
-      if (at === 0) {
-        context.fillStyle = this.scene.theme.background;
-        context.fillRect(0, 0, layer.width, layer.height);
-      }
-      this.place(context, camera);
-      for (const group of groups) for (const shape of group.shapes) this.shape(context, shape);
-      return layer;
+    this.seen = { scale: camera.scale, origin: camera.origin };
+    this.mosaic = new Mosaic(camera.window, this.lines.length + 2 * this.discs.length);
+    this.dressed = '';
+    for (const item of [...this.lines, ...this.discs]) item.laid = null;
+    this.pictures.back = this.picture(camera, [], (context) => {
+      const [left, top] = camera.unit(0, 0), [right, bottom] = camera.unit(camera.window[0], camera.window[1]);
+      context.fillStyle = this.scene.theme.background;
+      context.fillRect(left, top, right - left, bottom - top);
+      for (const { shapes } of this.back) for (const shape of shapes) this.shape(context, shape);
     });
+    return true;
+  }
+
+  /** A picture of shapes, each of which is as strong as its alpha; none where there are no shapes.
+   * @param {Camera} camera @param {Shape[]} shapes @param {(context: Context) => void} [more]
+   * @returns {Uint8ClampedArray | null} */
+  picture(camera, shapes, more) {
+    if (!shapes.length && !more) return null;
+    const canvas = document.createElement('canvas'), [width, height] = camera.window;
+    [canvas.width, canvas.height] = [width, height];
+    const context = /** @type {Context} */ (canvas.getContext('2d', { willReadFrequently: true }));
+    this.place(context, camera);
+    for (const shape of shapes) this.shape(context, shape);
+    if (more) more(context);
+    return context.getImageData(0, 0, width, height).data;
   }
 
   /** @param {Context} context @param {Camera} camera */
@@ -120,58 +200,126 @@ export class Drawing {
     context.lineJoin = 'round';
   }
 
-  /** @param {Context} context @param {Line} line @param {Look} look */
-  line(context, line, look) {
-    const { constants } = this, kind = look.kinds[line.index];
-    const width = look.widths[line.index] / constants.fineness, glow = look.glows[line.index] / constants.fineness;
-    const colour = this.palette.fills[look.lines[line.index] + constants.levels];
-    context.globalAlpha = (kind & constants.isFaint ? constants.faint : 1) * this.share(`c${line.index}`);
-    if (glow > 0) {
-      context.strokeStyle = this.scene.theme.glow;
-      context.lineWidth = glow;
-      context.stroke(line.path);
-    }
-    context.strokeStyle = colour;
-    context.lineWidth = width;
-    context.stroke(line.path);
-    this.head(context, line.head, width, colour, (kind & constants.isBar) !== 0);
-    for (const shape of line.rest) this.shape(context, shape);
+  /** Draw the pictures of what stays where they are other ones now. @param {Camera} camera @param {Look} look */
+  dress(camera, look) {
+    const { lines, discs, mosaic } = this, { isFaint } = this.constants, { kinds } = look;
+    const faint = [...lines.filter(({ rest, index }) => rest.length && kinds[index] & isFaint),
+      ...discs.filter(({ index }) => kinds[look.widths.length + index] & isFaint)].map(({ id }) => id);
+    const dressed = [this.held, this.moves, ...faint, ':', ...this.near].join();
+    if (dressed === this.dressed || !mosaic) return;
+    this.dressed = dressed;
+    const before = this.pictures, isWord = (/** @type {Shape} */ shape) => shape.kind === 'text' && shape.onDisc;
+    /** @param {Context} context @param {(Line | Disc)[]} items */
+    const draw = (context, items) => {
+      for (const { rest, laid } of items) {
+        context.globalAlpha = laid ? laid.share : 1;
+        for (const shape of rest) if (!isWord(shape)) this.shape(context, shape);
+      }
+    };
+    const words = discs.flatMap(({ rest }) => rest.filter(isWord)), beads = lines.filter(({ rest }) => rest.length);
+    this.pictures = {
+      back: before.back,
+      between: beads.length ? this.picture(camera, [], (context) => draw(context, beads)) : null,
+      words: this.picture(camera, words),
+      front: this.picture(camera, [], (context) => {
+        draw(context, discs);
+        context.globalAlpha = 1;
+        for (const { shape, id } of discs) if (id === this.held) this.ring(context, shape);
+        for (const { shapes } of this.front) for (const shape of shapes) this.shape(context, shape);
+      }),
+    };
+    for (const name of ['between', 'words', 'front']) mosaic.compare(before[name], this.pictures[name]);
   }
 
-  /** @param {Context} context @param {Disc} disc @param {Look} look */
-  disc(context, disc, look) {
-    const { constants } = this, level = look.discs[disc.index] + constants.levels;
-    const faint = look.kinds[look.widths.length + disc.index] & constants.isFaint, id = `n${disc.index}`;
-    context.globalAlpha = (faint ? constants.faint : 1) * this.share(id);
-    this.shape(context, { ...disc.shape, fill: this.palette.fills[level] });
-    for (const shape of disc.rest) {
-      if (shape.kind === 'text') this.text(context, shape, shape.onDisc ? this.palette.texts[level] : shape.fill);
-      else this.shape(context, shape);
-    }
-    if (id === this.held) {
-      const { at, radius } = disc.shape;
-      context.globalAlpha = 1;
-      context.strokeStyle = this.scene.theme.ink;
-      context.lineWidth = 2;
-      context.beginPath();
-      context.arc(at[0], at[1], radius + 3, 0, 2 * Math.PI);
-      context.stroke();
-    }
+  /** Show that a disc is held. @param {Context} context @param {Shape} shape */
+  ring(context, { at, radius }) {
+    context.strokeStyle = this.scene.theme.ink;
+    context.lineWidth = 2;
+    context.beginPath();
+    context.arc(at[0], at[1], radius + 3, 0, 2 * Math.PI);
+    context.stroke();
   }
 
-  /** How much is seen of something. @param {string} id @returns {number} */
-  share(id) {
-    return !this.near.size || this.near.has(id) ? 1 : RECEDING;
+  /** Lay out what lies otherwise than before, and have all in its colours. @param {Camera} camera @param {Look} look */
+  lay(camera, look) {
+    const { lines, discs, constants, near, fills } = this, { scale } = camera, [left, top] = camera.origin;
+    const mosaic = /** @type {Mosaic} */ (this.mosaic), { fineness, levels, isFaint, isBar } = constants;
+    /** @param {string} id @param {number} kind */
+    const shareOf = (id, kind) => (kind & isFaint ? constants.faint : 1) * (!near.size || near.has(id) ? 1 : RECEDING);
+    discs.forEach((disc, at) => {
+      const kind = look.kinds[look.widths.length + disc.index], share = shareOf(disc.id, kind), { shape, laid } = disc;
+      const level = look.discs[disc.index] + levels, slot = lines.length + at;
+      mosaic.paint(slot, fills[level]);
+      mosaic.paint(slot + discs.length, this.inks[level]);
+      const x = shape.at[0] * scale + left, y = shape.at[1] * scale + top;
+      if (laid && laid.x === x && laid.y === y && laid.share === share) return;
+      if (laid && (laid.x !== x || laid.y !== y)) this.moves++;
+      const radius = shape.radius * scale, ring = (Math.max(0, shape.width) / 2) * scale;
+      const tiles = mosaic.around(x, y, radius + ring + 1);
+      for (const tile of laid ? laid.tiles : []) tile.discs.delete(at);
+      for (const tile of tiles) tile.discs.add(at);
+      mosaic.spoil(laid ? laid.tiles : []);
+      mosaic.spoil(tiles);
+      disc.laid = { x, y, radius, ring, colour: ring ? whole(shape.stroke) : 0, tiles, share };
+    });
+    lines.forEach((line, at) => {
+      const { index, points, laid } = line, kind = look.kinds[index], share = shareOf(line.id, kind);
+      const width = look.widths[index], glow = look.glows[index], bar = (kind & isBar) !== 0;
+      mosaic.paint(at, fills[look.lines[index] + levels]);
+      if (laid && laid.points === points && laid.end === line.head && laid.width === width && laid.glow === glow
+        && laid.bar === bar && laid.share === share) return;
+      const reach = (Math.max(width, glow) / 2 / fineness) * scale + 0.5, { half, length } = this.sizes(line.head, width / fineness);
+      const room = Math.hypot(half, length) * scale + 1, same = laid && laid.points === points && laid.end === line.head;
+      const now = { points, end: line.head, width, glow, bar, share, reach, room };
+      if (same && reach <= laid.reach && room <= laid.room) {
+        Object.assign(laid, now, { reach: laid.reach, room: laid.room });
+        mosaic.spoil(laid.tiles);
+        return;
+      }
+      const chain = same ? laid.chain : flattened(points, scale, camera.origin), [x, y] = line.head.at;
+      const tiles = mosaic.beside(chain, reach + SPARE, x * scale + left, y * scale + top, room + SPARE);
+      for (const tile of laid ? laid.tiles : []) tile.lines.delete(at);
+      for (const tile of tiles) tile.lines.add(at);
+      mosaic.spoil(laid ? laid.tiles : []);
+      mosaic.spoil(tiles);
+      line.laid = { ...now, reach: reach + SPARE, room: room + SPARE, chain, tiles };
+    });
   }
 
-  /** The end of a line. @param {Context} context @param {Shape} shape @param {number} width @param {string} colour
-   * @param {boolean} bar */
-  head(context, shape, width, colour, bar) {
-    const { constants } = this, { length } = shape, [x, y] = shape.at, [dx, dy] = shape.along;
+  /** Put in all that is in a tile, from front to back. @param {Coverage} coverage @param {Tile} tile */
+  fill(coverage, tile) {
+    const { lines, discs, pictures, seen, constants, colours } = this, [left, top] = seen.origin;
+    coverage.picture(pictures.front);
+    for (const at of [...tile.discs].sort((a, b) => b - a)) {
+      const { laid } = discs[at], slot = lines.length + at;
+      if (laid) coverage.disc(laid, slot, pictures.words, slot + discs.length);
+    }
+    coverage.picture(pictures.between);
+    const half = seen.scale / 2 / constants.fineness;
+    for (const at of [...tile.lines].sort((a, b) => b - a)) {
+      if (!coverage.open) break;
+      const { laid, head } = lines[at];
+      if (!laid) continue;
+      const sizes = this.sizes(head, laid.width / constants.fineness), [x, y] = head.at, [dx, dy] = head.along;
+      const end = { x: x * seen.scale + left, y: y * seen.scale + top, dx, dy };
+      coverage.head(end, sizes, seen.scale, laid.bar, laid.share, at);
+      coverage.line(laid.chain, laid.width * half, laid.glow * half, laid.share, at, colours.glow);
+    }
+    coverage.picture(pictures.back);
+  }
+
+  /** How large the end of a line of a width is, in units. @param {Shape} shape @param {number} width @returns {Sizes} */
+  sizes({ length }, width) {
+    const { constants } = this, notch = -constants.notch * length;
     const half = Math.max(constants.headOfLength * length + constants.headOfWidth * width,
       (0.5 / constants.notch) * width + constants.headMore);
-    const notch = -constants.notch * length, back = -constants.bar * length, lap = notch - constants.lap * length;
-    const stem = width / 2;
+    return { length, half, notch, back: -constants.bar * length, lap: notch - constants.lap * length, stem: width / 2 };
+  }
+
+  /** The end of a line that stays. @param {Context} context @param {Shape} shape @param {number} width @param {string} colour
+   * @param {boolean} bar */
+  head(context, shape, width, colour, bar) {
+    const { length, half, notch, back, lap, stem } = this.sizes(shape, width), [x, y] = shape.at, [dx, dy] = shape.along;
     const corners = bar
       ? [0, half, back, half, back, stem, lap, stem, lap, -stem, back, -stem, back, -half, 0, -half]
       : [0, 0, -length, half, notch, 0, -length, -half];

@@ -35,9 +35,10 @@ function show() {
   if (!drawing || !look?.serial) return;
   if (density !== devicePixelRatio) resize();
   [drawing.near, drawing.held] = [attention.near, attention.held];
-  drawing.draw(context, camera, look);
+  const more = drawing.draw(context, camera, look);
   attention.show(camera, look);
   controls.frame(look);
+  if (more) redraw();
   if (fresh) {
     fresh = false;
     link.drawn();
