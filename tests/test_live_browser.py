@@ -6,6 +6,7 @@ import asyncio
 import io
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -84,7 +85,40 @@ def test_the_page_shows_the_picture_that_render_draws(spec: str, theme: str, tmp
             seen = taken.crop((0, 0, *drawn.size))
             seen.save(tmp_path / "seen.png")
             drawn.save(tmp_path / "drawn.png")
-            assert similarity(seen, drawn) >= 0.98
+        assert similarity(seen, drawn) >= 0.98
+
+    asyncio.run(main())
+
+
+DENSE = """neurovis: 1
+name: dense
+neurons: {R: {count: 120, activation: tanh, initial: "uniform(-1, 1)"}}
+connections:
+  R -> R: {weight: "normal(0, 0.2)", pattern: {random: {probability: 0.14}}}
+render: {min_weight: 0}
+"""
+
+
+def test_two_thousand_lines_are_those_of_render_on_a_display_of_two_pixels_a_pixel(tmp_path: Path) -> None:
+    async def main() -> None:
+        (tmp_path / "dense.yaml").write_text(DENSE)
+        async with shown(str(tmp_path / "dense.yaml"), tmp_path) as (opened, compiled, _):
+            step = await pause(opened)
+            snapshot, layout = compiled.run(step + 1).snapshot(step), compiled.drawn().value
+            scene = pipeline.picture(compiled.network, layout, snapshot, compiled.gains, compiled.network.render)
+            width, height = round(scene.width * scene.density), round(scene.height * scene.density)
+            await opened.size(width, height + BAR, density=2.0)
+            await opened.shot()  # headless, a page that stands still notices another display when it is looked at
+            await opened.until(f"document.querySelector('#picture').width == {2 * width}")
+            await opened.ask("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+            taken = Image.open(io.BytesIO(await opened.shot())).convert("RGB")
+            sharp = replace(scene, density=2 * scene.density)
+            drawn = Image.open(io.BytesIO(pipeline.draw(sharp, ".png"))).convert("RGB")
+            seen = taken.crop((0, 0, *drawn.size))
+            seen.save(tmp_path / "seen.png")
+            drawn.save(tmp_path / "drawn.png")
+            assert len(compiled.network.connections) > 1900
+        assert similarity(seen, drawn) >= 0.98
 
     asyncio.run(main())
 

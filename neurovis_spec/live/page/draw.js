@@ -18,10 +18,10 @@ import { Mosaic } from './mosaic.js';
 /** @typedef {import('./coverage.js').Round} Round */
 /** @typedef {import('./coverage.js').Sizes} Sizes */
 /** A line as it was laid out: from these points, as this chain, in these tiles, which have room for this reach.
- * @typedef {{points: number[], end: Shape, chain: Chain, tiles: Tile[], reach: number, room: number, width: number,
+ * @typedef {{points: number[], end: Shape, box: number[], chain: Chain, tiles: Tile[], reach: number, room: number, width: number,
  *   glow: number, bar: boolean, share: number}} LaidLine */
 /** What lies otherwise when another `points`, `head` or `at` is put in place of the one before.
- * @typedef {{id: string, index: number, points: number[], path: Path2D, box: number[], head: Shape, rest: Shape[],
+ * @typedef {{id: string, index: number, points: number[], head: Shape, rest: Shape[],
  *   laid: LaidLine | null}} Line */
 /** @typedef {{id: string, index: number, shape: Shape, rest: Shape[], laid: (Round & {tiles: Tile[]}) | null}} Disc */
 
@@ -108,9 +108,8 @@ export class Drawing {
     if (data.neuron !== undefined) {
       this.discs.push({ id, index: Number(id.slice(1)), shape: shapes[0], rest: shapes.slice(1), laid: null });
     } else if (data.connection !== undefined) {
-      const { points } = shapes[0], index = Number(id.slice(1));
-      const rest = shapes.slice(2), path = spline(points);
-      this.lines.push({ id, index, points, path, box: around(points), head: shapes[1], rest, laid: null });
+      const [{ points }, head, ...rest] = shapes;
+      this.lines.push({ id, index: Number(id.slice(1)), points, head, rest, laid: null });
     } else if (id === 'caption') {
       this.caption = shapes[0];
     } else {
@@ -282,7 +281,7 @@ export class Drawing {
       for (const tile of tiles) tile.lines.add(at);
       mosaic.spoil(laid ? laid.tiles : []);
       mosaic.spoil(tiles);
-      line.laid = { ...now, reach: reach + SPARE, room: room + SPARE, chain, tiles };
+      line.laid = { ...now, reach: reach + SPARE, room: room + SPARE, box: around(points), chain, tiles };
     });
   }
 

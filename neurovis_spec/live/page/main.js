@@ -18,7 +18,7 @@ const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d',
 const camera = new Camera();
 /** @type {Drawing | null} */
 let drawing = null;
-let fresh = false, asked = false, density = 1;
+let fresh = false, asked = false, density = 0;
 
 /** Draw before the display's next frame. */
 function redraw() {
@@ -56,7 +56,10 @@ function blank() {
 /** Fill the window, a pixel a pixel. */
 function resize() {
   const box = canvas.getBoundingClientRect();
-  density = devicePixelRatio;
+  if (density !== devicePixelRatio) {
+    density = devicePixelRatio;
+    matchMedia(`(resolution: ${density}dppx)`).addEventListener('change', redraw, { once: true });
+  }
   camera.window = [Math.max(1, Math.round(box.width * density)), Math.max(1, Math.round(box.height * density))];
   [canvas.width, canvas.height] = camera.window;
   blank();
@@ -105,7 +108,7 @@ new ResizeObserver(resize).observe(canvas);
 new Pointer(canvas, camera, attention, {
   pointed(x, y) {
     const { look } = link;
-    return drawing && look ? under(context, drawing, camera, look, x, y) : '';
+    return drawing && look ? under(drawing, camera, look, x, y) : '';
   },
   redraw,
 });

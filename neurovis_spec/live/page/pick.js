@@ -9,32 +9,35 @@
 /** How far from a line, in pixels of a page, a pointer may be. */
 const NEAR = 5;
 
-/** The id of the neuron or the connection under a pixel, '' for none; neurons lie above connections.
- * @param {CanvasRenderingContext2D} context @param {Drawing} drawing @param {Camera} camera @param {Look} look
+/** How far a point is from a curve. @param {import('./coverage.js').Chain} chain @param {number} x @param {number} y
+ * @returns {number} */
+function distance({ at, parts }, x, y) {
+  let least = Infinity;
+  for (let i = 0; i < 2 * parts; i += 2) {
+    const dx = at[i + 2] - at[i], dy = at[i + 3] - at[i + 1], right = x - at[i], down = y - at[i + 1];
+    const part = Math.min(1, Math.max(0, (right * dx + down * dy) / (dx * dx + dy * dy)));
+    least = Math.min(least, Math.hypot(right - part * dx, down - part * dy));
+  }
+  return least;
+}
+
+/** The id of the neuron or the connection under a pixel, '' for none; neurons lie above connections, and what is drawn
+ * there is before what is close by. @param {Drawing} drawing @param {Camera} camera @param {Look} look
  * @param {number} x @param {number} y @returns {string} */
-export function under(context, drawing, camera, look, x, y) {
+export function under(drawing, camera, look, x, y) {
   const [across, down] = camera.unit(x, y), near = (NEAR * devicePixelRatio) / camera.scale;
-  for (const { index, shape } of drawing.discs.slice().reverse()) {
-    const reach = Math.max(shape.radius, near);
-    if (Math.hypot(across - shape.at[0], down - shape.at[1]) <= reach) return `n${index}`;
+  for (const { id, shape } of drawing.discs.slice().reverse()) {
+    if (Math.hypot(across - shape.at[0], down - shape.at[1]) <= Math.max(shape.radius, near)) return id;
   }
-  const close = drawing.lines.filter(({ box, index }) => {
-    const room = near + look.widths[index] / drawing.constants.fineness;
-    return across > box[0] - room && across < box[2] + room && down > box[1] - room && down < box[3] + room;
-  }).reverse();
-  context.save();
-  context.setTransform(1, 0, 0, 1, 0, 0);
-  let found = '';
-  // what is drawn under the pixel first, then what is close by
-  for (const more of [0, near / 2, near]) {
-    for (const { index, path } of found ? [] : close) {
-      context.lineWidth = look.widths[index] / drawing.constants.fineness + 2 * more;
-      if (context.isPointInStroke(path, across, down)) {
-        found = `c${index}`;
-        break;
-      }
-    }
+  const { scale, origin } = drawing.seen;
+  let found = '', least = near;
+  for (const { id, index, laid } of drawing.lines.slice().reverse()) {
+    const half = look.widths[index] / drawing.constants.fineness / 2, room = near + half;
+    if (!laid || across < laid.box[0] - room || across > laid.box[2] + room || down < laid.box[1] - room
+      || down > laid.box[3] + room) continue;
+    const far = distance(laid.chain, across * scale + origin[0], down * scale + origin[1]) / scale - half;
+    if (far <= 0) return id;
+    if (far < least) [found, least] = [id, far];
   }
-  context.restore();
   return found;
 }
