@@ -12,7 +12,7 @@ import pytest
 
 import neurovis_spec as nv
 from neurovis_spec.live.appearance import Appearance
-from neurovis_spec.live.clock import Clock
+from neurovis_spec.live.clock import FRAMES, Clock, Pace
 from neurovis_spec.live.commands import Branch, Command, Draw, Event, Pause, Play, Restart, Seek, Speed, Step
 from neurovis_spec.live.recorded import RecordedSource
 from neurovis_spec.live.run import Run, Shown
@@ -74,6 +74,21 @@ def driven() -> Iterator[Driven]:
     yield made
     made.run.end()
     assert made.run.failure is None
+
+
+def test_frames_that_are_begun_late_are_no_fewer() -> None:
+    pace, now, frames = Pace(), 100.0, 0
+    pace.begin(now)
+    while now < 110.0:
+        now = max(now + 0.005, pace.due) + 0.002 * (frames % 3)
+        pace.begin(now)
+        frames += 1
+    assert 10 * FRAMES - 2 <= frames <= 10 * FRAMES + 2
+    # after a while in which there were none, they are not made up for
+    pace.begin(now + 60.0)
+    assert pace.due == now + 60.0
+    pace.begin(now + 60.0)
+    assert pace.due > now + 60.0
 
 
 def test_the_clock_counts_steps_in_real_time_and_at_other_speeds() -> None:

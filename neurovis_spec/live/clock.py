@@ -1,4 +1,4 @@
-"""The clock of a live run: how many steps are due.
+"""The clock of a live run: how many steps are due, and when the next frame is.
 
 In: the time, in seconds. Out: steps. A run that cannot keep up goes as fast as it can, and does not catch up later.
 """
@@ -62,3 +62,14 @@ class Clock:
     def make(self, steps: int) -> None:
         """So many were made."""
         self._made += steps
+
+
+class Pace:
+    """When frames are due: one that was begun late has the next no later."""
+
+    def __init__(self) -> None:
+        self.due = 0.0
+
+    def begin(self, now: float) -> None:
+        """A frame is begun."""
+        self.due = max(self.due + 1 / FRAMES, now)

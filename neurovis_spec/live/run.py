@@ -16,7 +16,7 @@ from threading import Thread
 from typing import TypeAlias
 
 from neurovis_spec.live.appearance import Appearance
-from neurovis_spec.live.clock import FRAMES, Clock
+from neurovis_spec.live.clock import FRAMES, Clock, Pace
 from neurovis_spec.live.commands import Branch, Command, Draw, Event, Pause, Play, Present, Restart, Seek, Speed, Step
 from neurovis_spec.live.source import Capabilities, Reach, Seen, Source, SourceError, Turned
 from neurovis_spec.live.view import Look, View
@@ -96,7 +96,7 @@ class Run:
         self.appearance, self._drawing = view.appearance, False
         #: the step to go to, which is further than has been reached
         self._target: int | None = None
-        self._clock = self._clock_of(source, 1.0)
+        self._clock, self._pace = self._clock_of(source, 1.0), Pace()
         self._thread = Thread(target=self._drive, name="live run", daemon=True)
         self.failure: Exception | None = None
 
@@ -138,12 +138,11 @@ class Run:
 
     def _attend(self) -> bool:
         """Carry out what was asked until a step is due; False at the end."""
-        shown = time.perf_counter()
         while True:
             wait = None
             if self._running:
-                due = 0.0 if self._target is not None else self._clock.next()
-                wait = max(0.0, max(due, shown + 1 / FRAMES if self._target is None else 0.0) - time.perf_counter())
+                due = 0.0 if self._target is not None else max(self._clock.next(), self._pace.due)
+                wait = max(0.0, due - time.perf_counter())
             try:
                 asked, refuse, done = self._asked.get(timeout=wait) if wait != 0.0 else self._asked.get_nowait()
             except Empty:
@@ -242,6 +241,7 @@ class Run:
     def _move(self) -> None:
         """Make the steps that are due, at most as many as there is time for in a frame, and show the last."""
         begun = time.perf_counter()
+        self._pace.begin(begun)
         due = math.inf if self._target is not None else self._clock.due(begun)
         made = 0
         while made < due:
