@@ -1,0 +1,257 @@
+"""Middleware: what NeuroVis asks of ROS 1 and ROS 2, one small interface.
+
+In: nothing; these are the types, and ``open_node``, which finds the ROS that is there. Messages are bytes as they go
+over the wire: ROS 1's serialization, or CDR with its four bytes of encapsulation. Whoever wants to know what is in
+them asks the node for a Codec.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Final, Literal, NamedTuple, Protocol, TypeAlias
+from urllib.parse import urlsplit
+
+Ros: TypeAlias = Literal[1, 2]
+#: the module that each ROS is imported as
+MODULES: Final[Mapping[Ros, str]] = {1: "rospy", 2: "rclpy"}
+#: what says who may listen; where one of them is set, nothing is changed
+_OPEN: Final = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_IP", "ROS_HOSTNAME")
+_HERE: Final = ("localhost", "127.0.0.1", "::1")
+
+
+class MiddlewareError(ValueError):
+    """No ROS, or one that cannot be used as it is asked for; ``hint`` says what there is to do."""
+
+    def __init__(self, message: str, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.hint = hint
+
+
+class Arrival(NamedTuple):
+    """A message as it came; times in nanoseconds since 1970. ``type`` is what its publisher says that it is
+    (``package/Name``), ``sent`` the time at which it was sent, where the middleware knows."""
+
+    data: bytes
+    received: int
+    sent: int | None
+    type: str
+
+
+#: Called with each message, in a thread of the middleware: it must not wait. What it raises is told.
+Arrived: TypeAlias = Callable[[Arrival], None]
+#: Called with a line about what goes on: a publisher with another quality of service, a master that is away.
+Tell: TypeAlias = Callable[[str], None]
+#: Called with values for parameters, in the middleware's thread; gives why not, or None when they are set.
+SetParameters: TypeAlias = Callable[[Mapping[str, float]], str | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Quality:
+    """Quality of service. Of a subscription ``offered`` takes the reliability and durability that publishers have.
+
+    ROS 1 knows depth (as the length of queues) and ``transient_local`` (latched) alone.
+    """
+
+    reliability: Literal["reliable", "best_effort", "offered"] = "reliable"
+    durability: Literal["volatile", "transient_local"] = "volatile"
+    depth: int = 10
+
+
+#: of the topic with the spec
+LATCHED: Final = Quality("reliable", "transient_local", 1)
+#: of a display: what it cannot show in time it does not get
+DISPLAY: Final = Quality("best_effort", "volatile", 5)
+#: of a recorder
+RECORDER: Final = Quality("offered", "volatile", 4000)
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A parameter of a node: its value, its bounds (None where there is none) and what it is."""
+
+    name: str
+    value: float
+    low: float | None = None
+    high: float | None = None
+    description: str = ""
+
+
+class Publisher(Protocol):
+    """Sends to a topic."""
+
+    topic: str
+    type: str
+
+    @property
+    def subscribers(self) -> int:
+        """How many there are now."""
+        ...
+
+    def publish(self, data: bytes) -> None:
+        """Send a message. Nothing is raised where nobody can be reached."""
+        ...
+
+    def close(self) -> None:
+        """Publish no more."""
+        ...
+
+
+class Subscription(Protocol):
+    """Listens to a topic."""
+
+    topic: str
+
+    @property
+    def publishers(self) -> int:
+        """How many there are now."""
+        ...
+
+    def close(self) -> None:
+        """Listen no more; after that nothing arrives."""
+        ...
+
+
+class Codec(Protocol):
+    """Messages of one type, as Python objects with an attribute for each field.
+
+    ``fields`` are the fields of the type and their types as the ROS writes them; ``definition`` its text with all that
+    it refers to, as recordings hold it."""
+
+    type: str
+    definition: str
+
+    def new(self) -> object:
+        """A message with everything zero or empty."""
+        ...
+
+    def fields(self, message: object) -> Mapping[str, str]:
+        """The fields of a message, or of one within it, and their types (``float64[]``, ``sequence<double>``)."""
+        ...
+
+    def decode(self, data: bytes) -> object:
+        """The message of these bytes. Raises ValueError."""
+        ...
+
+    def encode(self, message: object) -> bytes:
+        """The bytes of a message. Raises ValueError where a field has a value that it cannot have."""
+        ...
+
+    def stamp(self, message: object, nanoseconds: int) -> None:
+        """Put a time into the message's header, if it has one."""
+        ...
+
+
+class Node(Protocol):
+    """A node: it is there until it is closed. Its methods may be called by any thread."""
+
+    ros: Ros
+    #: its name, with its namespace
+    name: str
+    #: how often it had to be registered anew
+    reconnects: int
+
+    def now(self) -> int:
+        """Nanoseconds since 1970; with simulated time, nanoseconds of ``/clock``, 0 before it has begun."""
+        ...
+
+    def wait_until(self, nanoseconds: int, most: float) -> bool:
+        """Wait until ``now`` is so far; False where that takes more than ``most`` seconds on the wall."""
+        ...
+
+    def publisher(self, topic: str, type_: str, quality: Quality) -> Publisher:
+        """A publisher of messages of a type (``package/Name``). Raises MiddlewareError where the type's package is
+        missing."""
+        ...
+
+    def subscription(self, topic: str, type_: str, quality: Quality, arrived: Arrived) -> Subscription:
+        """Have ``arrived`` called with every message; in ROS 1 with those of other types, too, as their ``type``
+        says; ROS 2 delivers none of these, and the node tells that they are there. Raises MiddlewareError where the
+        type's package is missing."""
+        ...
+
+    def codec(self, type_: str) -> Codec:
+        """What reads and makes messages of a type. Raises MiddlewareError where its package is missing."""
+        ...
+
+    def topics(self) -> Mapping[str, tuple[str, ...]]:
+        """The topics that have publishers, and their types (``package/Name``), as far as they are known by now."""
+        ...
+
+    def declare(self, parameters: Sequence[Parameter], set_: SetParameters) -> None:
+        """Offer parameters that others can set: ROS 2's own; in ROS 1 ``NAME/parameters/…`` of the master's server."""
+        ...
+
+    def follow(self, values: Mapping[str, float]) -> None:
+        """Have parameters show what they are by now, whoever set them."""
+        ...
+
+    def close(self) -> None:
+        """Send what is still to be sent, and go. A second call does nothing."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """How a node is to be opened: its name and namespace, ``ros`` (None: what is there), whether it meets other
+    machines, whether its time is that of ``/clock``, whether another of its name may be there (``anonymous``)."""
+
+    name: str
+    namespace: str = "/"
+    ros: Ros | None = None
+    remote: bool = False
+    sim_time: bool = False
+    anonymous: bool = False
+    environment: Mapping[str, str] = field(default_factory=lambda: os.environ)
+
+
+def choose(asked: Ros | None, environment: Mapping[str, str] = os.environ) -> Ros:
+    """Which ROS is used: the one asked for, else that of ``ROS_VERSION`` where both are there, else what is there.
+    Raises MiddlewareError where it cannot be imported."""
+    there = [ros for ros, module in MODULES.items() if find_spec(module) is not None]
+    if asked is not None and asked not in there:
+        raise _missing(f"ROS {asked} is not here: the module '{MODULES[asked]}' cannot be imported")
+    if not there:
+        raise _missing(
+            "there is no ROS here: neither of the modules 'rclpy' (ROS 2) and 'rospy' (ROS 1) can be imported"
+        )
+    if asked is not None:
+        return asked
+    named = environment.get("ROS_VERSION")
+    return 1 if 1 in there and (2 not in there or named == "1") else 2
+
+
+def _missing(message: str) -> MiddlewareError:
+    return MiddlewareError(
+        message,
+        "source a ROS installation (. /opt/ros/DISTRO/setup.sh) in the environment that NeuroVis is in, or install one "
+        'there: pip install "ros-rclpy[fastrtps]" ros-std-msgs, or apt install python3-rospy python3-std-msgs',
+    )
+
+
+def confine(wish: Wish, ros: Ros) -> dict[str, str]:
+    """What is added to the environment so that this machine alone is met. Raises MiddlewareError for a master on
+    another machine."""
+    if wish.remote or any(wish.environment.get(name) for name in _OPEN):
+        return {}
+    if ros == 2:
+        return {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    master = wish.environment.get("ROS_MASTER_URI", "")
+    host = urlsplit(master).hostname
+    if host is not None and host not in _HERE:
+        raise MiddlewareError(
+            f"ROS_MASTER_URI names another machine, '{host}', which does not see this node",
+            "--remote lets other machines listen; or set ROS_IP to the address of this machine that they reach",
+        )
+    return {"ROS_IP": "127.0.0.1"}
+
+
+def open_node(wish: Wish, tell: Tell) -> Node:
+    """A node as it is wished for. Raises MiddlewareError."""
+    ros = choose(wish.ros, wish.environment)
+    os.environ.update(confine(wish, ros))
+    opened: Node = import_module(f"neurovis_spec.ros.ros{ros}").open_node(wish, tell)
+    return opened
