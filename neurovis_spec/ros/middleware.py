@@ -1,8 +1,7 @@
 """Middleware: what NeuroVis asks of ROS 1 and ROS 2, one small interface.
 
 In: nothing; these are the types, and ``open_node``, which finds the ROS that is there. Messages are bytes as they go
-over the wire: ROS 1's serialization, or CDR with its four bytes of encapsulation. Whoever wants to know what is in
-them asks the node for a Codec.
+over the wire: ROS 1's serialization, or CDR with its four bytes of encapsulation. ``fields`` and ``wire`` know what is in them.
 """
 
 from __future__ import annotations
@@ -115,51 +114,24 @@ class Subscription(Protocol):
         ...
 
 
-class Codec(Protocol):
-    """Messages of one type, as Python objects with an attribute for each field.
-
-    ``fields`` are the fields of the type and their types as the ROS writes them; ``definition`` its text with all that
-    it refers to, as recordings hold it."""
-
-    type: str
-    definition: str
-
-    def new(self) -> object:
-        """A message with everything zero or empty."""
-        ...
-
-    def fields(self, message: object) -> Mapping[str, str]:
-        """The fields of a message, or of one within it, and their types (``float64[]``, ``sequence<double>``)."""
-        ...
-
-    def decode(self, data: bytes) -> object:
-        """The message of these bytes. Raises ValueError."""
-        ...
-
-    def encode(self, message: object) -> bytes:
-        """The bytes of a message. Raises ValueError where a field has a value that it cannot have."""
-        ...
-
-    def stamp(self, message: object, nanoseconds: int) -> None:
-        """Put a time into the message's header, if it has one."""
-        ...
-
-
 class Node(Protocol):
     """A node: it is there until it is closed. Its methods may be called by any thread."""
 
     ros: Ros
+    #: how messages are written
+    encoding: Literal["ros1", "cdr"]
     #: its name, with its namespace
     name: str
     #: how often it had to be registered anew
     reconnects: int
 
-    def now(self) -> int:
-        """Nanoseconds since 1970; with simulated time, nanoseconds of ``/clock``, 0 before it has begun."""
+    @property
+    def ended(self) -> bool:
+        """Whether others have had the node shut down."""
         ...
 
-    def wait_until(self, nanoseconds: int, most: float) -> bool:
-        """Wait until ``now`` is so far; False where that takes more than ``most`` seconds on the wall."""
+    def now(self) -> int:
+        """Nanoseconds since 1970; with simulated time, nanoseconds of ``/clock``, 0 before it has begun."""
         ...
 
     def publisher(self, topic: str, type_: str, quality: Quality) -> Publisher:
@@ -173,8 +145,9 @@ class Node(Protocol):
         type's package is missing."""
         ...
 
-    def codec(self, type_: str) -> Codec:
-        """What reads and makes messages of a type. Raises MiddlewareError where its package is missing."""
+    def definition(self, type_: str) -> str:
+        """The fields of a type and of all that it refers to, as recordings hold them (``fields`` reads that). Raises
+        MiddlewareError where the type's package is missing."""
         ...
 
     def topics(self) -> Mapping[str, tuple[str, ...]]:

@@ -1,0 +1,378 @@
+"""What is in a message: numbers and texts at a field of any type, in the bytes of either ROS, and such bytes anew.
+
+In: the definition of a type, as recordings hold it; bytes. Out: numbers, texts; bytes. Lengths are compared with what
+is there before anything is made of them, so that no message costs more than its bytes.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final, Literal, TypeAlias, cast
+
+Encoding: TypeAlias = Literal["ros1", "cdr"]
+#: what a message is made of: numbers, texts, lists of values, fields by name; what is left out is 0 or empty
+Value: TypeAlias = "float | int | str | Sequence[Value] | Mapping[str, Value]"
+
+#: the characters of ``struct`` for primitive types
+_NUMBERS: Final[Mapping[str, str]] = {
+    "bool": "B", "byte": "B", "char": "B", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i",
+    "uint32": "I", "int64": "q", "uint64": "Q", "float32": "f", "float64": "d",
+}  # fmt: skip
+_LINE: Final = re.compile(r"([A-Za-z][\w/]*)(?:<=\d+)?(\[(?:<=)?\d*\])?\s+([A-Za-z]\w*)\s*(=)?")
+_DEEPEST: Final = 20
+
+
+class FieldError(ValueError):
+    """Bytes that are not a message of the type, or a value that it cannot hold."""
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """A field: ``array`` is None for one value, −1 for a list of any length, else the length."""
+
+    name: str
+    type: str
+    array: int | None = None
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A type, and the fields of each type that it refers to (``package/Name``)."""
+
+    type: str
+    types: Mapping[str, tuple[Field, ...]]
+
+    @classmethod
+    def parse(cls, type_: str, text: str) -> Definition:
+        """The definition that recordings hold. Raises FieldError.
+
+        >>> text = "float64[] x  # m\\nuint8 K=3\\nC c\\n" + "=" * 80 + "\\nMSG: a/C\\nstring<=9 s"
+        >>> Definition.parse("a/B", text).types["a/B"]
+        (Field(name='x', type='float64', array=-1), Field(name='c', type='a/C', array=None))
+        """
+        first, *others = re.split(r"^={80}\s*$", text, flags=re.MULTILINE)
+        types = {type_: tuple(_fields(first, type_))}
+        for other in others:
+            head, _, body = other.strip().partition("\n")
+            name = _plain(head.removeprefix("MSG:").strip())
+            types[name] = tuple(_fields(body, name))
+        made = cls(type_, types)
+        made._check(type_, 0)
+        return made
+
+    def _check(self, type_: str, depth: int) -> None:
+        if depth > _DEEPEST:
+            raise FieldError(f"the definition of {self.type} refers to itself")
+        for field in self.types[type_]:
+            if field.type not in _NUMBERS and field.type != "string":
+                if field.type not in self.types:
+                    raise FieldError(f"the definition of {self.type} does not say what {field.type} is")
+                self._check(field.type, depth + 1)
+
+    @cached_property
+    def least(self) -> Mapping[str, int]:
+        """The fewest bytes that a value of each type takes."""
+        found = {name: struct.calcsize(code) for name, code in _NUMBERS.items()} | {"string": 4}
+
+        def size(type_: str) -> int:
+            if type_ not in found:
+                found[type_] = sum(
+                    size(field.type) * field.array if field.array is not None and field.array >= 0
+                    else 4 if field.array is not None
+                    else size(field.type)
+                    for field in self.types[type_]
+                )  # fmt: skip
+            return found[type_]
+
+        for name in self.types:
+            size(name)
+        return found
+
+    def field(self, path: str) -> Field | None:
+        """The field at a dotted path."""
+        type_, found = self.type, None
+        for name in path.split("."):
+            if found is not None and found.array is not None:
+                return None
+            found = next((field for field in self.types.get(type_, ()) if field.name == name), None)
+            if found is None:
+                return None
+            type_ = found.type
+        return found
+
+    @property
+    def stamped(self) -> bool:
+        """Whether it begins with a header."""
+        return self.types[self.type][:1] == (Field("header", "std_msgs/Header"),)
+
+
+def _plain(name: str) -> str:
+    """``package/Name``, however it is written."""
+    return name.replace("/msg/", "/")
+
+
+def _fields(text: str, owner: str) -> Iterator[Field]:
+    for line in text.splitlines():
+        match = _LINE.match(line.partition("#")[0].strip())
+        if match is None or match[4]:
+            continue
+        base, brackets, name = _plain(match[1]), match[2], match[3]
+        if base in ("time", "duration"):
+            base = f"builtin_interfaces/{base.title()}"
+        elif base in ("Header", "roslib/Header"):
+            base = "std_msgs/Header"
+        elif base not in _NUMBERS and base != "string" and "/" not in base:
+            base = f"{owner.partition('/')[0]}/{base}"
+        length = None if brackets is None else brackets.strip("[]")
+        yield Field(name, base, None if length is None else int(length) if length.isdigit() else -1)
+
+
+#: what ROS 1 has as primitives; ROS 2 defines them, with signed seconds, of as many bytes
+TIMES: Final[Mapping[str, tuple[Field, ...]]] = {
+    f"builtin_interfaces/{name}": (Field("sec", "int32"), Field("nanosec", "uint32")) for name in ("Time", "Duration")
+}
+
+
+def definition(type_: str, text: str) -> Definition:
+    """The definition of a type. Raises FieldError."""
+    parts = "".join(
+        f"\n{'=' * 80}\nMSG: {name}\n" + "\n".join(f"{field.type} {field.name}" for field in fields)
+        for name, fields in TIMES.items()
+        if f"MSG: {name}" not in text
+    )
+    return Definition.parse(_plain(type_), text + parts)
+
+
+@dataclass
+class _Reader:
+    """Reads values from the bytes of a message."""
+
+    definition: Definition
+    data: bytes
+    encoding: Encoding
+    at: int = 0
+    order: str = "<"
+
+    def __post_init__(self) -> None:
+        self.start = 0
+        if self.encoding == "cdr":
+            if len(self.data) < 4 or self.data[0] != 0 or self.data[1] not in (0, 1):
+                raise FieldError("not encoded as CDR")
+            self.order = "<" if self.data[1] else ">"
+            self.at = self.start = 4
+
+    def align(self, size: int) -> None:
+        if self.encoding == "cdr":
+            self.at += (self.start - self.at) % size
+
+    def numbers(self, code: str, count: int) -> tuple[float, ...]:
+        size = struct.calcsize(code)
+        if count:
+            self.align(size)
+        self.need(size * count)
+        found = struct.unpack_from(f"{self.order}{count}{code}", self.data, self.at)
+        self.at += size * count
+        return found
+
+    def need(self, size: int) -> None:
+        if size > len(self.data) - self.at:
+            raise FieldError("the message is shorter than it says")
+
+    def count(self) -> int:
+        return int(self.numbers("I", 1)[0])
+
+    def text(self) -> str:
+        length = self.count()
+        self.need(length)
+        raw = self.data[self.at : self.at + length]
+        self.at += length
+        return (raw.removesuffix(b"\0") if self.encoding == "cdr" else raw).decode(errors="replace")
+
+    def several(self, field: Field) -> int:
+        """How many values a field has, as far as there is room for them."""
+        if field.array is None:
+            return 1
+        count = self.count() if field.array < 0 else field.array
+        self.need(count * self.definition.least[field.type])
+        return count
+
+    def values(self, field: Field) -> Sequence[float] | Sequence[str]:
+        """The values of a field of numbers or texts."""
+        count = self.several(field)
+        if field.type == "string":
+            return [self.text() for _ in range(count)]
+        return self.numbers(_NUMBERS[field.type], count)
+
+    def skip(self, field: Field) -> None:
+        if field.type in _NUMBERS or field.type == "string":
+            self.values(field)
+            return
+        count = self.several(field)
+        if self.definition.least[field.type]:
+            for _ in range(count):
+                for inner in self.definition.types[field.type]:
+                    self.skip(inner)
+
+    def find(self, type_: str, path: Sequence[str]) -> Sequence[float] | Sequence[str]:
+        """The values at a path; what is before it is passed over."""
+        for field in self.definition.types[type_]:
+            if field.name != path[0]:
+                self.skip(field)
+            elif len(path) > 1:
+                return self.find(field.type, path[1:])
+            else:
+                return self.values(field)
+        raise FieldError(f"there is no field '{path[0]}'")
+
+
+def numbers_at(definition: Definition, path: str, encoding: Encoding) -> Callable[[bytes], Sequence[float]]:
+    """What reads the numbers at a path. Raises FieldError where there are none; the reader raises it for bytes that are
+    no such message."""
+    field = definition.field(path)
+    if field is None or field.type not in _NUMBERS:
+        raise FieldError(f"messages of type {definition.type} have no numbers at '{path}'")
+    parts = path.split(".")
+    return lambda data: cast("Sequence[float]", _Reader(definition, data, encoding).find(definition.type, parts))
+
+
+def texts_at(definition: Definition, path: str, encoding: Encoding) -> Callable[[bytes], Sequence[str]]:
+    """What reads the texts at a path. Raises FieldError, as ``numbers_at`` does."""
+    field = definition.field(path)
+    if field is None or field.type != "string":
+        raise FieldError(f"messages of type {definition.type} have no texts at '{path}'")
+    parts = path.split(".")
+    return lambda data: cast("Sequence[str]", _Reader(definition, data, encoding).find(definition.type, parts))
+
+
+class _Writer:
+    """Writes values as the bytes of a message; ``wanted`` is where the numbers at a path begin."""
+
+    def __init__(self, definition: Definition, encoding: Encoding, wanted: str = "") -> None:
+        self.definition, self.encoding, self.path = definition, encoding, wanted
+        self.data, self.found = bytearray(), -1
+
+    def align(self, size: int) -> None:
+        if self.encoding == "cdr":
+            self.data += bytes(-len(self.data) % size)
+
+    def numbers(self, code: str, values: Sequence[float | int]) -> None:
+        if not values:
+            return
+        self.align(struct.calcsize(code))
+        if code not in "fd":
+            values = [int(value) for value in values]
+        try:
+            self.data += struct.pack(f"<{len(values)}{code}", *values)
+        except (struct.error, OverflowError) as error:
+            raise FieldError(f"a number that a field cannot hold: {error}") from None
+
+    def text(self, value: str) -> None:
+        raw = value.encode() + (b"\0" if self.encoding == "cdr" else b"")
+        self.numbers("I", [len(raw)])
+        self.data += raw
+
+    def value(self, type_: str, value: Value | None, path: str) -> None:
+        if type_ == "string":
+            self.text("" if value is None else str(value))
+        elif type_ in _NUMBERS:
+            self.numbers(_NUMBERS[type_], [cast(float, 0 if value is None else value)])
+        else:
+            given = cast("Mapping[str, Value]", value or {})
+            if unknown := [name for name in given if all(name != field.name for field in self.definition.types[type_])]:
+                raise FieldError(f"messages of type {type_} have no field '{unknown[0]}'")
+            for field in self.definition.types[type_]:
+                self.field(field, given.get(field.name), f"{path}.{field.name}" if path else field.name)
+
+    def field(self, field: Field, value: Value | None, path: str) -> None:
+        if field.array is None:
+            if path == self.path and field.type in _NUMBERS:
+                self.align(struct.calcsize(_NUMBERS[field.type]))
+                self.found = len(self.data)
+            self.value(field.type, value, path)
+            return
+        values = list(cast("Sequence[Value]", [] if value is None else value))
+        if field.array < 0:
+            self.numbers("I", [len(values)])
+        elif len(values) > field.array:
+            raise FieldError(f"'{path}' holds {field.array} values, not {len(values)}")
+        else:
+            zero: Value = "" if field.type == "string" else 0 if field.type in _NUMBERS else {}
+            values += [zero] * (field.array - len(values))
+        if field.type in _NUMBERS:
+            if values:
+                self.align(struct.calcsize(_NUMBERS[field.type]))
+            if path == self.path:
+                self.found = len(self.data)
+            self.numbers(_NUMBERS[field.type], cast("Sequence[float]", values))
+        else:
+            for one in values:
+                self.value(field.type, one, path)
+
+    def bytes(self) -> bytes:
+        return (b"\0\1\0\0" if self.encoding == "cdr" else b"") + bytes(self.data)
+
+
+def encode(definition: Definition, value: Mapping[str, Value], encoding: Encoding) -> bytes:
+    """The bytes of a message with these fields. Raises FieldError.
+
+    >>> encode(definition("std_msgs/Float64", "float64 data"), {"data": 1.5}, "ros1").hex()
+    '000000000000f83f'
+    """
+    writer = _Writer(definition, encoding)
+    writer.value(definition.type, value, "")
+    return writer.bytes()
+
+
+class Form:
+    """A message in which nothing but the numbers at a path changes, and the time of its header, if it has one.
+
+    Numbers for a field of integers are rounded and kept within what it holds. Raises FieldError where the field is none
+    of numbers, or holds another number of them.
+    """
+
+    def __init__(self, definition: Definition, path: str, size: int, encoding: Encoding) -> None:
+        field = definition.field(path)
+        if field is None or field.type not in _NUMBERS:
+            raise FieldError(f"messages of type {definition.type} have no numbers at '{path}'")
+        if field.array is None and size != 1:
+            raise FieldError(f"'{path}' of {definition.type} is one number, not {size}")
+        value: Value = 0 if field.array is None else [0] * size
+        for name in reversed(path.split(".")):
+            value = {name: value}
+        writer = _Writer(definition, encoding, path)
+        writer.value(definition.type, value, "")
+        shift = 4 if encoding == "cdr" else 0
+        self._data, self._at = bytearray(writer.bytes()), writer.found + shift
+        code = _NUMBERS[field.type]
+        self._numbers = struct.Struct(f"<{size}{code}")
+        self._bounds = None if code in "fd" else _bounds(field.type, code)
+        self._stamp = shift + (4 if encoding == "ros1" else 0) if definition.stamped else None
+        if self._stamp is not None and encoding == "ros1" and definition.types["std_msgs/Header"][0].name != "seq":
+            self._stamp = shift
+
+    def fill(self, numbers: Sequence[float], nanoseconds: int) -> bytes:
+        """The message with these numbers, at this time. Raises FieldError for a number that the field cannot hold."""
+        if self._bounds is not None:
+            low, high = self._bounds
+            if not all(number - number == 0 for number in numbers):
+                raise FieldError("a field of integers cannot hold what is not finite")
+            numbers = [min(max(round(number), low), high) for number in numbers]
+        try:
+            self._numbers.pack_into(self._data, self._at, *numbers)
+        except (struct.error, OverflowError) as error:
+            raise FieldError(str(error)) from None
+        if self._stamp is not None:
+            seconds, rest = divmod(nanoseconds, 1_000_000_000)
+            struct.pack_into("<II", self._data, self._stamp, seconds & 0xFFFFFFFF, rest)
+        return bytes(self._data)
+
+
+def _bounds(type_: str, code: str) -> tuple[int, int]:
+    bits = 8 * struct.calcsize(code)
+    if type_ == "bool":
+        return 0, 1
+    return (0, (1 << bits) - 1) if code.isupper() else (-(1 << (bits - 1)), (1 << (bits - 1)) - 1)

@@ -1,0 +1,372 @@
+"""ROS 1, over rospy: a node whose messages are bytes, and which outlives its master.
+
+In: a Wish. Out: a Node. A process has one node of ROS 1 at most. Once a second a watchdog asks the master whether the
+node stands there with all its topics, and registers it anew where it does not: connections that are there stay.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from http.client import HTTPConnection
+from threading import Event, Lock, Thread
+from typing import IO, Final, Literal, cast
+from xmlrpc.client import ServerProxy, Transport
+
+import genpy
+import rosgraph
+import roslib.message
+import rospy
+
+from neurovis_spec.ros.middleware import (
+    Arrival,
+    Arrived,
+    MiddlewareError,
+    Node,
+    Parameter,
+    Publisher,
+    Quality,
+    Ros,
+    SetParameters,
+    Subscription,
+    Tell,
+    Wish,
+)
+
+#: seconds between two questions to the master, to the cache of parameters, and until the master counts as away
+_WATCH, _LOOK, _AWAY = 1.0, 0.05, 2.0
+#: messages that wait for one subscriber before the oldest is given up, where none is to be lost
+_QUEUE: Final = 2000
+_BUFFER: Final = 1 << 20
+
+
+def open_node(wish: Wish, tell: Tell) -> Node:
+    """A node of ROS 1; waits for its master."""
+    return Ros1Node(wish, tell)
+
+
+class _Timely(Transport):
+    """Calls that end, whatever becomes of the master."""
+
+    def make_connection(self, host: tuple[str, dict[str, str]] | str) -> HTTPConnection:
+        made = super().make_connection(host)
+        made.timeout = _AWAY
+        return made
+
+
+def _class_of(type_: str) -> type:
+    package = type_.partition("/")[0]
+    try:
+        found = roslib.message.get_message_class(type_)
+    except (ImportError, ValueError):
+        found = None
+    if found is None:
+        hint = f"apt install python3-{package.replace('_', '-')}, or source the workspace that has it"
+        raise MiddlewareError(f"the message type {type_} is missing: there is no package '{package}' with it", hint)
+    return cast(type, found)
+
+
+def _raw(type_: str) -> type:
+    """A class of messages of a type that are bytes."""
+    real = _class_of(type_)
+
+    def begin(self: object, data: bytes = b"") -> None:
+        self.data = data  # type: ignore[attr-defined]
+
+    def serialize(self: object, buffer: IO[bytes]) -> None:
+        buffer.write(self.data)  # type: ignore[attr-defined]
+
+    members = {name: getattr(real, name) for name in ("_type", "_md5sum", "_full_text")}
+    made = {"__slots__": ["data"], "_slot_types": [], "_has_header": False, "__init__": begin, "serialize": serialize}
+    return type("Raw", (genpy.Message,), {**members, **made})
+
+
+class Ros1Publisher:
+    """Sends bytes to a topic."""
+
+    def __init__(self, node: Ros1Node, topic: str, type_: str, quality: Quality) -> None:
+        self.topic, self.type, self._node = topic, type_, node
+        self._class = _raw(type_)
+        latched = quality.durability == "transient_local"
+        queue = quality.depth if quality.reliability == "best_effort" else max(_QUEUE, quality.depth)
+        self.handle = rospy.Publisher(topic, self._class, queue_size=queue, latch=latched, tcp_nodelay=True)
+
+    @property
+    def subscribers(self) -> int:
+        """How many there are."""
+        return int(self.handle.get_num_connections())
+
+    def publish(self, data: bytes) -> None:
+        """Send a message."""
+        with suppress(rospy.ROSException):  # the node has ended
+            self.handle.publish(self._class(data))
+
+    @property
+    def waiting(self) -> bool:
+        """Whether messages still wait to be sent."""
+        return any(getattr(connection, "_queue", ()) for connection in list(self.handle.impl.connections))
+
+    def close(self) -> None:
+        """Publish no more."""
+        self._node.left(self)
+        self.handle.unregister()
+
+
+class Ros1Subscription:
+    """Hands on the bytes of a topic, whatever their type."""
+
+    def __init__(self, node: Ros1Node, topic: str, quality: Quality, arrived: Arrived) -> None:
+        self.topic, self.type, self._node, self._arrived, self._closed = topic, "*", node, arrived, False
+        self.handle = rospy.Subscriber(topic, rospy.AnyMsg, self._take, buff_size=_BUFFER, tcp_nodelay=True)
+
+    def _take(self, message: rospy.AnyMsg) -> None:
+        if self._closed:
+            return
+        received = time.time_ns()
+        header: Mapping[str, str] = getattr(message, "_connection_header", None) or {}
+        try:
+            self._arrived(Arrival(bytes(message._buff), received, None, header.get("type", "")))
+        except Exception as error:  # one message must not end the node
+            self._node.tell(f"{self.topic}: {error}")
+
+    @property
+    def publishers(self) -> int:
+        """How many there are."""
+        return int(self.handle.get_num_connections())
+
+    def close(self) -> None:
+        """Listen no more."""
+        if not self._closed:
+            self._closed = True
+            self._node.left(self)
+            self.handle.unregister()
+
+
+class Ros1Node:
+    """The node of ROS 1."""
+
+    ros: Ros = 1
+    encoding: Literal["ros1", "cdr"] = "ros1"
+
+    def __init__(self, wish: Wish, tell: Tell) -> None:
+        self.tell, self.reconnects, self.closed = tell, 0, False
+        self._lock, self._there = Lock(), list[Ros1Publisher | Ros1Subscription]()
+        self._clock = 0 if wish.sim_time else None
+        self._prefix, self._set = "", cast("SetParameters | None", None)
+        self._seen: dict[str, object] = {}
+        self._end, self._away = Event(), False
+        uri = os.environ.setdefault("ROS_MASTER_URI", "http://localhost:11311")
+        os.environ["ROS_NAMESPACE"] = wish.namespace
+        rospy.names._set_caller_id(rosgraph.names.make_global_ns(wish.namespace) + wish.name)
+        self._uri = uri
+        self._wait_for_master()
+        try:
+            remaps = ["neurovis", f"__ns:={wish.namespace}"]
+            rospy.init_node(wish.name, remaps, anonymous=wish.anonymous, disable_signals=True, disable_rostime=True)
+        except Exception as error:
+            raise MiddlewareError(f"a node of ROS 1 cannot be made: {error}") from None
+        self.name = str(rospy.get_name())
+        if self._clock is not None:
+            self.subscription("/clock", "rosgraph_msgs/Clock", Quality(), self._tick)
+        self._thread = Thread(target=self._watch, name="ros", daemon=True)
+        self._thread.start()
+
+    def _master(self) -> ServerProxy:
+        return ServerProxy(self._uri, transport=_Timely())
+
+    def _wait_for_master(self) -> None:
+        told = False
+        while True:
+            with suppress(OSError):
+                self._master().getPid("/neurovis")
+                return
+            if not told:
+                self.tell(f"waiting for the master of ROS 1 at {self._uri}")
+                told = True
+            time.sleep(0.2)
+
+    def _tick(self, arrival: Arrival) -> None:
+        if len(arrival.data) == 8:
+            seconds, rest = (int.from_bytes(arrival.data[at : at + 4], "little") for at in (0, 4))
+            self._clock = seconds * 1_000_000_000 + rest
+
+    def now(self) -> int:
+        """Nanoseconds since 1970, or of ``/clock``."""
+        return time.time_ns() if self._clock is None else self._clock
+
+    @property
+    def ended(self) -> bool:
+        """Whether others have had the node shut down."""
+        return bool(rospy.is_shutdown())
+
+    def publisher(self, topic: str, type_: str, quality: Quality) -> Publisher:
+        """A publisher."""
+        made = Ros1Publisher(self, topic, type_, quality)
+        with self._lock:
+            self._there.append(made)
+        return made
+
+    def subscription(self, topic: str, type_: str, quality: Quality, arrived: Arrived) -> Subscription:
+        """Listen to a topic, whatever the type of its messages."""
+        made = Ros1Subscription(self, topic, quality, arrived)
+        with self._lock:
+            self._there.append(made)
+        return made
+
+    def left(self, what: Ros1Publisher | Ros1Subscription) -> None:
+        """A publisher or a subscription is no more."""
+        with self._lock:
+            self._there.remove(what)
+
+    def definition(self, type_: str) -> str:
+        """The fields of a type, and of those that it refers to."""
+        return str(_class_of(type_)._full_text)  # type: ignore[attr-defined]
+
+    def topics(self) -> Mapping[str, tuple[str, ...]]:
+        """The topics that have publishers, and their types; none while the master is away."""
+        try:
+            found = cast("list[tuple[str, str]]", self._ask(lambda master: master.getPublishedTopics(self.name, "")))
+        except OSError:
+            return {}
+        return {topic: (type_,) for topic, type_ in found}
+
+    def _ask(self, what: Callable[[ServerProxy], object]) -> object:
+        """What the master answers. Raises OSError."""
+        try:
+            code, message, value = cast("tuple[int, str, object]", what(self._master()))
+        except OSError:
+            raise
+        except Exception as error:
+            raise OSError(str(error)) from None
+        if code != 1:
+            raise OSError(message)
+        return value
+
+    # ---- parameters --------------------------------------------------------------------------------------------
+
+    def declare(self, parameters: Sequence[Parameter], set_: SetParameters) -> None:
+        """Offer parameters on the master's server; who sets one there has it set here within a twentieth of a second.
+        One that cannot be set is put back."""
+        if parameters:
+            self._prefix = f"{self.name}/parameters"
+            self._values = {one.name: float(one.value) for one in parameters}
+            self._announce()
+            self._set = set_
+
+    def _announce(self) -> None:
+        """Put the parameters on the server, and have it tell of changes."""
+        values = dict(self._values)
+        self._ask(lambda master: master.setParam(self.name, self._prefix, values))
+        self._ask(lambda master: master.subscribeParam(self.name, rospy.core.get_node_uri(), self._prefix))
+        self._cache().set(self._prefix, dict(values))
+        self._seen = dict(values)
+
+    def _cache(self) -> rospy.impl.paramserver.ParamServerCache:
+        return rospy.impl.paramserver.get_param_server_cache()
+
+    def _look(self) -> None:
+        """Set what others have set on the server."""
+        if self._set is None:
+            return
+        now = cast("dict[str, object]", dict(self._cache().get(self._prefix)))
+        changed = {name: value for name, value in now.items() if self._seen.get(name) != value}
+        self._seen = now
+        changed = {name: value for name, value in changed.items() if value != self._values.get(name)}
+        if not changed:
+            return
+        why = self._refusal(changed)
+        if why is not None:
+            self.tell(f"{self._prefix}: {why}")
+            self._put({name: self._values[name] for name in changed if name in self._values})
+
+    def _refusal(self, changed: Mapping[str, object]) -> str | None:
+        given: dict[str, float] = {}
+        for name, value in changed.items():
+            if name not in self._values:
+                return f"there is no parameter '{name}'"
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                return f"'{name}' takes a number"
+            given[name] = float(value)
+        assert self._set is not None
+        why = self._set(given)
+        if why is None:
+            self._values |= given
+        return why
+
+    def _put(self, values: Mapping[str, float]) -> None:
+        for name, value in values.items():
+            key = f"{self._prefix}/{name}"
+            with suppress(OSError, KeyError):
+                self._ask(lambda master, key=key, value=value: master.setParam(self.name, key, value))  # type: ignore[misc]
+                self._cache().update(key, value)
+                self._seen[name] = value
+
+    def follow(self, values: Mapping[str, float]) -> None:
+        """Have parameters show what they are by now."""
+        if self._set is not None:
+            changed = {name: value for name, value in values.items() if self._values.get(name, value) != value}
+            self._values |= changed
+            self._put(changed)
+
+    # ---- the master --------------------------------------------------------------------------------------------
+
+    def _watch(self) -> None:
+        due = time.monotonic() + _WATCH
+        while not self._end.wait(_LOOK):
+            try:
+                self._look()
+                if time.monotonic() >= due:
+                    self._stand()
+                    due = time.monotonic() + _WATCH
+            except OSError as error:
+                if not self._away:
+                    self.tell(f"the master of ROS 1 is away ({error}): waiting for it")
+                self._away, due = True, time.monotonic() + _WATCH
+            except Exception as error:
+                self.tell(f"ROS 1: {error}")
+                due = time.monotonic() + _WATCH
+
+    def _stand(self) -> None:
+        """See that the node stands with the master, with all its topics. Raises OSError where that is away."""
+        with self._lock:
+            there = list(self._there)
+        state = cast("list[list[tuple[str, list[str]]]]", self._ask(lambda master: master.getSystemState(self.name)))
+        known = [{topic for topic, nodes in kind if self.name in nodes} for kind in state[:2]]
+        missing = [one for one in there if one.topic not in known[isinstance(one, Ros1Subscription)]]
+        if self._away:
+            self.tell("the master of ROS 1 is back")
+        if not missing and not self._away:
+            return
+        self._away = False
+        if missing:
+            self.reconnects += 1
+            for one in missing:
+                self._register(one)
+            if self._set is not None:
+                self._announce()
+
+    def _register(self, one: Ros1Publisher | Ros1Subscription) -> None:
+        """Have the master know a topic of this node again, and this node its publishers."""
+        uri = rospy.core.get_node_uri()
+        if isinstance(one, Ros1Publisher):
+            self._ask(lambda master: master.registerPublisher(self.name, one.topic, one.type, uri))
+            return
+        publishers: object = self._ask(lambda master: master.registerSubscriber(self.name, one.topic, one.type, uri))
+        ServerProxy(uri, transport=_Timely()).publisherUpdate("/master", one.topic, cast("list[str]", publishers))
+
+    def close(self) -> None:
+        """Go, once what waits has been sent."""
+        if self.closed:
+            return
+        self.closed = True
+        self._end.set()
+        deadline = time.monotonic() + 0.5
+        with self._lock:
+            publishers = [one for one in self._there if isinstance(one, Ros1Publisher)]
+        while any(one.waiting for one in publishers) and time.monotonic() < deadline:
+            time.sleep(0.01)
+        time.sleep(0.05)  # the last one is with the system by then
+        self._thread.join(2 * _AWAY)
+        rospy.signal_shutdown("the end")

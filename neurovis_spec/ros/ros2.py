@@ -1,0 +1,368 @@
+"""ROS 2, over rclpy: a node whose messages are bytes, spun by a thread of its own.
+
+In: a Wish. Out: a Node. What arrives at once is taken at once, so that a burst costs one turn of the executor.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from importlib import import_module
+from threading import Lock, Thread
+from typing import Final, Literal
+
+import rclpy
+from rclpy.context import Context
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.parameter import Parameter as Given
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import qos_policy_name_from_kind as policy_name
+
+from neurovis_spec.ros.middleware import (
+    Arrival,
+    Arrived,
+    MiddlewareError,
+    Node,
+    Parameter,
+    Publisher,
+    Quality,
+    Ros,
+    SetParameters,
+    Subscription,
+    Tell,
+    Wish,
+)
+
+_HUGE: Final = 1.7976931348623157e308
+#: names of primitives in interfaces, where they are others than in messages
+_PRIMITIVE: Final[Mapping[str, str]] = {"boolean": "bool", "octet": "byte", "double": "float64", "float": "float32"}
+_ARRAY: Final = re.compile(r"(?:sequence<(.+?)(?:, (\d+))?>|(.+)\[(\d+)\])")
+
+
+def open_node(wish: Wish, tell: Tell) -> Node:
+    """A node of ROS 2."""
+    return Ros2Node(wish, tell)
+
+
+def _message(type_: str) -> type:
+    """The class of messages of a type. Raises MiddlewareError."""
+    package, _, name = type_.partition("/")
+    try:
+        found: type = getattr(import_module(f"{package}.msg"), name)
+    except ImportError:
+        hint = (
+            f"install it beside rclpy: pip install ros-{package.replace('_', '-')}, or apt install ros-DISTRO-PACKAGE"
+        )
+        raise MiddlewareError(f"the package '{package}' of the message type {type_} is missing", hint) from None
+    except AttributeError:
+        raise MiddlewareError(f"the package '{package}' has no message type '{name}'") from None
+    return found
+
+
+def _profile(quality: Quality, reliable: bool) -> QoSProfile:
+    return QoSProfile(
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL
+        if quality.durability == "transient_local"
+        else DurabilityPolicy.VOLATILE,
+        history=HistoryPolicy.KEEP_LAST,
+        depth=quality.depth,
+    )
+
+
+class Ros2Publisher:
+    """Sends bytes to a topic."""
+
+    def __init__(self, node: Ros2Node, topic: str, type_: str, quality: Quality) -> None:
+        self.topic, self.type, self._node = topic, type_, node
+
+        def incompatible(event: object) -> None:
+            node.tell(f"{topic}: a subscriber asks for another quality of service ({_policy(event)}) and gets nothing")
+
+        self._handle = node.rcl.create_publisher(
+            _message(type_),
+            topic,
+            _profile(quality, quality.reliability != "best_effort"),
+            event_callbacks=PublisherEventCallbacks(incompatible_qos=incompatible),
+        )
+
+    @property
+    def subscribers(self) -> int:
+        """How many there are."""
+        return int(self._handle.get_subscription_count())
+
+    def publish(self, data: bytes) -> None:
+        """Send a message."""
+        if not self._node.closed:
+            self._handle.publish(data)
+
+    def close(self) -> None:
+        """Publish no more."""
+        if not self._node.closed:
+            self._node.rcl.destroy_publisher(self._handle)
+
+
+class Ros2Subscription:
+    """Hands on the bytes of a topic."""
+
+    def __init__(self, node: Ros2Node, topic: str, type_: str, quality: Quality, arrived: Arrived) -> None:
+        self.topic, self._type, self._node, self._quality, self._arrived = topic, type_, node, quality, arrived
+        self._class, self._closed, self._told = _message(type_), False, set[str]()
+        self._make(self._reliable())
+
+    def _reliable(self) -> bool:
+        if self._quality.reliability != "offered":
+            return self._quality.reliability == "reliable"
+        offers = self._node.rcl.get_publishers_info_by_topic(self.topic)
+        return all(offer.qos_profile.reliability != ReliabilityPolicy.BEST_EFFORT for offer in offers)
+
+    def _make(self, reliable: bool) -> None:
+        self._is_reliable = reliable
+        self._handle = self._node.rcl.create_subscription(
+            self._class,
+            self.topic,
+            self._take,
+            _profile(self._quality, reliable),
+            raw=True,
+            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=self._incompatible),
+        )
+
+    def _incompatible(self, event: object) -> None:
+        policy = _policy(event)
+        if self._quality.reliability == "offered" and self._is_reliable and policy == "RELIABILITY":
+            self._node.later(self._weaken)
+            return
+        self._node.tell(f"{self.topic}: a publisher offers another quality of service ({policy}): nothing comes of it")
+
+    def _weaken(self) -> None:
+        """Take what a publisher offers that is less than was asked for."""
+        if not self._closed and self._is_reliable:
+            old = self._handle
+            self._make(False)
+            self._node.rcl.destroy_subscription(old)
+
+    def _take(self, data: bytes, info: Mapping[str, int]) -> None:
+        handle, class_ = self._handle.handle, self._class
+        self._hand_on(data, info)
+        while not self._closed:  # what is there besides
+            taken = handle.take_message(class_, True)
+            if taken is None:
+                return
+            self._hand_on(*taken)
+
+    def _hand_on(self, data: bytes, info: Mapping[str, int]) -> None:
+        if self._closed:
+            return
+        sent = info.get("source_timestamp") or None
+        try:
+            self._arrived(Arrival(data, time.time_ns(), sent, self._type))
+        except Exception as error:  # one message must not end the node
+            self._node.tell(f"{self.topic}: {error}")
+
+    def look(self) -> None:
+        """Tell of publishers of another type, of which ROS 2 delivers nothing."""
+        for offer in self._node.rcl.get_publishers_info_by_topic(self.topic):
+            type_ = _plain(offer.topic_type)
+            if type_ != self._type and type_ not in self._told:
+                self._told.add(type_)
+                self._node.tell(f"{self.topic}: a publisher sends {type_}, not {self._type}: nothing comes of it")
+
+    @property
+    def publishers(self) -> int:
+        """How many there are."""
+        return int(self._handle.get_publisher_count())
+
+    def close(self) -> None:
+        """Listen no more."""
+        if not self._closed:
+            self._closed = True
+            self._node.left(self)
+            if not self._node.closed:
+                self._node.rcl.destroy_subscription(self._handle)
+
+
+class Ros2Node:
+    """A node of ROS 2."""
+
+    ros: Ros = 2
+    encoding: Literal["ros1", "cdr"] = "cdr"
+    reconnects = 0
+
+    def __init__(self, wish: Wish, tell: Tell) -> None:
+        self.tell, self.closed = tell, False
+        self._lock, self._subscriptions, self._following = Lock(), list[Ros2Subscription](), False
+        self._later: list[Callable[[], None]] = []
+        self._declared: set[str] = set()
+        self._context = Context()
+        try:
+            rclpy.init(args=[], context=self._context, signal_handler_options=rclpy.SignalHandlerOptions.NO)
+            self.rcl = rclpy.create_node(
+                wish.name,
+                namespace=wish.namespace,
+                context=self._context,
+                use_global_arguments=False,
+                parameter_overrides=[Given("use_sim_time", Given.Type.BOOL, True)] if wish.sim_time else [],
+            )
+        except Exception as error:
+            raise MiddlewareError(f"a node of ROS 2 cannot be made: {error}") from None
+        self.name = str(self.rcl.get_fully_qualified_name())
+        self._clock = self.rcl.get_clock()
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.rcl)
+        self.rcl.create_timer(1.0, self._look)
+        self._thread = Thread(target=self._spin, name="ros", daemon=True)
+        self._thread.start()
+
+    def _spin(self) -> None:
+        while not self.closed:
+            try:
+                self._executor.spin_once(timeout_sec=0.1)
+            except ExternalShutdownException:
+                return
+            except Exception as error:
+                if not self.closed:
+                    self.tell(f"ROS 2: {error}")
+            while self._later:
+                self._later.pop(0)()
+
+    def later(self, what: Callable[[], None]) -> None:
+        """Have something done by the node's thread, between two turns."""
+        self._later.append(what)
+
+    def _look(self) -> None:
+        with self._lock:
+            there = list(self._subscriptions)
+        for subscription in there:
+            subscription.look()
+
+    def left(self, subscription: Ros2Subscription) -> None:
+        """A subscription is no more."""
+        with self._lock:
+            self._subscriptions.remove(subscription)
+
+    def now(self) -> int:
+        """Nanoseconds since 1970, or of ``/clock``."""
+        return int(self._clock.now().nanoseconds)
+
+    @property
+    def ended(self) -> bool:
+        """Whether others have had the node shut down: ROS 2 does not know that."""
+        return False
+
+    def publisher(self, topic: str, type_: str, quality: Quality) -> Publisher:
+        """A publisher."""
+        return Ros2Publisher(self, topic, type_, quality)
+
+    def subscription(self, topic: str, type_: str, quality: Quality, arrived: Arrived) -> Subscription:
+        """Listen to a topic."""
+        made = Ros2Subscription(self, topic, type_, quality, arrived)
+        with self._lock:
+            self._subscriptions.append(made)
+        return made
+
+    def definition(self, type_: str) -> str:
+        """The fields of a type, and of those that it refers to."""
+        parts, waiting = dict[str, str](), [type_]
+        while waiting:
+            name = waiting.pop(0)
+            if name not in parts:
+                fields = _message(name).get_fields_and_field_types()  # type: ignore[attr-defined]
+                written = [(field, _written(type_)) for field, type_ in fields.items()]
+                parts[name] = "".join(f"{type_} {field}\n" for field, type_ in written)
+                waiting += [base for _, type_ in written if "/" in (base := type_.partition("[")[0])]
+        separator = "=" * 80
+        return f"{separator}\n".join(text if name == type_ else f"MSG: {name}\n{text}" for name, text in parts.items())
+
+    def topics(self) -> Mapping[str, tuple[str, ...]]:
+        """The topics that have publishers, and their types."""
+        return {
+            topic: tuple(_plain(type_) for type_ in types)
+            for topic, types in self.rcl.get_topic_names_and_types()
+            if self.rcl.count_publishers(topic)
+        }
+
+    def declare(self, parameters: Sequence[Parameter], set_: SetParameters) -> None:
+        """Offer parameters."""
+        from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
+
+        for one in parameters:
+            ranges = []
+            if one.low is not None or one.high is not None:
+                low, high = -_HUGE if one.low is None else one.low, _HUGE if one.high is None else one.high
+                ranges.append(FloatingPointRange(from_value=low, to_value=high, step=0.0))
+            about = ParameterDescriptor(description=one.description, floating_point_range=ranges)
+            if self.rcl.has_parameter(one.name):
+                self.tell(f"the parameter '{one.name}' is one of ROS itself: it cannot be set from outside")
+                continue
+            try:
+                self.rcl.declare_parameter(one.name, float(one.value), about)
+            except Exception as error:
+                self.tell(f"the parameter '{one.name}' is not offered: {error}")
+                continue
+            self._declared.add(one.name)
+
+        def asked(given: Sequence[Given]) -> SetParametersResult:
+            values = {one.name: float(one.value) for one in given if one.name in self._declared}
+            why = None if self._following or not values else set_(values)
+            return SetParametersResult(successful=why is None, reason=why or "")
+
+        self.rcl.add_on_set_parameters_callback(asked)
+
+    def follow(self, values: Mapping[str, float]) -> None:
+        """Have parameters show what they are by now."""
+        changed = {
+            name: value
+            for name, value in values.items()
+            if name in self._declared and self.rcl.get_parameter(name).value != value
+        }
+        if changed:
+            self.later(lambda: self._show(changed))
+
+    def _show(self, values: Mapping[str, float]) -> None:
+        self._following = True
+        try:
+            self.rcl.set_parameters([Given(name, Given.Type.DOUBLE, value) for name, value in values.items()])
+        finally:
+            self._following = False
+
+    def close(self) -> None:
+        """Go, once what was sent has been taken by those who take it for sure."""
+        if self.closed:
+            return
+        with suppress(Exception):
+            from rclpy.duration import Duration
+
+            for publisher in list(self.rcl.publishers):
+                publisher.wait_for_all_acked(Duration(seconds=0.3))
+        self.closed = True
+        self._thread.join(2.0)
+        with suppress(Exception):
+            self._executor.shutdown(timeout_sec=1.0)
+            self.rcl.destroy_node()
+            self._context.try_shutdown()
+
+
+def _policy(event: object) -> str:
+    kind = getattr(event, "last_policy_kind", None)
+    return str(policy_name(kind)) if kind is not None else "unknown"
+
+
+def _plain(type_: str) -> str:
+    return type_.replace("/msg/", "/")
+
+
+def _written(type_: str) -> str:
+    """A type of a field as a message definition writes it.
+
+    >>> _written("sequence<double>"), _written("double[36]"), _written("sequence<string<10>, 3>")
+    ('float64[]', 'float64[36]', 'string[]')
+    """
+    match = _ARRAY.fullmatch(type_)
+    base, array = type_, ""
+    if match is not None:
+        base, array = (match[1], "[]") if match[1] is not None else (match[3], f"[{match[4]}]")
+    base = re.sub(r"<.*", "", base)
+    return f"{_PRIMITIVE.get(base, base)}{array}"
