@@ -48,10 +48,9 @@ class Asked:
 
 
 @contextmanager
-def deferred() -> Iterator[Asked]:
-    """A block in which the first signal only asks: it has its effect at the end of the block. A second one has it at
-    once. A signal that would have no handler of this process keeps its effect, and so does everything in other threads.
-    """
+def heeded() -> Iterator[Asked]:
+    """A block in which the first signal only asks, and a second one has its effect at once. A signal that would have no
+    handler of this process keeps its effect, and so does everything in other threads."""
     asked = Asked()
     if threading.current_thread() is not threading.main_thread():
         yield asked
@@ -71,5 +70,14 @@ def deferred() -> Iterator[Asked]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+@contextmanager
+def deferred() -> Iterator[Asked]:
+    """A block in which the first signal only asks: it has its effect at the end of the block."""
+    with heeded() as asked:
+        yield asked
     if asked:
-        before[signal.Signals(asked.number)](asked.number, None)
+        handler = signal.getsignal(asked.number)
+        if callable(handler):
+            handler(asked.number, None)

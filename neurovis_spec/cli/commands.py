@@ -35,10 +35,11 @@ COMMANDS: Final[Mapping[str, str]] = {
     "render": "Draw one step as a picture.",
     "animate": "Draw a run as a moving picture.",
     "live": "Show a network in the browser while it runs.",
+    "ros": "Run a network as a node of ROS, or show and record one.",
     "export": "Write a network as source code for a robot.",
 }
 #: What the language names and this version does not have yet.
-LATER: Final = ("ros", "analyze", "import")
+LATER: Final = ("analyze", "import")
 NO_READER: Final = 141  # as a process that SIGPIPE has ended
 
 EPILOG = """\b

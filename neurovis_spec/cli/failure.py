@@ -64,6 +64,7 @@ def said(error: OSError) -> str:
 def _input_errors() -> tuple[type[Exception], ...]:
     """What running and drawing raise where the input is at fault; imported when something has gone wrong."""
     from neurovis_spec.plugins import PluginError
+    from neurovis_spec.ros.middleware import MiddlewareError
     from neurovis_spec.runtime.backend import BackendError
     from neurovis_spec.runtime.inputs import InputError
     from neurovis_spec.runtime.recording import RecordingError, UnknownNameError
@@ -73,5 +74,5 @@ def _input_errors() -> tuple[type[Exception], ...]:
 
     return (
         *(RendererError, BackendError, InputError, ParameterError, PluginError, RecordingError, SweepError),
-        UnknownNameError,
+        *(MiddlewareError, UnknownNameError),
     )

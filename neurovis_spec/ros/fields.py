@@ -13,6 +13,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, Literal, TypeAlias, cast
 
+import numpy as np
+import numpy.typing as npt
+
 Encoding: TypeAlias = Literal["ros1", "cdr"]
 #: what a message is made of: numbers, texts, lists of values, fields by name; what is left out is 0 or empty
 Value: TypeAlias = "float | int | str | Sequence[Value] | Mapping[str, Value]"
@@ -328,13 +331,21 @@ def encode(definition: Definition, value: Mapping[str, Value], encoding: Encodin
 
 
 class Form:
-    """A message in which nothing but the numbers at a path changes, and the time of its header, if it has one.
+    """A message in which nothing but the numbers at a path changes, and the time of its header, if it has one; ``rest``
+    are its other fields.
 
     Numbers for a field of integers are rounded and kept within what it holds. Raises FieldError where the field is none
     of numbers, or holds another number of them.
     """
 
-    def __init__(self, definition: Definition, path: str, size: int, encoding: Encoding) -> None:
+    def __init__(
+        self,
+        definition: Definition,
+        path: str,
+        size: int,
+        encoding: Encoding,
+        rest: Mapping[str, Value] | None = None,
+    ) -> None:
         field = definition.field(path)
         if field is None or field.type not in _NUMBERS:
             raise FieldError(f"messages of type {definition.type} have no numbers at '{path}'")
@@ -344,35 +355,36 @@ class Form:
         for name in reversed(path.split(".")):
             value = {name: value}
         writer = _Writer(definition, encoding, path)
-        writer.value(definition.type, value, "")
+        writer.value(definition.type, {**(rest or {}), **cast("Mapping[str, Value]", value)}, "")
         shift = 4 if encoding == "cdr" else 0
-        self._data, self._at = bytearray(writer.bytes()), writer.found + shift
+        self._data, at = bytearray(writer.bytes()), writer.found + shift
         code = _NUMBERS[field.type]
-        self._numbers = struct.Struct(f"<{size}{code}")
+        self._numbers = np.frombuffer(self._data, dtype=f"<{code}", count=size, offset=at)
         self._bounds = None if code in "fd" else _bounds(field.type, code)
-        self._stamp = shift + (4 if encoding == "ros1" else 0) if definition.stamped else None
-        if self._stamp is not None and encoding == "ros1" and definition.types["std_msgs/Header"][0].name != "seq":
-            self._stamp = shift
+        self._stamp: int | None = None
+        if definition.stamped:
+            numbered = definition.types["std_msgs/Header"][0].name == "seq"
+            self._stamp = shift + (4 if numbered else 0)
 
-    def fill(self, numbers: Sequence[float], nanoseconds: int) -> bytes:
+    def fill(self, numbers: npt.ArrayLike, nanoseconds: int) -> bytes:
         """The message with these numbers, at this time. Raises FieldError for a number that the field cannot hold."""
+        given = np.asarray(numbers, dtype=np.float64)
         if self._bounds is not None:
-            low, high = self._bounds
-            if not all(number - number == 0 for number in numbers):
+            if not np.isfinite(given).all():
                 raise FieldError("a field of integers cannot hold what is not finite")
-            numbers = [min(max(round(number), low), high) for number in numbers]
-        try:
-            self._numbers.pack_into(self._data, self._at, *numbers)
-        except (struct.error, OverflowError) as error:
-            raise FieldError(str(error)) from None
+            given = np.clip(np.round(given), *self._bounds)
+        with np.errstate(all="ignore"):
+            self._numbers[:] = given
         if self._stamp is not None:
             seconds, rest = divmod(nanoseconds, 1_000_000_000)
             struct.pack_into("<II", self._data, self._stamp, seconds & 0xFFFFFFFF, rest)
         return bytes(self._data)
 
 
-def _bounds(type_: str, code: str) -> tuple[int, int]:
-    bits = 8 * struct.calcsize(code)
+def _bounds(type_: str, code: str) -> tuple[float, float]:
+    """The least and the most that integers of a type can be, as far as a double can say it."""
     if type_ == "bool":
-        return 0, 1
-    return (0, (1 << bits) - 1) if code.isupper() else (-(1 << (bits - 1)), (1 << (bits - 1)) - 1)
+        return 0.0, 1.0
+    about = np.iinfo(np.dtype(code))
+    high = float(about.max)
+    return float(about.min), high if int(high) <= about.max else float(np.nextafter(high, 0))

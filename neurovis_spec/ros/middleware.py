@@ -1,7 +1,7 @@
 """Middleware: what NeuroVis asks of ROS 1 and ROS 2, one small interface.
 
 In: nothing; these are the types, and ``open_node``, which finds the ROS that is there. Messages are bytes as they go
-over the wire: ROS 1's serialization, or CDR with its four bytes of encapsulation. ``fields`` and ``wire`` know what is in them.
+over the wire: ROS 1's serialization, or CDR with its four bytes of encapsulation. ``fields`` knows what is in them.
 """
 
 from __future__ import annotations

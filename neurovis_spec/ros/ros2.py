@@ -355,11 +355,7 @@ def _plain(type_: str) -> str:
 
 
 def _written(type_: str) -> str:
-    """A type of a field as a message definition writes it.
-
-    >>> _written("sequence<double>"), _written("double[36]"), _written("sequence<string<10>, 3>")
-    ('float64[]', 'float64[36]', 'string[]')
-    """
+    """A type of a field as a message definition writes it: ``sequence<double>`` is ``float64[]``."""
     match = _ARRAY.fullmatch(type_)
     base, array = type_, ""
     if match is not None:

@@ -150,7 +150,12 @@ class Simulation:
             self._watch.look(state)
         if self._apply(state):  # events of the next step apply now, so that ``weights`` are those of the next step
             self._reader.use(state)
-        return {name: read(state) for name, read in self._outputs.items()}
+        return self.outputs
+
+    @property
+    def outputs(self) -> Mapping[str, np.float64 | FloatArray]:
+        """The outputs of the last step."""
+        return {name: read(self._state) for name, read in self._outputs.items()}
 
     def set(self, values: Mapping[str, float] | None = None, /, **parameters: float) -> None:
         """Give parameters other values from step k on, until an event of a later step sets them again.

@@ -1,0 +1,96 @@
+"""What the commands of ``neurovis ros`` share: which ROS, who may listen, when it ends, how the summary is printed.
+
+In: texts of the command line. Out: a Meeting, which opens the node and ends with the summary.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, TypeVar
+
+import click
+
+from neurovis_spec.cli.options import finite
+
+if TYPE_CHECKING:
+    from neurovis_spec.ros.middleware import Node, Ros
+    from neurovis_spec.ros.summary import Summary
+
+F = TypeVar("F", bound=Callable[..., object])
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """How a command meets ROS."""
+
+    ros: Ros | None
+    remote: bool
+    sim_time: bool
+    seconds: float | None
+    wait: float
+    format: Literal["text", "json"]
+
+    @contextmanager
+    def node(self, name: str, namespace: str = "/", anonymous: bool = False) -> Iterator[Node]:
+        """A node that is there for a block. Raises MiddlewareError."""
+        from neurovis_spec.ros.middleware import Wish, open_node
+
+        opened = open_node(Wish(name, namespace, self.ros, self.remote, self.sim_time, anonymous), tell)
+        try:
+            yield opened
+        finally:
+            opened.close()
+
+    def show(self, summary: Summary) -> None:
+        """Print the summary."""
+        click.echo(summary.json() if self.format == "json" else summary.text())
+
+
+def tell(text: str) -> None:
+    """A line on standard error."""
+    click.echo(text, err=True)
+
+
+def meeting_options(wait: float) -> Callable[[F], F]:
+    """The options that all commands have, as one argument ``meeting``; ``wait`` is the default of ``--wait``."""
+
+    def add(command: F) -> F:
+        import functools
+
+        @functools.wraps(command)
+        def with_meeting(
+            *args: object,
+            ros: str | None,
+            remote: bool,
+            sim_time: bool,
+            seconds: float | None,
+            wait: float,
+            format_: Literal["text", "json"],
+            **rest: object,
+        ) -> object:
+            version: Ros | None = None if ros is None else 1 if ros == "1" else 2
+            return command(*args, meeting=Meeting(version, remote, sim_time, seconds, wait, format_), **rest)
+
+        positive = click.FloatRange(min=0)
+        options = (
+            click.option("--ros", type=click.Choice(["1", "2"]), help="Which ROS; default: the one that is there."),
+            click.option("--seconds", type=positive, callback=finite, metavar="S", help="End after S seconds."),
+            click.option(
+                "--wait", type=positive, callback=finite, default=wait, show_default=True, metavar="S",
+                help="Begin when every topic has a subscriber, at the latest after S seconds.",
+            ),
+            click.option("--remote", is_flag=True, help="Meet other machines; else this one alone."),
+            click.option("--sim-time", is_flag=True, help="Take the time from /clock."),
+            click.option(
+                "--format", "format_", type=click.Choice(["text", "json"]), default="text",
+                help="How the summary is printed; json: one object on one line.",
+            ),
+        )  # fmt: skip
+        result: Callable[..., object] = with_meeting
+        for option in reversed(options):
+            result = option(result)
+        return result  # type: ignore[return-value]
+
+    return add

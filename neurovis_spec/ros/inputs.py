@@ -1,0 +1,123 @@
+"""Inputs from topics: the latest message of each is the input of a step, as long as it is not too old.
+
+In: messages, by a thread of the middleware. Out: for each step the values of inputs, and which of them have fallen
+silent. A message that cannot be used is counted, and the one before it stays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.ros_settings import Subscription as Settings
+from neurovis_spec.ros.counts import REASONS, Counts, Reason, Teller
+from neurovis_spec.ros.fields import Definition, Encoding, FieldError, numbers_at, texts_at
+from neurovis_spec.ros.middleware import Arrival
+
+
+class _Reading:
+    """One input: what of a message it takes, and what it was last."""
+
+    def __init__(self, settings: Settings, size: int, definition: Definition, encoding: Encoding) -> None:
+        self.settings, self.size = settings, size
+        self._numbers = numbers_at(definition, settings.field, encoding)
+        self._names = texts_at(definition, "name", encoding) if settings.names else None
+        #: the last message's values, and when it came; one value, so that no step sees half of it
+        self.last: tuple[FloatArray, float] | None = None
+        self.silent = False
+
+    def values(self, data: bytes) -> FloatArray | Reason:
+        """The values of a message, or why it has none. Raises FieldError."""
+        numbers = np.array(self._numbers(data), dtype=np.float64)
+        if self._names is not None:
+            names = list(self._names(data))
+            if len(names) != len(numbers) or any(name not in names for name in self.settings.names):
+                return "length"
+            return numbers[[names.index(name) for name in self.settings.names]]
+        return numbers if len(numbers) == self.size else "length"
+
+
+@dataclass(eq=False)
+class InputTopic:
+    """A topic that inputs come from; ``clock`` gives the seconds by which messages grow old."""
+
+    topic: str
+    type: str
+    readings: Sequence[_Reading]
+    clock: Callable[[], float]
+    teller: Teller
+    counts: Counts = field(default_factory=Counts)
+
+    def take(self, arrival: Arrival) -> None:
+        """A message."""
+        self.counts.received += 1
+        if arrival.type not in (self.type, "*", ""):
+            self._reject("type")
+            return
+        try:
+            found = [reading.values(arrival.data) for reading in self.readings]
+        except FieldError:
+            self._reject("parse")
+            return
+        now = self.clock()
+        reasons = [one for one in found if isinstance(one, str)]
+        values = [(reading, one) for reading, one in zip(self.readings, found, strict=True) if not isinstance(one, str)]
+        if reasons:
+            self._reject(reasons[0])
+        if any(not np.isfinite(one).all() for _, one in values):
+            self.counts.not_finite += 1
+            self.teller.note(f"not finite on {self.topic}")
+        for reading, one in values:
+            if np.isfinite(one).all():
+                reading.last = one, now
+
+    def _reject(self, reason: Reason) -> None:
+        self.counts.rejected[reason] += 1
+        self.teller.note(f"{REASONS[reason]} on {self.topic}")
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """All inputs that come from topics."""
+
+    topics: tuple[InputTopic, ...]
+
+    @classmethod
+    def of(
+        cls,
+        settings: Iterable[Settings],
+        sizes: Mapping[str, int],
+        definitions: Mapping[str, Definition],
+        encoding: Encoding,
+        clock: Callable[[], float],
+        teller: Teller,
+    ) -> Inputs:
+        """The inputs of a spec, whose topics are absolute; ``definitions`` by type. Raises FieldError where a type has
+        no such numbers."""
+        found = dict[tuple[str, str], list[_Reading]]()
+        for one in settings:
+            reading = _Reading(one, sizes[one.input], definitions[one.type], encoding)
+            found.setdefault((one.topic, one.type), []).append(reading)
+        return cls(tuple(InputTopic(*key, readings, clock, teller) for key, readings in found.items()))
+
+    def values(self, now: float) -> dict[str, float | FloatArray]:
+        """The inputs of a step; 0 before the first message."""
+        result = dict[str, float | FloatArray]()
+        for topic in self.topics:
+            for reading in topic.readings:
+                values, last = np.zeros(reading.size), reading.last
+                if last is not None:
+                    timeout = reading.settings.timeout
+                    reading.silent = timeout is not None and now - last[1] > timeout
+                    if not reading.silent or reading.settings.on_timeout != "zero":
+                        values = last[0]
+                result[reading.settings.input] = float(values[0]) if reading.size == 1 else values
+        return result
+
+    @property
+    def silent(self) -> tuple[Settings, ...]:
+        """The inputs of the last step that had fallen silent."""
+        return tuple(one.settings for topic in self.topics for one in topic.readings if one.silent)

@@ -1,0 +1,315 @@
+"""A network as a node: inputs from topics, a step each 1/rate seconds, outputs, activities and weights to topics.
+
+In: a CompiledNetwork, a Node. Out: messages, and at the end a Summary. Steps are made by the thread that calls ``run``;
+parameters are set by the middleware's thread between two of them; once a second another one says how it goes.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from threading import Event, Lock, Thread
+from typing import Final, Protocol
+
+import numpy as np
+
+from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.ros.counts import Counts, Teller
+from neurovis_spec.ros.diagnostics import Diagnostics
+from neurovis_spec.ros.fields import FieldError, Form, Value, definition, encode
+from neurovis_spec.ros.inputs import Inputs
+from neurovis_spec.ros.middleware import LATCHED, MiddlewareError, Node, Parameter, Publisher, Quality, Tell
+from neurovis_spec.ros.pace import Clock, Pace, SimulatedClock, SteadyClock
+from neurovis_spec.ros.summary import Summary
+from neurovis_spec.runtime.backend import BackendError, choose_backend
+from neurovis_spec.runtime.ros_messages import label_of
+from neurovis_spec.runtime.simulation import ParameterError, Simulation
+
+ARRAY: Final = "std_msgs/Float64MultiArray"
+STRING: Final = "std_msgs/String"
+#: a run has no end: what compiling costs is soon paid for
+_ENDLESS: Final = 1 << 40
+
+
+class Witness(Protocol):
+    """Who is shown what a node publishes: a recorder, a display. It must not wait."""
+
+    def sent(self, topic: str, type_: str, data: bytes, nanoseconds: int) -> None:
+        """A message that was published, at this time."""
+        ...
+
+    def stepped(self, step: int, activity: FloatArray, weights: FloatArray) -> None:
+        """A step that was made, with w[t] of all connections."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """How a run goes: ``rate`` steps a second, at most ``steps`` of them or so many ``seconds``, on a ``backend``;
+    it begins when its topics have subscribers, at the latest after ``wait`` seconds."""
+
+    rate: float
+    steps: int | None = None
+    seconds: float | None = None
+    wait: float = 0.0
+    backend: str | None = None
+    sim_time: bool = False
+
+
+def simulation(network: Network, backend: str | None) -> Simulation:
+    """The network, made ready: in C where that can be. Raises BackendError."""
+    if backend is not None:
+        return Simulation(network, backend)
+    chosen = choose_backend(network, _ENDLESS)[0]
+    try:
+        return Simulation(network, chosen)
+    except BackendError:
+        if chosen != "c":
+            raise
+        return Simulation(network, "numpy")  # a compiler that cannot compile
+
+
+def absolute(topic: str, node: str) -> str:
+    """A topic's whole name, seen from a node.
+
+    >>> absolute("/a", "/ns/net"), absolute("a/b", "/ns/net"), absolute("~/a", "/ns/net")
+    ('/a', '/ns/a/b', '/ns/net/a')
+    """
+    if topic.startswith("/"):
+        return topic
+    if topic.startswith("~"):
+        return f"{node}/{topic[1:].lstrip('/')}"
+    return f"{node.rpartition('/')[0]}/{topic}"
+
+
+class _Sender:
+    """A publisher whose messages a witness sees."""
+
+    def __init__(self, publisher: Publisher, form: Form, witnesses: list[Witness]) -> None:
+        self.publisher, self._form, self._witnesses = publisher, form, witnesses
+
+    def send(self, numbers: FloatArray, nanoseconds: int) -> None:
+        """Send numbers. Raises FieldError."""
+        data = self._form.fill(numbers, nanoseconds)
+        self.publisher.publish(data)
+        for witness in self._witnesses:
+            witness.sent(self.publisher.topic, self.publisher.type, data, nanoseconds)
+
+
+class _Array(_Sender):
+    """An array of the network's, with its prelude."""
+
+    def __init__(self, publisher: Publisher, form: Form, witnesses: list[Witness], size: int) -> None:
+        super().__init__(publisher, form, witnesses)
+        self._numbers = np.zeros(size + 2)
+
+    def step(self, step: int, seconds: float, values: FloatArray) -> None:
+        """The array of a step."""
+        self._numbers[0], self._numbers[1], self._numbers[2:] = step, seconds, values
+        self.send(self._numbers, 0)
+
+
+class _Output(_Sender):
+    """An output. What is not finite is not sent: its safe value is, where it has one."""
+
+    def __init__(
+        self, publisher: Publisher, form: Form, witnesses: list[Witness], name: str, size: int, safe: float | None
+    ) -> None:
+        super().__init__(publisher, form, witnesses)
+        self.name, self.safe, self.withheld = name, None if safe is None else np.full(size, safe), 0
+
+    def put(self, values: FloatArray, nanoseconds: int) -> None:
+        """The output of a step."""
+        given = np.atleast_1d(values)
+        if not np.isfinite(given).all():
+            self.withheld += 1
+            if self.safe is None:
+                return
+            given = self.safe
+        self.send(given, nanoseconds)
+
+    def end(self, nanoseconds: int) -> None:
+        """The last message, where there is one for the end."""
+        if self.safe is not None:
+            self.send(self.safe, nanoseconds)
+
+
+class NodeRun:
+    """A network that runs as a node. What it says goes to ``tell``."""
+
+    def __init__(self, compiled: CompiledNetwork, node: Node, course: Course, tell: Tell) -> None:
+        self._compiled, self.network, self.node, self._course = compiled, compiled.network, node, course
+        self._tell, self._teller = tell, Teller(tell)
+        self.witnesses: list[Witness] = []
+        self._lock, self._end = Lock(), Event()
+        self._simulation = simulation(self.network, course.backend)
+        self._clock: Clock = SimulatedClock(node.now) if course.sim_time else SteadyClock()
+        self._pace = Pace(self._clock, course.rate)
+        self._begun = time.monotonic()
+        self.why: str | None = None
+        try:
+            self._inputs = self._subscribe()
+            self._publish()
+        except FieldError as error:
+            raise MiddlewareError(str(error)) from None
+        self._offer()
+        self._diagnostics = Diagnostics.of(node, f"{node.name.lstrip('/')}: network")
+
+    # ---- what there is -----------------------------------------------------------------------------------------
+
+    def _subscribe(self) -> Inputs:
+        node, settings = self.node, self.network.ros
+        wanted = [replace(one, topic=absolute(one.topic, node.name)) for one in settings.subscribe]
+        definitions = {one.type: definition(one.type, node.definition(one.type)) for one in wanted}
+        sizes = {entry.name: entry.size for entry in self.network.inputs}
+        inputs = Inputs.of(wanted, sizes, definitions, node.encoding, self._clock.now, self._teller)
+        quality = Quality("offered", "volatile", 10)
+        for topic in inputs.topics:
+            node.subscription(topic.topic, topic.type, quality, topic.take)
+        return inputs
+
+    def _publish(self) -> None:
+        node, network = self.node, self.network
+        settings = network.ros
+        quality = Quality(settings.reliability, settings.durability, settings.depth)
+        base = f"{settings.namespace.rstrip('/')}/{network.name}"
+        self._activity = self._array(f"{base}/activity", len(network.neurons), quality)
+        changing = len(network.changing)
+        self._weights = self._array(f"{base}/weights", changing, quality) if changing else None
+        sizes = {output.name: output.size for output in network.outputs}
+        self._outputs = []
+        for one in settings.publish:
+            type_ = definition(one.type, node.definition(one.type))
+            form = Form(type_, one.field, sizes[one.output], node.encoding)
+            publisher = node.publisher(absolute(one.topic, node.name), one.type, quality)
+            made = _Output(publisher, form, self.witnesses, one.output, sizes[one.output], one.safe)
+            self._outputs.append(made)
+        self._spec = node.publisher(f"{base}/spec", STRING, LATCHED)
+        text = definition(STRING, node.definition(STRING))
+        self._spec.publish(encode(text, {"data": self._compiled.text()}, node.encoding))
+
+    def _array(self, topic: str, size: int, quality: Quality) -> _Array:
+        type_ = definition(ARRAY, self.node.definition(ARRAY))
+        dimension: Value = {"label": label_of(self.network.hash), "size": size, "stride": size}
+        layout: dict[str, Value] = {"layout": {"dim": [dimension], "data_offset": 2}}
+        form = Form(type_, "data", size + 2, self.node.encoding, layout)
+        return _Array(self.node.publisher(topic, ARRAY, quality), form, self.witnesses, size)
+
+    def _offer(self) -> None:
+        network, spec = self.network, self._compiled.spec
+        parameters = []
+        for name, value in self._settable().items():
+            slot = network.settable.slots[network.settable.index[name]]
+            low, high = (bound if isinstance(bound, float) and np.isfinite(bound) else None
+                         for bound in (slot.low, slot.high))  # fmt: skip
+            written = spec.parameters.get(name)
+            parameters.append(Parameter(name, value, low, high, (written and written.description) or ""))
+        self.node.declare(parameters, self._set)
+
+    def _settable(self) -> dict[str, float]:
+        now = self._simulation.parameters
+        return {name: value for name, value in now.items() if name not in self.network.structural}
+
+    def _set(self, values: Mapping[str, float]) -> str | None:
+        """Set parameters between two steps; gives why not."""
+        with self._lock:
+            try:
+                self._simulation.set(values)
+            except ParameterError as error:
+                return str(error)
+        return None
+
+    # ---- the run -----------------------------------------------------------------------------------------------
+
+    def wait(self, stopped: Callable[[], bool]) -> None:
+        """Wait for subscribers, as long as the course says."""
+        senders = [self._activity, *([self._weights] if self._weights else []), *self._outputs]
+        deadline = time.monotonic() + self._course.wait
+        while time.monotonic() < deadline and not stopped():
+            if all(sender.publisher.subscribers for sender in senders):
+                return
+            time.sleep(0.01)
+
+    def run(self, asked: Callable[[], bool]) -> None:
+        """Make the steps, until ``asked`` says to end, or the course does; at the end the outputs are safe."""
+        course, step = self._course, 0
+        self._begun = begun = time.monotonic()
+
+        def stopped() -> bool:
+            over = course.seconds is not None and time.monotonic() - begun >= course.seconds
+            return over or asked() or self.node.ended
+
+        watch = Thread(target=self._watch, name="ros diagnostics", daemon=True)
+        watch.start()
+        try:
+            going = self._pace.begin(stopped)
+            while going and (course.steps is None or step < course.steps) and self._pace.wait(step, stopped):
+                going = self._step(step)
+                step += 1
+        finally:
+            now = self.node.now()
+            for output in self._outputs:
+                output.end(now)
+            self._end.set()
+            watch.join(2.0)
+            self._teller.rest()
+
+    def _step(self, step: int) -> bool:
+        """Make a step and publish it; False where an input that has fallen silent ends the run."""
+        inputs = self._inputs.values(self._clock.now())
+        for one in self._inputs.silent:
+            if one.on_timeout == "stop":
+                self.why = f"the input '{one.input}' has fallen silent: no message on {one.topic} for {one.timeout:g} s"
+                return False
+        run, now = self._simulation, self.node.now()
+        with self._lock:
+            all_weights = run.connection_weights if self.witnesses else None
+            weights = run.weights if self._weights is not None else None
+            try:
+                outputs = run.step(inputs)
+            except ParameterError as error:  # the step was made, without the events that cannot be
+                self._tell(str(error))
+                outputs = run.outputs
+            activity = run.activity
+        for output in self._outputs:
+            output.put(np.asarray(outputs[output.name], dtype=np.float64), now)
+        self._activity.step(step, now / 1e9, activity)
+        if self._weights is not None and weights is not None:
+            self._weights.step(step, now / 1e9, weights)
+        if all_weights is not None:
+            for witness in self.witnesses:
+                witness.stepped(step, activity, all_weights)
+        return True
+
+    # ---- how it goes -------------------------------------------------------------------------------------------
+
+    def _watch(self) -> None:
+        while not self._end.wait(1.0):
+            try:
+                with self._lock:
+                    now = self._settable()
+                self.node.follow(now)
+                self._teller.look()
+                self._diagnostics.say(self.summary(), [one.input for one in self._inputs.silent], self._course.rate)
+            except Exception as error:
+                self._tell(f"diagnostics: {error}")
+
+    def summary(self) -> Summary:
+        """How it has gone so far. What was withheld of outputs counts as not finite."""
+        topics = {"activity": Counts(), "weights": Counts()}
+        topics |= {topic.topic: topic.counts for topic in self._inputs.topics}
+        for output in self._outputs:
+            topics[output.publisher.topic] = Counts(not_finite=output.withheld)
+        return Summary(
+            network=self.network.name,
+            hash=self.network.hash,
+            ros=self.node.ros,
+            seconds=time.monotonic() - self._begun,
+            steps=self._simulation.k,
+            late=self._pace.late,
+            reconnects=self.node.reconnects,
+            topics=topics,
+        )
