@@ -245,7 +245,7 @@ class _Reading:
             for message in records.messages_of(content):
                 if isinstance(message, Message):
                     self._message(message)
-                else:
+                elif isinstance(message, Topic):
                     self._channel(message)
 
     def _channel(self, topic: Topic) -> None:

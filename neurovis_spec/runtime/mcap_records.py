@@ -33,17 +33,19 @@ class DamagedError(RecordingError):
 
 
 class Schema(NamedTuple):
-    """What messages of a type look like."""
+    """What messages of a type look like; ``encoding`` is that of the text."""
 
     name: str
     text: str
+    encoding: str = "ros2msg"
 
 
 class Channel(NamedTuple):
-    """A topic, and the number of its schema, from 1."""
+    """A topic, and the number of its schema, from 1; ``encoding`` is that of its messages."""
 
     schema: int
     topic: str
+    encoding: str = "cdr"
 
 
 class Message(NamedTuple):
@@ -81,23 +83,21 @@ def head(profile: str, library: str) -> bytes:
 
 def schemas_and_channels(schemas: Iterable[Schema], channels: Iterable[Channel]) -> bytes:
     """The records that name topics and types, numbered from 1."""
-    parts = []
-    for number, schema in enumerate(schemas, 1):
-        data = schema.text.encode()
-        parts.append(
-            record(
-                SCHEMA,
-                struct.pack("<H", number),
-                text(schema.name),
-                text("ros2msg"),
-                struct.pack("<I", len(data)),
-                data,
-            )
-        )
-    for number, channel in enumerate(channels, 1):
-        ends = struct.pack("<HH", number, channel.schema)
-        parts.append(record(CHANNEL, ends, text(channel.topic), text("cdr"), mapping({})))
-    return b"".join(parts)
+    parts = [schema_record(number, schema) for number, schema in enumerate(schemas, 1)]
+    return b"".join([*parts, *(channel_record(number, channel) for number, channel in enumerate(channels, 1))])
+
+
+def schema_record(number: int, schema: Schema) -> bytes:
+    """The record that says what messages of a type look like."""
+    data = schema.text.encode()
+    size = struct.pack("<I", len(data))
+    return record(SCHEMA, struct.pack("<H", number), text(schema.name), text(schema.encoding), size, data)
+
+
+def channel_record(number: int, channel: Channel) -> bytes:
+    """The record that names a topic."""
+    ends = struct.pack("<HH", number, channel.schema)
+    return record(CHANNEL, ends, text(channel.topic), text(channel.encoding), mapping({}))
 
 
 def attachment(name: str, data: bytes) -> bytes:
@@ -228,21 +228,36 @@ def expanded_size(content: Reader) -> int:
 
 
 class Topic(NamedTuple):
-    """The number of a channel, and its topic."""
+    """The number of a channel, its topic, the number of its schema (0: none), and the encoding of its messages."""
 
     channel: int
     topic: str
+    schema: int
+    encoding: str
 
 
 def topic_of(reader: Reader) -> Topic:
     """What the record of a channel says."""
-    number = reader.number(2)
-    reader.take(2)
-    return Topic(number, reader.text())
+    number, schema = reader.number(2), reader.number(2)
+    return Topic(number, reader.text(), schema, reader.text())
 
 
-def messages_of(content: Reader) -> Iterator[Message | Topic]:
-    """The messages of a chunk, whose checksum must agree, and the channels that stand in it. Raises RecordingError."""
+class Described(NamedTuple):
+    """The number of a schema, and the schema."""
+
+    number: int
+    schema: Schema
+
+
+def schema_of(reader: Reader) -> Described:
+    """What the record of a schema says."""
+    number, name, encoding = reader.number(2), reader.text(), reader.text()
+    return Described(number, Schema(name, reader.take(reader.number(4)).decode(errors="replace"), encoding))
+
+
+def messages_of(content: Reader) -> Iterator[Message | Topic | Described]:
+    """The messages of a chunk, whose checksum must agree, and the channels and schemas that stand in it. Raises
+    RecordingError."""
     content.take(16)
     size, checksum, compression = content.number(8), content.number(4), content.text()
     data = content.take(content.number(8))
@@ -260,11 +275,18 @@ def messages_of(content: Reader) -> Iterator[Message | Topic]:
                 raise RecordingError("a chunk holds what is no message")
         if opcode == CHANNEL:
             yield topic_of(Reader(inner))
+        elif opcode == SCHEMA:
+            yield schema_of(Reader(inner))
         elif opcode == MESSAGE:
-            if length < _MESSAGE.size:
-                raise RecordingError("a message is shorter than it says")
-            channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(inner)
-            yield Message(channel, sequence, log_time, publish_time, inner[_MESSAGE.size :])
+            yield message_of(inner)
+
+
+def message_of(content: bytes) -> Message:
+    """What the record of a message says. Raises RecordingError."""
+    if len(content) < _MESSAGE.size:
+        raise RecordingError("a message is shorter than it says")
+    channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(content)
+    return Message(channel, sequence, log_time, publish_time, content[_MESSAGE.size :])
 
 
 #: the most bytes that a compressed chunk may grow to

@@ -1,0 +1,198 @@
+"""Bags of ROS 1 (format 2.0) are read record by record, with suspicion, also those that break off and have no index.
+
+In: an open file. Out: what its header says, its connections, its messages, to the last whole chunk.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+from bz2 import BZ2Decompressor
+from collections.abc import Iterator, Mapping
+from typing import BinaryIO, Final, NamedTuple
+
+from neurovis_spec.language.ros_types import plain
+from neurovis_spec.ros.logs import ABOUT, BAG_HEADER, BAG_MAGIC, CHUNK, CONNECTION, MESSAGE_DATA, Topic
+from neurovis_spec.runtime.mcap_records import MOST_NAMED, Reader
+from neurovis_spec.runtime.recording import RecordingError
+
+#: bytes of the header of a record
+_LARGEST_HEADER: Final = 1 << 20
+#: bytes of a chunk, as it is and as it may grow to
+_LARGEST: Final = 1 << 30
+
+
+class Record(NamedTuple):
+    """A record of a bag: its operation, its fields, and where and how long its data is."""
+
+    op: int
+    fields: Mapping[str, bytes]
+    start: int
+    length: int
+
+    def number(self, name: str) -> int:
+        """The field of this name as a number. Raises RecordingError."""
+        value = self.fields.get(name, b"")
+        if len(value) not in (4, 8):
+            raise RecordingError(f"a record has no '{name}'")
+        return int.from_bytes(value, "little")
+
+
+class Head(NamedTuple):
+    """What the header of a bag says: where its index is, and of which network it is, if it is one of ours."""
+
+    place: int
+    whole: bool
+    about: Mapping[str, str]
+
+
+class Found(NamedTuple):
+    """A message of a connection; the time in nanoseconds."""
+
+    connection: int
+    time: int
+    data: bytes
+
+
+def _fields(data: bytes) -> dict[str, bytes]:
+    reader, result = Reader(data), {}
+    while reader.at < len(data):
+        name, equals, value = reader.take(reader.number(4)).partition(b"=")
+        if not equals:
+            raise RecordingError("a field has no value")
+        result[name.decode(errors="replace")] = value
+    return result
+
+
+def _scan(file: BinaryIO, start: int, size: int) -> Iterator[Record]:
+    """The whole records from a place on, without their data."""
+    at = start
+    while at + 8 <= size:
+        file.seek(at)
+        (length,) = struct.unpack("<I", file.read(4))
+        if at + 8 + length > size:
+            return
+        if length > _LARGEST_HEADER:
+            raise RecordingError("a record's header is larger than any can be")
+        header = file.read(length + 4)
+        fields = _fields(header[:length])
+        (data,) = struct.unpack_from("<I", header, length)
+        begin = at + 8 + length
+        if begin + data > size:
+            return
+        op = fields.get("op", b"")
+        if len(op) != 1:
+            raise RecordingError("a record does not say what it is")
+        yield Record(op[0], fields, begin, data)
+        at = begin + data
+
+
+def _data(file: BinaryIO, record: Record) -> bytes:
+    if record.length > _LARGEST:
+        raise RecordingError("a record is larger than any can be")
+    file.seek(record.start)
+    data = file.read(record.length)
+    if len(data) != record.length:
+        raise RecordingError("a record breaks off")
+    return data
+
+
+def _size(file: BinaryIO) -> int:
+    return file.seek(0, io.SEEK_END)
+
+
+def head_of(file: BinaryIO) -> Head:
+    """What the header says. Raises RecordingError."""
+    size = _size(file)
+    first = next(_scan(file, len(BAG_MAGIC), size), None)
+    if first is None or first.op != BAG_HEADER:
+        raise RecordingError("not a bag: it has no header")
+    if first.fields.get("encryptor"):
+        raise RecordingError("its messages are encrypted")
+    about = first.fields.get(ABOUT)
+    index = first.number("index_pos")
+    return Head(index, 0 < index <= size, {} if about is None else Reader(about).mapping())
+
+
+def connections_of(file: BinaryIO, head: Head) -> dict[int, Topic]:
+    """The connections, by their numbers: those of the index, else of all chunks. Raises RecordingError."""
+    result: dict[int, Topic] = {}
+    size = _size(file)
+    if head.whole:
+        for record in _scan(file, head.place, size):
+            if record.op == CONNECTION:
+                _learn(record, _data(file, record), result)
+        return result
+    for record in _scan(file, len(BAG_MAGIC), size):
+        if record.op == CHUNK:
+            content = io.BytesIO(_expanded(record, _data(file, record)))
+            for inner in _scan(content, 0, len(content.getbuffer())):
+                if inner.op == CONNECTION:
+                    _learn(inner, _data(content, inner), result)
+        elif record.op == CONNECTION:
+            _learn(record, _data(file, record), result)
+    return result
+
+
+def _learn(record: Record, data: bytes, known: dict[int, Topic]) -> None:
+    number = record.number("conn")
+    if number in known:
+        return
+    if len(known) >= MOST_NAMED:
+        raise RecordingError("it holds more connections than there can be")
+    about = _fields(data)
+    topic = record.fields.get("topic", about.get("topic", b"")).decode(errors="replace")
+    type_, text = about.get("type", b"").decode(errors="replace"), about.get("message_definition", b"")
+    if not topic or "/" not in type_:
+        raise RecordingError("a connection does not say of which type its messages are")
+    known[number] = Topic(topic, plain(type_), "ros1", text.decode(errors="replace"))
+
+
+def messages_of(file: BinaryIO) -> Iterator[Found]:
+    """The messages, in the order of the file. Raises RecordingError."""
+    for record in _scan(file, len(BAG_MAGIC), _size(file)):
+        if record.op == CHUNK:
+            content = io.BytesIO(_expanded(record, _data(file, record)))
+            for inner in _scan(content, 0, len(content.getbuffer())):
+                if inner.op == MESSAGE_DATA:
+                    yield _message(inner, _data(content, inner))
+        elif record.op == MESSAGE_DATA:
+            yield _message(record, _data(file, record))
+
+
+def _message(record: Record, data: bytes) -> Found:
+    nanoseconds, seconds = divmod(record.number("time"), 1 << 32)
+    return Found(record.number("conn"), seconds * 10**9 + nanoseconds, data)
+
+
+def _expanded(record: Record, data: bytes) -> bytes:
+    """What a chunk holds."""
+    compression, size = record.fields.get("compression", b""), record.number("size")
+    if size > _LARGEST:
+        raise RecordingError("a chunk is larger than any can be")
+    if compression == b"none":
+        found = data
+    elif compression == b"bz2":
+        try:
+            found = BZ2Decompressor().decompress(data, size)
+        except OSError:
+            raise RecordingError("a chunk is damaged") from None
+    elif compression == b"lz4":
+        found = _unpacked(data, size)
+    else:
+        raise RecordingError(f"a chunk is compressed in a way that is not read ({compression[:20]!r})")
+    if len(found) != size:
+        raise RecordingError("a chunk is not as large as it says")
+    return found
+
+
+def _unpacked(data: bytes, size: int) -> bytes:
+    try:
+        from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
+    except ImportError:
+        raise RecordingError("its chunks are compressed (lz4), which needs: pip install 'neurovis-spec[ros]'") from None
+    try:
+        found: bytes = LZ4FrameDecompressor().decompress(data, max_length=size)
+    except RuntimeError:
+        raise RecordingError("a chunk is damaged") from None
+    return found
