@@ -20,7 +20,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 NPM := npm --no-audit --no-fund --no-package-lock --loglevel=error
-ELSEWHERE := browser or dot or compiler or cluster
+ELSEWHERE := browser or dot or compiler or cluster or node
 
 .PHONY: help install demo gallery test test-all needs fuzz layouts docs page page-check format clean
 .DELETE_ON_ERROR:
@@ -78,7 +78,7 @@ needs:
 	test -z "$$missing" || { echo "make test-all needs what is not here:$$missing" >&2; exit 1; }
 
 node_modules/made: package.json
-	@echo "installing what checks the page's JavaScript"
+	@echo "installing what checks the page's JavaScript and reads recordings"
 	@$(NPM) install --silent
 	@touch $@
 
