@@ -59,10 +59,10 @@ class Driven:
 
     def until(self, true: Callable[[Shown], bool]) -> Shown:
         """What is shown when something is true of it, after all that was asked."""
-        seen: list[int] = []
-        self.run.ask(Set({"none": 0.0}), lambda reason: seen.append(len(self.shown)))  # refused, when its turn comes
+        seen: list[str] = []
+        self.run.ask(Set({"none": 0.0}), seen.append)  # refused, when its turn comes, and after what is then to be seen
         for _ in range(2000):
-            if seen and len(self.shown) > seen[0] and true(self.shown[-1]):
+            if seen and true(self.shown[-1]):
                 return self.shown[-1]
             time.sleep(0.005)
         raise AssertionError(f"never: step {self.shown[-1].look.step}, {self.run.failure}")
