@@ -13,7 +13,7 @@ import socket
 import struct
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
-from contextlib import asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,7 +27,7 @@ from neurovis_spec.live.access import Access
 from neurovis_spec.live.commands import Pause, Seek
 from neurovis_spec.live.hub import AHEAD, Hub
 from neurovis_spec.live.live import listen
-from neurovis_spec.live.protocol import FRAME, LARGEST, MESSAGES, SCENE
+from neurovis_spec.live.protocol import FRAME, LARGEST, MESSAGES, SCENE, TRACE
 from neurovis_spec.live.run import Run
 from neurovis_spec.live.server import BURST, MOST_CLIENTS, MOST_CONNECTIONS, Server
 from neurovis_spec.live.simulated import SimulatedSource
@@ -109,6 +109,8 @@ class Eyes:
         self.step = -1
         self.serial = 0
         self.bytes = 0
+        #: items (connections, then neurons) with the least and the largest value of each bin
+        self.traces: dict[int, np.ndarray[Any, Any]] = {}
 
     async def look(self, acknowledge: bool = True, seconds: float = 10.0) -> int:
         """The kind of the next message: SCENE, FRAME, or 0 for a text."""
@@ -126,6 +128,11 @@ class Eyes:
             lines, discs = self.scene["lines"], self.scene["discs"]
             self.widths, self.kinds = np.zeros(lines, np.uint16), np.zeros(lines + discs, np.uint8)
             return SCENE
+        if data[0] == TRACE:
+            _, _, count, _, _, bins = struct.unpack_from("<BxHIdII", data)
+            ranges = np.frombuffer(data, "<f4", 2 * bins * count, 24 + 4 * count).reshape(count, bins, 2)
+            self.traces = dict(zip(np.frombuffer(data, "<u4", count, 24).tolist(), ranges, strict=True))
+            return TRACE
         _, _, self.serial, changed, step, self.first, self.last, words = struct.unpack_from("<BxHIIdddH", data)
         self.step = int(step)
         items = np.frombuffer(data, "<u4", changed, 40)
@@ -307,6 +314,45 @@ def test_whoever_looks_at_something_is_told_its_exact_values(owner: bool) -> Non
     served(test)
 
 
+@pytest.mark.parametrize("owner", [True, False])
+def test_whoever_asks_for_traces_is_sent_them_once(owner: bool) -> None:
+    recording = COMPILED.run(steps=60)
+
+    async def test(live: Live) -> None:
+        async with live.stream(live.access.owner if owner else live.access.viewer) as stream:
+            eyes = Eyes(stream)
+            await eyes.until(lambda: eyes.step >= 60)
+            await eyes.ask("trace", items=["n3", "c0", "c99"], first=10, every=5, bins=8)
+            await eyes.until(lambda: bool(eyes.traces))
+            assert set(eyes.traces) == {6 + 3, 0}
+            rows = recording.activity[10:50, 3].reshape(8, 5)
+            assert np.allclose(eyes.traces[9], np.transpose([rows.min(axis=1), rows.max(axis=1)]), rtol=1e-6)
+            assert np.allclose(eyes.traces[0][:, 0], recording.weights[10:50, 0].reshape(8, 5).min(axis=1), rtol=1e-6)
+            eyes.traces = {}
+            here = eyes.step
+            await eyes.until(lambda: eyes.step > here + 10)
+            assert not eyes.traces
+
+    served(test)
+
+
+def test_many_who_ask_for_traces_are_answered_in_turn_and_cost_the_run_little() -> None:
+    """Whoever asks again before there was an answer does not wait twice, and none is forgotten."""
+
+    async def test(live: Live) -> None:
+        async with AsyncExitStack() as stack:
+            crowd = [Eyes(await stack.enter_async_context(live.stream(live.access.viewer))) for _ in range(20)]
+            for _ in range(3):
+                for eyes in crowd:
+                    await eyes.ask("trace", items=["n0", "n1", "n2", "n3"], first=0, every=1, bins=2048)
+            for eyes in crowd:
+                await eyes.until(lambda eyes=eyes: len(eyes.traces) == 4)  # type: ignore[misc]
+            here = crowd[0].step
+            await crowd[0].until(lambda: crowd[0].step > here + 20)
+
+    served(test)
+
+
 def test_one_who_comes_while_it_stands_still_sees_the_same() -> None:
     async def seen(live: Live, token: str) -> tuple[list[int], ...]:
         async with live.stream(token) as stream:
@@ -357,6 +403,13 @@ BROKEN: list[str | bytes] = [
     *(json.dumps(DRAW | {"theme": "x"}), json.dumps(DRAW | {"signal": 0}), json.dumps(DRAW | {"change": 65})),
     *(json.dumps(DRAW | {"activity": True}), '{"type": "draw", "theme": ""}', json.dumps(DRAW | {"theme": None})),
     *('{"type": "set", "values": {"pull": 1}, "moving": 1}', '{"type": "lesion", "part": "B", "moving": true}'),
+    *(
+        json.dumps({"type": "trace", "items": ["n1"], "first": 0, "every": 1, "bins": 9} | wrong)
+        for wrong in (
+            *({"first": -1}, {"every": 0}, {"bins": 0}, {"bins": 1 << 20}, {"every": 1 << 60}, {"items": ["n"]}),
+            *({"items": [f"n{index}" for index in range(17)]}, {"first": 0.5}, {"more": 1}),
+        )
+    ),
     *(b"", b"\x00", b"\x00" * 5, b"\x00" * 1000, '{"type": "pl\x00ay"}', '{"type": "step", "by": ' + "9" * 5000 + "}"),
 ]
 

@@ -16,13 +16,23 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.live.protocol import frame_message, refused_message, scene_message, status_message, values_message
+from neurovis_spec.live.protocol import (
+    Trace,
+    frame_message,
+    refused_message,
+    scene_message,
+    status_message,
+    trace_message,
+    values_message,
+)
 from neurovis_spec.live.run import Shown
 
 #: Frames that a client may be sent before it has drawn them.
 AHEAD: Final = 2
 #: Frames a second that all viewers together are sent, and the least that each is, where it has room.
 _FRAMES_OF_ALL, _FRAMES_EACH = 2000, 20
+#: After traces were read nobody's are for so many times as long: they take a quarter of the time at most.
+_REST: Final = 3
 #: Texts that wait for a client; of more the oldest are dropped.
 _TEXTS: Final = 16
 
@@ -41,6 +51,9 @@ class Client:
     #: what it wants the values of, and whether it has just asked
     items: tuple[str, ...] = ()
     asked: bool = False
+    #: the traces that it wants, and those that it is to be sent
+    wanted: Trace | None = None
+    traces: bytes = b""
     texts: deque[str] = field(default_factory=lambda: deque(maxlen=_TEXTS))
     wake: asyncio.Event = field(default_factory=asyncio.Event)
 
@@ -66,6 +79,10 @@ class Hub:
         #: when viewers are sent the next frame, and what will do so where there is one
         self._next = 0.0
         self._timer: asyncio.TimerHandle | None = None
+        #: who waits for traces, until when nobody is answered, and what will answer
+        self._waiting: deque[Client] = deque()
+        self._rest = 0.0
+        self._reader: asyncio.TimerHandle | None = None
         self._statuses: dict[bool, str] = {}
         self._findings = ""
 
@@ -111,6 +128,33 @@ class Hub:
         client.items, client.asked = items, bool(items)
         client.wake.set()
 
+    def trace(self, client: Client, wanted: Trace) -> None:
+        """A client wants traces, in place of those that it has asked for before and not been sent yet."""
+        if client.wanted is None:
+            self._waiting.append(client)
+        client.wanted = wanted
+        if self._reader is None:
+            self._reader = self._loop.call_at(self._rest, self._read_traces)
+
+    def _read_traces(self) -> None:
+        """Read traces for whoever has waited longest; the longer it takes the longer is the rest."""
+        begun, shown = self._loop.time(), self._shown
+        client, self._reader = self._waiting.popleft(), None
+        wanted, client.wanted = client.wanted, None
+        if client in self._clients and shown is not None and wanted is not None:
+            lines, traces = len(shown.look.lines), {}
+            for item in wanted.items:
+                members = shown.view.members(item)
+                if members is not None:
+                    index = int(item[1:]) + (lines if members.neurons else 0)
+                    traces[index] = shown.history.read(members, wanted.bins)
+            client.traces = trace_message(self._version, traces, wanted.bins)
+            client.wake.set()
+        now = self._loop.time()
+        self._rest = now + _REST * (now - begun)
+        if self._waiting:
+            self._reader = self._loop.call_at(self._rest, self._read_traces)
+
     def drawn(self, client: Client, serial: int) -> None:
         """A client has drawn a frame, and so those before it."""
         while client.ahead and client.ahead[0] <= serial:
@@ -141,6 +185,9 @@ class Hub:
         if client.asked:
             client.asked = False
             yield values_message(shown.look.step, shown.view.values(shown.seen, client.items))
+        if client.traces:
+            traces, client.traces = client.traces, b""
+            yield traces
 
     def _take(self) -> None:
         self._scheduled = False

@@ -20,6 +20,7 @@ import numpy.typing as npt
 from neurovis_spec.live.appearance import MOST, Appearance
 from neurovis_spec.live.clock import SPEEDS
 from neurovis_spec.live.commands import Branch, Command, Draw, Event, Pause, Play, Restart, Seek, Speed, Step
+from neurovis_spec.live.history import Bins, Range
 from neurovis_spec.live.run import Status
 from neurovis_spec.live.source import Reach, Turned
 from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set
@@ -27,11 +28,13 @@ from neurovis_spec.live.view import Look
 from neurovis_spec.themes import THEMES
 
 #: The first byte of a binary message from the server.
-SCENE, FRAME = 1, 2
+SCENE, FRAME, TRACE = 1, 2, 3
 #: kind, scene
 _SCENE_HEAD = struct.Struct("<BxH")
 #: kind, scene, serial, changed, step, first, last, bytes of the caption, of what follows it none
 _HEAD = struct.Struct("<BxHIIdddHxx")
+#: kind, scene, traces, the bins: the first step, steps in each, how many
+_TRACE_HEAD = struct.Struct("<BxHIdII")
 #: A message of a client: at most so many bytes, names so many characters.
 LARGEST, _LONGEST = 16_384, 4096
 #: The most steps there can be (a double holds each).
@@ -42,6 +45,8 @@ _MANY = 1024
 _WATCHED, _ITEM = 64, re.compile(r"[nc][0-9]{1,9}", re.ASCII)
 #: The gains of Eqs. 2–5.
 _GAINS = ("activity", "signal", "thickness", "change")
+#: The most items that a client is sent traces of at once, the most bins, and steps in each.
+_TRACED, _BINS, _EVERY = 16, 2048, 1 << 32
 #: The most turns and events that are listed, the latest turns and the first events.
 _LISTED = 1000
 #: The most steps that are made at once.
@@ -105,6 +110,13 @@ def values_message(step: int, values: Mapping[str, float]) -> str:
     return _text("values", step=step, values=known)
 
 
+def trace_message(version: int, traces: Mapping[int, Range], bins: Bins) -> bytes:
+    """Traces of items (connections, then neurons): the least and the largest value of each bin."""
+    head = _TRACE_HEAD.pack(TRACE, version, len(traces), bins.first, bins.every, bins.count)
+    items = np.array(list(traces), "<u4")
+    return b"".join([head, items.tobytes(), *(trace.astype("<f4").tobytes() for trace in traces.values())])
+
+
 def findings_message(text: str, errors: bool) -> str:
     """What was noticed about an edited spec, as ``validate`` shows it; nothing: all is well."""
     return _text("findings", text=text, errors=errors)
@@ -141,6 +153,14 @@ class LookAt:
     items: tuple[str, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """The client wants to be sent once how some items went, in bins of steps; viewers may ask for it, too."""
+
+    items: tuple[str, ...]
+    bins: Bins
+
+
 def acknowledged(data: bytes) -> Acknowledged:
     """A binary message: four bytes. Raises ProtocolError."""
     if len(data) != 4:
@@ -148,7 +168,7 @@ def acknowledged(data: bytes) -> Acknowledged:
     return Acknowledged(int.from_bytes(data, "little"))
 
 
-def command_of(text: str) -> Command | LookAt:
+def command_of(text: str) -> Command | LookAt | Trace:
     """A text message. Raises ProtocolError."""
     if len(text) > LARGEST:
         raise ProtocolError("the message is too long")
@@ -242,8 +262,18 @@ def _items(value: object) -> tuple[str, ...]:
     raise ProtocolError(f"at most {_WATCHED} ids of neurons and connections are wanted")
 
 
-_MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command | LookAt]]]] = {
+def _trace(items: tuple[str, ...], first: int, every: int, bins: int) -> Trace:
+    if len(items) > _TRACED:
+        raise ProtocolError(f"at most {_TRACED} traces are wanted")
+    return Trace(items, Bins(first, every, bins))
+
+
+_MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command | LookAt | Trace]]]] = {
     "look": ({"items": _items}, LookAt),
+    "trace": (
+        {"items": _items, "first": _whole(0, _MOST), "every": _whole(1, _EVERY), "bins": _whole(1, _BINS)},
+        _trace,
+    ),
     "play": ({}, Play),
     "pause": ({}, Pause),
     "step": ({"by": _whole(-_NEAR, _NEAR)}, Step),

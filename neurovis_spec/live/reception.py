@@ -6,7 +6,7 @@ In: the messages of a client, who is trusted with nothing. Out: the hub and the 
 from __future__ import annotations
 
 from neurovis_spec.live.hub import Client, Hub
-from neurovis_spec.live.protocol import LookAt, acknowledged, command_of, refused_message
+from neurovis_spec.live.protocol import LookAt, Trace, acknowledged, command_of, refused_message
 from neurovis_spec.live.run import Run
 
 
@@ -24,6 +24,8 @@ class Reception:
         command = command_of(message)
         if isinstance(command, LookAt):
             self._hub.look_at(client, command.items)
+        elif isinstance(command, Trace):
+            self._hub.trace(client, command)
         elif client.owner:
             self._run.ask(command, lambda reason: self._hub.refuse(client, reason))
         else:

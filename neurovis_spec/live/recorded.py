@@ -10,6 +10,7 @@ from bisect import bisect_left
 import numpy as np
 
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.live.history import Recorded
 from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned
 from neurovis_spec.live.turns import Turn
 from neurovis_spec.runtime.recording import Recording, RecordingError
@@ -32,6 +33,7 @@ class RecordedSource:
         self._steps: list[int] = recording.step.tolist()
         self._lesions = lesions_of(network)
         self._row = 0
+        self.history = Recorded(self._recording)
 
     @property
     def step(self) -> int:

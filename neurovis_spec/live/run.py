@@ -18,6 +18,7 @@ from typing import TypeAlias
 from neurovis_spec.live.appearance import Appearance
 from neurovis_spec.live.clock import FRAMES, Clock, Pace
 from neurovis_spec.live.commands import Branch, Command, Draw, Event, Pause, Play, Present, Restart, Seek, Speed, Step
+from neurovis_spec.live.history import History
 from neurovis_spec.live.source import Capabilities, Reach, Seen, Source, SourceError, Turned
 from neurovis_spec.live.view import Look, View
 
@@ -48,6 +49,7 @@ class Shown:
     look: Look
     reach: Reach
     status: Status
+    history: History
 
 
 Stage: TypeAlias = tuple[Source, View]
@@ -278,4 +280,4 @@ class Run:
             appearance=self.appearance,
         )
         seen = source.seen()
-        return Shown(self._view, seen, self._view.look(seen), source.reach, status)
+        return Shown(self._view, seen, self._view.look(seen), source.reach, status, source.history)

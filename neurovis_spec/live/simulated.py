@@ -15,6 +15,7 @@ from operator import attrgetter
 import numpy as np
 
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.live.history import Ring
 from neurovis_spec.live.past import EVERY, ROOM, Kept, Past
 from neurovis_spec.live.rules import rules
 from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned
@@ -48,6 +49,7 @@ class SimulatedSource:
 
     def _begin(self, state: State, turned: Sequence[Turned], fed: Mapping[str, tuple[float, ...]]) -> None:
         self._past = Past(self._room)
+        self.history = Ring(len(self.network.neurons), len(self.network.connections))
         self._fading = Fading(self.network)
         self._fed, self._turned = dict(fed), list(turned)
         self._listed: tuple[list[Turned], tuple[Turned, ...]] = ([], ())
@@ -149,6 +151,7 @@ class SimulatedSource:
     def branch(self) -> None:
         """Forget what came after the step that it stands at."""
         self._past.cut(self._simulation.k)
+        self.history.cut(self.step)
         self._last = self.step
         self._turned = [entry for entry in self._turned if entry.step <= self.step]
         self._listed = [], ()
@@ -197,6 +200,7 @@ class SimulatedSource:
             warnings.warn(str(error), RuntimeWarning, stacklevel=2)
         previous = before.weights if before is not None and before.step == step - 1 else None
         activity = run.activity
+        self.history.note(step, activity, weights)
         seen = self._fading.follow(np.array([step]), activity[None]) if self._fading else None
         return Seen(Snapshot(step, activity, weights, previous, seen), *lesioned)
 

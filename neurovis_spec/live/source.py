@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.live.history import History
 from neurovis_spec.live.turns import Turn
 from neurovis_spec.runtime.recording import Snapshot
 
@@ -93,6 +94,11 @@ class Source(Protocol):
     @property
     def learning(self) -> Mapping[str, bool | None]:
         """Whether the rules of the network are carried out, by their connections; None where some are."""
+        ...
+
+    @property
+    def history(self) -> History:
+        """What is known of its steps, for traces; another thread may read it."""
         ...
 
     def seen(self) -> Seen:

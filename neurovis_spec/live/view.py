@@ -17,6 +17,7 @@ from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.live.appearance import AS_IT_IS, Appearance
 from neurovis_spec.live.declared import declared
 from neurovis_spec.live.drawing import content
+from neurovis_spec.live.history import Members
 from neurovis_spec.live.source import Mask, Seen
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.scene import Scene
@@ -90,6 +91,12 @@ class View:
             if index < len(values):
                 result[item] = float(values[index])
         return result
+
+    def members(self, item: str) -> Members | None:
+        """What of the network an item (``n3``, ``c5``) stands for; None where there is none."""
+        neurons, index = item[0] == "n", int(item[1:])
+        of, count = (self.drawn.unit, len(self.drawn.sizes)) if neurons else (self.drawn.bundle, len(self.drawn.counts))
+        return Members(neurons, np.flatnonzero(of == index)) if index < count else None
 
     def _lesioned(self, seen: Seen) -> tuple[Mask, Mask]:
         """What is drawn as lesioned: a glyph, or a line between glyphs, where all that it stands for is."""

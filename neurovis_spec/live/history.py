@@ -1,0 +1,142 @@
+"""The history: what neurons did and what connections weighed, step by step, in bounded memory, for traces.
+
+In: the activities and weights of each step. Out: of any of them the least and the largest value in each of some bins
+of steps. One thread notes, others read without waiting: what is read while it changes may be wrong for one picture.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Protocol, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.runtime.recording import Recording
+
+#: bytes
+ROOM: Final = 64 << 20
+#: The most steps of a ring, and how many of these are never read, since they are overwritten next.
+_STEPS, _NEXT = 1 << 18, 16
+#: The most numbers that are read for one trace; of more every second, third, … step is read.
+_READ: Final = 1 << 20
+
+Range: TypeAlias = npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class Bins:
+    """So many bins of ``every`` steps each, from step ``first`` on."""
+
+    first: int
+    every: int
+    count: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Members:
+    """What a trace is of: the mean activity of neurons, or the sum of the weights of connections (indices)."""
+
+    neurons: bool
+    indices: IntArray
+
+
+class History(Protocol):
+    """What can be read of the steps of a source."""
+
+    def read(self, members: Members, bins: Bins) -> Range:
+        """The least and the largest value in each bin (bins, 2); NaN where nothing is known."""
+        ...
+
+
+def _ranges(steps: IntArray, values: FloatArray | Range, bins: Bins) -> Range:
+    """The least and the largest of the values at ascending steps in each bin."""
+    result = np.full((bins.count, 2), np.nan, np.float32)
+    edges = np.searchsorted(steps, bins.first + bins.every * np.arange(bins.count + 1))
+    there = edges[1:] > edges[:-1]
+    if there.any():
+        starts, values = edges[:-1][there], values[: edges[-1]]
+        with np.errstate(over="ignore", invalid="ignore"):
+            result[there, 0] = np.fmin.reduceat(values, starts)
+            result[there, 1] = np.fmax.reduceat(values, starts)
+    return result
+
+
+def _joined(members: Members, values: FloatArray | Range) -> FloatArray | Range:
+    """Values (rows, members) as those of what is drawn for them."""
+    if values.shape[1] == 1:
+        return values[:, 0]
+    with np.errstate(over="ignore", invalid="ignore"):
+        joined: FloatArray = np.mean(values, 1, np.float64) if members.neurons else np.sum(values, 1, np.float64)
+        return joined
+
+
+def _thinned(rows: IntArray, members: Members) -> IntArray:
+    """Rows to be read, so that together with the members they are not too many."""
+    return rows[:: max(1, -(-len(rows) * len(members.indices) // _READ))]
+
+
+class Ring:
+    """The latest steps of a run of n neurons and m connections; where ``room`` (bytes) is full the oldest go."""
+
+    def __init__(self, neurons: int, connections: int, room: int = ROOM) -> None:
+        self._neurons = neurons
+        self._size = max(2 * _NEXT, min(_STEPS, room // (4 * max(1, neurons + connections))))
+        self._values = np.empty((self._size, neurons + connections), np.float32)
+        self._first, self._last = 0, -1
+
+    @property
+    def steps(self) -> tuple[int, int]:
+        """The first and the last step that are known; the last is the smaller where none is."""
+        return self._first, self._last
+
+    def note(self, step: int, activity: FloatArray, weights: FloatArray) -> None:
+        """Keep a step; one that is known stays as it is."""
+        if self._first <= step <= self._last:
+            return
+        if step != self._last + 1 or self._last < self._first:
+            if step < self._last:  # longer ago than is known
+                return
+            self._first, self._last = step, step - 1
+        self._first = max(self._first, step + 1 + _NEXT - self._size)
+        row = self._values[step % self._size]
+        with np.errstate(over="ignore"):
+            row[: self._neurons], row[self._neurons :] = activity, weights
+        self._last = step
+
+    def cut(self, step: int) -> None:
+        """Forget what came after a step."""
+        self._last = min(self._last, step)
+        self._first = min(self._first, self._last + 1)
+
+    def read(self, members: Members, bins: Bins) -> Range:
+        """The least and the largest value in each bin."""
+        first, last = self._first, self._last
+        end = min(last, bins.first + bins.every * bins.count - 1)
+        steps = _thinned(np.arange(max(first, bins.first), end + 1), members)
+        columns = members.indices + (0 if members.neurons else self._neurons)
+        return _ranges(steps, _joined(members, self._values[(steps % self._size)[:, None], columns]), bins)
+
+
+class Recorded:
+    """The steps of a recording, which holds all activities and weights."""
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
+        self._column = np.full(len(recording.sources), -1, np.int64)
+        self._column[recording.plastic] = np.arange(len(recording.plastic))
+        self._fixed = np.zeros(len(recording.sources))
+        self._fixed[np.delete(np.arange(len(recording.sources)), recording.plastic)] = recording.weights_static
+
+    def read(self, members: Members, bins: Bins) -> Range:
+        """The least and the largest value in each bin."""
+        steps = self._recording.step
+        ends = np.searchsorted(steps, [bins.first, bins.first + bins.every * bins.count])
+        rows = _thinned(np.arange(*ends), members)
+        if members.neurons:
+            values = self._recording.activity[rows[:, None], members.indices]
+        else:
+            column, values = self._column[members.indices], np.tile(self._fixed[members.indices], (len(rows), 1))
+            values[:, column >= 0] = self._recording.weights[rows[:, None], column[column >= 0]]
+        return _ranges(steps[rows], _joined(members, values), bins)
