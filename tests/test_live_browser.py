@@ -53,6 +53,9 @@ async def shown(
             await opened.size(width, height + BAR)
             await opened.call("Page.navigate", url=access.url())
             await opened.until(f"{STEP} >= 0")
+            below = await opened.ask("innerHeight - document.querySelector('#stage').offsetHeight")
+            assert isinstance(below, int)
+            await opened.size(width, height + below)
             yield opened, compiled, access
             assert opened.errors == []
     finally:

@@ -35,13 +35,18 @@ from neurovis_spec.scene import (
     Text,
 )
 from neurovis_spec.scene.lesions import FAINT
+from neurovis_spec.scene.matrix import Order
 
 
 def content(
-    network: Network, scene: Scene, more: Mapping[str, float], declared: Mapping[str, object] = MappingProxyType({})
+    network: Network,
+    scene: Scene,
+    rows: Order,
+    more: Mapping[str, float],
+    declared: Mapping[str, object] = MappingProxyType({}),
 ) -> bytes:
-    """The scene and what a page must know of its network, as JSON, compressed; ``more`` are further constants,
-    ``declared`` what can be turned."""
+    """The scene and what a page must know of its network, as JSON, compressed; ``rows`` are those of its matrix,
+    ``more`` further constants, ``declared`` what can be turned."""
     value = {
         "name": network.name,
         "title": scene.title,
@@ -52,6 +57,8 @@ def content(
         "dt": network.dt if network.dt_given else None,
         "discs": len(network.neurons),
         "lines": len(network.connections),
+        "order": rows.neurons.tolist(),
+        "bands": [[band.start, band.name, band.count] for band in (rows.levels or ((),))[0]],
         **declared,
         "constants": {
             "families": list(FAMILIES), "halo": HALO, "subscriptDrop": SUBSCRIPT_DROP, "subscriptSize": SUBSCRIPT_SIZE,

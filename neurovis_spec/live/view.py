@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.live.appearance import AS_IT_IS, Appearance
 from neurovis_spec.live.declared import declared
 from neurovis_spec.live.drawing import content
@@ -26,6 +27,7 @@ from neurovis_spec.scene.collapse import Gathered, gathered
 from neurovis_spec.scene.encode import looks, paint, tooltips
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.gathered_layout import laid_out
+from neurovis_spec.scene.matrix import order_of
 from neurovis_spec.scene.plan import Plan, plan
 from neurovis_spec.themes import THEMES
 
@@ -34,13 +36,16 @@ LEVELS = 127
 #: Widths are counted in these parts of a user unit, up to what 16 bits hold.
 FINENESS, _WIDEST = 16, (1 << 16) - 1
 #: What a connection or a neuron may be besides.
-BAR, FAINT = 1, 2
+BAR, FAINT, NEGATIVE = 1, 2, 4
+#: What a kind has besides in its higher bits: the size of a weight, from 0 to the largest of its scale.
+SHARES, _SHARE = 31, 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
     """What a step looks like: colour values of discs (n,) and lines (m,); widths and glow widths (m,); and ``kinds``
-    (m + n,): of each connection, then of each neuron, BAR where its line ends in a bar, FAINT where it is lesioned."""
+    (m + n,): of each connection, then of each neuron, BAR where its line ends in a bar, FAINT where it is lesioned,
+    NEGATIVE where its weight is, and in the higher bits how large it is."""
 
     step: int
     caption: str
@@ -58,6 +63,8 @@ class View:
     drawn: Gathered
     gains: Gains
     plan: Plan
+    #: of each line, the largest weight that there is on its scale
+    largest: FloatArray
     #: all that stays, as a page gets it
     content: bytes
     appearance: Appearance
@@ -72,6 +79,7 @@ class View:
         words = self.plan.caption_shape(caption(drawn.whole, whole.step, whole.activity))
         neurons, lines = self._lesioned(seen)
         bars = shown.bars & (self.plan.theme.ends == "signs")
+        of_lines = bars * BAR + lines * FAINT + shown.bars * NEGATIVE + self._shares(snapshot.weights) * _SHARE
         return Look(
             step=snapshot.step,
             caption="" if words is None else words.text,
@@ -79,8 +87,15 @@ class View:
             lines=_levels(shown.lines),
             widths=_parts(shown.widths),
             glows=_parts(shown.glows),
-            kinds=np.concatenate([bars * BAR + lines * FAINT, neurons * FAINT]).astype(np.uint8),
+            kinds=np.concatenate([of_lines, neurons * FAINT]).astype(np.uint8),
         )
+
+    def _shares(self, weights: FloatArray) -> npt.NDArray[np.int64]:
+        """How large weights are, as parts of the largest of their scale; none is 0 that is not."""
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            parts = np.nan_to_num(np.ceil(SHARES * np.abs(weights) / self.largest), nan=0.0, posinf=SHARES)
+        result: npt.NDArray[np.int64] = np.minimum(parts, SHARES).astype(np.int64)
+        return result
 
     def values(self, seen: Seen, items: Iterable[str]) -> dict[str, float]:
         """Exact activities (``n3``) and weights (``c5``) at a step, by the ids of groups, of those that there are."""
@@ -121,11 +136,17 @@ def view_of(
     settings = compiled.settings_for(appearance.theme or theme)
     drawn = gathered(network, settings.collapse)
     seen = appearance.gains(gains)
-    planned = plan(drawn, laid_out(drawn, compiled.drawn(engine).value), seen, settings)
-    constants = {"levels": LEVELS, "fineness": FINENESS, "isBar": BAR, "isFaint": FAINT}
+    layout = laid_out(drawn, compiled.drawn(engine).value)
+    planned = plan(drawn, layout, seen, settings)
+    largest = np.ones(len(seen.thickness))
+    for scale in seen.thickness_scales:
+        largest[seen.thickness == scale.gain] = scale.reaches or 1.0
+    kinds = {"isBar": BAR, "isFaint": FAINT, "isNegative": NEGATIVE}
+    constants = {"levels": LEVELS, "fineness": FINENESS, "shares": SHARES, "share": _SHARE, **kinds}
     scene = _scene(planned, seen)
-    words = content(drawn.network, scene, constants, {**declared(compiled), "themes": list(THEMES)})
-    return View(drawn, seen, planned, words, appearance, partial(view_of, compiled, gains, theme, engine))
+    rows = order_of(drawn.network, layout, range(len(drawn.network.neurons)))
+    words = content(drawn.network, scene, rows, constants, {**declared(compiled), "themes": list(THEMES)})
+    return View(drawn, seen, planned, largest, words, appearance, partial(view_of, compiled, gains, theme, engine))
 
 
 def _scene(planned: Plan, gains: Gains) -> Scene:

@@ -9,7 +9,7 @@
 /** @typedef {import('./protocol.js').Group} Group */
 
 /** A number with its sign, for what is not told by colour alone. @param {number | null} value @returns {string} */
-function signed(value) {
+export function signed(value) {
   if (value === null) return 'not finite';
   return (value > 0 ? '+' : '') + String(Number(value.toPrecision(6))).replace('-', '−');
 }
@@ -24,6 +24,10 @@ export class Attention {
     this.changed = changed;
     this.pointed = '';
     this.held = '';
+    /** what else it wants the values of @type {string[]} */
+    this.also = [];
+    /** where a picture of another kind has something, in units @type {((id: string) => number[]) | null} */
+    this.spot = null;
     /** @type {Map<string, Group>} */
     this.groups = new Map();
     /** the ids of what stands out with what is held @type {Set<string>} */
@@ -46,7 +50,7 @@ export class Attention {
 
   /** Ask for the values of what is shown. */
   ask() {
-    this.link.ask('look', { items: [...new Set([this.pointed, this.held])].filter(Boolean) });
+    this.link.ask('look', { items: [...new Set([this.pointed, this.held, ...this.also])].filter(Boolean) });
   }
 
   /** @param {string} id @param {number[]} place */
@@ -111,7 +115,8 @@ export class Attention {
     if (!words) return;
     if (tip.textContent !== words) tip.textContent = words;
     const shapes = /** @type {Group} */ (this.groups.get(id)).shapes;
-    const [x, y] = this.pointed ? this.place : (id[0] === 'n' ? shapes[0] : shapes[1]).at, [left, top] = camera.origin;
+    const there = this.spot ? this.spot(id) : (id[0] === 'n' ? shapes[0] : shapes[1]).at;
+    const [x, y] = this.pointed ? this.place : there, [left, top] = camera.origin;
     const at = [left + x * camera.scale, top + y * camera.scale].map((pixel) => pixel / devicePixelRatio);
     const room = [tip.offsetWidth, tip.offsetHeight];
     const edge = camera.window.map((size) => size / devicePixelRatio);

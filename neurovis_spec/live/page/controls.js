@@ -1,5 +1,5 @@
 /**
- * Controls: the buttons, the speed, the scrubber and the keys of a run.
+ * Controls: the buttons, the speed and the keys of a run.
  */
 
 /** @typedef {import('./protocol.js').Link} Link */
@@ -15,12 +15,11 @@ export class Controls {
   constructor(link) {
     this.link = link;
     this.playing = true;
+    this.turns = false;
     /** @type {HTMLButtonElement} */
     this.play = part('play');
     /** @type {HTMLSelectElement} */
     this.speed = part('speed');
-    /** @type {HTMLInputElement} */
-    this.scrub = part('scrub');
     this.told = part('told');
     this.findings = part('findings');
     /** @type {Object<string, () => void>} */
@@ -29,16 +28,21 @@ export class Controls {
       back: () => link.ask('step', { by: -1 }),
       play: () => this.toggle(),
       step: () => link.ask('step', { by: 1 }),
+      before: () => link.ask('event', { by: -1 }),
+      next: () => link.ask('event', { by: 1 }),
+      branch: () => link.ask('branch'),
     };
     for (const [id, action] of Object.entries(actions)) part(id).onclick = action;
     this.speed.onchange = () => link.ask('speed', { value: this.speed.value });
-    this.scrub.oninput = () => link.ask('seek', { step: Number(this.scrub.value) });
     /** @type {Keys} */
     this.keys = {
       ' ': ['play or pause', actions.play],
       ArrowRight: ['one step on', actions.step],
       ArrowLeft: ['one step back', actions.back],
       Home: ['restart', actions.restart],
+      e: ['to the next event of the spec', actions.next],
+      E: ['to the event before', actions.before],
+      b: ['from here on differently: forget what came after', actions.branch],
     };
     addEventListener('keydown', (event) => this.key(event));
   }
@@ -67,17 +71,16 @@ export class Controls {
     this.play.textContent = status.playing ? '❚❚' : '▶';
     this.play.setAttribute('aria-label', status.playing ? 'pause' : 'play');
     this.speed.value = status.speed;
-    for (const id of ['restart', 'back', 'play', 'step', 'speed', 'scrub']) {
-      /** @type {HTMLButtonElement} */ (part(id)).disabled = !status.owner;
+    this.turns = status.owner && status.can.turns;
+    for (const id of ['restart', 'back', 'play', 'step', 'speed', 'before', 'next']) {
+      const isEvent = id === 'before' || id === 'next';
+      /** @type {HTMLButtonElement} */ (part(id)).disabled = !status.owner || (isEvent && !status.events.length);
     }
   }
 
   /** @param {Look} look */
   frame(look) {
-    if (document.activeElement !== this.scrub || this.playing) {
-      [this.scrub.min, this.scrub.max, this.scrub.value] = [String(look.first), String(look.last), String(look.step)];
-    }
-    this.scrub.setAttribute('aria-valuetext', `step ${look.step} of ${look.last}, back to ${look.first}`);
+    /** @type {HTMLButtonElement} */ (part('branch')).disabled = !this.turns || look.step === look.last;
     this.tell(`step ${look.step}`);
   }
 

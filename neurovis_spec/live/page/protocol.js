@@ -13,13 +13,14 @@
 /** @typedef {{version: number, name: string, title: string, width: number, height: number, density: number,
  *   theme: Theme, dt: number | null, discs: number, lines: number, parameters: Declared[],
  *   inputs: {name: string, size: number, description: string}[], rules: {connections: string, rule: string}[], themes: string[],
- *   constants: Object<string, any>, groups: Group[]}} Scene */
+ *   order: number[], bands: [number, string, number][], constants: Object<string, any>, groups: Group[]}} Scene */
+/** @typedef {{first: number, every: number, ranges: Map<string, Float32Array>}} Traces */
 /** @typedef {{serial: number, step: number, first: number, last: number, caption: string, discs: Int8Array,
  *   lines: Int8Array, widths: Uint16Array, glows: Uint16Array, kinds: Uint8Array}} Look */
-/** @typedef {{scene: (scene: Scene) => void, frame: () => void, text: (message: any) => void,
- *   link: (open: boolean) => void}} Listener */
+/** @typedef {{scene: (scene: Scene) => void, frame: () => void, traces: (traces: Traces) => void,
+ *   text: (message: any) => void, link: (open: boolean) => void}} Listener */
 
-const SCENE = 1, FRAME = 2, HEAD = 40;
+const SCENE = 1, FRAME = 2, TRACE = 3, HEAD = 40;
 
 /** Unpack a scene. @param {ArrayBuffer} buffer @returns {Promise<Scene>} */
 async function unpack(buffer) {
@@ -54,6 +55,18 @@ export function take(buffer, version, look) {
   look.lines = new Int8Array(buffer, colours + discs, lines);
   look.caption = new TextDecoder().decode(new Uint8Array(buffer, colours + discs + lines, words));
   return true;
+}
+
+/** Unpack traces: by id, the least and the largest value of each bin. @param {ArrayBuffer} buffer @param {number} lines
+ * @returns {Traces} */
+function unpackTraces(buffer, lines) {
+  const view = new DataView(buffer), count = view.getUint32(4, true), bins = view.getUint32(20, true);
+  const ranges = new Map();
+  new Uint32Array(buffer, 24, count).forEach((item, at) => {
+    const id = item < lines ? `c${item}` : `n${item - lines}`;
+    ranges.set(id, new Float32Array(buffer, 24 + 4 * count + 8 * bins * at, 2 * bins));
+  });
+  return { first: view.getFloat64(8, true), every: view.getUint32(16, true), ranges };
 }
 
 /** What stands for the websocket where the page is in the frame of a notebook: the port that the frame is handed. */
@@ -138,6 +151,8 @@ export class Link {
       this.listener.scene(this.scene);
     } else if (kind === FRAME && this.scene && this.look && take(data, this.scene.version, this.look)) {
       this.listener.frame();
+    } else if (kind === TRACE && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
+      this.listener.traces(unpackTraces(data, this.scene.lines));
     }
   }
 

@@ -1,0 +1,126 @@
+/**
+ * The scrubber: the time axis, which strips share, the step on it, how far back it reaches, and what happened when.
+ */
+
+/** @typedef {import('./protocol.js').Link} Link */
+/** @typedef {import('./protocol.js').Look} Look */
+
+/** Half the width of a slider's thumb: so far from its ends lie the first and the last step, in pixels of a page. */
+export const THUMB = 8;
+/** Milliseconds for which the thumb stays where a key has put it. */
+const KEPT = 300;
+
+/** Shows the steps from `low` to `high`, the latest `span` of them, or those around the step that is shown. */
+export class Scrubber {
+  /** @param {Link} link @param {(id: string) => HTMLElement} find @param {() => void} changed */
+  constructor(link, find, changed) {
+    this.link = link;
+    this.low = 0;
+    this.high = 0;
+    /** @type {HTMLInputElement} */
+    this.scrub = /** @type {HTMLInputElement} */ (find('scrub'));
+    this.span = /** @type {HTMLSelectElement} */ (find('span'));
+    this.reach = find('reach');
+    this.marks = /** @type {HTMLCanvasElement} */ (find('marks'));
+    this.cursor = find('cursor');
+    this.sought = -KEPT;
+    /** the steps of the spec's events @type {number[]} */
+    this.events = [];
+    /** the steps from which on something is turned, those that are still to come again among them @type {number[]} */
+    this.turned = [];
+    /** @type {number[]} */
+    this.known = [];
+    this.drawn = '';
+    this.scrub.oninput = () => this.seek(Number(this.scrub.value));
+    this.span.onchange = changed;
+    this.changed = changed;
+    find('past').addEventListener('wheel', (event) => {
+      this.more(Math.sign(event.deltaY));
+      event.preventDefault();
+    }, { passive: false });
+  }
+
+  /** Go to a step. @param {number} step */
+  seek(step) {
+    this.sought = performance.now();
+    this.link.ask('seek', { step });
+  }
+
+  /** Show more of the past, or less. @param {number} by */
+  more(by) {
+    this.span.selectedIndex = Math.max(0, Math.min(this.span.length - 1, this.span.selectedIndex + by));
+    this.changed();
+  }
+
+  /** @param {any} status */
+  status(status) {
+    this.scrub.disabled = !status.owner;
+    this.events = status.events;
+    this.turned = status.turned.map((/** @type {{step: number}} */ { step }) => step + 1);
+  }
+
+  /** How far across the axis a step is, from 0 to 1. @param {number} step @returns {number} */
+  across(step) {
+    return (step - this.low) / Math.max(1, this.high - this.low);
+  }
+
+  /** The step under a pixel of an element as wide as the axis. @param {number} x @param {number} width @returns {number} */
+  under(x, width) {
+    const share = (x - THUMB) / Math.max(1, width - 2 * THUMB);
+    return Math.round(this.low + Math.min(1, Math.max(0, share)) * (this.high - this.low));
+  }
+
+  /** The steps at which events begin and something is turned, with which of both it is. @returns {[number, boolean][]} */
+  happened() {
+    /** @type {[number, boolean][]} */
+    const all = [...this.events.map((step) => /** @type {[number, boolean]} */ ([step, true])),
+      ...this.known.map((step) => /** @type {[number, boolean]} */ ([step, false]))];
+    return all.filter(([step]) => step >= this.low && step <= this.high);
+  }
+
+  /** @param {Look} look */
+  show(look) {
+    const { first, last, step } = look, span = Number(this.span.value) || Infinity, { scrub } = this;
+    const coming = this.known.filter((turn) => turn > step + 1 && turn <= last);
+    this.known = [...new Set([...this.turned, ...coming])];
+    if (!scrub.matches(':active')) {
+      const outside = step < this.low || step > this.high;
+      const atEdge = (step === this.low && step > first) || (step === this.high && step < last);
+      if (step === last || last - first <= span) this.high = last;
+      else if (outside || atEdge) this.high = Math.round(step + span / 2);
+      this.high = Math.min(last, Math.max(this.high, first + span));
+      this.low = Math.max(first, this.high - span);
+      [scrub.min, scrub.max] = [String(this.low), String(this.high)];
+      if (document.activeElement !== scrub || performance.now() - this.sought > KEPT) scrub.value = String(step);
+    }
+    scrub.setAttribute('aria-valuetext', `step ${step} of ${last}, back to ${first}`);
+    const words = `back to ${first}`;
+    if (this.reach.textContent !== words) this.reach.textContent = words;
+    const { offsetLeft, offsetWidth } = /** @type {HTMLElement} */ (scrub.parentElement);
+    const at = offsetLeft + THUMB + this.across(step) * (offsetWidth - 2 * THUMB);
+    this.cursor.style.transform = `translateX(${at.toFixed(1)}px)`;
+    this.mark(offsetWidth);
+  }
+
+  /** Mark what happened: a filled triangle for an event of the spec, a ring for a turn. @param {number} width */
+  mark(width) {
+    const happened = this.happened(), layout = [width, devicePixelRatio, this.low, this.high, ...happened].join(' ');
+    if (layout === this.drawn) return;
+    this.drawn = layout;
+    const { marks } = this, context = /** @type {CanvasRenderingContext2D} */ (marks.getContext('2d'));
+    [marks.width, marks.height] = [width * devicePixelRatio, 9 * devicePixelRatio];
+    context.scale(devicePixelRatio, devicePixelRatio);
+    context.fillStyle = context.strokeStyle = getComputedStyle(marks).color;
+    for (const [step, event] of happened) {
+      const x = THUMB + this.across(step) * (width - 2 * THUMB);
+      context.beginPath();
+      if (event) {
+        for (const [dx, y] of [[-4, 0], [4, 0], [0, 8]]) context.lineTo(x + dx, y);
+        context.fill();
+      } else {
+        context.arc(x, 4.5, 3, 0, 2 * Math.PI);
+        context.stroke();
+      }
+    }
+  }
+}

@@ -1,0 +1,215 @@
+/**
+ * Strips: how what is held and what is pinned went, below the network, over the time axis of the scrubber.
+ */
+
+import { signed } from './attention.js';
+import { THUMB } from './scrubber.js';
+
+/** @typedef {import('./attention.js').Attention} Attention */
+/** @typedef {import('./protocol.js').Group} Group */
+/** @typedef {import('./protocol.js').Link} Link */
+/** @typedef {import('./protocol.js').Look} Look */
+/** @typedef {import('./protocol.js').Traces} Traces */
+/** @typedef {import('./scrubber.js').Scrubber} Scrubber */
+/** @typedef {{id: string, data: string, name: HTMLButtonElement, value: HTMLElement, canvas: HTMLCanvasElement,
+ *   ends: HTMLElement[], pin: HTMLButtonElement, parts: HTMLElement[]}} Strip */
+
+/** The most strips that are pinned; milliseconds between two traces that are asked for, and until one is asked for again. */
+const PINS = 8, PACE = 40, LOST = 2000;
+
+/** A new element with a class. @param {string} tag @param {string} of @returns {any} */
+function element(tag, of) {
+  const made = document.createElement(tag);
+  made.className = of;
+  return made;
+}
+
+/** The strips: first what is pinned, at the end what is held. */
+export class Strips {
+  /** @param {Link} link @param {Attention} attention @param {Scrubber} scrubber @param {HTMLElement} place
+   * @param {() => void} changed */
+  constructor(link, attention, scrubber, place, changed) {
+    this.link = link;
+    this.attention = attention;
+    this.scrubber = scrubber;
+    this.place = place;
+    this.changed = changed;
+    /** @type {Strip[]} */
+    this.pinned = [];
+    this.held = this.strip();
+    this.asked = '';
+    this.when = -LOST;
+    /** whether an answer is awaited */
+    this.waiting = false;
+    this.of(this.held, undefined);
+    this.list();
+  }
+
+  /** A strip of nothing. @returns {Strip} */
+  strip() {
+    const name = element('button', 'of'), value = element('span', 'now'), label = element('div', 'label');
+    const canvas = element('canvas', 'trace'), ends = [element('span', 'end'), element('span', 'end')];
+    const pin = element('button', 'pin'), scale = element('div', 'scale'), numbers = element('div', 'ends');
+    /** @type {Strip} */
+    const strip = { id: '', data: '', name, value, canvas, ends, pin, parts: [label, canvas, scale] };
+    label.append(name, value);
+    numbers.append(...ends);
+    scale.append(numbers, pin);
+    canvas.setAttribute('role', 'img');
+    name.onclick = () => this.attention.hold(strip.id);
+    pin.onclick = () => this.toggle(strip.id);
+    canvas.onpointerdown = canvas.onpointermove = (/** @type {PointerEvent} */ event) => {
+      if (event.buttons !== 1 || this.scrubber.scrub.disabled) return;
+      canvas.setPointerCapture(event.pointerId);
+      this.scrubber.seek(this.scrubber.under(event.offsetX, canvas.clientWidth));
+    };
+    return strip;
+  }
+
+  /** Say what a strip is of. @param {Strip} strip @param {Group | undefined} group */
+  of(strip, group) {
+    const name = group ? group.title.split('\n')[0] : '', isPinned = strip !== this.held;
+    [strip.id, strip.data] = group ? [group.id, JSON.stringify(group.data)] : ['', ''];
+    const again = !isPinned && this.pinned.some(({ id }) => id === strip.id);
+    strip.name.textContent = name;
+    strip.name.title = name;
+    strip.pin.textContent = isPinned ? '×' : 'pin';
+    strip.pin.setAttribute('aria-label', `${isPinned ? 'unpin' : 'pin'} ${name}`);
+    strip.pin.hidden = again || (!isPinned && this.pinned.length >= PINS);
+    this.place.classList.toggle('nothing', !this.held.id);
+    this.clear(strip);
+  }
+
+  /** Show no trace. @param {Strip} strip */
+  clear(strip) {
+    for (const part of [strip.value, ...strip.ends]) part.textContent = '';
+    strip.canvas.width = 0;
+    this.asked = '';
+  }
+
+  /** Another network; what has the same name in it stays pinned. */
+  use() {
+    const groups = [...this.attention.groups.values()];
+    this.pinned = this.pinned.filter((strip) => {
+      const same = groups.find(({ data }) => JSON.stringify(data) === strip.data);
+      if (same) this.of(strip, same);
+      return same;
+    });
+    this.waiting = false;
+    this.list();
+  }
+
+  /** Something is held, or nothing. @param {Group | undefined} group */
+  hold(group) {
+    if ((group ? group.id : '') !== this.held.id) this.of(this.held, group);
+    this.changed();
+  }
+
+  /** Pin what is held, or unpin it. @param {string} id */
+  toggle(id) {
+    const group = this.attention.groups.get(id), known = this.pinned.findIndex((strip) => strip.id === id);
+    if (!group || (known < 0 && this.pinned.length >= PINS)) return;
+    if (known < 0) {
+      const strip = this.strip();
+      this.pinned.push(strip);
+      this.of(strip, group);
+    } else this.pinned.splice(known, 1);
+    this.of(this.held, this.attention.groups.get(this.held.id));
+    this.list();
+    if (known < 0) this.pinned[this.pinned.length - 1].pin.focus();
+    else this.held.name.focus();
+  }
+
+  /** Show the strips that there are. */
+  list() {
+    this.attention.also = this.pinned.map(({ id }) => id);
+    this.attention.ask();
+    this.place.replaceChildren(...[...this.pinned, this.held].flatMap(({ parts }) => parts));
+    this.changed();
+  }
+
+  /** Ask for the traces of the steps on the axis, where others are known. @param {Look} look */
+  show(look) {
+    const { low, high } = this.scrubber, width = Math.max(1, this.held.canvas.clientWidth - 2 * THUMB);
+    const items = [...new Set([...this.pinned, this.held].map(({ id }) => id))].filter(Boolean);
+    for (const { id, value } of [...this.pinned, this.held]) {
+      const known = this.attention.values[id], words = id && known !== undefined ? signed(known) : '';
+      if (value.textContent !== words) value.textContent = words;
+    }
+    const every = Math.max(1, Math.ceil((high - low + 1) / Math.min(width, 2000))), now = performance.now();
+    const first = Math.floor(low / every) * every, wanted = [look.last, low, high, every, width, ...items].join(' ');
+    if (!items.length || wanted === this.asked || now - this.when < (this.waiting ? LOST : PACE)) {
+      if (items.length && wanted !== this.asked && !this.waiting) setTimeout(this.changed, PACE);
+      return;
+    }
+    [this.asked, this.when, this.waiting] = [wanted, now, true];
+    this.link.ask('trace', { items, first, every, bins: Math.floor((high - first) / every) + 1 });
+  }
+
+  /** Traces have come. @param {Traces} traces */
+  take(traces) {
+    this.waiting = false;
+    for (const strip of [...this.pinned, this.held]) {
+      const trace = traces.ranges.get(strip.id);
+      if (trace) this.paint(strip, trace, traces);
+    }
+    this.changed();
+  }
+
+  /** Draw a trace: a line, up and down in each bin where it has several steps.
+   * @param {Strip} strip @param {Float32Array} trace @param {Traces} traces */
+  paint(strip, trace, { first, every }) {
+    const { canvas } = strip, context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
+    const { clientWidth: width, clientHeight: height } = canvas, style = getComputedStyle(canvas), { scrubber } = this;
+    let [low, high] = [Infinity, -Infinity];
+    for (const value of trace) {
+      if (Number.isFinite(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
+    }
+    const known = low <= high, room = height - 8;
+    [high, low].forEach((end, at) => { strip.ends[at].textContent = known && (at === 0 || high > low) ? short(end) : ''; });
+    [canvas.width, canvas.height] = [width * devicePixelRatio, height * devicePixelRatio];
+    context.scale(devicePixelRatio, devicePixelRatio);
+    /** @param {number} step */
+    const x = (step) => THUMB + scrubber.across(step) * (width - 2 * THUMB);
+    /** @param {number} value */
+    const y = (value) => 4 + room * (high > low ? (high - Math.min(high, Math.max(low, value))) / (high - low) : 0.5);
+    context.strokeStyle = style.borderTopColor;
+    context.setLineDash([2, 3]);
+    context.beginPath();
+    for (const [step] of scrubber.happened()) {
+      context.moveTo(x(step), 0);
+      context.lineTo(x(step), height);
+    }
+    if (known && low < 0 && high > 0) {
+      context.moveTo(0, y(0));
+      context.lineTo(width, y(0));
+    }
+    context.stroke();
+    context.setLineDash([]);
+    context.strokeStyle = style.color;
+    context.lineWidth = 1.2;
+    context.lineJoin = 'round';
+    context.beginPath();
+    let before = NaN;
+    for (let bin = 0; 2 * bin < trace.length; bin++) {
+      const [least, most] = [trace[2 * bin], trace[2 * bin + 1]], at = x(first + bin * every + (every - 1) / 2);
+      if (!Number.isNaN(least)) {
+        // the end that is nearer to the last value first
+        const up = Math.abs(least - before) <= Math.abs(most - before);
+        if (Number.isNaN(before)) context.moveTo(at, y(least));
+        context.lineTo(at, y(up ? least : most));
+        if (most > least) context.lineTo(at, y(up ? most : least));
+        before = up ? most : least;
+      } else before = NaN;
+    }
+    context.stroke();
+    canvas.setAttribute('aria-label', known
+      ? `${strip.name.textContent} from step ${scrubber.low} to ${scrubber.high}: between ${signed(low)} and ${signed(high)}`
+      : `${strip.name.textContent}: nothing is known of these steps`);
+  }
+}
+
+/** A number in little room. @param {number} value @returns {string} */
+function short(value) {
+  return String(Number(value.toPrecision(3))).replace('-', '−');
+}

@@ -1,0 +1,190 @@
+"""The live page: strips over the time axis of the scrubber, jumps to events, branches, and the matrix of weights."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import pytest
+from chromium import Page
+from test_live_browser import STEP, pause, shown
+from test_live_looking import places, told
+
+pytestmark = pytest.mark.browser
+
+SCRUB = "document.querySelector('#scrub')"
+#: Whether a strip, by its place, has its trace, and what is said of it.
+TRACE = "document.querySelectorAll('.trace')[{0}]?.getAttribute('aria-label')"
+TITLE = "document.querySelectorAll('.of')[{0}]?.textContent"
+#: Whether there is anything on a canvas.
+INK = (
+    "(c => c.toDataURL() != Object.assign(document.createElement('canvas'), {{width: c.width, "
+    "height: c.height}}).toDataURL())({0})"
+)
+MARKS = INK.format("document.querySelector('#marks')")
+
+
+async def numbers(opened: Page, *scripts: str) -> list[float]:
+    """The values of some expressions."""
+    found = await opened.ask(f"[{', '.join(scripts)}].map(Number)")
+    assert isinstance(found, list)
+    return found
+
+
+async def drawn(opened: Page, place: int) -> bool:
+    """Whether a strip shows a line."""
+    found = await opened.ask(INK.format(f"document.querySelectorAll('.trace')[{place}]"))
+    return bool(found)
+
+
+def test_what_is_held_has_its_trace_and_several_are_pinned(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, compiled, _):
+            await opened.until(f"{STEP} > 60")
+            step, at = await pause(opened), places(compiled)
+            run = compiled.run(step + 1)
+            await opened.click(*at["C1"])
+            await told(opened, "C1")
+            await opened.until(f"{TRACE.format(0)}?.startsWith('C1 from step 0 to {step}')")
+            assert await drawn(opened, 0)
+            values = run["C1"]
+            for number in (values.min(), values.max()):
+                text = f"{number:.6g}".replace("-", "−")
+                assert text in str(await opened.ask(TRACE.format(0)))
+            value = float(str(await opened.ask("document.querySelector('.now').textContent")).replace("−", "-"))
+            assert value == pytest.approx(values[step], rel=1e-5)
+            await opened.key("p")
+            await opened.until(f"{TITLE.format(0)} == 'C1' && document.querySelectorAll('.trace').length == 2")
+            await opened.key("]")
+            await opened.until(f"{TITLE.format(1)} == 'C2'")
+            await opened.until(f"{TRACE.format(1)}?.startsWith('C2 from step 0 to {step}')")
+            await opened.key("Escape")
+            await opened.until(f"{TITLE.format(1)} == ''")
+            assert await drawn(opened, 0)
+            await opened.key("ArrowLeft")
+            await opened.until(f"{STEP} == {step - 1}")
+            now = "Number(document.querySelector('.now').textContent.replace('−', '-'))"
+            await opened.until(f"Math.abs({now} - {values[step - 1]}) < 1e-5")
+            await opened.ask("document.querySelector('.pin').click()")
+            await opened.until("document.querySelectorAll('.trace').length == 1")
+
+    asyncio.run(main())
+
+
+def test_strips_share_their_axis_with_the_scrubber(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):
+            await opened.key("]")
+            await opened.ask("const speed = document.querySelector('#speed'); speed.value = 'max'; speed.onchange()")
+            await opened.until(f"{STEP} > 1500")
+            last = await pause(opened)
+            axis = tuple(f"{SCRUB}.{name}" for name in ("min", "max", "value"))
+            assert await numbers(opened, *axis) == [last - 1000, last, last]
+            assert await opened.ask("document.querySelector('#reach').textContent") == "back to 0"
+            box = "document.querySelector('.trace').getBoundingClientRect()"
+            left, top, width = await numbers(opened, *(f"{box}.{name}" for name in ("left", "top", "width")))
+            await opened.click(left + 8 + 0.25 * (width - 16), top + 20)
+            await opened.until(f"Math.abs({STEP} - {last - 750}) <= 2")
+            assert await numbers(opened, *axis, STEP) == [last - 1000, last, *(await numbers(opened, STEP, STEP))]
+            cursor = "document.querySelector('#cursor').getBoundingClientRect().left"
+            assert (await numbers(opened, cursor))[0] == pytest.approx(left + 8 + 0.25 * (width - 16), abs=3)
+            await opened.key("<")
+            await opened.until(f"{SCRUB}.min == '0'")
+            await opened.until(f"{TRACE.format(0)}?.includes('from step 0 to {last}')")
+            await opened.ask(f"{SCRUB}.value = 200; {SCRUB}.dispatchEvent(new Event('input'))")
+            await opened.until(f"{STEP} == 200")
+            for _ in range(2):
+                await opened.key(">")
+            await opened.until(f"{SCRUB}.max - {SCRUB}.min == 300")
+            low, high, here = await numbers(opened, *axis)
+            assert low < here == 200 < high < last, "the axis shows the steps around the one that is shown"
+
+    asyncio.run(main())
+
+
+def test_it_jumps_to_events_which_are_marked_as_turns_are(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):
+            await opened.until(f"{STEP} > 3")
+            assert await opened.ask("document.querySelector('#next').disabled"), "it has no events"
+            assert not await opened.ask(MARKS)
+            await pause(opened)
+            await opened.key("]")
+            await opened.key("t")
+            await opened.ask("document.querySelector('#lesion').click()")
+            await opened.key("ArrowRight")
+            await opened.until(MARKS)
+            await opened.key("Home")
+            await opened.until(f"{STEP} == 0")
+            await opened.until(f"!{MARKS}")
+        async with shown("hexapod/hexapod.yaml", tmp_path / "events") as (opened, compiled, _):
+            steps = sorted({change.at for change in compiled.network.changes})
+            await pause(opened)
+            await opened.key("Home")
+            await opened.key("e")
+            await opened.until(f"{STEP} == {steps[0]}")
+            await opened.ask("document.querySelector('#next').click()")
+            await opened.until(f"{STEP} == {steps[1]}")
+            await opened.until(MARKS)
+            await opened.ask("document.querySelector('#before').click()")
+            await opened.until(f"{STEP} == {steps[0]}")
+            await opened.key("E")
+            await opened.until("document.querySelector('#told').textContent.startsWith('there is no event before')")
+
+    asyncio.run(main())
+
+
+def test_a_branch_forgets_what_came_after(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):
+            await opened.key("]")
+            await opened.until(f"{STEP} > 30")
+            await pause(opened)
+            assert await opened.ask("document.querySelector('#branch').disabled"), "nothing came after"
+            await opened.ask(f"{SCRUB}.value = 20; {SCRUB}.dispatchEvent(new Event('input'))")
+            await opened.until(f"{STEP} == 20 && !document.querySelector('#branch').disabled")
+            await opened.key("b")
+            await opened.until(f"{SCRUB}.max == '20' && document.querySelector('#branch').disabled")
+            await opened.until(f"{TRACE.format(0)}?.includes('from step 0 to 20')")
+
+    asyncio.run(main())
+
+
+def test_the_matrix_is_in_place_of_the_picture_with_the_same_click(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, compiled, _):
+            await opened.until(f"{STEP} > 100")
+            step = await pause(opened)
+            await opened.key("m")
+            await opened.until("document.querySelector('#matrix').getAttribute('aria-pressed') == 'true'")
+            assert "matrix" in str(await opened.ask("document.querySelector('#picture').getAttribute('aria-label')"))
+            names = list(compiled.network.neurons.names)  # here in the order of the layout
+            margin, side = 20 + 0.7 * 11 * 2, 20
+            size = margin + 2 * 11 + side * len(names)
+            across, down = await numbers(
+                opened, *(f"document.querySelector('#picture').{s}" for s in ("width", "height"))
+            )
+            scale = min(across / size, down / size)
+            left, top = (across - scale * size) / 2, (down - scale * size) / 2
+
+            def cell(source: str, target: str) -> tuple[float, float]:
+                row, column = names.index(source), names.index(target)
+                x, y = (margin + (place + 0.3) * side for place in (column, row))
+                return left + scale * x, top + scale * y
+
+            snapshot = compiled.run(step + 1).snapshot(step)
+            await opened.point(*cell("C2", "C1"))
+            words = await told(opened, "C2 → C1")
+            weight = snapshot.weights[compiled.network.connection_index["C2 -> C1"]]
+            assert float(words[1].removeprefix("weight ").replace("−", "-")) == pytest.approx(weight, rel=1e-5)
+            await opened.click(*cell("K2", "O"))
+            await opened.point(2, 2)
+            await told(opened, "K2 → O")
+            await opened.until(f"{TITLE.format(0)} == 'K2 → O'")
+            await opened.click(left + scale * (margin - 5), cell("K3", "O")[1])
+            await told(opened, "K3")
+            await opened.key("m")
+            await opened.until("document.querySelector('#matrix').getAttribute('aria-pressed') == 'false'")
+            await told(opened, "K3")
+
+    asyncio.run(main())
