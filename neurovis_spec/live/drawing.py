@@ -58,6 +58,7 @@ def content(
         "discs": len(network.neurons),
         "lines": len(network.connections),
         "order": rows.neurons.tolist(),
+        "ends": [network.connections.sources.tolist(), network.connections.targets.tolist()],
         "bands": [[band.start, band.name, band.count] for band in (rows.levels or ((),))[0]],
         **declared,
         "constants": {

@@ -18,7 +18,7 @@ from neurovis_spec.runtime.recording import Recording
 #: bytes
 ROOM: Final = 64 << 20
 #: The most steps of a ring, and how many of these are never read, since they are overwritten next.
-_STEPS, _NEXT = 1 << 18, 16
+_STEPS, _NEXT = 1 << 16, 16
 #: The most numbers that are read for one trace; of more every second, third, … step is read.
 _READ: Final = 1 << 20
 
@@ -116,7 +116,13 @@ class Ring:
         end = min(last, bins.first + bins.every * bins.count - 1)
         steps = _thinned(np.arange(max(first, bins.first), end + 1), members)
         columns = members.indices + (0 if members.neurons else self._neurons)
-        return _ranges(steps, _joined(members, self._values[(steps % self._size)[:, None], columns]), bins)
+        if len(columns) > 1 or not len(steps):
+            values = self._values[(steps % self._size)[:, None], columns]
+        else:  # of one member all steps are read, of which the later may stand before the earlier
+            (column,), begin, end = columns, steps[0] % self._size, steps[-1] % self._size + 1
+            parts = [(begin, end)] if begin < end else [(begin, self._size), (0, end)]
+            values = np.concatenate([self._values[one:other, column] for one, other in parts])[:, None]
+        return _ranges(steps, _joined(members, values), bins)
 
 
 class Recorded:

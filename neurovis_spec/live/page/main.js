@@ -45,7 +45,7 @@ function show() {
   attention.show(camera, look);
   controls.frame(look);
   scrubber.show(look);
-  strips.show(look);
+  strips.show();
   if (more) redraw();
   if (fresh) {
     fresh = false;
@@ -119,7 +119,7 @@ const attention = new Attention(link, redraw, (group) => {
   strips.hold(group);
 });
 const scrubber = new Scrubber(link, part, redraw);
-const strips = new Strips(link, attention, scrubber, part('strips'), redraw);
+const strips = new Strips(link, attention, scrubber, part('strips'));
 
 /** Show the matrix in place of the picture, or the picture. @param {boolean} asMatrix */
 function choose(asMatrix) {

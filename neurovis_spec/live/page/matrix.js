@@ -24,29 +24,27 @@ export class Matrix {
   constructor(scene) {
     this.scene = scene;
     this.palette = palette(scene.theme, scene.constants.levels);
-    /** @type {Map<string, number>} */
-    const rows = new Map();
+    /** the row of each neuron @type {number[]} */
+    const rows = [];
     /** the group of the neuron of each row @type {Group[]} */
     this.rows = [];
-    const groups = new Map(scene.groups.map((group) => [group.id, group]));
+    this.groups = new Map(scene.groups.map((group) => [group.id, group]));
     scene.order.forEach((index, row) => {
-      const group = /** @type {Group} */ (groups.get(`n${index}`));
-      rows.set(group.data.neuron, row);
-      this.rows.push(group);
+      rows[index] = row;
+      this.rows.push(/** @type {Group} */ (this.groups.get(`n${index}`)));
     });
     /** @type {Map<number, Cell>} */
     this.cells = new Map();
-    for (const { id, data } of scene.groups) {
-      if (data.connection === undefined) continue;
-      const row = /** @type {number} */ (rows.get(data.from)), column = /** @type {number} */ (rows.get(data.to));
-      const place = row * this.rows.length + column, line = Number(id.slice(1)), known = this.cells.get(place);
+    scene.ends[0].forEach((source, line) => {
+      const row = rows[source], column = rows[scene.ends[1][line]], place = row * this.rows.length + column;
+      const known = this.cells.get(place);
       if (known) known.lines.push(line);
       else this.cells.set(place, { row, column, lines: [line] });
-    }
+    });
     this.family = scene.constants.families.map((/** @type {string} */ name) => JSON.stringify(name)).join();
     const count = this.rows.length, letters = Math.max(...this.rows.map(({ data }) => data.neuron.length));
     this.each = count <= NAMES;
-    this.font = this.each ? NAMED : 0.012 * count * CELL;
+    this.font = this.each ? NAMED : 0.016 * count * CELL;
     this.margin = this.each ? Math.min(LONGEST, 20 + 0.7 * NAMED * letters) : 8 * this.font;
     this.size = [0, 1].map(() => this.margin + 2 * this.font + count * CELL);
     /** @type {Set<string>} */
@@ -54,9 +52,13 @@ export class Matrix {
     this.held = '';
   }
 
-  /** Draw a look. @param {Context} context @param {Camera} camera @param {Look} look */
+  /** Draw a look, all of it at once. @param {Context} context @param {Camera} camera @param {Look} look
+   * @returns {boolean} */
   draw(context, camera, look) {
-    const { theme, constants } = this.scene, { margin, font } = this, count = this.rows.length, [left, top] = camera.origin;
+    const { theme, constants } = this.scene,
+      { margin, font } = this,
+      count = this.rows.length,
+      [left, top] = camera.origin;
     const pixels = (CELL * camera.scale) / devicePixelRatio, gap = 0.5;
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.globalAlpha = 1;
@@ -70,7 +72,9 @@ export class Matrix {
     for (const { row, column, lines } of this.cells.values()) {
       const x = margin + column * CELL, y = margin + row * CELL, level = this.level(lines, look);
       const isFaint = lines.every((line) => look.kinds[line] & constants.isFaint);
-      context.globalAlpha = (isFaint ? constants.faint : 1) * this.share(lines.map((line) => `c${line}`));
+      const held = this.rows[row].id === this.held || this.rows[column].id === this.held;
+      context.globalAlpha =
+        (isFaint ? constants.faint : 1) * (held || !this.near.size ? 1 : this.share(lines.map((line) => `c${line}`)));
       context.fillStyle = this.palette.fills[level + constants.levels];
       context.fillRect(x + gap, y + gap, CELL - 2 * gap, CELL - 2 * gap);
       const glow = lines.some((line) => look.glows[line] > constants.fineness / 2);
@@ -101,6 +105,7 @@ export class Matrix {
     context.fillText('rows send, columns take in', margin, margin + count * CELL + 1.5 * font);
     if (this.each) for (const [row, group] of this.rows.entries()) this.name(context, group, row, look, pixels);
     else for (const [start, name, size] of this.scene.bands) this.write(context, name, start + size / 2, 0.5 * font);
+    return false;
   }
 
   /** The name of a row and a column, with the colour of the neuron. @param {Context} context @param {Group} group
@@ -161,7 +166,9 @@ export class Matrix {
     if (row >= count || column >= count || (row < 0 && column < 0)) return '';
     if (row >= 0 && column >= 0) {
       const cell = this.cells.get(row * count + column);
-      return cell ? `c${cell.lines[0]}` : '';
+      // of what the picture leaves out nothing is told
+      const line = cell?.lines.find((one) => this.groups.has(`c${one}`));
+      return line === undefined ? '' : `c${line}`;
     }
     return this.rows[Math.max(row, column)].id;
   }

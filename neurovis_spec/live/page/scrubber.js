@@ -7,8 +7,8 @@
 
 /** Half the width of a slider's thumb: so far from its ends lie the first and the last step, in pixels of a page. */
 export const THUMB = 8;
-/** Milliseconds for which the thumb stays where a key has put it. */
-const KEPT = 300;
+/** Milliseconds for which the thumb stays where a key has put it, and between two steps that are sought. */
+const KEPT = 300, AGAIN = 30;
 
 /** Shows the steps from `low` to `high`, the latest `span` of them, or those around the step that is shown. */
 export class Scrubber {
@@ -24,6 +24,8 @@ export class Scrubber {
     this.marks = /** @type {HTMLCanvasElement} */ (find('marks'));
     this.cursor = find('cursor');
     this.sought = -KEPT;
+    this.goal = 0;
+    this.timer = 0;
     /** the steps of the spec's events @type {number[]} */
     this.events = [];
     /** the steps from which on something is turned, those that are still to come again among them @type {number[]} */
@@ -34,16 +36,26 @@ export class Scrubber {
     this.scrub.oninput = () => this.seek(Number(this.scrub.value));
     this.span.onchange = changed;
     this.changed = changed;
-    find('past').addEventListener('wheel', (event) => {
-      this.more(Math.sign(event.deltaY));
-      event.preventDefault();
-    }, { passive: false });
+    find('time').addEventListener(
+      'wheel',
+      (event) => {
+        this.more(Math.sign(event.deltaY));
+        event.preventDefault();
+      },
+      { passive: false },
+    );
   }
 
-  /** Go to a step. @param {number} step */
+  /** Go to a step; of many that are sought in a drag, to some and the last. @param {number} step */
   seek(step) {
     this.sought = performance.now();
+    this.goal = step;
+    if (this.timer) return;
     this.link.ask('seek', { step });
+    this.timer = setTimeout(() => {
+      this.timer = 0;
+      if (this.goal !== step) this.seek(this.goal);
+    }, AGAIN);
   }
 
   /** Show more of the past, or less. @param {number} by */
@@ -73,8 +85,10 @@ export class Scrubber {
   /** The steps at which events begin and something is turned, with which of both it is. @returns {[number, boolean][]} */
   happened() {
     /** @type {[number, boolean][]} */
-    const all = [...this.events.map((step) => /** @type {[number, boolean]} */ ([step, true])),
-      ...this.known.map((step) => /** @type {[number, boolean]} */ ([step, false]))];
+    const all = [
+      ...this.events.map((step) => /** @type {[number, boolean]} */ ([step, true])),
+      ...this.known.map((step) => /** @type {[number, boolean]} */ ([step, false])),
+    ];
     return all.filter(([step]) => step >= this.low && step <= this.high);
   }
 
@@ -115,7 +129,12 @@ export class Scrubber {
       const x = THUMB + this.across(step) * (width - 2 * THUMB);
       context.beginPath();
       if (event) {
-        for (const [dx, y] of [[-4, 0], [4, 0], [0, 8]]) context.lineTo(x + dx, y);
+        for (const [dx, y] of [
+          [-4, 0],
+          [4, 0],
+          [0, 8],
+        ])
+          context.lineTo(x + dx, y);
         context.fill();
       } else {
         context.arc(x, 4.5, 3, 0, 2 * Math.PI);

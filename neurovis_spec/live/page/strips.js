@@ -8,7 +8,6 @@ import { THUMB } from './scrubber.js';
 /** @typedef {import('./attention.js').Attention} Attention */
 /** @typedef {import('./protocol.js').Group} Group */
 /** @typedef {import('./protocol.js').Link} Link */
-/** @typedef {import('./protocol.js').Look} Look */
 /** @typedef {import('./protocol.js').Traces} Traces */
 /** @typedef {import('./scrubber.js').Scrubber} Scrubber */
 /** @typedef {{id: string, data: string, name: HTMLButtonElement, value: HTMLElement, canvas: HTMLCanvasElement,
@@ -27,13 +26,12 @@ function element(tag, of) {
 /** The strips: first what is pinned, at the end what is held. */
 export class Strips {
   /** @param {Link} link @param {Attention} attention @param {Scrubber} scrubber @param {HTMLElement} place
-   * @param {() => void} changed */
-  constructor(link, attention, scrubber, place, changed) {
+   */
+  constructor(link, attention, scrubber, place) {
     this.link = link;
     this.attention = attention;
     this.scrubber = scrubber;
     this.place = place;
-    this.changed = changed;
     /** @type {Strip[]} */
     this.pinned = [];
     this.held = this.strip();
@@ -41,6 +39,7 @@ export class Strips {
     this.when = -LOST;
     /** whether an answer is awaited */
     this.waiting = false;
+    this.timer = 0;
     this.of(this.held, undefined);
     this.list();
   }
@@ -77,6 +76,7 @@ export class Strips {
     strip.pin.setAttribute('aria-label', `${isPinned ? 'unpin' : 'pin'} ${name}`);
     strip.pin.hidden = again || (!isPinned && this.pinned.length >= PINS);
     this.place.classList.toggle('nothing', !this.held.id);
+    strip.canvas.setAttribute('aria-label', `trace of ${name}`);
     this.clear(strip);
   }
 
@@ -102,12 +102,13 @@ export class Strips {
   /** Something is held, or nothing. @param {Group | undefined} group */
   hold(group) {
     if ((group ? group.id : '') !== this.held.id) this.of(this.held, group);
-    this.changed();
+    this.show();
   }
 
   /** Pin what is held, or unpin it. @param {string} id */
   toggle(id) {
     const group = this.attention.groups.get(id), known = this.pinned.findIndex((strip) => strip.id === id);
+    const focused = this.place.contains(document.activeElement);
     if (!group || (known < 0 && this.pinned.length >= PINS)) return;
     if (known < 0) {
       const strip = this.strip();
@@ -116,30 +117,40 @@ export class Strips {
     } else this.pinned.splice(known, 1);
     this.of(this.held, this.attention.groups.get(this.held.id));
     this.list();
-    if (known < 0) this.pinned[this.pinned.length - 1].pin.focus();
-    else this.held.name.focus();
+    const { pin } =
+      this.pinned[known < 0 ? this.pinned.length - 1 : Math.min(known, this.pinned.length - 1)] || this.held;
+    if (focused) (pin.checkVisibility({ visibilityProperty: true }) ? pin : this.scrubber.scrub).focus();
   }
 
   /** Show the strips that there are. */
   list() {
     this.attention.also = this.pinned.map(({ id }) => id);
     this.attention.ask();
+    const focused = /** @type {HTMLElement} */ (document.activeElement);
     this.place.replaceChildren(...[...this.pinned, this.held].flatMap(({ parts }) => parts));
-    this.changed();
+    if (this.place.contains(focused)) focused.focus();
+    this.show();
   }
 
-  /** Ask for the traces of the steps on the axis, where others are known. @param {Look} look */
-  show(look) {
-    const { low, high } = this.scrubber, width = Math.max(1, this.held.canvas.clientWidth - 2 * THUMB);
+  /** Ask for the traces of the steps on the axis, where others are known. */
+  show() {
+    const { look } = this.link;
+    if (!look) return;
+    const { low, high, events, known: turned } = this.scrubber,
+      width = Math.max(1, this.held.canvas.clientWidth - 2 * THUMB);
     const items = [...new Set([...this.pinned, this.held].map(({ id }) => id))].filter(Boolean);
     for (const { id, value } of [...this.pinned, this.held]) {
-      const known = this.attention.values[id], words = id && known !== undefined ? signed(known) : '';
+      const now = this.attention.values[id], words = id && now !== undefined ? signed(now) : '';
       if (value.textContent !== words) value.textContent = words;
     }
     const every = Math.max(1, Math.ceil((high - low + 1) / Math.min(width, 2000))), now = performance.now();
-    const first = Math.floor(low / every) * every, wanted = [look.last, low, high, every, width, ...items].join(' ');
-    if (!items.length || wanted === this.asked || now - this.when < (this.waiting ? LOST : PACE)) {
-      if (items.length && wanted !== this.asked && !this.waiting) setTimeout(this.changed, PACE);
+    const first = Math.floor(low / every) * every;
+    const wanted = [look.last, low, high, width, devicePixelRatio, events.length, turned.length, ...items].join(' ');
+    if (!items.length || wanted === this.asked) return;
+    const wait = this.when + (this.waiting ? LOST : PACE) - now;
+    clearTimeout(this.timer);
+    if (wait > 0) {
+      this.timer = setTimeout(() => this.show(), wait);
       return;
     }
     [this.asked, this.when, this.waiting] = [wanted, now, true];
@@ -153,7 +164,7 @@ export class Strips {
       const trace = traces.ranges.get(strip.id);
       if (trace) this.paint(strip, trace, traces);
     }
-    this.changed();
+    this.show();
   }
 
   /** Draw a trace: a line, up and down in each bin where it has several steps.
@@ -166,7 +177,9 @@ export class Strips {
       if (Number.isFinite(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
     }
     const known = low <= high, room = height - 8;
-    [high, low].forEach((end, at) => { strip.ends[at].textContent = known && (at === 0 || high > low) ? short(end) : ''; });
+    [high, low].forEach((end, at) => {
+      strip.ends[at].textContent = known && (at === 0 || high > low) ? short(end) : '';
+    });
     [canvas.width, canvas.height] = [width * devicePixelRatio, height * devicePixelRatio];
     context.scale(devicePixelRatio, devicePixelRatio);
     /** @param {number} step */
@@ -203,9 +216,12 @@ export class Strips {
       } else before = NaN;
     }
     context.stroke();
-    canvas.setAttribute('aria-label', known
-      ? `${strip.name.textContent} from step ${scrubber.low} to ${scrubber.high}: between ${signed(low)} and ${signed(high)}`
-      : `${strip.name.textContent}: nothing is known of these steps`);
+    canvas.setAttribute(
+      'aria-label',
+      known
+        ? `${strip.name.textContent} from step ${scrubber.low} to ${scrubber.high}: between ${signed(low)} and ${signed(high)}`
+        : `${strip.name.textContent}: nothing is known of these steps`,
+    );
   }
 }
 
