@@ -2,7 +2,10 @@
  * Attention: what is pointed at, and what is held; its values, and what stands out with it.
  */
 
+import { say } from './say.js';
+
 /** @typedef {import('./camera.js').Camera} Camera */
+/** @typedef {import('./zoom.js').Zoom} Zoom */
 /** @typedef {import('./protocol.js').Link} Link */
 /** @typedef {import('./protocol.js').Look} Look */
 /** @typedef {import('./protocol.js').Scene} Scene */
@@ -16,10 +19,17 @@ export function signed(value) {
 
 /** What is pointed at and what is held, by the ids of their groups, '' for nothing. */
 export class Attention {
-  /** @param {Link} link @param {() => void} changed called when something else is to be seen
-   * @param {(group: Group | undefined) => void} taken called with what is held */
-  constructor(link, changed, taken) {
+  /** @param {Link} link @param {Zoom} zoom @param {() => void} changed called when something else is to be seen
+   * @param {(group: Group | undefined) => void} taken called with what is held @param {(id: string) => void} entered called with
+   * a closed box */
+  constructor(link, zoom, changed, taken, entered) {
+    this.entered = entered;
     this.taken = taken;
+    this.zoom = zoom;
+    /** what else the values are wanted of @type {string[]} */
+    this.listed = [];
+    /** whether what is held is to be said as soon as its value is known */
+    this.saying = false;
     this.link = link;
     this.changed = changed;
     this.pointed = '';
@@ -30,6 +40,8 @@ export class Attention {
     this.spot = null;
     /** @type {Map<string, Group>} */
     this.groups = new Map();
+    /** the dotted lines from neurons to rules @type {Group[]} */
+    this.signals = [];
     /** the ids of what stands out with what is held @type {Set<string>} */
     this.near = new Set();
     /** @type {Object<string, number | null>} */
@@ -43,6 +55,7 @@ export class Attention {
   use(scene) {
     const before = this.groups.get(this.held), name = before && JSON.stringify(before.data);
     this.groups = new Map(scene.groups.filter(({ id }) => /^[nc]\d+$/.test(id)).map((group) => [group.id, group]));
+    this.signals = scene.groups.filter(({ data }) => data.signal !== undefined);
     this.pointed = '';
     const same = [...this.groups.values()].find(({ data }) => JSON.stringify(data) === name);
     this.hold(same ? same.id : '');
@@ -50,7 +63,13 @@ export class Attention {
 
   /** Ask for the values of what is shown. */
   ask() {
-    this.link.ask('look', { items: [...new Set([this.pointed, this.held, ...this.also])].filter(Boolean) });
+    this.link.ask('look', { items: this.wanted() });
+  }
+
+  /** The ids of neurons and connections whose values are shown. @returns {string[]} */
+  wanted() {
+    const all = new Set([this.pointed, this.held, ...this.also, ...this.listed]);
+    return [...all].filter((id) => this.groups.has(id)).slice(0, 64);
   }
 
   /** @param {string} id @param {number[]} place */
@@ -63,10 +82,15 @@ export class Attention {
     this.changed();
   }
 
-  /** Hold a neuron or a connection; '' lets go. @param {string} id */
+  /** Hold a neuron or a connection, or enter a closed box; '' lets go. @param {string} id */
   hold(id) {
+    if (id && !this.groups.has(id)) {
+      this.entered(id);
+      return;
+    }
     this.held = id;
     this.near = new Set(id ? this.around(id) : []);
+    this.saying = id !== '';
     this.ask();
     this.taken(this.groups.get(id));
     this.changed();
@@ -84,22 +108,34 @@ export class Attention {
     const { data } = /** @type {Group} */ (this.groups.get(id)), all = [...this.groups.values()];
     const lines = data.neuron === undefined ? [this.groups.get(id)]
       : all.filter((line) => line.data.from === data.neuron || line.data.to === data.neuron);
+    const dotted = this.signals.filter((signal) => signal.data.signal.split(' -> ').includes(data.neuron));
     const ends = new Set(lines.flatMap((line) => (line ? [line.data.from, line.data.to] : [])));
+    for (const signal of dotted) for (const end of signal.data.signal.split(' -> ')) ends.add(end);
     const discs = all.filter((disc) => disc.data.neuron !== undefined && ends.has(disc.data.neuron));
-    return [id, ...[...lines, ...discs].map((group) => (group ? group.id : ''))];
+    return [id, ...[...lines, ...dotted, ...discs].map((group) => (group ? group.id : ''))];
   }
 
   /** @param {{values: Object<string, number | null>}} message */
   take(message) {
     this.values = message.values;
+    const { look } = this.link;
+    if (this.saying && look && this.held in this.values) {
+      this.saying = false;
+      this.say(look);
+    }
     this.changed();
   }
 
-  /** What is said of a neuron or a connection: name, activity or weight, delay, rule. @param {string} id @param {Look} look
+  /** Have a screen reader read what is held. @param {Look} look */
+  say(look) {
+    if (this.held) say(this.words(this.held, look).replaceAll('\n', ', '));
+  }
+
+  /** What is said of a neuron, a connection or a closed box: name, activity or weight, delay, rule. @param {string} id @param {Look} look
    * @returns {string} */
   words(id, look) {
     const group = this.groups.get(id);
-    if (!group) return '';
+    if (!group) return this.zoom.words(id, look);
     const [name, ...more] = group.title.split('\n'), { neuron, delay } = group.data;
     const told = id in this.values ? [`${neuron === undefined ? 'weight' : 'activity'} ${signed(this.values[id])}`] : [];
     if (delay !== undefined && !more.some((line) => line.startsWith('delay '))) told.push(`delay ${delay}`);
@@ -108,16 +144,21 @@ export class Attention {
     return [name, ...told, ...more, ...gone].join('\n');
   }
 
+  /** Where a neuron is, or the tip of a connection. @param {string} id @returns {number[]} */
+  middle(id) {
+    if (this.spot) return this.spot(id);
+    const { shapes } = /** @type {Group} */ (this.groups.get(id));
+    return shapes[id[0] === 'n' ? 0 : 1].at;
+  }
+
   /** Show the tooltip beside what is pointed at, or else held. @param {Camera} camera @param {Look} look */
   show(camera, look) {
     const id = this.pointed || this.held, words = this.words(id, look), { tip } = this;
     tip.hidden = !words;
     if (!words) return;
     if (tip.textContent !== words) tip.textContent = words;
-    const shapes = /** @type {Group} */ (this.groups.get(id)).shapes;
-    const there = this.spot ? this.spot(id) : (id[0] === 'n' ? shapes[0] : shapes[1]).at;
-    const [x, y] = this.pointed ? this.place : there, [left, top] = camera.origin;
-    const at = [left + x * camera.scale, top + y * camera.scale].map((pixel) => pixel / devicePixelRatio);
+    const [x, y] = this.pointed ? this.place : this.middle(id);
+    const at = camera.pixel(x, y).map((pixel) => pixel / devicePixelRatio);
     const room = [tip.offsetWidth, tip.offsetHeight];
     const edge = camera.window.map((size) => size / devicePixelRatio);
     // where there is no room to the right or below, it is to the left or above

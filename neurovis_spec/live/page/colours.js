@@ -10,7 +10,7 @@ export function channels(colour) {
 }
 
 /** Relative luminance (WCAG 2). @param {number[]} rgb @returns {number} */
-function luminance(rgb) {
+export function luminance(rgb) {
   const [r, g, b] = rgb.map((v) => v / 255).map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4));
   return 0.2126 * r + 0.7152 * g + 0.0722 * b;
 }

@@ -2,6 +2,9 @@
  * Controls: the buttons, the speed and the keys of a run.
  */
 
+import { followKeys } from './keys.js';
+import { say } from './say.js';
+
 /** @typedef {import('./protocol.js').Link} Link */
 /** @typedef {import('./protocol.js').Look} Look */
 /** @typedef {import('./keys.js').Keys} Keys */
@@ -44,20 +47,7 @@ export class Controls {
       E: ['to the event before', actions.before],
       b: ['from here on differently: forget what came after', actions.branch],
     };
-    addEventListener('keydown', (event) => this.key(event));
-  }
-
-  /** @param {KeyboardEvent} event */
-  key(event) {
-    const at = /** @type {Element} */ (event.target);
-    if (event.ctrlKey || event.metaKey || event.altKey || at.closest('input, select, textarea')) return;
-    if (event.key === ' ' && at.closest('button')) return;
-    if (at.closest('dialog') && event.key !== '?') return;
-    const known = this.keys[event.key];
-    if (known) {
-      known[1]();
-      event.preventDefault();
-    }
+    followKeys(this.keys);
   }
 
   /** Play or pause. */
@@ -82,6 +72,12 @@ export class Controls {
   frame(look) {
     /** @type {HTMLButtonElement} */ (part('branch')).disabled = !this.turns || look.step === look.last;
     this.tell(`step ${look.step}`);
+  }
+
+  /** Why something is not done. @param {string} reason */
+  refuse(reason) {
+    this.tell(reason);
+    say(reason);
   }
 
   /** @param {string} text */

@@ -120,10 +120,9 @@ export class Drawing {
   /** Draw a look; true where there is more to be drawn in the next frame.
    * @param {Context} context @param {Camera} camera @param {Look} look @returns {boolean} */
   draw(context, camera, look) {
-    const begun = performance.now(), layout = layoutOf(camera), moving = layout !== this.asked;
-    this.asked = layout;
-    if (moving && this.layout && this.cost > SLOW && begun - this.since < PATIENCE * this.cost && this.mosaic
-      && this.mosaic.image.width === camera.window[0] && this.mosaic.image.height === camera.window[1]) {
+    const begun = performance.now(), isPassing = this.isPassing(camera);
+    this.asked = layoutOf(camera);
+    if (isPassing) {
       this.preview(context, camera);
       return true;
     }
@@ -142,6 +141,13 @@ export class Drawing {
       this.shot = null;
     }
     return left;
+  }
+
+  /** Whether the camera is on its way, and a picture of what it sees would take long. @param {Camera} camera @returns {boolean} */
+  isPassing(camera) {
+    const { mosaic, cost } = this;
+    return layoutOf(camera) !== this.asked && cost > SLOW && performance.now() - this.since < PATIENCE * cost && mosaic !== null
+      && mosaic.image.width === camera.window[0] && mosaic.image.height === camera.window[1];
   }
 
   /** Show the latest picture where the camera would see it. @param {Context} context @param {Camera} camera */
@@ -169,12 +175,6 @@ export class Drawing {
     this.mosaic = new Mosaic(camera.window, this.lines.length + 2 * this.discs.length);
     this.dressed = '';
     for (const item of [...this.lines, ...this.discs]) item.laid = null;
-    this.pictures.back = this.picture(camera, [], (context) => {
-      const [left, top] = camera.unit(0, 0), [right, bottom] = camera.unit(camera.window[0], camera.window[1]);
-      context.fillStyle = this.scene.theme.background;
-      context.fillRect(left, top, right - left, bottom - top);
-      for (const { shapes } of this.back) for (const shape of shapes) this.shape(context, shape);
-    });
     return true;
   }
 
@@ -201,7 +201,7 @@ export class Drawing {
 
   /** Draw the pictures of what stays where they are other ones now. @param {Camera} camera @param {Look} look */
   dress(camera, look) {
-    const { lines, discs, mosaic } = this, { isFaint } = this.constants, { kinds } = look;
+    const { lines, discs, near, mosaic } = this, { isFaint } = this.constants, { kinds } = look;
     const faint = [...lines.filter(({ rest, index }) => rest.length && kinds[index] & isFaint),
       ...discs.filter(({ index }) => kinds[look.widths.length + index] & isFaint)].map(({ id }) => id);
     const dressed = [this.held, this.moves, ...faint, ':', ...this.near].join();
@@ -217,7 +217,15 @@ export class Drawing {
     };
     const words = discs.flatMap(({ rest }) => rest.filter(isWord)), beads = lines.filter(({ rest }) => rest.length);
     this.pictures = {
-      back: before.back,
+      back: this.picture(camera, [], (context) => {
+        const [left, top] = camera.unit(0, 0), [right, bottom] = camera.unit(camera.window[0], camera.window[1]);
+        context.fillStyle = this.scene.theme.background;
+        context.fillRect(left, top, right - left, bottom - top);
+        for (const { id, data, shapes } of this.back) {
+          context.globalAlpha = data.signal === undefined || !near.size || near.has(id) ? 1 : RECEDING;
+          for (const shape of shapes) this.shape(context, shape);
+        }
+      }),
       between: beads.length ? this.picture(camera, [], (context) => draw(context, beads)) : null,
       words: this.picture(camera, words),
       front: this.picture(camera, [], (context) => {
@@ -227,7 +235,7 @@ export class Drawing {
         for (const { shapes } of this.front) for (const shape of shapes) this.shape(context, shape);
       }),
     };
-    for (const name of ['between', 'words', 'front']) mosaic.compare(before[name], this.pictures[name]);
+    for (const name of ['back', 'between', 'words', 'front']) mosaic.compare(before[name], this.pictures[name]);
   }
 
   /** Show that a disc is held. @param {Context} context @param {Shape} shape */

@@ -6,7 +6,28 @@
  * @typedef {Object<string, [string, () => void]>} Keys */
 
 /** How keys are called that are not called by what they write. @type {Object<string, string>} */
-const CALLED = { ' ': 'space', ArrowRight: '→', ArrowLeft: '←', '-': '−' };
+const CALLED = {
+  ' ': 'space', ArrowRight: '→', ArrowLeft: '←', '-': '−',
+  'Shift+ArrowLeft': '⇧←', 'Shift+ArrowRight': '⇧→', 'Shift+ArrowUp': '⇧↑', 'Shift+ArrowDown': '⇧↓',
+};
+/** The keys that a slider takes for itself. */
+const SLIDES = /^(Arrow|Home|End|Page)/;
+
+/** Do what keys do, but where they write, choose or press something. @param {Keys} keys */
+export function followKeys(keys) {
+  addEventListener('keydown', (event) => {
+    const at = /** @type {Element} */ (event.target), { key } = event;
+    if (event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented) return;
+    if (at.matches('input[type=range]') ? SLIDES.test(key) : at.closest('input, select, textarea')) return;
+    if (key === ' ' && at.closest('button, summary')) return;
+    if (at.closest('dialog') && key !== '?') return;
+    const known = keys[event.shiftKey && key.startsWith('Arrow') ? `Shift+${key}` : key];
+    if (known) {
+      known[1]();
+      event.preventDefault();
+    }
+  });
+}
 
 /** Show the list of keys, or close it. @param {HTMLDialogElement} dialog @param {Keys} keys */
 export function listKeys(dialog, keys) {

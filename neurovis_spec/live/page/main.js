@@ -3,27 +3,36 @@
  */
 
 import { Attention } from './attention.js';
-import { Camera } from './camera.js';
+import { Camera, isStill } from './camera.js';
+import { channels, luminance } from './colours.js';
 import { Controls, part } from './controls.js';
 import { Drawing } from './draw.js';
 import { listKeys } from './keys.js';
 import { Matrix } from './matrix.js';
+import { Outline } from './outline.js';
 import { under } from './pick.js';
+import { followFingers } from './pinch.js';
 import { Pointer } from './pointer.js';
 import { Link } from './protocol.js';
 import { Refusal } from './refusal.js';
 import { Scrubber } from './scrubber.js';
 import { Strips } from './strips.js';
+import { say } from './say.js';
 import { Turning } from './turning.js';
+import { Zoom } from './zoom.js';
 
 const canvas = /** @type {HTMLCanvasElement} */ (document.getElementById('picture'));
 const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d', { alpha: false }));
-const camera = new Camera();
+const camera = new Camera(), zoom = new Zoom();
+/** Where little is to move, pictures of a run come so many milliseconds after each other: fewer than three flashes a second. */
+const CALM = 400;
+/** What is gone to is seen with so many radii of a neuron around it. */
+const ROOM = 12;
 /** @type {Drawing | null} */
 let drawing = null;
 /** what is shown in place of the drawing, where it is @type {Matrix | null} */
 let matrix = null;
-let fresh = false, asked = false, density = 0;
+let fresh = false, asked = false, density = 0, shown = 0;
 
 /** Draw before the display's next frame. */
 function redraw() {
@@ -37,18 +46,28 @@ function redraw() {
 function show() {
   asked = false;
   const { look } = link;
-  if (!drawing || !look?.serial) return;
+  if (!look?.serial) return;
   if (density !== devicePixelRatio) resize();
+  if (camera.glide()) redraw();
+  if (!matrix) {
+    const scene = zoom.seen(camera);
+    if (!scene) return;
+    if (!drawing || (drawing.scene !== scene && !drawing.isPassing(camera))) drawing = new Drawing(scene);
+  }
   const picture = matrix || drawing;
+  if (!picture) return;
   [picture.near, picture.held] = [attention.near, attention.held];
   const more = picture.draw(context, camera, look);
+  if (!matrix && drawing) zoom.draw(context, camera, look, drawing);
   attention.show(camera, look);
+  outline.show(look);
   controls.frame(look);
   scrubber.show(look);
   strips.show();
   if (more) redraw();
   if (fresh) {
     fresh = false;
+    shown = performance.now();
     link.drawn();
   }
 }
@@ -76,18 +95,21 @@ function resize() {
 
 const link = new Link({
   scene(scene) {
-    const first = !drawing;
-    drawing = new Drawing(scene);
+    const first = !zoom.scene;
+    zoom.use(scene);
+    drawing = null;
     document.title = `${scene.title} – NeuroVis`;
     const names = { back: 'background', ink: 'ink', muted: 'muted', line: 'box_line', fill: 'box_fill' };
-    for (const [name, of] of Object.entries(names)) {
-      document.documentElement.style.setProperty(`--${name}`, scene.theme[of]);
-    }
+    const { style } = document.documentElement;
+    for (const [name, of] of Object.entries(names)) style.setProperty(`--${name}`, scene.theme[of]);
+    style.colorScheme = luminance(channels(scene.theme.background)) < 0.18 ? 'dark' : 'light';
     if (first) blank();
     choose(matrix !== null);
+    part('titled').textContent = scene.title;
     attention.use(scene);
     strips.use();
     turning.use(scene);
+    outline.use(scene);
     redraw();
   },
   traces(traces) {
@@ -95,7 +117,8 @@ const link = new Link({
   },
   frame() {
     fresh = true;
-    redraw();
+    if (isStill()) setTimeout(redraw, shown + CALM - performance.now());
+    else redraw();
   },
   text(message) {
     if (message.type === 'status') {
@@ -108,16 +131,18 @@ const link = new Link({
   },
   link(open) {
     if (open) attention.ask();
-    else controls.tell('not connected, trying again …');
+    else controls.refuse('not connected, trying again …');
   },
 });
 const controls = new Controls(link);
 const turning = new Turning(link, part);
 const refusal = new Refusal(part('refusal'));
-const attention = new Attention(link, redraw, (group) => {
+const attention = new Attention(link, zoom, redraw, (group) => {
   turning.hold(group);
+  outline.hold();
   strips.hold(group);
-});
+}, (id) => go(id));
+const outline = new Outline(attention, part, (id) => go(id));
 const scrubber = new Scrubber(link, part, redraw);
 const strips = new Strips(link, attention, scrubber, part('strips'));
 
@@ -125,25 +150,60 @@ const strips = new Strips(link, attention, scrubber, part('strips'));
 function choose(asMatrix) {
   const { scene } = link;
   if (!scene) return;
-  const shown = asMatrix ? new Matrix(scene) : null;
-  if (!shown !== !matrix) camera.fit();
-  matrix = shown;
-  camera.size = shown ? shown.size : [scene.width, scene.height];
-  attention.spot = shown && ((id) => shown.at(id));
-  canvas.setAttribute('aria-label', shown ? `${scene.title}, the matrix of its weights` : scene.title);
+  const cells = asMatrix ? new Matrix(scene) : null, changed = !cells !== !matrix;
+  matrix = cells;
+  camera.size = cells ? cells.size : [scene.width, scene.height];
+  if (changed) camera.fit();
+  attention.spot = cells && ((id) => cells.at(id));
+  canvas.setAttribute('aria-label', cells ? `${scene.title}, the matrix of its weights` : scene.title);
   part('matrix').setAttribute('aria-pressed', String(asMatrix));
   redraw();
 }
 
+/** Hold a neuron or a connection, or go to a box; where it is not seen, the picture is moved. @param {string} id */
+function go(id) {
+  const box = zoom.boxes.find((one) => one.id === id), { look } = link;
+  if (box) {
+    const [x0, y0, x1, y1] = box.rect, room = 0.1 * Math.max(x1 - x0, y1 - y0);
+    choose(false);
+    camera.see([x0 - room, y0 - room, x1 + room, y1 + room]);
+    if (look) say(zoom.words(id, look).replaceAll('\n', ', '));
+  } else {
+    attention.hold(id);
+    const [x, y] = attention.middle(id), room = ROOM * (drawing?.discs[0]?.shape.radius ?? 20);
+    const outside = camera.pixel(x, y).some((pixel, axis) => pixel < 0 || pixel > camera.window[axis]);
+    if (outside || (!matrix && zoom.under([x, y]))) camera.see([x - room, y - room, x + room, y + room]);
+  }
+  redraw();
+}
+
 new ResizeObserver(resize).observe(canvas);
+followFingers(canvas, camera, redraw);
 new Pointer(canvas, camera, attention, {
   pointed(x, y) {
     const { look } = link;
     if (matrix) return matrix.under(camera, x, y);
-    return drawing && look ? under(drawing, camera, look, x, y) : '';
+    return zoom.under(camera.unit(x, y)) || (drawing && look ? under(drawing, camera, look, x, y) : '');
   },
   redraw,
 });
+/** Come closer to the middle, or go away. @param {number} factor */
+function nearer(factor) {
+  camera.closer(factor, camera.window[0] / 2, camera.window[1] / 2);
+  redraw();
+}
+/** Move the picture, by shares of the window. @param {number} across @param {number} down */
+function pan(across, down) {
+  camera.move(across * camera.window[0], down * camera.window[1]);
+  redraw();
+}
+/** Have read what is held, or else how the run stands. */
+function tellAll() {
+  const { look, scene } = link;
+  if (!look || !scene) return;
+  if (attention.held) attention.say(look);
+  else say(`${scene.title}, ${look.caption || `step ${look.step}`}, ${controls.playing ? 'playing' : 'paused'}, neurons ${scene.discs}, connections ${scene.lines}`);
+}
 /** List the keys, or close the list. */
 function help() {
   listKeys(/** @type {HTMLDialogElement} */ (part('keys')), controls.keys);
@@ -152,9 +212,16 @@ part('help').onclick = help;
 part('matrix').onclick = () => choose(!matrix);
 part('shut').onclick = help;
 Object.assign(controls.keys, {
-  '+': ['come closer', () => { camera.closer(1.25, camera.window[0] / 2, camera.window[1] / 2); redraw(); }],
-  '-': ['go further away', () => { camera.closer(0.8, camera.window[0] / 2, camera.window[1] / 2); redraw(); }],
+  '+': ['come closer', () => nearer(1.25)],
+  '-': ['go further away', () => nearer(0.8)],
   0: ['see all of it', () => { camera.fit(); redraw(); }],
+  'Shift+ArrowLeft': ['see more on the left', () => pan(0.1, 0)],
+  'Shift+ArrowRight': ['see more on the right', () => pan(-0.1, 0)],
+  'Shift+ArrowUp': ['see more above', () => pan(0, 0.1)],
+  'Shift+ArrowDown': ['see more below', () => pan(0, -0.1)],
+  '/': ['search by name', () => outline.search()],
+  o: ['open or close the outline', () => outline.toggle()],
+  v: ['say what is held with its value, or how the run stands', tellAll],
   t: ['open or close the panel for turning', () => turning.toggle()],
   m: ['the matrix of the weights in place of the picture, and back', () => choose(!matrix)],
   p: ['pin the strip of what is held, or unpin it', () => strips.toggle(attention.held)],

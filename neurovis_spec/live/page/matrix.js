@@ -12,7 +12,7 @@ import { palette } from './colours.js';
 /** @typedef {{row: number, column: number, lines: number[]}} Cell */
 
 /** The side of a cell, the size of a name, the most neurons with a name each, how far names reach: in units. */
-const CELL = 20, NAMED = 11, NAMES = 80, LONGEST = 130;
+const CELL = 20, NAMED_CELL = 11, NAMES = 80, LONGEST = 130;
 /** The least sides of cells, in pixels of a page, that have their sign written in them, and names. */
 const SIGNED = 12, LEGIBLE = 8;
 /** How much is seen of what recedes. */
@@ -44,8 +44,8 @@ export class Matrix {
     this.family = scene.constants.families.map((/** @type {string} */ name) => JSON.stringify(name)).join();
     const count = this.rows.length, letters = Math.max(...this.rows.map(({ data }) => data.neuron.length));
     this.each = count <= NAMES;
-    this.font = this.each ? NAMED : 0.016 * count * CELL;
-    this.margin = this.each ? Math.min(LONGEST, 20 + 0.7 * NAMED * letters) : 8 * this.font;
+    this.font = this.each ? NAMED_CELL : 0.016 * count * CELL;
+    this.margin = this.each ? Math.min(LONGEST, 20 + 0.7 * NAMED_CELL * letters) : 8 * this.font;
     this.size = [0, 1].map(() => this.margin + 2 * this.font + count * CELL);
     /** @type {Set<string>} */
     this.near = new Set();

@@ -1,0 +1,153 @@
+/**
+ * The outline: boxes, neurons and connections as a list of names and values, to search, to read and to hold.
+ */
+
+import { search } from './search.js';
+
+/** @typedef {import('./attention.js').Attention} Attention */
+/** @typedef {import('./protocol.js').Look} Look */
+/** @typedef {import('./protocol.js').Scene} Scene */
+/** @typedef {import('./search.js').Entry} Entry */
+
+/** As many are listed, and the values of so many are asked for: those around the one that is chosen. */
+const LISTED = 100, VALUED = 24;
+
+/** The panel with the list. */
+export class Outline {
+  /** @param {Attention} attention @param {(id: string) => HTMLElement} find @param {(id: string) => void} taken called with
+   * what is chosen */
+  constructor(attention, find, taken) {
+    this.attention = attention;
+    this.find = find;
+    this.panel = find('outline');
+    this.field = /** @type {HTMLInputElement} */ (find('search'));
+    this.list = find('found');
+    /** @type {Entry[]} */
+    this.entries = [];
+    /** what is listed @type {Entry[]} */
+    this.shown = [];
+    this.at = 0;
+    this.field.oninput = () => this.fill();
+    this.field.onkeydown = (event) => this.key(event);
+    this.list.onclick = (event) => {
+      const row = /** @type {Element} */ (event.target).closest('li');
+      if (row) this.choose([...this.list.children].indexOf(row));
+    };
+    find('outlined').onclick = () => this.toggle();
+    this.taken = taken;
+  }
+
+  /** Another network. @param {Scene} scene */
+  use(scene) {
+    // boxes first, then neurons, then connections
+    const rank = (/** @type {Entry} */ { id }) => 'nc'.indexOf(id[0]);
+    this.entries = scene.groups.filter(({ id }) => /^([nc]\d+$|box:|instance:)/.test(id)).map(({ id, data, title }) => {
+      const [first, ...more] = title.split('\n');
+      return { id, name: data.neuron === undefined ? first : data.neuron, more: [first, ...more].join('\n') };
+    }).sort((one, other) => rank(one) - rank(other) || (rank(one) < 0 ? 0 : Number(one.id.slice(1)) - Number(other.id.slice(1))));
+    this.fill();
+  }
+
+  /** Open or close. */
+  toggle() {
+    this.panel.hidden = !this.panel.hidden;
+    this.find('outlined').setAttribute('aria-expanded', String(!this.panel.hidden));
+    this.fill();
+    (this.panel.hidden ? this.find('picture') : this.field).focus();
+  }
+
+  /** Open, and search for something else. */
+  search() {
+    this.field.value = '';
+    if (this.panel.hidden) this.toggle();
+    else this.fill();
+    this.field.focus();
+  }
+
+  /** What is held is another: list what it is connected with. */
+  hold() {
+    if (!this.field.value) this.fill();
+  }
+
+  /** What is listed without a search: what is held with its inputs and outputs, else all. @returns {Entry[]} */
+  first() {
+    const { held, near, groups } = this.attention, one = groups.get(held);
+    if (!one) return this.entries;
+    const to = (/** @type {Entry} */ { id }) => groups.get(id)?.data.to === one.data.neuron;
+    const found = this.entries.filter(({ id }) => id !== held && near.has(id) && (id[0] === 'c') === (held[0] === 'n'));
+    return [...this.entries.filter(({ id }) => id === held), ...found.filter(to), ...found.filter((entry) => !to(entry))];
+  }
+
+  /** List what fits. */
+  fill() {
+    if (this.panel.hidden) {
+      this.value([]);
+      return;
+    }
+    const found = this.field.value.trim() ? search(this.entries, this.field.value) : this.first();
+    this.shown = found.slice(0, LISTED);
+    this.list.replaceChildren(...this.shown.map(({ id }) => {
+      const row = document.createElement('li'), [name, more] = ['b', 'span'].map((tag) => document.createElement(tag));
+      row.id = `found-${id}`;
+      row.setAttribute('role', 'option');
+      row.append(name, ' ', more);
+      return row;
+    }));
+    const left = found.length - this.shown.length;
+    this.find('more').textContent = left ? `and ${left} more` : found.length ? '' : 'nothing is called so';
+    this.to(0);
+  }
+
+  /** Go to a row. @param {number} at */
+  to(at) {
+    this.at = Math.max(0, Math.min(this.shown.length - 1, at));
+    [...this.list.children].forEach((row, place) => { row.setAttribute('aria-selected', String(place === this.at)); });
+    const row = this.list.children[this.at];
+    this.field.setAttribute('aria-activedescendant', row ? row.id : '');
+    if (row) row.scrollIntoView({ block: 'nearest' });
+    const from = Math.max(0, this.at - VALUED / 3);
+    this.value(this.shown.slice(from, from + VALUED).map(({ id }) => id).filter((id) => /^[nc]\d+$/.test(id)));
+  }
+
+  /** Ask for the values of these. @param {string[]} ids */
+  value(ids) {
+    if (ids.join() !== this.attention.listed.join()) {
+      this.attention.listed = ids;
+      this.attention.ask();
+    }
+    this.attention.changed();
+  }
+
+  /** Hold what a row is about. @param {number} at */
+  choose(at) {
+    const entry = this.shown[at];
+    if (entry) this.taken(entry.id);
+  }
+
+  /** @param {KeyboardEvent} event */
+  key(event) {
+    /** @type {Object<string, () => void>} */
+    const does = {
+      ArrowDown: () => this.to(this.at + 1), ArrowUp: () => this.to(this.at - 1),
+      PageDown: () => this.to(this.at + 10), PageUp: () => this.to(this.at - 10),
+      Enter: () => this.choose(this.at), Escape: () => this.toggle(),
+    };
+    if (does[event.key]) {
+      does[event.key]();
+      event.preventDefault();
+    }
+  }
+
+  /** Write names and values. @param {Look} look */
+  show(look) {
+    if (this.panel.hidden) return;
+    const around = new Set(this.attention.listed);
+    this.shown.forEach(({ id }, at) => {
+      const [name, more] = /** @type {Iterable<HTMLElement>} */ (this.list.children[at].children);
+      if (name.textContent && !around.has(id) && /^[nc]\d+$/.test(id)) return;
+      const [first, ...rest] = this.attention.words(id, look).split('\n'), words = rest.join(', ');
+      if (name.textContent !== first) name.textContent = first;
+      if (more.textContent !== words) more.textContent = words;
+    });
+  }
+}

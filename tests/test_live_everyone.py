@@ -1,0 +1,267 @@
+"""The live page for everyone: found by name, read by screen readers, no motion where none is wanted, on a telephone."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import json
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+from chromium import Page
+from PIL import Image
+from test_live_browser import STEP, pause, shown
+
+pytestmark = pytest.mark.browser
+
+ROOT = Path(__file__).parents[1]
+AXE = ROOT / "node_modules/axe-core/axe.min.js"
+TIP = "document.querySelector('#tip')"
+SAID = "document.querySelector('#said').textContent"
+ROWS = "[...document.querySelectorAll('#found li')]"
+NAMES = f"{ROWS}.map(row => row.querySelector('b').textContent)"
+CHOSEN = "document.querySelector('#found [aria-selected=true]').textContent"
+
+
+async def violations(opened: Page) -> list[str]:
+    """What axe-core finds in the page as it stands, in short."""
+    assert AXE.exists(), "axe-core is not installed: make node_modules/made"
+    if not await opened.ask("'axe' in window"):
+        await opened.call("Runtime.evaluate", expression=AXE.read_text(encoding="utf-8"))
+    found = await opened.ask(
+        "axe.run({resultTypes: ['violations']}).then(found => found.violations.map("
+        "({id, nodes}) => `${id}: ${nodes.map(({html}) => html.slice(0, 160)).join(' ')}`))"
+    )
+    assert isinstance(found, list)
+    return found
+
+
+async def tap(opened: Page, *points: tuple[float, float]) -> None:
+    """Put fingers where they are said to be; none: take them away."""
+    fingers = [{"x": x, "y": y, "id": number} for number, (x, y) in enumerate(points)]
+    await opened.call("Input.dispatchTouchEvent", type="touchStart" if points else "touchEnd", touchPoints=fingers)
+
+
+@asynccontextmanager
+async def telephone(spec: str, folder: Path) -> AsyncIterator[Page]:
+    """A live view on a telephone."""
+    async with shown(spec, folder) as (opened, _, _):
+        await opened.call("Emulation.setDeviceMetricsOverride", width=390, height=844, deviceScaleFactor=2, mobile=True)
+        await opened.call("Emulation.setTouchEmulationEnabled", enabled=True, maxTouchPoints=5)
+        await opened.call("Page.reload")
+        await opened.until(f"document.readyState == 'complete' && {STEP} > 3")
+        yield opened
+
+
+@pytest.mark.parametrize("theme", ["default", "dark"])
+def test_axe_finds_nothing_whatever_is_open(theme: str, tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path, theme) as (opened, _, _):
+            assert await violations(opened) == [], "playing"
+            await pause(opened)
+            await opened.key("]")
+            await opened.until(f"!{TIP}.hidden")
+            assert await violations(opened) == [], "held"
+            await opened.key("t")
+            await opened.ask("document.querySelector('#lesion').click()")
+            await opened.until("document.querySelector('#turned').children.length")
+            assert await violations(opened) == [], "turning"
+            await opened.key("/")
+            await opened.until(f"{ROWS}.length > 3")
+            assert await violations(opened) == [], "searching"
+            await opened.key("Escape")
+            await opened.key("?")
+            assert await violations(opened) == [], "the keys"
+
+    asyncio.run(main())
+
+
+def test_a_slash_searches_by_name_and_enter_holds(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):
+            await pause(opened)
+            await opened.key("/")
+            await opened.until("document.activeElement.id == 'search'")
+            await opened.call("Input.insertText", text="k2")
+            await opened.until(f"{NAMES}[0] == 'K2'")
+            names = await opened.ask(NAMES)
+            assert isinstance(names, list)
+            assert "K2 → O" in names
+            assert all("k2" in name.lower() for name in names)
+            await opened.key("ArrowDown")
+            await opened.until(f"!{CHOSEN}.startsWith('K2 activity')")
+            await opened.key("ArrowUp")
+            await opened.until(f"{CHOSEN}.startsWith('K2 activity')")
+            await opened.key("Enter")
+            await opened.until(f"{TIP}.textContent.startsWith('K2\\n')")
+            assert await opened.ask("document.activeElement.id") == "search", "the search goes on"
+            await opened.ask("document.querySelector('#search').select()")
+            await opened.call("Input.insertText", text="K2 -> O")
+            await opened.until(f"{NAMES}[0] == 'K2 → O'")
+            await opened.key("Enter")
+            await opened.until(f"{TIP}.textContent.startsWith('K2 → O\\n')")
+            await opened.ask("document.querySelector('#search').select()")
+            await opened.call("Input.insertText", text="nobody")
+            await opened.until(f"{ROWS}.length == 0")
+            assert await opened.ask("document.querySelector('#more').textContent") == "nothing is called so"
+            await opened.key("Escape")
+            await opened.until("document.activeElement.id == 'picture' && document.querySelector('#outline').hidden")
+
+    asyncio.run(main())
+
+
+def test_what_is_searched_beside_the_window_is_brought_into_it(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):
+            await pause(opened)
+            for _ in range(12):
+                await opened.key("+")
+            await opened.key("/")
+            await opened.call("Input.insertText", text="T")
+            await opened.until(f"{NAMES}[0] == 'T'")
+            await opened.key("Enter")
+            await opened.until(f"{TIP}.textContent.startsWith('T\\n')")
+            inside = (
+                "(({left, top}) => left > 300 && left < innerWidth - 300 && top > 200)({0}.getBoundingClientRect())"
+            )
+            await opened.until(inside.replace("{0}", TIP))
+
+    asyncio.run(main())
+
+
+def test_the_outline_reads_names_and_values_of_what_is_held_and_its_inputs_and_outputs(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, compiled, _):
+            step = await pause(opened)
+            await opened.key("o")
+            await opened.until(
+                f"{ROWS}.length == {2 + len(compiled.network.neurons) + len(compiled.network.connections)}"
+            )
+            await opened.until(f"{NAMES}.slice(0, 3).join() == 'kernels,rhythm,C1'")
+            for _ in range(2):
+                await opened.key("ArrowDown")
+            await opened.until(f"/^C1 activity [+−]/.test({CHOSEN})")
+            row = await opened.ask("document.querySelector('#search').getAttribute('aria-activedescendant')")
+            assert await opened.ask(f"document.getElementById('{row}').textContent == {CHOSEN}")
+            await opened.key("Enter")
+            names = compiled.network.connection_names
+            wanted = [name.replace("->", "→") for name in names if "C1" in name.replace(" (", " ").split(" ")]
+            await opened.until(f"{NAMES}.length == {len(wanted) + 1}")
+            await opened.until(f"{ROWS}.every(row => / (activity|weight) /.test(row.textContent))")
+            listed = await opened.ask(NAMES)
+            assert isinstance(listed, list)
+            assert sorted(listed[1:]) == sorted(wanted)
+            assert listed[1].endswith("→ C1"), "inputs first"
+            value = compiled.run(step + 1).snapshot(step).activity[compiled.network.neurons.names.index("C1")]
+            said = await opened.ask(f"{ROWS}[0].textContent.match(/activity ([+−].*?),/)[1].replace('−', '-')")
+            assert float(str(said)) == pytest.approx(value, rel=1e-5)
+
+    asyncio.run(main())
+
+
+def test_it_says_what_is_asked_and_nothing_while_it_plays(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):
+            await opened.ask(
+                "window.told = []; for (const place of document.querySelectorAll("
+                "'[aria-live], [role=status], [role=alert], output')) "
+                "new MutationObserver(() => told.push(place.textContent)).observe(place, "
+                "{childList: true, characterData: true, subtree: true})"
+            )
+            step = await opened.ask(STEP)
+            await opened.until(f"{STEP} > {step} + 20")
+            assert await opened.ask("told") == [], "a step is no news"
+            await opened.key("v")
+            await opened.until(f"/^Function approximation, step .* playing, neurons 12/.test({SAID})")
+            await pause(opened)
+            await opened.key("]")
+            await opened.until(f"/^C1.*, activity [+−][\\d.]+, tanh/.test({SAID})")
+            await opened.key("v")
+            await opened.until("told.filter(text => text.startsWith('C1')).length == 2")
+
+    asyncio.run(main())
+
+
+def test_the_picture_is_moved_by_keys(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):
+            await pause(opened)
+            await opened.key("]")
+            await opened.until(f"!{TIP}.hidden")
+            place = f"(({{left, top}}) => [left, top])({TIP}.getBoundingClientRect())"
+            before = await opened.ask(place)
+            assert isinstance(before, list)
+            for key in ("ArrowLeft", "ArrowUp"):
+                for kind in ("keyDown", "keyUp"):
+                    await opened.call("Input.dispatchKeyEvent", type=kind, key=key, modifiers=8)
+            await opened.until(f"{place}[0] > {before[0]} + 20 && {place}[1] > {before[1]} + 20")
+            await opened.key("0")
+            await opened.until(f"{place}.join() == '{before[0]},{before[1]}'")
+            await opened.ask("document.querySelector('#scrub').focus()")
+            await opened.key("t")
+            await opened.until("!document.querySelector('#turning').hidden")
+
+    asyncio.run(main())
+
+
+def test_with_reduced_motion_pictures_come_seldom_and_nothing_glides(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):
+            count = (
+                "new Promise(done => { const seen = new Set(); const at = setInterval(() => seen.add("
+                "document.querySelector('#told').textContent), 10); "
+                "setTimeout(() => { clearInterval(at); done(seen.size); }, 2000); })"
+            )
+            assert int(str(await opened.ask(count))) > 20
+            await opened.call(
+                "Emulation.setEmulatedMedia", features=[{"name": "prefers-reduced-motion", "value": "reduce"}]
+            )
+            assert 2 <= int(str(await opened.ask(count))) <= 7, "fewer than three flashes a second"
+
+    asyncio.run(main())
+
+
+@pytest.mark.parametrize(("theme", "scheme"), [("default", "light"), ("dark", "dark")])
+def test_what_the_browser_draws_itself_is_as_dark_as_the_theme(theme: str, scheme: str, tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path, theme) as (opened, _, _):
+            assert await opened.ask("getComputedStyle(document.documentElement).colorScheme") == scheme
+
+    asyncio.run(main())
+
+
+def test_on_a_telephone_two_fingers_come_closer_and_a_tap_holds(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with telephone("cpg_rbf.yaml", tmp_path) as opened:
+            await pause(opened)
+            assert await opened.ask("document.documentElement.scrollWidth <= innerWidth")
+            assert await violations(opened) == []
+            small = await opened.ask(
+                "[...document.querySelectorAll('button, input, select')].filter(one => one.offsetWidth).filter("
+                "one => one.offsetWidth < 44 || one.offsetHeight < 44).map(one => one.id)"
+            )
+            assert small == [], "fingers are wider than pointers"
+            before = Image.open(io.BytesIO(await opened.shot())).convert("RGB")
+            await tap(opened, (195, 300), (195, 380))
+            for by in range(0, 100, 10):
+                fingers = [{"x": 195, "y": 300 - by, "id": 0}, {"x": 195, "y": 380 + by, "id": 1}]
+                await opened.call("Input.dispatchTouchEvent", type="touchMove", touchPoints=fingers)
+            await tap(opened)
+            await opened.ask("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+            after = Image.open(io.BytesIO(await opened.shot())).convert("RGB")
+            after.save(tmp_path / "pinched.png")
+            assert before.tobytes() != after.tobytes()
+            assert await opened.ask(f"{TIP}.hidden"), "a pinch is no tap"
+            await opened.key("0")
+            await opened.key("o")
+            await opened.until(f"{ROWS}.length > 10")
+            panel = await opened.ask("JSON.stringify(document.querySelector('#outline').getBoundingClientRect())")
+            box = json.loads(str(panel))
+            assert box["width"] == 390
+            assert box["top"] > 300, "the picture is seen above it"
+            (tmp_path / "outline.png").write_bytes(await opened.shot())
+            assert await violations(opened) == []
+
+    asyncio.run(main())

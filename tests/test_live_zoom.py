@@ -1,0 +1,132 @@
+"""Zooming in the live page: near by no line or label grows, at a distance boxes close and have their mean colour."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from chromium import Page
+from PIL import Image
+from test_live_browser import pause, shown
+from test_live_looking import TIP, places, told
+
+from neurovis_spec.live.view import LEVELS, view_of
+
+pytestmark = pytest.mark.browser
+
+
+async def picture(opened: Page) -> Image.Image:
+    """The window, once all that was asked is drawn."""
+    await opened.ask(
+        "new Promise(done => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(done)), 300))"
+    )
+    return Image.open(io.BytesIO(await opened.shot())).convert("RGB")
+
+
+def test_near_by_discs_grow_while_lines_and_labels_keep_their_weight(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("ring.yaml", tmp_path) as (opened, compiled, _):
+            await pause(opened)
+            name = compiled.network.neurons.names[0]
+            x, y = places(compiled)[name]
+            await opened.call("Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, deltaX=0, deltaY=0)
+            before = np.array(await picture(opened)).astype(int)
+            # four times as close, about the middle of a disc
+            delta = -400 * float(np.log(4))
+            await opened.call("Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, deltaX=0, deltaY=delta)
+            after_image = await picture(opened)
+            after_image.save(tmp_path / "near.png")
+            after = np.array(after_image).astype(int)
+
+            def ring(pixels: np.ndarray) -> tuple[int, int]:
+                """Where the ring of the disc begins to the right of its middle, and how thick it is."""
+                row = pixels[round(y) + 12, round(x) :]
+                inside = row[8]
+                other = np.flatnonzero(np.abs(row[8:] - inside).sum(axis=1) > 60) + 8
+                first = int(other[0])
+                paper = np.flatnonzero(row[first:].sum(axis=1) > 3 * 235)
+                return first, int(paper[0])
+
+            (reach, thick), (far, thin) = ring(before), ring(after)
+            assert far > 2.5 * reach, "the disc is larger"
+            assert thin <= thick + 3, "its ring is not thicker"
+            await opened.key("0")
+            again = np.array(await picture(opened)).astype(int)
+            assert np.abs(again - before).mean() < 0.5, "and all is as it was"
+
+    asyncio.run(main())
+
+
+def test_at_a_distance_boxes_are_closed_and_have_the_mean_colour_of_their_neurons(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("hexapod/hexapod.yaml", tmp_path) as (opened, compiled, _):
+            step = await pause(opened)
+            network, view = compiled.network, view_of(compiled, compiled.gains)
+            (instance,) = (entry for entry in network.instances if entry.path == "left1")
+            at = np.mean([places(compiled)[network.neurons.names[index]] for index in instance.indices], axis=0)
+            await opened.point(*at)
+            opened_shot = await picture(opened)
+            await opened.size(420, 482)
+            scale = min(420 / opened_shot.width, (482 - 44) / (opened_shot.height - 44))
+            left = (420 - scale * view.plan.frame.width * view.plan.frame.density) / 2
+            small = await picture(opened)
+            small.save(tmp_path / "closed.png")
+            x, y = left + scale * at[0], scale * at[1]
+            await opened.point(x, y)
+            await opened.until(f"{TIP}.textContent.startsWith('left1\\nmean ')")
+            words = str(await opened.ask(f"{TIP}.textContent")).split("\n")
+            seen = compiled.run(step + 1).snapshot(step)
+            from neurovis_spec.scene.encode import looks
+
+            levels = looks(network, seen, compiled.gains, view.plan.frame.widest).discs[list(instance.indices)]
+            mean = 100 * round(float(np.rint(levels * LEVELS).mean())) / LEVELS
+            assert words[1] == f"mean {'+' if mean > 0 else ''}{round(mean)} %".replace("-", "−")
+            assert words[2] == f"neurons {instance.count}"
+            # a click opens it: its neurons are seen, and the others' boxes are gone
+            await opened.click(x, y)
+            await picture(opened)
+            await opened.until("document.querySelector('#picture').matches(':focus')")
+            near = await picture(opened)
+            near.save(tmp_path / "opened.png")
+            await opened.point(210, 200)
+            assert not str(await opened.ask(f"{TIP}.textContent")).startswith("left1\nmean")
+            await opened.key("0")
+            await picture(opened)
+            await opened.point(x, y)
+            await opened.until(f"!{TIP}.hidden && {TIP}.textContent.startsWith('left1\\nmean ')")
+
+    asyncio.run(main())
+
+
+def test_dotted_lines_recede_too_where_something_else_is_held(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, compiled, _):
+            await pause(opened)
+            (signal,) = (group for group in view_of(compiled, compiled.gains).plan.back if "signal" in group.data)
+            density, spline = view_of(compiled, compiled.gains).plan.frame.density, signal.shapes[0]
+            points = np.array(spline.points) * density
+            box = [*np.floor(points.min(axis=0) - 3), *np.ceil(points.max(axis=0) + 3)]
+
+            async def ink() -> int:
+                """How much darker than paper the surroundings of the line are."""
+                pixels = np.array((await picture(opened)).crop(tuple(int(value) for value in box))).astype(int)
+                return int((255 * 3 - pixels.sum(axis=2)).clip(0).sum())
+
+            await ink()
+            before = await ink()
+            await opened.click(*places(compiled)["K2"])
+            await told(opened, "K2")
+            await opened.point(2, 2)
+            held = await ink()
+            await opened.key("Escape")
+            await opened.click(*places(compiled)["T"])
+            await told(opened, "T")
+            await opened.point(2, 2)
+            of_its_own = await ink()
+            assert held < 0.7 * before
+            assert of_its_own > 1.2 * held
+
+    asyncio.run(main())
