@@ -14,6 +14,8 @@ from test_live_browser import pause, shown
 from test_live_looking import TIP, places, told
 
 from neurovis_spec.live.view import LEVELS, view_of
+from neurovis_spec.scene import Spline
+from neurovis_spec.scene.encode import looks
 
 pytestmark = pytest.mark.browser
 
@@ -79,8 +81,6 @@ def test_at_a_distance_boxes_are_closed_and_have_the_mean_colour_of_their_neuron
             await opened.until(f"{TIP}.textContent.startsWith('left1\\nmean ')")
             words = str(await opened.ask(f"{TIP}.textContent")).split("\n")
             seen = compiled.run(step + 1).snapshot(step)
-            from neurovis_spec.scene.encode import looks
-
             levels = looks(network, seen, compiled.gains, view.plan.frame.widest).discs[list(instance.indices)]
             mean = 100 * round(float(np.rint(levels * LEVELS).mean())) / LEVELS
             assert words[1] == f"mean {'+' if mean > 0 else ''}{round(mean)} %".replace("-", "−")
@@ -107,12 +107,14 @@ def test_dotted_lines_recede_too_where_something_else_is_held(tmp_path: Path) ->
             await pause(opened)
             (signal,) = (group for group in view_of(compiled, compiled.gains).plan.back if "signal" in group.data)
             density, spline = view_of(compiled, compiled.gains).plan.frame.density, signal.shapes[0]
+            assert isinstance(spline, Spline)
             points = np.array(spline.points) * density
-            box = [*np.floor(points.min(axis=0) - 3), *np.ceil(points.max(axis=0) + 3)]
+            left, top = np.floor(points.min(axis=0) - 3).tolist()
+            right, bottom = np.ceil(points.max(axis=0) + 3).tolist()
 
             async def ink() -> int:
                 """How much darker than paper the surroundings of the line are."""
-                pixels = np.array((await picture(opened)).crop(tuple(int(value) for value in box))).astype(int)
+                pixels = np.array((await picture(opened)).crop((left, top, right, bottom))).astype(int)
                 return int((255 * 3 - pixels.sum(axis=2)).clip(0).sum())
 
             await ink()

@@ -7,8 +7,7 @@
 
 /** How keys are called that are not called by what they write. @type {Object<string, string>} */
 const CALLED = {
-  ' ': 'space', ArrowRight: '→', ArrowLeft: '←', '-': '−',
-  'Shift+ArrowLeft': '⇧←', 'Shift+ArrowRight': '⇧→', 'Shift+ArrowUp': '⇧↑', 'Shift+ArrowDown': '⇧↓',
+  ' ': 'space', ArrowRight: '→', ArrowLeft: '←', ArrowUp: '↑', ArrowDown: '↓', '-': '−',
 };
 /** The keys that a slider takes for itself. */
 const SLIDES = /^(Arrow|Home|End|Page)/;
@@ -21,7 +20,7 @@ export function followKeys(keys) {
     if (at.matches('input[type=range]') ? SLIDES.test(key) : at.closest('input, select, textarea')) return;
     if (key === ' ' && at.closest('button, summary')) return;
     if (at.closest('dialog') && key !== '?') return;
-    const known = keys[event.shiftKey && key.startsWith('Arrow') ? `Shift+${key}` : key];
+    const known = keys[event.shiftKey && key.startsWith('Arrow') ? `shift+${CALLED[key]}` : key];
     if (known) {
       known[1]();
       event.preventDefault();
