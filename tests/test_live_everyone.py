@@ -277,3 +277,34 @@ def test_on_a_telephone_two_fingers_come_closer_and_a_tap_holds(tmp_path: Path) 
             assert await violations(opened) == []
 
     asyncio.run(main())
+
+
+@pytest.mark.parametrize(("spec", "theme"), [("ring.yaml", None), ("ring.yaml", "default"), ("cpg_rbf.yaml", None)])
+def test_where_nobody_asks_for_a_theme_it_is_dark_where_the_system_is(
+    spec: str, theme: str | None, tmp_path: Path
+) -> None:
+    asked = theme is not None or nv.compile(ROOT / "specs" / spec).spec.render is not None
+
+    async def main() -> None:
+        async with shown(spec, tmp_path, theme) as (opened, _, access):
+            back = "getComputedStyle(document.body).backgroundColor"
+            for scheme, rgb in (("dark", "rgb(13, 17, 23)"), ("light", "rgb(255, 255, 255)")):
+                await opened.call(
+                    "Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}]
+                )
+                if not asked:
+                    await opened.until(f"{back} == '{rgb}' && {STEP} > 3")
+            if asked:
+                step = await opened.ask(STEP)
+                await opened.until(f"{STEP} > {step} + 20")
+                assert await opened.ask(back) == "rgb(255, 255, 255)"
+            await opened.call(
+                "Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark"}]
+            )
+            await opened.call("Page.navigate", url=access.url(owner=False))
+            await opened.until(f"document.querySelector('#play')?.disabled && {STEP} > 0")
+            step = await opened.ask(STEP)
+            await opened.until(f"{STEP} > {step} + 20")
+            assert await opened.ask(back) == "rgb(255, 255, 255)", "who only looks on has nothing drawn otherwise"
+
+    asyncio.run(main())

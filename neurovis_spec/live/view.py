@@ -145,7 +145,11 @@ def view_of(
     constants = {"levels": LEVELS, "fineness": FINENESS, "shares": SHARES, "share": _SHARE, **kinds}
     scene = _scene(planned, seen)
     rows = order_of(drawn.network, layout, range(len(drawn.network.neurons)))
-    words = content(drawn.network, scene, rows, constants, {**declared(compiled), "themes": list(THEMES)})
+    written = compiled.spec.render
+    themed = theme is not None or (written is not None and written.theme is not None)
+    words = content(
+        drawn.network, scene, rows, constants, {**declared(compiled), "themes": list(THEMES), "themed": themed}
+    )
     return View(drawn, seen, planned, largest, words, appearance, partial(view_of, compiled, gains, theme, engine))
 
 

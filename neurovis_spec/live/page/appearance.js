@@ -18,8 +18,19 @@ export class Appearance {
     this.theme = theme;
     /** @type {Object<string, any>} */
     this.shown = {};
+    /** whether the system says if it is to be dark: nobody else does */
+    this.isFree = false;
+    /** whether it is dark because this page has asked for it */
+    this.isFollowed = false;
+    this.owner = false;
+    this.isDark = matchMedia('(prefers-color-scheme: dark)');
     const ask = (/** @type {object} */ more) => link.ask('draw', { ...this.shown, ...more });
-    theme.onchange = () => ask({ theme: theme.value });
+    this.ask = ask;
+    theme.onchange = () => {
+      this.isFree = false;
+      ask({ theme: theme.value });
+    };
+    this.isDark.onchange = () => this.follow();
     this.sliders = new Sliders(place);
     for (const [name, description] of Object.entries(GAINS)) {
       this.sliders.add({ name, value: 1, low: 1 / 64, high: 64, description, log: true }, `gain-${name}`,
@@ -27,16 +38,28 @@ export class Appearance {
     }
   }
 
-  /** @param {string[]} names */
-  use(names) {
+  /** @param {string[]} names @param {boolean} themed whether a theme is asked for */
+  use(names, themed) {
+    if (this.theme.length === 0) this.isFree = !themed;
+    this.follow();
     if (this.theme.length === names.length + 1) return;
     this.theme.replaceChildren(...['', ...names].map((name) => new Option(name || 'of the spec', name)));
     this.theme.value = this.shown.theme;
   }
 
-  /** @param {Object<string, any>} shown */
-  show(shown) {
+  /** Be dark where the system is, unless somebody has chosen a theme. */
+  follow() {
+    const { matches } = this.isDark;
+    if (!this.isFree || !this.owner || matches === this.isFollowed || this.shown.theme !== (matches ? '' : 'dark')) return;
+    this.isFollowed = matches;
+    this.ask({ theme: matches ? 'dark' : '' });
+  }
+
+  /** @param {Object<string, any>} shown @param {boolean} owner */
+  show(shown, owner) {
     this.shown = shown;
+    this.owner = owner;
+    this.follow();
     this.theme.value = shown.theme;
     this.sliders.show(shown);
   }

@@ -13,7 +13,8 @@
 /** @typedef {{version: number, name: string, title: string, width: number, height: number, density: number,
  *   theme: Theme, dt: number | null, discs: number, lines: number, parameters: Declared[],
  *   inputs: {name: string, size: number, description: string}[], rules: {connections: string, rule: string}[], themes: string[],
- *   order: number[], ends: number[][], bands: [number, string, number][], constants: Object<string, any>, groups: Group[]}} Scene */
+ *   themed: boolean, order: number[], ends: number[][], bands: [number, string, number][], constants: Object<string, any>,
+ *   groups: Group[]}} Scene */
 /** @typedef {{first: number, every: number, ranges: Map<string, Float32Array>}} Traces */
 /** @typedef {{serial: number, step: number, first: number, last: number, caption: string, discs: Int8Array,
  *   lines: Int8Array, widths: Uint16Array, glows: Uint16Array, kinds: Uint8Array}} Look */

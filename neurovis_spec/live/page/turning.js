@@ -58,8 +58,8 @@ export class Turning {
   }
 
   /** Another network. @param {Scene} scene */
-  use({ parameters, inputs, rules, themes }) {
-    this.appearance.use(themes);
+  use({ parameters, inputs, rules, themes, themed }) {
+    this.appearance.use(themes, themed);
     const shown = JSON.stringify([parameters, inputs, rules]);
     if (shown === this.shown) return;
     this.shown = shown;
@@ -90,7 +90,7 @@ export class Turning {
   status(status) {
     /** @type {HTMLFieldSetElement} */ (this.find('turns')).disabled = !status.owner || !status.can.turns;
     /** @type {HTMLFieldSetElement} */ (this.find('drawn')).disabled = !status.owner;
-    this.appearance.show(status.appearance);
+    this.appearance.show(status.appearance, status.owner);
     this.sliders.show(status.parameters);
     this.feeds.show(status.fed);
     this.rules.show(status.learning);
