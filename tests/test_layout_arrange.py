@@ -12,7 +12,7 @@ from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.choose import choose_engine
 from neurovis_spec.layout.engines import engine_of
 from neurovis_spec.layout.geometry import straight
-from neurovis_spec.layout.model import LayoutModule
+from neurovis_spec.layout.model import LayoutMirror, LayoutModule
 from neurovis_spec.layout.problem import canonical
 from neurovis_spec.layout.refusals import asked_by, refuse
 
@@ -25,6 +25,8 @@ def test_auto_is_manual_where_everything_is_pinned() -> None:
     assert lay_out_problem(pinned).engine == "manual"
     assert choose_engine(PAIR)[0] == "layered"
     assert lay_out_problem(PAIR).engine == "layered"
+    mirrored = replace(pinned, mirrors=(LayoutMirror(-1, ((0, 1),)),))
+    assert lay_out_problem(mirrored).engine == "layered", "'manual' draws no mirror images"
 
 
 def tangle(count: int, steps: tuple[int, ...] = (1, 7, 11)) -> LayoutProblem:

@@ -55,10 +55,10 @@ def _takes(name: str, problem: LayoutProblem) -> bool:
 def _most_suitable(problem: LayoutProblem) -> tuple[str, str]:
     """The engine whose drawing says most, and why."""
     edges = len(problem.edges)
-    if problem.neurons and len(problem.pins) == len(problem.neurons):
-        return "manual", "every neuron has a position"
     if problem.arrange or problem.mirrors or problem.align:
         return "layered", "it can arrange, mirror and align as the spec says"
+    if problem.neurons and len(problem.pins) == len(problem.neurons):
+        return "manual", "every neuron has a position"
     if problem.modules and edges <= _MOST_IN_LAYERS:
         return "layered", "it draws instances as frames"
     if not (problem.pins or problem.modules) and _tangled(problem):
