@@ -19,8 +19,8 @@ from random_specs import Plain, Spec, section, specs
 
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
-from neurovis_spec.cli.differences import difference
 from neurovis_spec.diagnostics import Findings
+from neurovis_spec.differences import difference
 from neurovis_spec.language.fmt import FormattingError, format_read, format_text
 from neurovis_spec.language.fmt_keys import normal
 from neurovis_spec.language.fmt_parse import TreeReader

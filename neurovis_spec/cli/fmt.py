@@ -8,12 +8,12 @@ from typing import Final
 
 import click
 
-from neurovis_spec.cli.differences import difference
 from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.files import STDIN, standard_input, writing
 from neurovis_spec.cli.options import examples, specs_argument
 from neurovis_spec.cli.progress import progress
 from neurovis_spec.diagnostics import Diagnostic, Findings, SpecError
+from neurovis_spec.differences import difference
 from neurovis_spec.findings import printable, show_text
 
 _BOM: Final = "\ufeff"
