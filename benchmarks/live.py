@@ -62,7 +62,7 @@ WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu
 _SPEC = """neurovis: 1
 name: random
 time: {{steps: 100, dt: 0.016}}
-neurons: {{R: {{count: {neurons}, activation: tanh, initial: "uniform(-1, 1)"}}}}
+neurons: {{R: {{count: {neurons}, activation: tanh, initial: "uniform(-1, 1)", noise: "normal(0, 0.3)"}}}}
 connections:
   R -> R: {{weight: "normal(0, {deviation})", pattern: {{random: {{probability: {probability}}}}}}}
 render: {{min_weight: 0}}
