@@ -629,6 +629,8 @@ class CompiledNetwork:
         return _svg(self.network, self._layout, snapshot, gains)
 
 
+#: How wide a picture is in a notebook at most, in pixels: JupyterLab cuts off what is wider than its column.
+_CELL = 900.0
 #: pixels of an inch where a user unit is one pixel, and the most that are drawn of a picture
 _CSS, _MOST_PIXELS = 96.0, 1 << 28
 
@@ -691,11 +693,11 @@ def _bounded(draw: Callable[[RenderSettings], tuple[Scene, bytes]], settings: Re
 
 
 def _svg(network: Network, layout: Layout, snapshot: Snapshot, gains: Gains) -> str:
-    """The picture of a step for a notebook, which is to be no larger than one in a file."""
+    """The picture of a step for a notebook: a pixel a unit, but no wider than a cell, and no larger than a file."""
 
     def draw(settings: RenderSettings) -> tuple[Scene, bytes]:
         scene = pipeline.picture(network, layout, snapshot, gains, settings)
-        return scene, pipeline.draw(scene, ".svg")
+        return scene, pipeline.draw(replace(scene, density=min(1.0, _CELL / scene.width)), ".svg")
 
     return _bounded(draw, network.render, ".svg").decode()
 

@@ -136,6 +136,14 @@ def test_in_a_notebook_they_draw_themselves(network: nv.CompiledNetwork) -> None
         assert shown._repr_svg_().lstrip().startswith("<svg")
 
 
+def test_no_picture_is_wider_than_the_cell_of_a_notebook(network: nv.CompiledNetwork) -> None:
+    """A pixel a unit, and where that is wider, as wide as the cell."""
+    parts = "layout: {direction: right}\nneurons: {A: {count: 20}}\nconnections: {A -> A: {pattern: chain}}"
+    chain = nv.compile_text(f"neurovis: 1\nname: chain\n{parts}")
+    for shown, wide in ((network, 736), (network.layout(), 736), (chain.layout(), 900)):
+        assert f' width="{wide}" ' in shown._repr_svg_()[:200]
+
+
 def test_what_python_gives_is_checked_like_what_a_spec_says(network: nv.CompiledNetwork, tmp_path: Path) -> None:
     """Unknown names are answered with the nearest, and a seed is an integer."""
     with pytest.raises(ValueError, match="no theme 'drak'") as unknown:
