@@ -97,10 +97,15 @@ async def until(true: Callable[[], bool]) -> None:
 @asynccontextmanager
 async def inside(opened: Page) -> AsyncIterator[None]:
     """What is asked in the block is asked of the widget's frame, which is closed off from the page around it."""
-    targets = (await opened.call("Target.getTargets"))["targetInfos"]
-    assert isinstance(targets, list)
-    (frame,) = [target["targetId"] for target in targets if target["type"] == "iframe"]
-    attached = await opened.call("Target.attachToTarget", targetId=frame, flatten=True)
+    frames = list[str]()
+    for _ in range(500):
+        if frames:
+            break
+        await asyncio.sleep(0.02)
+        targets = (await opened.call("Target.getTargets"))["targetInfos"]
+        assert isinstance(targets, list)
+        frames = [target["targetId"] for target in targets if target["type"] == "iframe"]
+    attached = await opened.call("Target.attachToTarget", targetId=frames[0], flatten=True)
     around, opened.session = opened.session, str(attached["sessionId"])
     for name in ("Runtime", "Log"):
         await opened.call(f"{name}.enable")
