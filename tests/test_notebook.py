@@ -20,6 +20,7 @@ from IPython.core.formatters import DisplayFormatter
 
 import neurovis_spec as nv
 from neurovis_spec.live.protocol import FRAME, SCENE
+from neurovis_spec.notebook import session
 from neurovis_spec.notebook.recording import PlayedRecording
 from neurovis_spec.notebook.session import MOST
 from neurovis_spec.notebook.widget import LiveWidget
@@ -88,6 +89,7 @@ def until(true: Callable[[], bool]) -> None:
 
 def test_a_frame_is_sent_the_page_the_scene_and_frames_as_fast_as_it_draws() -> None:
     with notebook() as it:
+        it.say("a", page=True)
         it.say("a", open=True)
         until(lambda: len(it.kinds("a")) == 3)
         time.sleep(0.2)
@@ -174,7 +176,7 @@ def test_a_recording_is_played_and_cannot_be_turned() -> None:
     "content",
     [
         *({}, {"view": "a"}, {"view": 3, "open": True}, {"view": "", "open": True}, {"view": "a" * 65, "open": True}),
-        *({"view": "a", "text": 3}, {"view": "nobody", "text": "{}"}, {"view": "nobody", "open": False}, "what", None),
+        *({"view": "a", "text": 3}, {"view": "a", "open": 1}, {"view": "nobody", "open": False}, "what", None),
     ],
 )
 def test_a_message_that_no_frame_of_ours_sends_does_nothing(content: object) -> None:
@@ -195,6 +197,18 @@ def test_of_too_many_frames_the_first_are_left() -> None:
         until(lambda: f"f{MOST}" in it.binary)
         assert "f0" not in it.widget._session._frames
         assert len(it.widget._session._frames) == MOST
+
+
+def test_a_frame_that_draws_nothing_counts_as_gone_until_it_says_something(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(session, "SILENCE", 0.1)
+    with notebook() as it:
+        it.say("a", open=True)
+        until(lambda: it.kinds("a") == [SCENE, FRAME, FRAME])
+        until(lambda: not it.widget.playing)
+        step = it.widget.step
+        serial = int.from_bytes(it.binary["a"][-1][4:8], "little")
+        it.say("a", serial.to_bytes(4, "little"))
+        until(lambda: it.kinds("a").count(SCENE) == 2 and it.widget.step > step)
 
 
 def test_closing_ends_its_threads() -> None:

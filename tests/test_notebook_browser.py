@@ -139,6 +139,13 @@ def test_a_network_plays_in_a_cell_and_is_turned_on_both_sides(tmp_path: Path) -
                 await opened.until(f"{alpha}.value == '1.2'")
                 await opened.ask(f"{alpha}.value = 1.1; {alpha}.dispatchEvent(new Event('change'))")
                 await until(lambda: bool(widget.alpha == 1.1))
+            await opened.ask("const box = document.querySelector('#cell > div'); box.append(box.firstChild)")
+            async with inside(opened):
+                step = widget.step
+                await opened.until(f"document.querySelector('#told')?.textContent == 'step {step}'")
+                await opened.ask("document.querySelector('#step').click()")
+                await until(lambda: widget.step == step + 1)
+            assert len(widget._session._frames) == 1
             await opened.ask("window.taller()")
             assert await opened.ask("document.querySelector('#cell > div').offsetHeight") == 500
             await opened.ask("window.end()")

@@ -12,13 +12,15 @@ from threading import Thread, current_thread
 from typing import Final, TypeAlias
 
 from neurovis_spec.live.commands import Command, Pause, Play, Present
-from neurovis_spec.live.hub import Client, Hub
+from neurovis_spec.live.hub import AHEAD, Client, Hub
 from neurovis_spec.live.protocol import ProtocolError, findings_message, refused_message
 from neurovis_spec.live.reception import Reception
 from neurovis_spec.live.run import Done, Refuse, Run, Shown, Stage
 
 #: Frames of a notebook at once; of more, the one that came first is left.
 MOST: Final = 16
+#: Seconds after which a frame that has drawn nothing counts as gone.
+SILENCE = 20.0
 #: Frames a second and bytes a second that each is sent: a Jupyter server cuts off a kernel beyond 1 MB/s.
 _FRAMES, _BYTES = 30, 300_000
 
@@ -30,7 +32,8 @@ Follow: TypeAlias = Callable[[], None]
 
 class Session:
     """A run for frames; ``shown`` is what it shows now. It stands still while there is no frame, and ``playing`` says
-    whether it begins to play with the first."""
+    whether it begins to play with the first. A frame that draws nothing of what it is sent for a while counts as gone:
+    its browser is closed, its tab is behind others, or the notebook is at work; when it says something, it is back."""
 
     def __init__(self, stage: Stage, send: Send, follow: Follow, playing: bool = True) -> None:
         self._send, self._follow, self._playing = send, follow, playing
@@ -114,9 +117,9 @@ class Session:
         self._loop.call_soon(self._loop.stop)
 
     def _take(self, name: str, message: bytes | str) -> None:
-        client, _ = self._frames.get(name, (None, None))
-        if client is None:
-            return
+        if name not in self._frames:
+            self._join(name)
+        client, _ = self._frames[name]
         try:
             self._reception.take(client, message)
         except ProtocolError as error:
@@ -125,7 +128,14 @@ class Session:
     async def _write(self, name: str, client: Client) -> None:
         """Send what there is for a frame whenever there is something, no faster than a notebook can bear."""
         while True:
-            await client.wake.wait()
+            try:
+                async with asyncio.timeout(SILENCE):
+                    await client.wake.wait()
+            except TimeoutError:
+                if len(client.ahead) < AHEAD:
+                    continue
+                self._leave(name)
+                return
             client.wake.clear()
             sent = 0
             for message in list(self._hub.messages(client)):

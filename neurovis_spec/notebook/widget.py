@@ -159,13 +159,14 @@ class LiveWidget(anywidget.AnyWidget):
             self.send({"view": view, "text": message})
 
     def _take_message(self, _: object, content: object, buffers: Sequence[bytes | memoryview]) -> None:
-        """What a frame sends: that it has come or gone, or a message of the protocol."""
+        """What a frame sends: that it wants the page, has come or gone, or a message of the protocol."""
         view = content.get("view") if isinstance(content, dict) else None
         if not isinstance(content, dict) or not isinstance(view, str) or not 0 < len(view) <= _LONGEST:
             return
         match content:
-            case {"open": True}:
+            case {"page": True}:
                 self.send({"view": view, "page": page()})
+            case {"open": True}:
                 self._session.join(view)
             case {"open": False}:
                 self._session.leave(view)
