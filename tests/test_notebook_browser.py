@@ -155,6 +155,33 @@ def test_a_network_plays_in_a_cell_and_is_turned_on_both_sides(tmp_path: Path) -
     asyncio.run(main())
 
 
+def test_the_page_takes_the_wheel_once_it_is_clicked_and_may_copy(tmp_path: Path) -> None:
+    async def wheel(opened: Page) -> object:
+        """Whether the page has taken it."""
+        async with inside(opened):
+            await opened.ask(
+                "addEventListener('wheel', (event) => { window.taken = event.defaultPrevented; }); taken = -1"
+            )
+        await opened.call("Input.dispatchMouseEvent", type="mouseWheel", x=300, y=200, deltaX=0, deltaY=40)
+        async with inside(opened):
+            await opened.until("taken !== -1")
+            return await opened.ask("taken")
+
+    async def main() -> None:
+        widget = nv.compile(ROOT / "specs/cpg_rbf.yaml").live()
+        async with shown(widget, tmp_path) as opened:
+            await until(lambda: widget.step > 5)
+            assert await wheel(opened) is False
+            await opened.click(30, 30)
+            assert await wheel(opened) is True
+            async with inside(opened):
+                assert (
+                    await opened.ask("navigator.clipboard.writeText('events').then(() => 'copied', String)") == "copied"
+                )
+
+    asyncio.run(main())
+
+
 def test_a_recording_waits_for_play_and_ends(tmp_path: Path) -> None:
     async def main() -> None:
         compiled = nv.compile(ROOT / "specs/cpg_rbf.yaml")

@@ -16,6 +16,7 @@ function render({ model, el }) {
   const box = document.createElement('div'), frame = document.createElement('iframe');
   box.style.cssText = 'width: 100%; min-height: 160px; overflow: hidden; resize: vertical;';
   frame.setAttribute('sandbox', 'allow-scripts allow-downloads');
+  frame.allow = 'clipboard-write *';
   frame.title = model.get('title');
   frame.style.cssText = 'display: block; width: 100%; height: 100%; border: 0;';
   el.append(box);

@@ -31,6 +31,8 @@ export class Pointer {
 
   /** Come closer, or go away. @param {WheelEvent} event */
   wheel(event) {
+    // in a notebook it scrolls that, until the page has been clicked
+    if (parent !== window && !document.hasFocus()) return;
     const [x, y] = pixel(event);
     this.camera.closer(Math.exp(-event.deltaY / 400), x, y);
     event.preventDefault();
