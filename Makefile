@@ -3,7 +3,8 @@
 #   make demo       makes .venv, installs, and runs the main job into demo/
 #   make test       every check that needs Python alone
 #   make gallery    draws the examples into docs/pictures and writes docs/gallery.md; needs graphviz' dot
-#   make test-all   what needs Chromium, graphviz' dot, gcc and g++, node, or starts a cluster; fails without them
+#   make test-all   what needs Chromium, graphviz' dot, gcc and g++, node, or starts a cluster, and test-ros; fails without
+#   make test-ros   the tests with ROS: ROS 1 of Debian, and ROS 2 (Kilted, Jazzy) as wheels, installed into .ros
 #   make fuzz       20,000 broken specs and 5,000 expressions (FUZZ_ARGS=... for more), two or three minutes
 #   make layouts    layouts beside dot's, sfdp's and networkx' (LAYOUTS_ARGS="--all --graphs FOLDER" for more)
 #   make docs       writes the generated parts of docs/ anew
@@ -21,8 +22,9 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 NPM := npm --no-audit --no-fund --no-package-lock --loglevel=error
 ELSEWHERE := browser or dot or compiler or cluster or node
+ROS_EXTRAS := bags,live,ros
 
-.PHONY: help install demo gallery test test-all needs fuzz layouts docs page page-check format clean
+.PHONY: help install demo gallery test test-all test-elsewhere test-ros needs needs-ros fuzz layouts docs page page-check format clean
 .DELETE_ON_ERROR:
 
 help:
@@ -61,10 +63,30 @@ test: $(VENV)/tested
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python -m pytest -n auto -m "not ($(ELSEWHERE))" $(PYTEST_ARGS)
+	$(BIN)/python -m pytest -n auto -m "not ($(ELSEWHERE) or ros)" $(PYTEST_ARGS)
 
-test-all: needs $(VENV)/tested page-check
+test-all: test-elsewhere test-ros
+
+test-elsewhere: needs $(VENV)/tested page-check
 	$(BIN)/python -m pytest -m "$(ELSEWHERE)" $(PYTEST_ARGS)
+
+# Each ROS is in an environment of its own, in which NeuroVis is used in place.
+test-ros: needs-ros $(VENV)/tested .ros/one/made .ros/kilted/made .ros/jazzy/made
+	$(BIN)/python tests/isolated.py $(BIN)/python -m pytest -m ros $(PYTEST_ARGS)
+
+.ros/one/made: pyproject.toml
+	@echo "installing into .ros/one, beside ROS 1"
+	@/usr/bin/python3 -m venv --system-site-packages .ros/one
+	@.ros/one/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[$(ROS_EXTRAS)]'
+	@touch $@
+
+.ros/kilted/made: WHEELS := ros-rclpy[fastrtps]==9.1.2 ros-std-msgs==5.5.1 ros-sensor-msgs==5.5.1 ros-diagnostic-msgs==5.5.1
+.ros/jazzy/made: WHEELS := ros-rclpy[fastrtps]==7.1.6 ros-std-msgs==5.3.6 ros-sensor-msgs==5.3.6
+.ros/kilted/made .ros/jazzy/made: .ros/%/made: $(VENV)/made pyproject.toml
+	@echo "installing ROS 2 into .ros/$*"
+	@$(BIN)/python -m venv .ros/$*
+	@.ros/$*/bin/python -m pip install --quiet --disable-pip-version-check $(WHEELS:%='%') --editable '.[$(ROS_EXTRAS)]'
+	@touch $@
 
 # Skipping would hide that nothing was tested: what is missing is an error.
 needs:
@@ -84,6 +106,13 @@ node_modules/made: package.json
 
 page-check: node_modules/made
 	$(NPM) run --silent check
+
+ROS_1 := python3-rosmaster python3-rospy python3-std-msgs python3-sensor-msgs
+
+needs-ros:
+	@/usr/bin/python3 -c 'import rosmaster, rospy, std_msgs.msg, sensor_msgs.msg' 2>/dev/null && command -v rosmaster >/dev/null \
+	  || { echo "make test-ros needs what is not here: ROS 1 (apt-get install $(ROS_1))" >&2; exit 1; }
+	@test "$$(uname -sm)" = "Linux x86_64" || { echo "make test-ros needs Linux on x86_64: there are no wheels of ROS 2 for others" >&2; exit 1; }
 
 fuzz: $(VENV)/tested
 	$(BIN)/python benchmarks/fuzzing.py $(FUZZ_ARGS)

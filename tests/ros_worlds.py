@@ -1,0 +1,186 @@
+"""ROS as it is installed for the tests: ROS 1 of Debian, ROS 2 Kilted and Jazzy, each in an environment of its own.
+
+``make test-ros`` makes the environments; a World is one of them, with a domain or a master of its own.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parent.parent
+FOLDER = Path(os.environ.get("NEUROVIS_ROS", ROOT / ".ros"))
+PEER = Path(__file__).parent / "ros_peer.py"
+NAMES = ("kilted", "jazzy", "one")
+#: set by the wheels of ROS 2 for their own process, and by whoever runs the tests
+_OURS = ("LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE", "PYTHONPATH")
+_domains = itertools.count(os.getpid() % 100 + 1)
+#: seconds for what takes one: machines of tests are slow
+PATIENCE = 60.0
+
+
+class Process:
+    """A process whose lines are read as they come."""
+
+    def __init__(self, command: Sequence[str | Path], environment: Mapping[str, str]) -> None:
+        self._process = subprocess.Popen(
+            [str(word) for word in command],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=dict(environment),
+            start_new_session=True,
+        )
+        self.out: list[str] = []
+        self.err: list[str] = []
+        self._threads = [
+            threading.Thread(target=self._read, args=(pipe, lines), daemon=True)
+            for pipe, lines in ((self._process.stdout, self.out), (self._process.stderr, self.err))
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    @staticmethod
+    def _read(pipe: Any, lines: list[str]) -> None:
+        for line in pipe:
+            lines.append(line.rstrip("\n"))
+
+    def wait_for(self, text: str, seconds: float = PATIENCE) -> str:
+        """The first line, of either stream, that holds a text."""
+        deadline = time.monotonic() + seconds
+        while time.monotonic() < deadline:
+            for line in [*self.err, *self.out]:
+                if text in line:
+                    return line
+            if self._process.poll() is not None and not any(thread.is_alive() for thread in self._threads):
+                break
+            time.sleep(0.01)
+        raise AssertionError(f"no '{text}' in {self.out} {self.err}")
+
+    def signal(self, number: int) -> None:
+        self._process.send_signal(number)
+
+    @property
+    def running(self) -> bool:
+        return self._process.poll() is None
+
+    def end(self, seconds: float = PATIENCE) -> int:
+        """Wait for the end; the status."""
+        try:
+            status = self._process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            self.kill()
+            raise AssertionError(f"it does not end: {self.out} {self.err}") from None
+        for thread in self._threads:
+            thread.join(5)
+        return status
+
+    def stop(self) -> int:
+        """End it as Ctrl-C does; the status."""
+        self.signal(signal.SIGINT)
+        return self.end()
+
+    def kill(self) -> None:
+        """End it and what it has started, at once."""
+        with suppress(ProcessLookupError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+
+    def json(self) -> Any:
+        """The last line, as JSON."""
+        assert self.out, self.err
+        return json.loads(self.out[-1])
+
+
+class World:
+    """One ROS: its commands, run in its environment."""
+
+    def __init__(self, name: str) -> None:
+        self.name, self.ros = name, 1 if name == "one" else 2
+        self.bin = FOLDER / name / "bin"
+        assert self.bin.is_dir(), f"there is no environment {self.bin.parent}: make test-ros makes it"
+        self.processes: list[Process] = []
+        kept = {key: value for key, value in os.environ.items() if key not in _OURS and not key.startswith("ROS_")}
+        self.environment = {**kept, "PYTHONUNBUFFERED": "1"}
+        self._core: Process | None = None
+        if self.ros == 1:
+            self.port = free_port()
+            uri = f"http://127.0.0.1:{self.port}"
+            self.environment |= {"ROS_MASTER_URI": uri, "ROS_LOG_DIR": f"/tmp/neurovis-ros-{self.port}"}
+            self.start_core()
+        else:
+            self.environment |= {"ROS_DOMAIN_ID": str(next(_domains) % 200)}
+
+    def _started(self, command: Sequence[str | Path], **more: str) -> Process:
+        process = Process(command, {**self.environment, **more})
+        self.processes.append(process)
+        return process
+
+    def start_core(self) -> None:
+        """Start the master of ROS 1: ``roscore`` without what it starts besides."""
+        environment = {**self.environment, "ROS_IP": "127.0.0.1"}
+        command = ["/usr/bin/python3", "/usr/bin/rosmaster", "--core", "-p", str(self.port)]
+        self._core = Process(command, environment)
+        self.processes.append(self._core)
+        deadline = time.monotonic() + PATIENCE
+        while True:
+            with suppress(OSError), socket.create_connection(("127.0.0.1", self.port)):
+                return
+            assert time.monotonic() < deadline, self._core.err
+            time.sleep(0.02)
+
+    def stop_core(self) -> None:
+        """Kill the master of ROS 1."""
+        assert self._core is not None
+        self._core.kill()
+
+    def neurovis(self, *arguments: str | Path, **environment: str) -> Process:
+        """A command of NeuroVis."""
+        return self._started([self.bin / "neurovis", *arguments], **environment)
+
+    def peer(self, **plan: object) -> Process:
+        """Another node; see ``ros_peer``. It meets this machine alone."""
+        alone = {"ROS_IP": "127.0.0.1"} if self.ros == 1 else {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+        return self._started([self.bin / "python", PEER, json.dumps({"seconds": PATIENCE, **plan})], **alone)
+
+    def python(self, code: str, *arguments: str) -> Process:
+        """A program in this environment."""
+        alone = {"ROS_IP": "127.0.0.1"} if self.ros == 1 else {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+        return self._started([self.bin / "python", "-c", code, *arguments], **alone)
+
+    def close(self) -> None:
+        """Kill what still runs."""
+        for process in self.processes:
+            process.kill()
+
+
+@contextmanager
+def world(name: str) -> Iterator[World]:
+    """A world for a block."""
+    made = World(name)
+    try:
+        yield made
+    finally:
+        made.close()
+
+
+def free_port() -> int:
+    """A port that nobody listens at."""
+    with socket.socket() as sock:
+        sock.bind(("127.0.0.1", 0))
+        return int(sock.getsockname()[1])
+
+
+assert sys.platform == "linux", "the tests with ROS run on Linux"

@@ -1,0 +1,377 @@
+"""``neurovis ros run`` with real ROS: what it computes, what it listens to and sends, and how it ends."""
+
+from __future__ import annotations
+
+import json
+import signal
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ros_worlds import NAMES, World, world
+
+import neurovis_spec
+
+pytestmark = pytest.mark.ros
+
+ARRAY = "std_msgs/Float64MultiArray"
+ARM = """
+neurovis: 1
+name: arm
+time: {dt: 0.01, steps: 100}
+parameters:
+  gain: {value: 0.5, min: 0, max: 2, description: How strongly it follows.}
+  count: 2
+inputs: {target: {}, torque: {size: 2}}
+neurons:
+  A: {input: target, activation: identity}
+  M: {count: count, input: torque, activation: identity}
+  B: {activation: identity}
+connections: {A -> B: gain}
+outputs: {signal: B, motors: M}
+ros:
+  rate: 100
+  qos: {depth: 2000}
+  subscribe:
+    target: {topic: /target, type: std_msgs/Float64, timeout: 0.4, on_timeout: ON_TIMEOUT}
+    torque: {topic: joints, type: sensor_msgs/JointState, field: effort, names: [hip, knee], timeout: 0.4}
+  publish:
+    signal: {topic: /cmd_vel, type: geometry_msgs/Twist, field: linear.x, safe: -1}
+    motors: {topic: ~/motors, type: std_msgs/Float64MultiArray, safe: 0}
+"""
+
+
+@pytest.fixture(params=NAMES)
+def ros(request: pytest.FixtureRequest) -> Iterator[World]:
+    with world(request.param) as made:
+        yield made
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Path:
+    return written(tmp_path)
+
+
+def written(folder: Path, on_timeout: str = "zero") -> Path:
+    path = folder / "arm.yaml"
+    path.write_text(ARM.replace("ON_TIMEOUT", on_timeout))
+    return path
+
+
+def targets(value: float, count: int, **more: object) -> dict[str, object]:
+    return {"topic": "/target", "type": "std_msgs/Float64", "values": {"data": value}, "count": count, **more}
+
+
+COMMANDS = {"topic": "/cmd_vel", "type": "geometry_msgs/Twist", "fields": ["linear.x", "angular.z"]}
+MOTORS = {"topic": "/neurovis/arm/motors", "type": ARRAY, "fields": ["data"]}
+
+
+def test_what_is_published_is_the_offline_run_bit_for_bit(ros: World, tmp_path: Path) -> None:
+    text = (Path(__file__).parent.parent / "specs" / "hebbian.yaml").read_text()
+    spec = tmp_path / "spec.yaml"
+    spec.write_text(f"{text}\nros: {{rate: 100, qos: {{depth: 2000}}}}\n")
+    network = neurovis_spec.compile(spec)
+    base = f"/neurovis/{network.name}"
+    arrays = [
+        {"topic": f"{base}/{kind}", "type": ARRAY, "fields": ["data", "layout.dim.0.label", "layout.dim.0.size"]}
+        for kind in ("activity", "weights")
+    ]
+    steps = 150
+    peer = ros.peer(listen=arrays, until={f"{base}/activity": steps, f"{base}/weights": steps})
+    run = ros.neurovis(
+        *("ros", "run", spec, "--steps", str(steps), "--wait", "30", "--backend", "reference", "--format", "json")
+    )
+    assert run.wait_for("ready").startswith("ready")
+    assert run.end() == 0
+    assert peer.end() == 0
+    summary = run.json()
+    assert summary["steps"] == steps
+    assert summary["hash"] == network.hash
+    recording = network.run(steps, backend="reference")
+    for topic, rows in ((f"{base}/activity", recording.activity), (f"{base}/weights", recording.weights)):
+        came = peer.json()[topic]
+        assert [one[0][0] for one in came] == list(range(steps))
+        np.testing.assert_array_equal([one[0][2:] for one in came], rows)
+        assert {(one[1], one[2]) for one in came} == {(f"neurovis/1:{network.hash}", rows.shape[1])}
+        stamps = [one[0][1] for one in came]
+        assert abs(stamps[0] - time.time()) < 600
+        assert stamps == sorted(stamps)
+
+
+def test_inputs_become_outputs_and_the_end_is_safe(ros: World, arm: Path) -> None:
+    run = ros.neurovis("ros", "run", arm, "--format", "json")
+    run.wait_for("ready")
+    joints = {"name": ["knee", "elbow", "hip"], "effort": [4.0, 9.0, 3.0]}
+    sent = {"topic": "/neurovis/joints", "type": "sensor_msgs/JointState", "values": joints, "count": 60}
+    peer = ros.peer(listen=[COMMANDS, MOTORS], send=[targets(1.5, 60), sent], seconds=2.5)
+    peer.wait_for("ready")
+    time.sleep(1.5)
+    assert run.stop() == 0
+    assert peer.end() == 0
+    came = peer.json()
+    signals = [one[0] for one in came["/cmd_vel"]]
+    assert {one[1] for one in came["/cmd_vel"]} == {0.0}
+    assert set(signals) == {0.0, 0.75, -1.0}
+    assert signals[-1] == -1.0
+    motors = [tuple(one[0]) for one in came["/neurovis/arm/motors"]]
+    assert (3.0, 4.0) in motors
+    assert motors[-1] == (0.0, 0.0)
+    summary = run.json()["topics"]
+    assert summary["/target"]["received"] == 60
+    assert summary["/neurovis/joints"]["received"] == 60
+
+
+def test_messages_that_cannot_be_used_are_counted_and_survived(ros: World, arm: Path) -> None:
+    run = ros.neurovis("ros", "run", arm, "--format", "json")
+    run.wait_for("ready")
+    name = {"name": ["knee", "hip"]}
+    odd = [
+        {**name, "effort": [1.0]},
+        {**name, "effort": [float("nan"), 1.0]},
+        {"name": ["ankle", "hip"], "effort": [1.0, 2.0]},
+        {"effort": [1.0, 2.0]},
+        {**name, "effort": [float("inf"), 1.0]},
+    ]
+    good = {**name, "effort": [2.0, 1.0]}
+    sent = {"topic": "/neurovis/joints", "type": "sensor_msgs/JointState", "values": [*odd, good, *odd], "rate": 100}
+    peer = ros.peer(listen=[MOTORS], send=[sent, targets(float("nan"), 5)], seconds=1.0)
+    assert peer.end() == 0
+    assert run.stop() == 0
+    motors = {tuple(one[0]) for one in peer.json()["/neurovis/arm/motors"]}
+    assert motors <= {(0.0, 0.0), (1.0, 2.0)}
+    assert (1.0, 2.0) in motors
+    topics = run.json()["topics"]
+    assert topics["/neurovis/joints"]["received"] == 11
+    assert topics["/neurovis/joints"]["rejected"]["length"] == 6
+    assert topics["/neurovis/joints"]["not_finite"] == 4
+    assert topics["/target"]["not_finite"] == 5
+    assert any("of another length on /neurovis/joints" in line for line in run.err)
+
+
+@pytest.mark.parametrize(("on_timeout", "after"), [("hold", 0.75), ("zero", 0.0)])
+def test_an_input_that_falls_silent(ros: World, tmp_path: Path, on_timeout: str, after: float) -> None:
+    run = ros.neurovis("ros", "run", written(tmp_path, on_timeout), "--format", "json")
+    run.wait_for("ready")
+    peer = ros.peer(listen=[COMMANDS], send=[targets(1.5, 10)], seconds=1.5)
+    assert peer.end() == 0
+    assert run.stop() == 0
+    signals = [one[0] for one in peer.json()["/cmd_vel"]]
+    assert 0.75 in signals
+    assert signals[-1] == after
+
+
+def test_a_run_stops_safely_when_an_input_falls_silent(ros: World, tmp_path: Path) -> None:
+    run = ros.neurovis("ros", "run", written(tmp_path, "stop"), "--format", "json")
+    run.wait_for("ready")
+    peer = ros.peer(listen=[COMMANDS], send=[targets(1.5, 10)], seconds=2.0)
+    assert run.end() == 1
+    assert peer.end() == 0
+    signals = [one[0] for one in peer.json()["/cmd_vel"]]
+    assert 0.75 in signals
+    assert signals[-1] == -1.0
+    assert any("the input 'target' has fallen silent" in line for line in run.err)
+    assert run.json()["steps"] > 0
+
+
+def test_sigterm_ends_it_and_so_do_seconds(ros: World, arm: Path) -> None:
+    run = ros.neurovis("ros", "run", arm, "--format", "json", "--seconds", "1")
+    assert run.end() == 0
+    assert run.json()["seconds"] >= 1
+    run = ros.neurovis("ros", "run", arm)
+    run.wait_for("ready")
+    run.signal(signal.SIGTERM)
+    assert run.end() == 0
+    assert run.out[0].startswith("arm: ")
+
+
+def test_the_spec_waits_for_who_comes_late(ros: World, arm: Path) -> None:
+    run = ros.neurovis("ros", "run", arm)
+    run.wait_for("ready")
+    time.sleep(0.5)
+    spec = {"topic": "/neurovis/arm/spec", "type": "std_msgs/String", "fields": ["data"], "latched": True}
+    peer = ros.peer(listen=[spec], until={"/neurovis/arm/spec": 1})
+    assert peer.end() == 0
+    assert run.stop() == 0
+    ((text,),) = peer.json()["/neurovis/arm/spec"]
+    assert neurovis_spec.compile_text(text).hash == neurovis_spec.compile(arm).hash
+
+
+def test_steps_that_are_late_are_counted_and_made(ros: World, arm: Path) -> None:
+    run = ros.neurovis("ros", "run", arm, "--rate", "1e6", "--steps", "400", "--format", "json")
+    assert run.end() == 0
+    assert run.json()["steps"] == 400
+    assert run.json()["late"] > 300
+
+
+def test_time_can_be_simulated(ros: World, arm: Path) -> None:
+    run = ros.neurovis("ros", "run", arm, "--sim-time", "--steps", "30", "--format", "json")
+    run.wait_for("ready")
+    time.sleep(0.5)
+    assert run.running
+    if ros.ros == 2:
+        ticks = [{"clock.sec": 100 + n // 10, "clock.nanosec": n % 10 * 100_000_000} for n in range(10)]
+    else:
+        ticks = [{"clock.secs": 100 + n // 10, "clock.nsecs": n % 10 * 100_000_000} for n in range(10)]
+    clock = {"topic": "/clock", "type": "rosgraph_msgs/Clock", "values": ticks, "rate": 10}
+    activity = {"topic": "/neurovis/arm/activity", "type": ARRAY, "fields": ["data"]}
+    peer = ros.peer(send=[clock], listen=[activity], seconds=1.5)
+    assert run.end() == 0
+    assert peer.end() == 0
+    stamps = [one[0][1] for one in peer.json()["/neurovis/arm/activity"]]
+    assert all(100 <= stamp < 101 for stamp in stamps)
+    assert run.json()["steps"] == 30
+
+
+def test_diagnostics_are_sent_where_there_is_a_package_for_them(arm: Path) -> None:
+    with world("kilted") as ros:
+        run = ros.neurovis("ros", "run", arm)
+        fields = ["status.0.name", "status.0.message", "status.0.hardware_id", "header.stamp.sec"]
+        wish = {"topic": "/diagnostics", "type": "diagnostic_msgs/DiagnosticArray", "fields": fields}
+        peer = ros.peer(listen=[wish], until={"/diagnostics": 2})
+        assert peer.end() == 0
+        assert run.stop() == 0
+        for name, message, about, stamp in peer.json()["/diagnostics"]:
+            assert name == "neurovis/arm: network"
+            assert message
+            assert about == "arm"
+            assert abs(stamp - time.time()) < 600
+
+
+def test_nothing_is_said_of_diagnostics_where_there_is_none(arm: Path) -> None:
+    with world("one") as ros:
+        run = ros.neurovis("ros", "run", arm, "--seconds", "1.5")
+        assert run.end() == 0
+        assert len(run.err) == 1
+
+
+@pytest.mark.parametrize("name", ["kilted", "jazzy"])
+def test_another_quality_of_service_is_told(name: str, tmp_path: Path) -> None:
+    spec = tmp_path / "arm.yaml"
+    spec.write_text(ARM.replace("ON_TIMEOUT", "zero").replace("{depth: 2000}", "{reliability: best_effort}"))
+    with world(name) as ros:
+        run = ros.neurovis("ros", "run", spec)
+        run.wait_for("ready")
+        peer = ros.peer(listen=[COMMANDS])
+        line = run.wait_for("another quality of service")
+        assert line.startswith("/cmd_vel: ")
+        assert "RELIABILITY" in line
+        peer.kill()
+        assert run.stop() == 0
+
+
+PARAMETERS = """
+import json, sys, time
+import rclpy
+from rcl_interfaces.msg import Parameter, ParameterValue
+from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
+rclpy.init()
+node = rclpy.create_node("setter")
+def call(type_, name, request):
+    client = node.create_client(type_, f"/neurovis/arm/{name}")
+    assert client.wait_for_service(30)
+    future = client.call_async(request)
+    rclpy.spin_until_future_complete(node, future, timeout_sec=30)
+    return future.result()
+def set_(name, value, kind=3):
+    value = ParameterValue(type=kind, **({"double_value": value} if kind == 3 else {"string_value": value}))
+    given = Parameter(name=name, value=value)
+    result = call(SetParameters, "set_parameters", SetParameters.Request(parameters=[given]))
+    return result.results[0].successful
+def get():
+    return call(GetParameters, "get_parameters", GetParameters.Request(names=["gain"])).values[0].double_value
+about = call(DescribeParameters, "describe_parameters", DescribeParameters.Request(names=["gain"])).descriptors[0]
+bounds = about.floating_point_range[0]
+done = [get(), set_("gain", 1.5), get(), set_("gain", 3.0), set_("gain", "much", 4), set_("count", 3.0), get()]
+print(json.dumps([about.description, bounds.from_value, bounds.to_value, done]), flush=True)
+import os; os._exit(0)
+"""
+
+
+@pytest.mark.parametrize("name", ["kilted", "jazzy"])
+def test_parameters_of_ros_2(name: str, tmp_path: Path) -> None:
+    with world(name) as ros:
+        run = ros.neurovis("ros", "run", written(tmp_path, "hold"))
+        run.wait_for("ready")
+        setter = ros.python(PARAMETERS)
+        assert setter.end() == 0, setter.err
+        about, low, high, done = json.loads(setter.out[-1])
+        assert (about, low, high) == ("How strongly it follows.", 0, 2)
+        assert done == [0.5, True, 1.5, False, False, False, 1.5]
+        peer = ros.peer(listen=[COMMANDS], send=[targets(2.0, 20)], until={"/cmd_vel": 40})
+        assert peer.end() == 0
+        assert 3.0 in [one[0] for one in peer.json()["/cmd_vel"]]
+        assert run.stop() == 0
+
+
+def test_parameters_of_ros_1(tmp_path: Path) -> None:
+    with world("one") as ros:
+        run = ros.neurovis("ros", "run", written(tmp_path, "hold"))
+        run.wait_for("ready")
+        code = """
+import json, time, rosgraph
+master = rosgraph.Master("/setter")
+prefix = "/neurovis/arm/parameters"
+def set_(name, value):
+    master.setParam(f"{prefix}/{name}", value)
+    time.sleep(1)
+    return master.getParam(prefix).get("gain")
+print(json.dumps([master.getParam(prefix), set_("gain", 1.5), set_("gain", 3.0), set_("gain", "much")]))
+"""
+        setter = ros.python(code)
+        assert setter.end() == 0, setter.err
+        assert json.loads(setter.out[-1]) == [{"gain": 0.5}, 1.5, 1.5, 1.5]
+        peer = ros.peer(listen=[COMMANDS], send=[targets(2.0, 20)], until={"/cmd_vel": 40})
+        assert peer.end() == 0
+        assert 3.0 in [one[0] for one in peer.json()["/cmd_vel"]]
+        assert run.stop() == 0
+        assert any("above its bound" in line or "at most" in line or "gain" in line for line in run.err)
+        assert any("takes a number" in line for line in run.err)
+
+
+def test_a_node_outlives_its_master(arm: Path) -> None:
+    with world("one") as ros:
+        run = ros.neurovis("ros", "run", arm, "--format", "json")
+        run.wait_for("ready")
+        ros.stop_core()
+        run.wait_for("is away")
+        ros.start_core()
+        begun = time.monotonic()
+        wish = {"topic": "/cmd_vel", "type": "geometry_msgs/Twist", "fields": ["linear.x"]}
+        peer = ros.peer(listen=[wish], send=[targets(1.5, 200)], until={"/cmd_vel": 100}, wait=5)
+        assert peer.end() == 0
+        assert 0.75 in [one[0] for one in peer.json()["/cmd_vel"]]
+        assert time.monotonic() - begun < PATIENCE_OF_WATCHDOG
+        assert run.stop() == 0
+        assert run.json()["reconnects"] == 1
+        assert any("is back" in line for line in run.err)
+
+
+#: five seconds until messages flow, and what the peer needs to start on a busy machine
+PATIENCE_OF_WATCHDOG = 20
+
+
+def test_a_master_elsewhere_needs_an_address(arm: Path) -> None:
+    with world("one") as ros:
+        run = ros.neurovis("ros", "run", arm, ROS_MASTER_URI="http://robot.example:11311")
+        assert run.end() == 1
+        assert "robot.example" in run.err[0]
+        assert "--remote" in run.err[1]
+
+
+def test_the_ros_that_is_asked_for_must_be_there(arm: Path) -> None:
+    with world("kilted") as ros:
+        run = ros.neurovis("ros", "run", arm, "--ros", "1")
+        assert run.end() == 1
+        assert "'rospy'" in run.err[0]
+
+
+def test_a_type_whose_package_is_missing_is_named(tmp_path: Path) -> None:
+    spec = tmp_path / "arm.yaml"
+    spec.write_text(ARM.replace("ON_TIMEOUT", "zero").replace("std_msgs/Float64,", "acme_msgs/Float64,"))
+    for name in ("kilted", "one"):
+        with world(name) as ros:
+            run = ros.neurovis("ros", "run", spec)
+            assert run.end() == 1
+            assert "'acme_msgs'" in "".join(run.err)
