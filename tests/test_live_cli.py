@@ -150,7 +150,7 @@ def test_a_recording_is_played_to_its_end(spec: Path, suffix: str) -> None:
             eyes = Eyes(await session.ws_connect(live.url.replace("/?", "/live?")))
             await eyes.until(lambda: eyes.status.get("ended") is True and eyes.step == 29)
             assert eyes.status["playing"] is False
-            assert eyes.status["can"] == {"turns": False, "ends": True}
+            assert eyes.status["can"] == {"turns": False, "ends": True, "arrives": False}
 
     asyncio.run(main())
 

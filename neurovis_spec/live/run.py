@@ -121,7 +121,8 @@ class Run:
 
     @staticmethod
     def _clock_of(source: Source, speed: float) -> Clock:
-        return Clock.of(source.network.dt, source.network.dt_given, speed)
+        given = source.network.dt_given and not source.capabilities.arrives
+        return Clock.of(source.network.dt, given, speed)
 
     def _drive(self) -> None:
         try:
@@ -234,7 +235,9 @@ class Run:
     def _go(self, step: int) -> None:
         source = self._source
         self._playing, self._target = False, None
-        if step > source.reach.last and not source.capabilities.ends:
+        if source.capabilities.arrives:
+            step = min(step, source.reach.last)
+        elif step > source.reach.last and not source.capabilities.ends:
             self._target = step
             return
         source.go(step)
@@ -248,7 +251,10 @@ class Run:
         made = 0
         while made < due:
             if not self._source.advance():
-                self._ended, self._playing = True, False
+                if self._source.capabilities.arrives:
+                    self._clock.start(begun)
+                else:
+                    self._ended, self._playing = True, False
                 break
             made += 1
             if self._target is not None and self._source.step >= self._target:

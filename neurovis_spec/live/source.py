@@ -1,7 +1,7 @@
 """The Source: what the live view shows, one small interface.
 
 In: nothing; these are the types. A Source stands at a step and shows it; it goes on step by step, back
-where it can, and takes turns where it can. ``simulated`` and ``recorded`` are the two there are.
+where it can, and takes turns where it can. ``simulated`` and ``recorded`` are two; ``ros.received`` is a third.
 """
 
 from __future__ import annotations
@@ -35,11 +35,13 @@ class Reach:
 
 @dataclass(frozen=True, slots=True)
 class Capabilities:
-    """What a source can do besides showing and going on: ``turns`` (set, clamp, lesion, stop learning, feed an input)
-    and ``ends`` (there is a last step)."""
+    """What a source can do besides showing and going on: ``turns`` (set, clamp, lesion, stop learning, feed an input),
+    ``ends`` (there is a last step) and ``arrives`` (its steps come from elsewhere: it goes on by the time of a frame,
+    and waits at the last that there is)."""
 
     turns: bool
     ends: bool
+    arrives: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,7 +108,7 @@ class Source(Protocol):
         ...
 
     def advance(self) -> bool:
-        """Go on by one step; False at the end, and then nothing has changed."""
+        """Go on by one step; False at the end, or where nothing has arrived: then nothing has changed."""
         ...
 
     def beside(self, by: int) -> int:

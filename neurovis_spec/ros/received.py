@@ -1,0 +1,204 @@
+"""What arrives as a source: the newest step, and back over those that came before.
+
+In: activities and weights, by the thread that receives them. Out: a Source for the live page, by another one. It takes
+the newest step and skips the others, so that no picture holds a message up; what came is kept as far as there is room.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from dataclasses import dataclass
+from operator import attrgetter
+from threading import Lock
+from typing import Final
+
+import numpy as np
+
+from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.live.clock import FRAMES
+from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned
+from neurovis_spec.live.turns import Turn
+from neurovis_spec.runtime.recording import Snapshot
+from neurovis_spec.scene.fading import Fading
+
+#: bytes of the steps that are kept
+ROOM: Final = 128 << 20
+_EACH: Final = 400
+#: a step that is so much further on is of another publisher
+_FARTHEST: Final = 1_000_000
+#: steps back in which weights look for the activities of their step
+_BESIDE: Final = 16
+_FRAME_TIME: Final = 10**9 // FRAMES
+
+
+@dataclass(slots=True, eq=False)
+class _Row:
+    """A step as it came: ``seq`` its publisher's number, ``time`` when it came in nanoseconds, ``weights`` those of the
+    plastic connections, ``seen`` what a picture shows in place of the activity."""
+
+    step: int
+    seq: int | None
+    time: int
+    activity: FloatArray
+    weights: FloatArray
+    seen: FloatArray | None
+
+
+class ReceivedSource:
+    """The steps that have arrived; at first step 0, at rest."""
+
+    capabilities = Capabilities(turns=False, ends=False, arrives=True)
+
+    def __init__(self, network: Network, room: int = ROOM) -> None:
+        self.network, self._room = network, room
+        self._changing = network.changing
+        self._weights = network.connections.weights[self._changing].copy()
+        self._lock = Lock()
+        self._rows = [_Row(0, None, 0, np.zeros(len(network.neurons)), self._weights, None)]
+        self._each = _EACH + 8 * len(network.neurons) + 8 * len(self._changing)
+        self._fading = Fading(network)
+        self._at, self._time = self._rows[0], 0
+        self._offset, self._begun, self._following = 0, False, True
+        self._shown: _Row | None = None
+        #: messages that were seen, and all that there were
+        self.shown = self.came = 0
+
+    # ---- what arrives, in the thread that receives it ----------------------------------------------------------
+
+    def hear_activity(self, seq: int | None, time: int, activity: FloatArray) -> None:
+        """The activities of a step."""
+        with self._lock:
+            step = self._next(seq)
+            known = self._weights
+            seen = self._fading.follow(np.array([step]), activity[None]) if self._fading else None
+            row = _Row(step, seq, time, activity, known, seen)
+            if not self._begun:
+                self._rows, self._begun = [], True
+            elif len(self._rows) * self._each > self._room:
+                del self._rows[: max(1, len(self._rows) // 8)]
+            self._rows.append(row)
+            self.came += 1
+
+    def hear_weights(self, seq: int | None, weights: FloatArray) -> None:
+        """The weights of the plastic connections at a step, whose activities may have come already."""
+        with self._lock:
+            if self._begun and seq is not None:
+                for row in reversed(self._rows[-_BESIDE:]):
+                    if row.seq == seq:
+                        row.weights = weights
+            elif self._begun:
+                self._rows[-1].weights = weights
+            self._weights = weights
+
+    def _next(self, seq: int | None) -> int:
+        """The number of the step that has come: its publisher's, as long as that grows."""
+        last = self._rows[-1].step if self._begun else -1
+        step = last + 1 if seq is None else seq + self._offset
+        if not last < step <= last + _FARTHEST:
+            if not self._begun and seq is not None and seq < 1 << 53:
+                return seq
+            step = last + 1
+            self._offset = 0 if seq is None else step - seq
+        return step
+
+    # ---- the source, in the thread of the run ------------------------------------------------------------------
+
+    @property
+    def step(self) -> int:
+        """The step that it stands at."""
+        return self._at.step
+
+    @property
+    def reach(self) -> Reach:
+        """The steps that are kept."""
+        with self._lock:
+            return Reach(min(self._rows[0].step, self._at.step), self._rows[-1].step)
+
+    @property
+    def turned(self) -> tuple[Turned, ...]:
+        """Nothing."""
+        return ()
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Nothing can be set."""
+        return {}
+
+    @property
+    def fed(self) -> dict[str, tuple[float, ...]]:
+        """Nothing is given by hand."""
+        return {}
+
+    @property
+    def learning(self) -> dict[str, bool | None]:
+        """No rule can be stopped."""
+        return {}
+
+    def seen(self) -> Seen:
+        """What is seen of the step that it stands at."""
+        at, network = self._at, self.network
+        with self._lock:
+            place = bisect_left(self._rows, at.step, key=attrgetter("step"))
+            before = self._rows[place - 1] if place else None
+        if at is not self._shown and self._begun:
+            self.shown += 1
+        self._shown = at
+        previous = None
+        if before is not None and before.step == at.step - 1:
+            previous = self._all_weights(before)
+        snapshot = Snapshot(at.step, at.activity, self._all_weights(at), previous, at.seen)
+        return Seen(snapshot, np.zeros(len(network.neurons), bool), np.zeros(len(network.connections), bool))
+
+    def _all_weights(self, row: _Row) -> FloatArray:
+        weights: FloatArray = self.network.connections.weights.copy()
+        weights[self._changing] = row.weights
+        return weights
+
+    def advance(self) -> bool:
+        """Go on to the newest step; where it was taken back, by the time of a frame. False where nothing is new."""
+        with self._lock:
+            newest = self._rows[-1]
+            before = self._at
+            if self._following:
+                self._at = newest
+            elif not self._begun or before.step < self._rows[0].step:
+                self._at = self._rows[0]
+                self._time = self._at.time
+            else:
+                self._time += _FRAME_TIME
+                first = bisect_left(self._rows, before.step, key=attrgetter("step"))
+                place = bisect_right(self._rows, self._time, first, key=attrgetter("time"))
+                self._at = self._rows[max(first, place - 1)]
+                if self._at is newest:
+                    self._following = True
+            return self._at is not before or (not self._following and self._at is not newest)
+
+    def beside(self, by: int) -> int:
+        """The step so many further on, or back, of those that are kept."""
+        with self._lock:
+            place = bisect_left(self._rows, self._at.step, key=attrgetter("step")) + by
+            return self._rows[min(max(place, 0), len(self._rows) - 1)].step
+
+    def go(self, step: int) -> None:
+        """Go to a step that is kept, or the next one that is. Raises SourceError."""
+        with self._lock:
+            first, last = self._rows[0].step, self._rows[-1].step
+            if not first <= step <= last:
+                raise SourceError(f"step {step} is out of reach: those from step {first} to {last} are kept")
+            self._at = self._rows[bisect_left(self._rows, step, key=attrgetter("step"))]
+            self._time, self._following = self._at.time, self._at is self._rows[-1]
+
+    def restart(self) -> None:
+        """Forget what came before."""
+        with self._lock:
+            del self._rows[:-1]
+            self._at, self._following = self._rows[-1], True
+
+    def branch(self) -> None:
+        """Raises SourceError: what arrives goes on by itself."""
+        raise SourceError("what arrives goes on by itself")
+
+    def turn(self, turn: Turn) -> None:
+        """Raises SourceError: the network runs elsewhere."""
+        raise SourceError("the network runs elsewhere, and is only shown here")

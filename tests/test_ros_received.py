@@ -1,0 +1,148 @@
+"""What arrives, as the live page shows it: the newest, and back over what came."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import neurovis_spec as nv
+from neurovis_spec.live.commands import Pause, Play, Seek, Step
+from neurovis_spec.live.run import Run, Shown
+from neurovis_spec.live.source import Reach, SourceError
+from neurovis_spec.live.view import view_of
+from neurovis_spec.ros.received import ReceivedSource
+
+SPEC = """
+neurovis: 1
+name: x
+time: {dt: 0.5}
+neurons: {A: {count: 2, initial: 0}, O: {initial: 0}}
+connections: {A -> O: {weight: 0.5, plasticity: {oja: {rate: 0.1}}}, O -> A1: 0.25}
+"""
+SECOND = 10**9
+
+
+@pytest.fixture(scope="module")
+def compiled() -> nv.CompiledNetwork:
+    return nv.compile_text(SPEC)
+
+
+@pytest.fixture
+def source(compiled: nv.CompiledNetwork) -> ReceivedSource:
+    return ReceivedSource(compiled.network)
+
+
+def come(source: ReceivedSource, seqs: range | list[int | None], start: int = 0) -> None:
+    for number, seq in enumerate(seqs, start):
+        source.hear_activity(seq, number * SECOND // 100, np.full(3, float(number)))
+
+
+def test_the_newest_step_is_seen_and_the_others_are_skipped(source: ReceivedSource) -> None:
+    assert source.step == 0
+    assert not source.advance()
+    come(source, range(100, 200))
+    assert source.reach == Reach(0, 199)
+    assert source.advance()
+    assert not source.advance()
+    assert (source.step, source.seen().snapshot.activity.tolist()) == (199, [99, 99, 99])
+    source.seen()
+    assert (source.came, source.shown, source.reach) == (100, 1, Reach(100, 199))
+
+
+def test_one_can_go_back_and_on_in_its_own_time(source: ReceivedSource) -> None:
+    come(source, range(500))
+    source.advance()
+    source.go(100)
+    come(source, range(500, 600), 500)
+    for _ in range(60):  # frames: a second
+        assert source.advance()
+    assert 198 <= source.step <= 200
+    assert source.beside(-10) == source.step - 10
+    assert source.beside(10**6) == 599
+    with pytest.raises(SourceError, match="from step 0 to 599"):
+        source.go(600)
+    source.go(599)
+    come(source, range(600, 603), 600)
+    source.advance()
+    assert source.step == 602
+
+
+def test_steps_ascend_whatever_their_numbers_do(source: ReceivedSource) -> None:
+    come(source, [5, 6, None, 9, 3, 4, 1 << 60, (1 << 60) + 1, 0])
+    steps = [row.step for row in source._rows]
+    assert steps[:4] == [5, 6, 7, 9]
+    assert steps == sorted(set(steps))
+    assert len(steps) == 9
+    assert steps[-1] < 1 << 53
+
+
+def test_no_more_is_kept_than_there_is_room_for(compiled: nv.CompiledNetwork) -> None:
+    source = ReceivedSource(compiled.network, room=100_000)
+    come(source, range(5000))
+    reach = source.reach
+    assert source.advance()
+    assert source.reach.last == 4999
+    assert 100 < reach.last - source.reach.first < 400
+    source.go(source.reach.first)
+    come(source, range(5000, 9000), 5000)
+    assert source.seen().snapshot.step == source.step  # what is shown stays
+    assert source.advance()
+    assert source.step >= 8000
+
+
+@pytest.mark.parametrize("first", ["activity", "weights"])
+def test_weights_are_those_of_their_step(source: ReceivedSource, first: str) -> None:
+    for seq in range(5):
+        weights = np.array([seq + 0.5, seq + 0.25])
+        if first == "weights":
+            source.hear_weights(seq, weights)
+        source.hear_activity(seq, seq, np.zeros(3))
+        if first == "activity":
+            source.hear_weights(seq, weights)
+    source.go(3)
+    snapshot = source.seen().snapshot
+    assert snapshot.weights.tolist() == [3.5, 3.25, 0.25]
+    assert snapshot.previous_weights is not None
+    assert snapshot.previous_weights.tolist() == [2.5, 2.25, 0.25]
+
+
+def until(true: Callable[[], bool]) -> None:
+    end = time.monotonic() + 20
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.002)
+
+
+def test_a_live_run_follows_pauses_and_goes_back(compiled: nv.CompiledNetwork, source: ReceivedSource) -> None:
+    shown = list[Shown]()
+    run = Run(source, view_of(compiled, compiled.gains_for(None)), shown.append)
+    run.start()
+    try:
+        come(source, range(50))
+        until(lambda: bool(shown) and shown[-1].look.step == 49)
+        assert shown[-1].status.playing
+        assert not shown[-1].status.ended
+        count = len(shown)
+        come(source, range(50, 80), 50)
+        until(lambda: shown[-1].look.step == 79)
+        assert len(shown) - count <= 30
+        run.ask(Pause())
+        run.ask(Seek(10))
+        until(lambda: shown[-1].look.step == 10)
+        come(source, range(80, 90), 80)
+        run.ask(Step(1))
+        until(lambda: shown[-1].look.step == 11)
+        run.ask(Seek(10**6))
+        until(lambda: shown[-1].look.step == 89)
+        assert shown[-1].reach == Reach(0, 89)
+        come(source, range(90, 95), 90)
+        run.ask(Play())
+        until(lambda: shown[-1].look.step == 94)
+    finally:
+        run.end()
+    assert run.failure is None
+    assert source.came == 95
+    assert 5 <= source.shown <= 95
