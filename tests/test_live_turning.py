@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import asyncio
+import gzip
+import io
+import json
 import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 from chromium import Page
+from PIL import Image
 from test_live_browser import SPECS, STEP, pause, shown
 from test_live_looking import TIP, places, told
 
 import neurovis_spec as nv
+from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.live.declared import declared
+from neurovis_spec.live.view import view_of
 from neurovis_spec.themes import THEMES
 
 pytestmark = pytest.mark.browser
@@ -290,6 +296,49 @@ def test_a_refusal_is_read_while_it_plays_until_something_else_is_done(tmp_path:
             assert not await opened.ask(f"{said}.hidden")
             await opened.key("Escape")
             await opened.until(f"{said}.hidden")
+
+    asyncio.run(main())
+
+
+def test_what_is_lesioned_is_crossed_out(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, compiled, _):
+            await pause(opened)
+            scene = json.loads(gzip.decompress(view_of(compiled, compiled.gains).content))
+            groups = {next(iter(group["data"].values()), ""): group["shapes"][0] for group in scene["groups"]}
+            x, y = groups["K5"]["at"]
+            reach = 0.4 * groups["K5"]["radius"]
+            points = groups["C1 -> C2"]["points"]
+            middle = len(points) // 12 * 6  # the begin of the piece in the middle
+            assert (len(points) - 2) // 6 % 2 == 1
+            ends = np.array(points[middle : middle + 8]).reshape(4, 2)
+            line = np.array([1, 3, 3, 1]) @ ends / 8 * scene["density"]
+            disc = np.array([x + reach, y - reach]) * scene["density"]
+
+            async def dark(place: FloatArray) -> bool:
+                await opened.ask("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+                taken = np.array(Image.open(io.BytesIO(await opened.shot())).convert("L"))
+                column, row = np.rint(place).astype(int)
+                return bool(taken[row - 1 : row + 2, column - 1 : column + 2].min() < 60)
+
+            async def lesion(name: str) -> None:
+                await opened.ask("document.querySelector('#picture').focus()")
+                await opened.click(*places(compiled)[name])
+                await opened.until(f"document.querySelector('#parted').textContent == '{name}'")
+                await opened.ask("document.querySelector('#lesion').click()")
+                await opened.until(f"{TIP}.textContent.endsWith('lesioned')")
+                await opened.key("Escape")
+                await opened.point(2, 2)
+                await opened.until(f"{TIP}.hidden")
+
+            assert not await dark(disc)
+            assert not await dark(line)
+            await lesion("K5")
+            assert await dark(disc)
+            await lesion("C1 -> C2")
+            assert await dark(line)
+            await lesion("C1")
+            assert not await dark(line), "the line of a neuron that is crossed out is not"
 
     asyncio.run(main())
 

@@ -8,6 +8,7 @@ import { channels, luminance } from './colours.js';
 import { Controls, part } from './controls.js';
 import { Drawing } from './draw.js';
 import { listKeys } from './keys.js';
+import { Marks } from './marks.js';
 import { Matrix } from './matrix.js';
 import { Outline } from './outline.js';
 import { under } from './pick.js';
@@ -30,6 +31,8 @@ const CALM = 400;
 const ROOM = 12;
 /** @type {Drawing | null} */
 let drawing = null;
+/** what is lesioned in it @type {Marks | null} */
+let marks = null;
 /** what is shown in place of the drawing, where it is @type {Matrix | null} */
 let matrix = null;
 let fresh = false, asked = false, density = 0, shown = 0;
@@ -52,13 +55,19 @@ function show() {
   if (!matrix) {
     const scene = zoom.seen(camera);
     if (!scene) return;
-    if (!drawing || (drawing.scene !== scene && !drawing.isPassing(camera))) drawing = new Drawing(scene);
+    if (!drawing || (drawing.scene !== scene && !drawing.isPassing(camera))) {
+      drawing = new Drawing(scene);
+      marks = new Marks(scene);
+    }
   }
   const picture = matrix || drawing;
   if (!picture) return;
   [picture.near, picture.held] = [attention.near, attention.held];
   const more = picture.draw(context, camera, look);
-  if (!matrix && drawing) zoom.draw(context, camera, look, drawing);
+  if (!matrix && drawing) {
+    marks?.draw(context, camera, look, attention.near);
+    zoom.draw(context, camera, look, drawing);
+  }
   attention.show(camera, look);
   outline.show(look);
   controls.frame(look);
