@@ -50,6 +50,7 @@ def same(one: Seen, other: Seen) -> bool:
         and np.array_equal(a.weights, b.weights)
         and np.array_equal(one.lesioned_neurons, other.lesioned_neurons)
         and np.array_equal(one.lesioned_connections, other.lesioned_connections)
+        and np.array_equal(one.clamped, other.clamped)
     )
 
 
@@ -274,6 +275,25 @@ def test_each_rule_has_a_reference_that_stops_it() -> None:
         source = SimulatedSource(compiled.simulator())
         source.turn(Learn(rule.connections, False))
         assert source.learning[rule.connections] is False
+
+
+def test_what_is_clamped_by_events_and_by_hand_is_seen() -> None:
+    events = "  - {from: 5, to: 9, clamp: {A1..A2: 0}}\n  - {from: 7, to: 8, clamp: {A2 + B: 0}}\n"
+    compiled = network(SPEC + events)
+    source = SimulatedSource(compiled.simulator())
+    recorded = RecordedSource(compiled.network, compiled.run(12))
+    wanted = {4: [], 5: [0, 1], 6: [0, 1], 7: [0, 1, 3], 8: [0, 1], 9: []}
+    for step, clamped in wanted.items():
+        source.go(0)
+        while source.step < step:
+            source.advance()
+        recorded.go(step)
+        for one in (source, recorded):
+            assert np.flatnonzero(one.seen().clamped).tolist() == clamped, (step, one)
+    source.turn(Hold("A3", 0.5))
+    assert np.flatnonzero(source.seen().clamped).tolist() == [2]
+    source.turn(Release("A"))
+    assert not source.seen().clamped.any()
 
 
 def test_an_edited_comment_changes_nothing() -> None:

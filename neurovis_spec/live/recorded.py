@@ -9,9 +9,10 @@ from bisect import bisect_left
 
 import numpy as np
 
+from neurovis_spec.compiler.changes import Clamp
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.history import Recorded
-from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned
+from neurovis_spec.live.source import Capabilities, Mask, Reach, Seen, SourceError, Turned
 from neurovis_spec.live.turns import Turn
 from neurovis_spec.runtime.recording import Recording, RecordingError
 from neurovis_spec.scene.fading import snapshots_of
@@ -71,7 +72,19 @@ class RecordedSource:
         for mask, lesions in ((neurons, self._lesions.neurons), (connections, self._lesions.connections)):
             mask[[index for index, step in lesions.items() if step <= self.step]] = True
         (snapshot,) = snapshots_of(self.network, self._recording, [self.step])
-        return Seen(snapshot, neurons, connections)
+        return Seen(snapshot, neurons, connections, self._clamped())
+
+    def _clamped(self) -> Mask:
+        """Which neurons events clamp at this step; clamps by hand are no part of a recording."""
+        held: dict[int, Clamp] = {}
+        for change in self.network.changes:
+            if change.at <= self.step:
+                held = {order: clamp for order, clamp in held.items() if clamp.event not in change.released}
+                held |= {clamp.order: clamp for clamp in change.clamps}
+        clamped = np.zeros(len(self.network.neurons), bool)
+        for clamp in held.values():
+            clamped[clamp.neurons] = True
+        return clamped
 
     def advance(self) -> bool:
         """Go on by one row; False at the end."""

@@ -43,6 +43,7 @@ class SimulatedSource:
     ) -> None:
         self.network: Network = simulation.network
         self._rules = rules(self.network)
+        self._all_learn: Mapping[str, bool | None] = {rule.connections: True for rule in self._rules}
         self._simulation, self._room = simulation, room
         self._origin = simulation.state() if origin is None else origin
         self._begin(self._origin if begin is None else begin, turned, fed or {})
@@ -93,6 +94,8 @@ class SimulatedSource:
     def learning(self) -> Mapping[str, bool | None]:
         """Whether the rules of the network are carried out, by their connections; None where some are."""
         stopped = self._simulation.stopped
+        if not stopped.any():
+            return self._all_learn
         off = {rule.connections: stopped[rule.members] for rule in self._rules}
         return {name: None if some.any() and not some.all() else not some.any() for name, some in off.items()}
 
@@ -126,7 +129,7 @@ class SimulatedSource:
             self._keep()
         place = bisect_right(self._turned, self.step, key=attrgetter("step"))
         if place and self._turned[place - 1].step == self.step:
-            self._seen = Seen(self._seen.snapshot, *self._simulation.lesioned)
+            self._seen = self._turned_seen()
 
     def beside(self, by: int) -> int:
         """The step so many further on, or back."""
@@ -170,7 +173,11 @@ class SimulatedSource:
         if self._turned and self._turned[-1].step == self.step and same_value(self._turned[-1].turn, what):
             self._turned.pop()
         self._turned.append(Turned(self.step, what))
-        self._seen = Seen(self._seen.snapshot, *self._simulation.lesioned)
+        self._seen = self._turned_seen()
+
+    def _turned_seen(self) -> Seen:
+        """What is seen of this step after a turn: what is lesioned and clamped is that of the next one."""
+        return Seen(self._seen.snapshot, *self._simulation.lesioned, self._simulation.held)
 
     def _feed(self, what: Feed) -> None:
         entry = next((entry for entry in self.network.inputs if entry.name == what.name), None)
@@ -193,7 +200,7 @@ class SimulatedSource:
     def _make(self, before: Snapshot | None) -> Seen:
         """Compute a step; ``before`` is what was seen of the one before it."""
         run = self._simulation
-        step, weights, lesioned = run.k, run.connection_weights, run.lesioned
+        step, weights, lesioned, held = run.k, run.connection_weights, run.lesioned, run.held
         try:
             run.step({name: values if len(values) > 1 else values[0] for name, values in self._fed.items()})
         except ParameterError as error:  # what events set does not go with what was turned: the step was made without
@@ -202,7 +209,7 @@ class SimulatedSource:
         activity = run.activity
         self.history.note(step, activity, weights)
         seen = self._fading.follow(np.array([step]), activity[None]) if self._fading else None
-        return Seen(Snapshot(step, activity, weights, previous, seen), *lesioned)
+        return Seen(Snapshot(step, activity, weights, previous, seen), *lesioned, held)
 
 
 def _without_ways(turned: Sequence[Turned]) -> tuple[Turned, ...]:

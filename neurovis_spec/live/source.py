@@ -46,11 +46,13 @@ class Capabilities:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
-    """What is seen of a step: its snapshot, and which neurons (n,) and connections (m,) are lesioned."""
+    """What is seen of a step: its snapshot, which neurons (n,) and connections (m,) are lesioned, and which neurons are
+    clamped (n,)."""
 
     snapshot: Snapshot
     lesioned_neurons: Mask
     lesioned_connections: Mask
+    clamped: Mask
 
 
 @dataclass(frozen=True, slots=True)

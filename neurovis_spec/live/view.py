@@ -35,9 +35,9 @@ from neurovis_spec.themes import THEMES
 LEVELS = 127
 #: Widths are counted in these parts of a user unit, up to what 16 bits hold.
 FINENESS, _WIDEST = 16, (1 << 16) - 1
-#: What a connection or a neuron may be besides.
-BAR, FAINT, NEGATIVE = 1, 2, 4
-#: What a kind has besides in its higher bits: the size of a weight, from 0 to the largest of its scale.
+#: Bits of a kind: a line that ends in a bar, what is lesioned, a connection whose weight is negative, a clamped neuron.
+BAR, FAINT, NEGATIVE, CLAMPED = 1, 2, 4, 4
+#: What the kind of a line has besides in its higher bits: the size of a weight, from 0 to the largest of its scale.
 SHARES, _SHARE = 31, 8
 
 
@@ -45,7 +45,7 @@ SHARES, _SHARE = 31, 8
 class Look:
     """What a step looks like: colour values of discs (n,) and lines (m,); widths and glow widths (m,); and ``kinds``
     (m + n,): of each connection, then of each neuron, BAR where its line ends in a bar, FAINT where it is lesioned,
-    NEGATIVE where its weight is, and in the higher bits how large it is."""
+    of a line NEGATIVE where its weight is, and in the higher bits how large it is; of a neuron CLAMPED where it is."""
 
     step: int
     caption: str
@@ -87,7 +87,7 @@ class View:
             lines=_levels(shown.lines),
             widths=_parts(shown.widths),
             glows=_parts(shown.glows),
-            kinds=np.concatenate([of_lines, neurons * FAINT]).astype(np.uint8),
+            kinds=np.concatenate([of_lines, neurons * FAINT + self._all(seen.clamped) * CLAMPED]).astype(np.uint8),
         )
 
     def _shares(self, weights: FloatArray) -> npt.NDArray[np.int64]:
@@ -119,9 +119,16 @@ class View:
         if not drawn.any:
             return seen.lesioned_neurons, seen.lesioned_connections
         outside = drawn.bundle >= 0
-        neurons = np.bincount(drawn.unit, seen.lesioned_neurons, len(drawn.sizes)) == drawn.sizes
         gone = np.bincount(drawn.bundle[outside], seen.lesioned_connections[outside], len(drawn.counts))
-        return neurons, gone == drawn.counts
+        return self._all(seen.lesioned_neurons), gone == drawn.counts
+
+    def _all(self, neurons: Mask) -> Mask:
+        """What is drawn and stands for such neurons alone."""
+        drawn = self.drawn
+        if not drawn.any:
+            return neurons
+        some: Mask = np.bincount(drawn.unit, neurons, len(drawn.sizes)) == drawn.sizes
+        return some
 
 
 def view_of(
@@ -141,7 +148,7 @@ def view_of(
     largest = np.ones(len(seen.thickness))
     for scale in seen.thickness_scales:
         largest[seen.thickness == scale.gain] = scale.reaches or 1.0
-    kinds = {"isBar": BAR, "isFaint": FAINT, "isNegative": NEGATIVE}
+    kinds = {"isBar": BAR, "isFaint": FAINT, "isNegative": NEGATIVE, "isClamped": CLAMPED}
     constants = {"levels": LEVELS, "fineness": FINENESS, "shares": SHARES, "share": _SHARE, **kinds}
     scene = _scene(planned, seen)
     rows = order_of(drawn.network, layout, range(len(drawn.network.neurons)))

@@ -148,7 +148,8 @@ class ReceivedSource:
         if before is not None and before.step == at.step - 1:
             previous = self._all_weights(before)
         snapshot = Snapshot(at.step, at.activity, self._all_weights(at), previous, at.seen)
-        return Seen(snapshot, np.zeros(len(network.neurons), bool), np.zeros(len(network.connections), bool))
+        neurons, connections = np.zeros(len(network.neurons), bool), np.zeros(len(network.connections), bool)
+        return Seen(snapshot, neurons, connections, neurons)
 
     def _all_weights(self, row: _Row) -> FloatArray:
         weights: FloatArray = self.network.connections.weights.copy()

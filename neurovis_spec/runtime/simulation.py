@@ -115,6 +115,11 @@ class Simulation:
         return now.lesioned_neurons.copy(), now.structure.gone.copy()
 
     @property
+    def held(self) -> npt.NDArray[np.bool_]:
+        """Which neurons (n,) are clamped from step k on, a copy."""
+        return self._state.conditions.held.order >= 0
+
+    @property
     def stopped(self) -> npt.NDArray[np.bool_]:
         """Of which connections (m,) the rules are stopped from step k on, a copy."""
         return self._state.conditions.paused.copy()

@@ -11,6 +11,15 @@ const GAINS = {
   activity: 'colour of neurons', signal: 'colour of connections', thickness: 'thickness of connections', change: 'glow where weights change',
 };
 
+/** What is drawn otherwise than the spec says: in words, and what takes it back. @param {Object<string, any>} shown
+ * @returns {{words: string, back: object}[]} */
+export function drawnOtherwise(shown) {
+  return Object.entries(shown).filter(([name, value]) => value !== (name === 'theme' ? '' : 1)).map(([name, value]) => ({
+    words: name === 'theme' ? `theme ${value}` : `gain of ${name} × ${value}`,
+    back: { ...shown, [name]: name === 'theme' ? '' : 1 },
+  }));
+}
+
 /** A choice of themes, and a slider for each gain. */
 export class Appearance {
   /** @param {Link} link @param {HTMLSelectElement} theme @param {HTMLElement} place */

@@ -140,8 +140,8 @@ export class Attention {
     const told = id in this.values ? [`${neuron === undefined ? 'weight' : 'activity'} ${signed(this.values[id])}`] : [];
     if (delay !== undefined && !more.some((line) => line.startsWith('delay '))) told.push(`delay ${delay}`);
     const item = Number(id.slice(1)) + (neuron === undefined ? 0 : look.widths.length);
-    const gone = look.kinds[item] & (this.link.scene ? this.link.scene.constants.isFaint : 0) ? ['lesioned'] : [];
-    return [name, ...told, ...more, ...gone].join('\n');
+    const { isClamped = 0, isFaint = 0 } = this.link.scene?.constants ?? {}, kind = look.kinds[item];
+    return [name, ...told, ...more, ...(neuron !== undefined && kind & isClamped ? ['clamped'] : []), ...(kind & isFaint ? ['lesioned'] : [])].join('\n');
   }
 
   /** Where a neuron is, or the tip of a connection. @param {string} id @returns {number[]} */

@@ -2,7 +2,7 @@
  * Turning: parameters, inputs, rules, clamps and lesions by hand; what was turned, listed, taken back, and copied for the spec.
  */
 
-import { Appearance } from './appearance.js';
+import { Appearance, drawnOtherwise } from './appearance.js';
 import { eventsOf, takenBack } from './events.js';
 import { Feeds } from './feeds.js';
 import { Rules } from './rules.js';
@@ -94,25 +94,30 @@ export class Turning {
     this.sliders.show(status.parameters);
     this.feeds.show(status.fed);
     this.rules.show(status.learning);
-    this.list(status.turned);
+    this.list(status.turned, status.appearance);
     /** @type {HTMLTextAreaElement} */ (this.find('events')).value = eventsOf(status.turned);
   }
 
-  /** List what was turned, the latest first. @param {Turned[]} turned */
-  list(turned) {
+  /** List what was turned, the latest first, and after that what is drawn otherwise.
+   * @param {Turned[]} turned @param {Object<string, any>} appearance */
+  list(turned, appearance) {
     const list = this.find('turned'), focused = list.contains(document.activeElement);
-    const rows = turned.map((entry, place) => {
-      const row = document.createElement('li'), undo = document.createElement('button');
-      const words = `step ${entry.step + 1}: ${told(entry)}`;
+    const row = (/** @type {string} */ words, /** @type {() => {type: string}} */ taken) => {
+      const one = document.createElement('li'), undo = document.createElement('button');
       undo.textContent = 'undo';
       undo.setAttribute('aria-label', `undo ${words}`);
       undo.onclick = () => {
-        const { type, ...more } = takenBack(turned, place, this.declared);
+        const { type, ...more } = taken();
         this.link.ask(type, more);
       };
-      row.append(words, undo);
-      return row;
-    });
+      one.append(words, undo);
+      return one;
+    };
+    const rows = [
+      ...drawnOtherwise(appearance).map(({ words, back }) => row(words, () => ({ type: 'draw', ...back }))),
+      ...turned.map((entry, place) => row(`step ${entry.step + 1}: ${told(entry)}`,
+        () => takenBack(turned, place, this.declared))),
+    ];
     list.replaceChildren(...rows.reverse());
     if (focused) (list.querySelector('button') || this.find('copy')).focus();
   }
