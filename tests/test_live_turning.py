@@ -234,6 +234,26 @@ def test_a_slider_that_is_dragged_while_it_plays_is_one_turn(tmp_path: Path) -> 
     asyncio.run(main())
 
 
+def test_a_slider_that_is_moved_by_keys_is_one_turn(tmp_path: Path) -> None:
+    async def main() -> None:
+        (tmp_path / "fed.yaml").write_text(FED)
+        async with shown(str(tmp_path / "fed.yaml"), tmp_path) as (opened, _, _):
+            await opened.key("t")
+            slider = "document.querySelector('#slider-pull')"
+            await opened.ask(f"{slider}.focus()")
+            for _ in range(4):
+                before, here = await opened.ask(f"{slider}.value"), await opened.ask(STEP)
+                for kind in ("rawKeyDown", "keyUp"):
+                    await opened.call("Input.dispatchKeyEvent", type=kind, key="ArrowRight", windowsVirtualKeyCode=39)
+                await opened.until(f"{slider}.value != '{before}' && {STEP} > {here} + 3")
+            await turned(opened, f"pull = {await opened.ask(f'{slider}.value')}")
+            for kind in ("rawKeyDown", "keyUp"):
+                await opened.call("Input.dispatchKeyEvent", type=kind, key="Delete", windowsVirtualKeyCode=46)
+            await opened.until(f"{slider}.value == '0.1'")
+
+    asyncio.run(main())
+
+
 def test_inputs_without_a_source_are_fed_by_sliders_until_they_are_reset(tmp_path: Path) -> None:
     async def main() -> None:
         (tmp_path / "fed.yaml").write_text(FED)

@@ -43,7 +43,7 @@ export class Appearance {
     this.sliders = new Sliders(place);
     for (const [name, description] of Object.entries(GAINS)) {
       this.sliders.add({ name, value: 1, low: 1 / 64, high: 64, description, log: true }, `gain-${name}`,
-        (value, moving) => { if (!moving) ask({ [name]: value ?? 1 }); });
+        (value) => ask({ [name]: value ?? 1 }));
     }
   }
 

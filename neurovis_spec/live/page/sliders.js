@@ -28,6 +28,8 @@ export class Sliders {
     /** the names of those that go by factors @type {Set<string>} */
     this.log = new Set();
     this.sent = 0;
+    /** whether a key is pressed */
+    this.pressed = false;
   }
 
   /** No rows. */
@@ -58,10 +60,15 @@ export class Sliders {
       this.sent = performance.now();
       given(slid(), true);
     };
-    slider.onchange = () => given(slid(), false);
+    // several keys in a row are one way
+    slider.onchange = () => given(slid(), this.pressed);
+    slider.onkeyup = () => { this.pressed = false; };
     field.onchange = () => { if (field.value && field.checkValidity()) given(Number(field.value), false); };
     slider.ondblclick = () => given(null, false);
-    slider.onkeydown = (event) => { if (event.key === 'Delete') given(null, false); };
+    slider.onkeydown = (event) => {
+      this.pressed = true;
+      if (event.key === 'Delete') given(null, false);
+    };
     row.append(label, document.createElement('span'), slider, field, ...(description ? [about] : []));
     this.inputs.set(name, [slider, field]);
     this.place.append(row);
