@@ -29,7 +29,13 @@ pytestmark = pytest.mark.browser
 
 SPECS = Path(__file__).parents[1] / "specs"
 STEP = "Number(document.querySelector('#told')?.textContent.split(' ')[1])"
-BAR = 44
+
+
+async def fit(opened: Page, width: int, height: int, density: float = 1.0) -> None:
+    """Have the picture so large, whatever stands below it."""
+    below = await opened.ask("innerHeight - document.querySelector('#stage').offsetHeight")
+    assert isinstance(below, int)
+    await opened.size(width, height + below, density)
 
 
 @asynccontextmanager
@@ -50,12 +56,10 @@ async def shown(
     width, height = round(frame.width * frame.density), round(frame.height * frame.density)
     try:
         async with chromium(folder) as opened:
-            await opened.size(width, height + BAR)
+            await opened.size(width, height)
             await opened.call("Page.navigate", url=access.url())
             await opened.until(f"{STEP} >= 0")
-            below = await opened.ask("innerHeight - document.querySelector('#stage').offsetHeight")
-            assert isinstance(below, int)
-            await opened.size(width, height + below)
+            await fit(opened, width, height)
             yield opened, compiled, access
             assert opened.errors == []
     finally:
@@ -110,7 +114,7 @@ def test_two_thousand_lines_are_those_of_render_on_a_display_of_two_pixels_a_pix
             snapshot, layout = compiled.run(step + 1).snapshot(step), compiled.drawn().value
             scene = pipeline.picture(compiled.network, layout, snapshot, compiled.gains, compiled.network.render)
             width, height = round(scene.width * scene.density), round(scene.height * scene.density)
-            await opened.size(width, height + BAR, density=2.0)
+            await fit(opened, width, height, density=2.0)
             await opened.shot()  # headless, a page that stands still notices another display when it is looked at
             await opened.until(f"document.querySelector('#picture').width == {2 * width}")
             await opened.ask("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")

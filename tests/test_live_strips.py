@@ -130,7 +130,7 @@ def test_it_jumps_to_events_which_are_marked_as_turns_are(tmp_path: Path) -> Non
             await opened.ask("document.querySelector('#before').click()")
             await opened.until(f"{STEP} == {steps[0]}")
             await opened.key("E")
-            await opened.until("document.querySelector('#told').textContent.startsWith('there is no event before')")
+            await opened.until("document.querySelector('#refusal').textContent.startsWith('there is no event before')")
 
     asyncio.run(main())
 
