@@ -11,6 +11,7 @@ import pytest
 from chromium import Page
 from PIL import Image
 from test_live_browser import pause, shown
+from test_live_drawing import opened as drawn_alone
 from test_live_looking import TIP, places, told
 
 from neurovis_spec.live.view import LEVELS, view_of
@@ -130,5 +131,29 @@ def test_dotted_lines_recede_too_where_something_else_is_held(tmp_path: Path) ->
             of_its_own = await ink()
             assert held < 0.7 * before
             assert of_its_own > 1.2 * held
+
+    asyncio.run(main())
+
+
+def test_a_picture_that_takes_long_is_made_anew_only_when_the_camera_stands(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with drawn_alone(tmp_path) as opened:
+            await opened.ask(
+                "import('/zoom.js').then(({Zoom}) => { window.zoom = new Zoom(); "
+                "window.passing = () => one.drawing.isPassing(camera); })"
+            )
+            assert not await opened.ask("passing()"), "it stands"
+            await opened.ask(
+                "Object.assign(one.drawing, {cost: 1000, since: performance.now()}); camera.closer(2, 9, 9)"
+            )
+            assert await opened.ask("passing()")
+            assert not await opened.ask("draw() && passing()"), "and stands again"
+            same = await opened.ask(
+                "(({scene}) => { zoom.use(scene); camera.move(0, 0); camera.zoom = 1; const whole = zoom.seen(camera); "
+                "camera.zoom = 4; const near = zoom.seen(camera); camera.move(5, 5); "
+                "return [whole === scene, near === scene, zoom.seen(camera) === near]; })(one.drawing)"
+            )
+            assert same == [True, False, True]
+            assert opened.errors == []
 
     asyncio.run(main())

@@ -32,7 +32,10 @@ export class Zoom {
     this.around = new Map();
     /** @type {Scene | null} */
     this.made = null;
-    this.key = '';
+    /** what it was made for, and from where it was last seen */
+    this.key = this.from = '';
+    /** how thick lines are, and how large labels, beside the picture's */
+    this.ink = 1;
   }
 
   /** Another network. @param {Scene} scene */
@@ -65,11 +68,14 @@ export class Zoom {
   /** The scene as it is seen from here; the same as long as it is drawn the same way. @param {Camera} camera @returns {Scene | null} */
   seen(camera) {
     const { scene } = this;
-    if (!scene) return null;
+    const from = [camera.scale, camera.whole, devicePixelRatio].join();
+    if (!scene || (this.made && from === this.from)) return this.made;
+    this.from = from;
     const ink = Math.min(1, Math.max(scene.density * devicePixelRatio, camera.whole) / camera.scale), closed = this.shut(camera);
     const key = `${ink.toFixed(3)} ${closed.map(({ id }) => id).join()}`;
     if (this.made && key === this.key) return this.made;
     this.key = key;
+    this.ink = ink;
     this.closed = closed;
     this.around.clear();
     for (const { id, data, shapes } of closed.length ? scene.groups : []) {
@@ -80,7 +86,7 @@ export class Zoom {
     this.made = ink === 1 && !closed.length ? scene : {
       ...scene,
       constants: { ...scene.constants, fineness: fineness / ink, headMore: headMore * ink },
-      groups: scene.groups.filter((group) => !this.covers(group)).map((group) => this.inked(group, ink)),
+      groups: scene.groups.filter((group) => !this.covers(group)).map((group) => this.inked(group)),
     };
     return this.made;
   }
@@ -95,9 +101,10 @@ export class Zoom {
     return Boolean(one) && this.closed.some(({ rect }) => one && within(rect, one.rect) && within(rect, one.rect.slice(2)));
   }
 
-  /** A group with less ink: thinner lines, smaller labels. @param {Group} group @param {number} ink @returns {Group} */
-  inked(group, ink) {
-    const { id, data, shapes } = group, [first] = shapes;
+  /** A group as it is drawn from here: near by with less ink, thinner lines and smaller labels. @param {Group} group
+   * @returns {Group} */
+  inked(group) {
+    const { ink } = this, { id, data, shapes } = group, [first] = shapes;
     if (ink === 1 || !(Object.keys(data).length || /^(box|instance|title):/.test(id))) return group;
     const { notch } = /** @type {Scene} */ (this.scene).constants, head = shapes.find(({ kind }) => kind === 'head');
     return { ...group, shapes: shapes.map((shape) => {
