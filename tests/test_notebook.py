@@ -260,6 +260,13 @@ def test_a_recording_shows_itself_with_play_and_scrubber_and_its_traces_beside()
     widget.close()
 
 
+def test_a_live_view_has_a_picture_for_those_who_read_the_notebook() -> None:
+    with notebook() as it:
+        shown = displayed(it.widget)
+    assert set(shown) == {WIDGET, "image/svg+xml", "text/plain"}
+    assert "live view of cell" in str(shown["text/plain"])
+
+
 def test_what_cannot_be_played_shows_its_traces() -> None:
     network = nv.compile_text(SPEC)
     for recording in (network.run(20, neurons="A"), network.run(0)):

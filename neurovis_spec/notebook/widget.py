@@ -76,6 +76,7 @@ class LiveWidget(anywidget.AnyWidget):
         super().__init__()
         stage = show.stage(compiled)
         frame = stage[1].plan.frame
+        self._picture = compiled.drawn(show.engine)
         self.title = f"{stage[1].plan.title} – NeuroVis"
         self.height = min(max(round(frame.height * frame.density) + _BAR, _LEAST), _MOST)
         self._known: dict[str, float] = {}
@@ -84,6 +85,13 @@ class LiveWidget(anywidget.AnyWidget):
         self._declare(compiled, stage[0].parameters)
         self._session.begin()
         self.on_msg(self._take_message)
+
+    def __repr__(self) -> str:
+        return f"<live view of {self._picture.compiled.name}>"
+
+    def _repr_svg_(self) -> str:
+        """The network before anything happens, for where a notebook is read that does not run."""
+        return self._picture._repr_svg_()
 
     def play(self) -> None:
         """Go on."""
