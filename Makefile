@@ -8,8 +8,8 @@
 #   make fuzz       20,000 broken specs and 5,000 expressions (FUZZ_ARGS=... for more), two or three minutes
 #   make layouts    layouts beside dot's, sfdp's and networkx' (LAYOUTS_ARGS="--all --graphs FOLDER" for more)
 #   make docs       writes the generated parts of docs/ anew
-#   make page       puts the page of the live view together from its modules
-#   make page-check checks its JavaScript: types and lint; needs node and npm
+#   make page       puts the page of the live view together from its modules; needs node and npm
+#   make page-check checks its JavaScript: types and lint, and that the page is up to date; needs node and npm
 #
 # PYTHON=... names another interpreter to make .venv with, PYTEST_ARGS=... adds to pytest's arguments.
 
@@ -104,8 +104,9 @@ node_modules/made: package.json
 	@$(NPM) install --silent
 	@touch $@
 
-page-check: node_modules/made
+page-check: $(VENV)/tested node_modules/made
 	$(NPM) run --silent check
+	$(BIN)/python neurovis_spec/live/page/build.py --check
 
 ROS_1 := python3-rosmaster python3-rospy python3-std-msgs python3-sensor-msgs
 
@@ -125,7 +126,7 @@ docs: $(VENV)/installed
 	$(BIN)/python docs/make_language.py
 	$(BIN)/python -m neurovis_spec.codes > docs/errors.md
 
-page: $(VENV)/tested
+page: $(VENV)/tested node_modules/made
 	$(BIN)/python neurovis_spec/live/page/build.py
 
 format: $(VENV)/tested

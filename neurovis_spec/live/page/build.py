@@ -1,13 +1,14 @@
 """Puts the page together: its modules, its style and its frame become ``page.html``, which is what is shipped.
 
-In: the files beside this one. Out: the page beside this folder. Run it after every change:
-``python neurovis_spec/live/page/build.py``. Modules become one script: their imports and exports go, so every name at
-the top of a module must be unique among all of them, which is checked. Comments stand on lines of their own.
+In: the files beside this one. Out: the page beside this folder, which begins with a digest of them. Run ``make page``
+after every change: esbuild, which npm installs, makes one small script of the modules. ``--check`` says whether the
+page is up to date.
 """
 
 from __future__ import annotations
 
-import re
+import hashlib
+import subprocess
 import sys
 from pathlib import Path
 
@@ -15,65 +16,40 @@ from jinja2 import Environment, StrictUndefined
 
 HERE = Path(__file__).parent
 TARGET = HERE.parent / "page.html"
-FIRST = "main.js"
-
-_IMPORT = re.compile(r"^import \{[^}]*\} from '\./([\w-]+\.js)';\n", re.MULTILINE)
-_TOP = re.compile(r"^(?:export )?(?:async )?(?:function|class|const|let) +(?:\{([^}]*)\}|(\w+))", re.MULTILINE)
-_MORE = re.compile(r"^(?:const|let) +(\w+ = [^(\[{;\n]*(?:, \w+ = [^(\[{;\n]*)+);", re.MULTILINE)
-_BLOCK = re.compile(r"^ *(?:/\*\*(?:[^*]|\*(?!/))*\*/|//.*)\n", re.MULTILINE)
-_TYPE = re.compile(r"/\*\* @(?:type|param) \{[^*]*\} ?\w*? ?\*/ ?")
+ESBUILD = HERE.parents[2] / "node_modules" / ".bin" / "esbuild"
 
 
-class BuildError(ValueError):
-    """Modules that cannot become one script."""
+def sources() -> list[Path]:
+    """The files that the page is made of."""
+    return sorted([*HERE.glob("*.js"), HERE / "style.css", HERE / "frame.html"])
 
 
-def order(first: str, seen: list[str]) -> list[str]:
-    """The modules that ``first`` needs, each after those that it needs itself."""
-    if first not in seen:
-        for needed in _IMPORT.findall((HERE / first).read_text(encoding="utf-8")):
-            order(needed, seen)
-        seen.append(first)
-    return seen
+def digest() -> str:
+    """A digest of the sources, by which a page says what it was made of."""
+    whole = hashlib.sha256()
+    for file in sources():
+        whole.update(f"{file.name}\n".encode() + file.read_bytes())
+    return whole.hexdigest()[:16]
 
 
-def names(text: str) -> list[str]:
-    """The names at the top of a module."""
-    found = []
-    for several, one in _TOP.findall(text):
-        found += [name.strip() for name in several.split(",")] if several else [one]
-    for line in _MORE.findall(text):
-        found += [entry.split("=")[0].strip() for entry in line.split(",")[1:]]
-    return found
-
-
-def script() -> str:
-    """All modules as one script."""
-    parts, known = [], dict[str, str]()
-    for module in order(FIRST, []):
-        text = (HERE / module).read_text(encoding="utf-8")
-        for name in names(text):
-            if known.setdefault(name, module) != module:
-                raise BuildError(f"'{name}' is at the top of {module} and of {known[name]}")
-        parts.append(small(re.sub(r"^export ", "", _IMPORT.sub("", text), flags=re.MULTILINE)))
-    return "\n" + "".join(parts)
-
-
-def small(text: str) -> str:
-    """A script or a style without comments, indentation and empty lines."""
-    lines = (line.strip() for line in _TYPE.sub("", _BLOCK.sub("", text)).split("\n"))
-    return "".join(f"{line}\n" for line in lines if line)
+def small(entry: str) -> str:
+    """A script or a style with all that it imports, minified."""
+    if not ESBUILD.exists():
+        sys.exit("esbuild is not here: run make page, which has npm install it")
+    options = ("--bundle", "--minify", "--format=esm", "--target=es2022", "--charset=utf8", "--log-level=warning")
+    made = subprocess.run([ESBUILD, HERE / entry, *options], check=True, capture_output=True, text=True)
+    return made.stdout.strip()
 
 
 def page() -> str:
     """The page."""
     environment = Environment(undefined=StrictUndefined, autoescape=False, keep_trailing_newline=True)
     frame = environment.from_string((HERE / "frame.html").read_text(encoding="utf-8"))
-    return frame.render(style="\n" + small((HERE / "style.css").read_text(encoding="utf-8")), script=script())
+    return frame.render(digest=digest(), style=small("style.css"), script=small("main.js"))
 
 
 if __name__ == "__main__":
     text = page()
     if sys.argv[1:] == ["--check"]:
-        sys.exit(0 if TARGET.read_text(encoding="utf-8") == text else f"{TARGET} is not up to date: run {__file__}")
+        sys.exit(0 if TARGET.read_text(encoding="utf-8") == text else f"{TARGET.name} is not up to date: run make page")
     TARGET.write_text(text, encoding="utf-8")
