@@ -58,7 +58,7 @@ def test_whatever_has_the_focus_has_an_outline_that_is_seen(theme: str, tmp_path
             await opened.key("]")
             await opened.key("t")
             seen = set()
-            for _ in range(40):
+            for _ in range(80):
                 for kind in ("rawKeyDown", "keyUp"):
                     await opened.call("Input.dispatchKeyEvent", type=kind, key="Tab", windowsVirtualKeyCode=9)
                 found = await opened.ask(
