@@ -205,6 +205,7 @@ def test_the_page_carries_a_strict_policy_and_may_only_run_its_own_script() -> N
         assert headers["Referrer-Policy"] == "no-referrer"
         assert headers["Cache-Control"] == "no-store"
         assert headers["Server"] == "neurovis"
+        assert headers["Content-Encoding"] in ("deflate", "gzip")
 
     served(test)
 

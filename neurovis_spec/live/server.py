@@ -122,7 +122,9 @@ class Server:
         if refused is not None:
             return self._refuse(refused.status, refused.reason)
         if request.path == PAGE:
-            return web.Response(text=self._html, content_type="text/html", charset="utf-8")
+            response = web.Response(text=self._html, content_type="text/html", charset="utf-8")
+            response.enable_compression()
+            return response
         return await self._stream(request, bool(self._access.of(token)))
 
     @staticmethod
