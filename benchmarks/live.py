@@ -5,9 +5,9 @@
 
 For each size every contender is measured in turn, several times, in a Chromium of its own, in a window that shows the
 picture a pixel a pixel; what is told is the median. Frames shown are different steps that were drawn, of a run that
-makes one in 16 ms, with all that belongs to it: the run, the server, the websocket, the page. The peers draw the same
-discs and curves (sigma.js: straight arrows) without labels, and make their colours up, as fast as the display asks for
-frames.
+makes one in 16 ms, with all that belongs to it: the run, the server, the websocket, the page. "page" is the
+page's drawing alone, with its labels, and the peers draw the same discs and curves (sigma.js: straight arrows) without
+labels: these have nothing else to do, and make their colours up, as fast as the display asks for frames.
 
 From activity to screen: from when a step was made to when the display asks for the frame after the one in which it was
 drawn. Bytes are those of all messages. The run's delay is how late each of its steps is made, from the earliest of
@@ -55,7 +55,7 @@ sys.path.insert(0, str(HERE.parent / "tests"))
 from chromium import Page, chromium  # noqa: E402
 
 SIZES = ((12, 28), (150, 200), (200, 400), (448, 7379), (1000, 10_000))
-PEERS = ("sigma", "pixi", "stroked")
+PEERS = ("page", "sigma", "pixi", "stroked")
 BAR = 44
 #: WebGL is drawn by the processor.
 WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
@@ -176,6 +176,7 @@ async def peer(name: str, view: View, compiled: nv.CompiledNetwork, seconds: flo
 
     app = web.Application()
     app.router.add_get("/scene", scene)
+    app.router.add_static("/page", HERE.parent / "neurovis_spec/live/page")
     app.router.add_static("/", HERE / "page_peers")
     runner, sock = web.AppRunner(app), listen("127.0.0.1", 0)
     await runner.setup()
@@ -202,8 +203,10 @@ def of_peers(view: View, compiled: nv.CompiledNetwork) -> dict[str, object]:
     scene = json.loads(gzip.decompress(view.content))
     source = SimulatedSource(compiled.simulator())
     source.advance()
-    widths = (view.look(source.seen()).widths / FINENESS).tolist()
-    discs, lines, names = [], [], dict[str, int]()
+    sizes = view.look(source.seen()).widths.tolist()
+    names: dict[str, int] = {}
+    discs: list[object] = []
+    lines: list[object] = []
     for group in scene["groups"]:
         if "neuron" in group["data"]:
             names[group["data"]["neuron"]] = len(discs)
@@ -215,7 +218,9 @@ def of_peers(view: View, compiled: nv.CompiledNetwork) -> dict[str, object]:
             corners = [(0, 0), (-head["length"], head["half"]), (notch, 0), (-head["length"], -head["half"])]
             at = [value for a, b in corners for value in (x + a * dx - b * dy, y + a * dy + b * dx)]
             ends = {"from": names[group["data"]["from"]], "to": names[group["data"]["to"]]}
-            lines.append({**ends, "points": line["points"], "width": widths[int(group["id"][1:])], "head": at})
+            lines.append(
+                {**ends, "points": line["points"], "width": sizes[int(group["id"][1:])] / FINENESS, "head": at}
+            )
     anchors = [
         [int(scene["theme"][name][i : i + 2], 16) for i in (1, 3, 5)] for name in ("negative", "zero", "positive")
     ]
@@ -223,7 +228,7 @@ def of_peers(view: View, compiled: nv.CompiledNetwork) -> dict[str, object]:
     rgb = [np.interp(shares, (-1, 0, 1), channel).round().astype(int) for channel in zip(*anchors, strict=True)]
     fills = (rgb[0] * 65536 + rgb[1] * 256 + rgb[2]).tolist()
     size = {"width": scene["width"], "height": scene["height"], "scale": scene["density"]}
-    return {**size, "discs": discs, "lines": lines, "fills": fills}
+    return {**size, "discs": discs, "lines": lines, "fills": fills, "scene": scene, "widths": sizes}
 
 
 async def photographed(page: Page, shot: Path | None) -> None:

@@ -3,12 +3,25 @@
  * its own that changes with each frame. `measure(name, milliseconds)` tells how many frames a second are drawn.
  */
 
-const { width, height, scale, discs, lines, fills } = await (await fetch('scene')).json();
+const { width, height, scale, discs, lines, fills, scene, widths } = await (await fetch('scene')).json();
 const stage = document.getElementById('stage'), LEVELS = (fills.length - 1) / 2;
 const css = fills.map((colour) => `#${colour.toString(16).padStart(6, '0')}`);
 
 /** The level of a neuron at a time; a connection has that of its source. */
 const level = (neuron, time) => LEVELS + Math.round(LEVELS * Math.sin(time / 300 + neuron));
+
+/** Ours, without its run and its server: the live page's own drawing, with its labels and its legend. */
+async function page() {
+  const { Drawing } = await import('./page/draw.js'), { Camera } = await import('./page/camera.js');
+  const canvas = Object.assign(document.createElement('canvas'), { width: width * scale, height: height * scale });
+  const context = canvas.getContext('2d', { alpha: false }), drawing = new Drawing(scene), none = widths.map(() => 0);
+  const camera = Object.assign(new Camera(), { size: [width, height], window: [canvas.width, canvas.height] });
+  stage.append(canvas);
+  return (now) => drawing.draw(context, camera, {
+    discs: discs.map((_, at) => level(at, now) - LEVELS), lines: lines.map(({ from }) => level(from, now) - LEVELS),
+    widths, glows: none, kinds: [...none, ...discs.map(() => 0)], caption: `${Math.round(now)} ms`,
+  });
+}
 
 /** sigma.js: straight arrows; colours by its reducers. */
 function sigma() {
@@ -83,7 +96,7 @@ function stroked() {
 
 /** Frames a second: of those that the display asks for, how many are drawn. */
 window.measure = async (name, milliseconds) => {
-  const draw = await { sigma, pixi, stroked }[name]();
+  const draw = await { page, sigma, pixi, stroked }[name]();
   const frame = () => new Promise(requestAnimationFrame);
   for (let i = 0; i < 3; i++) draw(await frame());
   const begun = performance.now();
