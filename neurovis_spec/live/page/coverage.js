@@ -7,6 +7,8 @@
 export const SIDE = 32;
 /** The weights of a pixel add up to this; an entry is a slot, of which colours are known, and in its low bits a weight. */
 const WHOLE = 256, LOW = 511, BITS = 9;
+/** The least weight that is seen. */
+const SEEN = 3;
 const OPAQUE = 255 << 24, UP = 65536;
 
 /** Red, green and blue in one number, so that a weighted sum is one sum. @param {number[]} rgb @returns {number} */
@@ -39,32 +41,29 @@ function inside(far) {
 
 /** @param {number[]} points of a cubic spline @param {number} scale @param {number[]} origin @returns {Chain} */
 export function flattened(points, scale, [left, top]) {
-  const found = [points[0] * scale + left, points[1] * scale + top];
+  const at = [points[0] * scale + left, points[1] * scale + top];
   for (let i = 2; i + 5 < points.length; i += 6) {
-    const [ax, ay, bx, by, cx, cy, dx, dy] = points.slice(i - 2, i + 6).map((v, at) => v * scale + (at % 2 ? top : left));
+    const ax = points[i - 2] * scale + left, ay = points[i - 1] * scale + top, bx = points[i] * scale + left;
+    const by = points[i + 1] * scale + top, cx = points[i + 2] * scale + left, cy = points[i + 3] * scale + top;
+    const dx = points[i + 4] * scale + left, dy = points[i + 5] * scale + top;
     const bend = Math.max(Math.hypot(ax - 2 * bx + cx, ay - 2 * by + cy), Math.hypot(bx - 2 * cx + dx, by - 2 * cy + dy));
     const count = Math.max(1, Math.ceil(Math.sqrt(7.5 * bend)));
     for (let k = 1; k <= count; k++) {
-      const t = k / count, s = 1 - t, [p, q, u, v] = [s * s * s, 3 * s * s * t, 3 * s * t * t, t * t * t];
-      const x = p * ax + q * bx + u * cx + v * dx, y = p * ay + q * by + u * cy + v * dy;
-      if (Math.hypot(x - found[found.length - 2], y - found[found.length - 1]) > 1e-3) found.push(x, y);
+      const t = k / count, s = 1 - t, p = s * s * s, q = 3 * s * s * t, u = 3 * s * t * t, v = t * t * t;
+      const x = p * ax + q * bx + u * cx + v * dx, y = p * ay + q * by + u * cy + v * dy, last = at.length - 2;
+      if (Math.abs(x - at[last]) + Math.abs(y - at[last + 1]) > 1e-3) at.push(x, y);
     }
   }
-  const at = Float64Array.from(found), along = new Float64Array(at.length), last = at.length - 2;
-  for (let i = 0; i <= last; i += 2) {
-    // at a joint between the directions of both parts, so that each pixel belongs to one of them
-    let [x, y] = [0, 0];
-    for (const from of [i - 2, i]) {
-      if (from < 0 || from === last) continue;
-      const dx = at[from + 2] - at[from], dy = at[from + 3] - at[from + 1], length = Math.hypot(dx, dy);
-      x += dx / length;
-      y += dy / length;
-    }
-    const length = Math.hypot(x, y) || 1;
-    along[i] = x / length;
-    along[i + 1] = y / length;
+  // at a joint between the directions of both parts, so that each pixel belongs to one of them
+  const along = new Float64Array(at.length), last = at.length - 2;
+  for (let i = 0; i < last; i += 2) {
+    const dx = at[i + 2] - at[i], dy = at[i + 3] - at[i + 1], length = Math.sqrt(dx * dx + dy * dy);
+    along[i] += dx / length;
+    along[i + 1] += dy / length;
+    along[i + 2] = dx / length;
+    along[i + 3] = dy / length;
   }
-  return { at, along, parts: last / 2 };
+  return { at: Float64Array.from(at), along, parts: last / 2 };
 }
 
 /** A part of the window: which pixels have colours that change, where each one's entries end, the sum of what stays.
@@ -105,12 +104,24 @@ export class Coverage {
     this.open = this.across * this.down;
   }
 
+  /** The weight of what covers a part of a pixel: none where nobody would see it, and all that is left where nobody would
+   * see what lies further back. @param {number} pixel @param {number} share @returns {number} */
+  take(pixel, share) {
+    const room = this.room[pixel], weight = (room * share + 0.5) | 0;
+    if (weight < SEEN) return 0;
+    if (room - weight >= SEEN) {
+      this.room[pixel] = room - weight;
+      return weight;
+    }
+    this.room[pixel] = 0;
+    this.open--;
+    return room;
+  }
+
   /** What changes covers a part of a pixel. @param {number} pixel @param {number} share @param {number} slot */
   put(pixel, share, slot) {
-    const weight = (this.room[pixel] * share + 0.5) | 0;
+    const weight = this.take(pixel, share);
     if (!weight) return;
-    this.room[pixel] -= weight;
-    if (!this.room[pixel]) this.open--;
     if (this.count === this.entries.length) this.grow();
     if (this.stamps[slot] !== this.stamp) {
       this.stamps[slot] = this.stamp;
@@ -123,11 +134,7 @@ export class Coverage {
 
   /** What stays covers a part of a pixel. @param {number} pixel @param {number} share @param {number} colour packed */
   fix(pixel, share, colour) {
-    const weight = (this.room[pixel] * share + 0.5) | 0;
-    if (!weight) return;
-    this.room[pixel] -= weight;
-    if (!this.room[pixel]) this.open--;
-    this.base[pixel] += weight * colour;
+    this.base[pixel] += this.take(pixel, share) * colour;
   }
 
   /** Make room for more entries. */
@@ -215,13 +222,11 @@ export class Coverage {
     }
   }
 
-  /** The end of a line: an arrowhead with a notch, or a bar. @param {End} end @param {Sizes} sizes @param {number} scale
-   * @param {boolean} bar @param {number} share @param {number} slot */
-  head({ x, y, dx, dy }, sizes, scale, bar, share, slot) {
-    const [length, half, notch] = [sizes.length * scale, sizes.half * scale, sizes.notch * scale];
-    const [back, lap, stem] = [sizes.back * scale, sizes.lap * scale, sizes.stem * scale];
+  /** The end of a line: an arrowhead with a notch, or a bar. @param {End} end @param {number} share @param {number} slot */
+  head({ x, y, dx, dy, length, half, notch, back, lap, stem, bar, room }, share, slot) {
+    if (x + room < this.left || y + room < this.top || x - room > this.left + SIDE || y - room > this.top + SIDE) return;
     const flank = Math.hypot(half, length), inner = Math.hypot(half, length + notch);
-    this.near(x, y, Math.hypot(half, bar ? -lap : length) + 1, (pixel, right, down) => {
+    this.near(x, y, room, (pixel, right, down) => {
       const along = right * dx + down * dy, beside = Math.abs(down * dx - right * dy);
       const far = bar
         ? Math.max(along, Math.min(Math.max(back - along, beside - half), Math.max(lap - along, beside - stem)))
@@ -272,9 +277,9 @@ export class Coverage {
   }
 }
 
-/** Where a line ends, in pixels, and its direction there. @typedef {{x: number, y: number, dx: number, dy: number}} End */
-/** Lengths from the tip of a line's end, in units. @typedef {{length: number, half: number, notch: number, back: number,
- *   lap: number, stem: number}} Sizes */
+/** Where a line ends, in pixels, its direction there, lengths from its tip, and how far it reaches.
+ * @typedef {{x: number, y: number, dx: number, dy: number, length: number, half: number, notch: number, back: number,
+ *   lap: number, stem: number, bar: boolean, room: number}} End */
 /** A disc in pixels; `ring` is half of the width of its ring, which has a colour.
  * @typedef {{x: number, y: number, radius: number, ring: number, colour: number, share: number}} Round */
 

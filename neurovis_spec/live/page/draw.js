@@ -16,10 +16,10 @@ import { Mosaic } from './mosaic.js';
 /** @typedef {import('./coverage.js').Chain} Chain */
 /** @typedef {import('./coverage.js').Tile} Tile */
 /** @typedef {import('./coverage.js').Round} Round */
-/** @typedef {import('./coverage.js').Sizes} Sizes */
+/** @typedef {import('./coverage.js').End} End */
 /** A line as it was laid out: from these points, as this chain, in these tiles, which have room for this reach.
- * @typedef {{points: number[], end: Shape, box: number[], chain: Chain, tiles: Tile[], reach: number, room: number, width: number,
- *   glow: number, bar: boolean, share: number}} LaidLine */
+ * @typedef {{points: number[], head: Shape, end: End, box: number[], chain: Chain, tiles: Tile[], reach: number, room: number,
+ *   width: number, glow: number, bar: boolean, share: number}} LaidLine */
 /** What lies otherwise when another `points`, `head` or `at` is put in place of the one before.
  * @typedef {{id: string, index: number, points: number[], head: Shape, rest: Shape[],
  *   laid: LaidLine | null}} Line */
@@ -273,18 +273,18 @@ export class Drawing {
       const { index, points, laid } = line, kind = look.kinds[index], share = shareOf(line.id, kind);
       const width = look.widths[index], glow = look.glows[index], bar = (kind & isBar) !== 0;
       mosaic.paint(at, fills[look.lines[index] + levels]);
-      if (laid && laid.points === points && laid.end === line.head && laid.width === width && laid.glow === glow
-        && laid.bar === bar && laid.share === share) return;
-      const reach = (Math.max(width, glow) / 2 / fineness) * scale + 0.5, { half, length } = this.sizes(line.head, width / fineness);
-      const room = Math.hypot(half, length) * scale + 1, same = laid && laid.points === points && laid.end === line.head;
-      const now = { points, end: line.head, width, glow, bar, share, reach, room };
+      const same = laid && laid.points === points && laid.head === line.head;
+      if (same && laid.width === width && laid.glow === glow && laid.bar === bar && laid.share === share) return;
+      const end = this.end(line.head, width / fineness, bar, scale, camera.origin);
+      const reach = (Math.max(width, glow) / 2 / fineness) * scale + 0.5, { room } = end;
+      const now = { points, head: line.head, end, width, glow, bar, share };
       if (same && reach <= laid.reach && room <= laid.room) {
-        Object.assign(laid, now, { reach: laid.reach, room: laid.room });
+        Object.assign(laid, now);
         mosaic.spoil(laid.tiles);
         return;
       }
-      const chain = same ? laid.chain : flattened(points, scale, camera.origin), [x, y] = line.head.at;
-      const tiles = mosaic.beside(chain, reach + SPARE, x * scale + left, y * scale + top, room + SPARE);
+      const chain = same ? laid.chain : flattened(points, scale, camera.origin);
+      const tiles = mosaic.beside(chain, reach + SPARE, end.x, end.y, room + SPARE);
       for (const tile of laid ? laid.tiles : []) tile.lines.delete(at);
       for (const tile of tiles) tile.lines.add(at);
       mosaic.spoil(laid ? laid.tiles : []);
@@ -295,38 +295,39 @@ export class Drawing {
 
   /** Put in all that is in a tile, from front to back. @param {Coverage} coverage @param {Tile} tile */
   fill(coverage, tile) {
-    const { lines, discs, pictures, seen, constants, colours } = this, [left, top] = seen.origin;
+    const { lines, discs, pictures, colours } = this, half = this.seen.scale / 2 / this.constants.fineness;
     coverage.picture(pictures.front);
-    for (const at of [...tile.discs].sort((a, b) => b - a)) {
+    for (const at of Uint32Array.from(tile.discs).sort().reverse()) {
       const { laid } = discs[at], slot = lines.length + at;
       if (laid) coverage.disc(laid, slot, pictures.words, slot + discs.length);
     }
     coverage.picture(pictures.between);
-    const half = seen.scale / 2 / constants.fineness;
-    for (const at of [...tile.lines].sort((a, b) => b - a)) {
+    for (const at of Uint32Array.from(tile.lines).sort().reverse()) {
       if (!coverage.open) break;
-      const { laid, head } = lines[at];
+      const { laid } = lines[at];
       if (!laid) continue;
-      const sizes = this.sizes(head, laid.width / constants.fineness), [x, y] = head.at, [dx, dy] = head.along;
-      const end = { x: x * seen.scale + left, y: y * seen.scale + top, dx, dy };
-      coverage.head(end, sizes, seen.scale, laid.bar, laid.share, at);
+      coverage.head(laid.end, laid.share, at);
       coverage.line(laid.chain, laid.width * half, laid.glow * half, laid.share, at, colours.glow);
     }
     coverage.picture(pictures.back);
   }
 
-  /** How large the end of a line of a width is, in units. @param {Shape} shape @param {number} width @returns {Sizes} */
-  sizes({ length }, width) {
-    const { constants } = this, notch = -constants.notch * length;
-    const half = Math.max(constants.headOfLength * length + constants.headOfWidth * width,
-      (0.5 / constants.notch) * width + constants.headMore);
-    return { length, half, notch, back: -constants.bar * length, lap: notch - constants.lap * length, stem: width / 2 };
+  /** The end of a line of a width, in pixels. @param {Shape} shape @param {number} width @param {boolean} bar
+   * @param {number} scale @param {number[]} origin @returns {End} */
+  end({ at, along, length: long }, width, bar, scale, origin) {
+    const { constants } = this, length = long * scale, notch = -constants.notch * length, lap = notch - constants.lap * length;
+    const half = Math.max(constants.headOfLength * length + constants.headOfWidth * width * scale,
+      (0.5 / constants.notch) * width * scale + constants.headMore * scale);
+    return {
+      x: at[0] * scale + origin[0], y: at[1] * scale + origin[1], dx: along[0], dy: along[1], length, half, notch,
+      back: -constants.bar * length, lap, stem: (width / 2) * scale, bar, room: Math.hypot(half, bar ? lap : length) + 1,
+    };
   }
 
   /** The end of a line that stays. @param {Context} context @param {Shape} shape @param {number} width @param {string} colour
    * @param {boolean} bar */
   head(context, shape, width, colour, bar) {
-    const { length, half, notch, back, lap, stem } = this.sizes(shape, width), [x, y] = shape.at, [dx, dy] = shape.along;
+    const { x, y, dx, dy, length, half, notch, back, lap, stem } = this.end(shape, width, bar, 1, [0, 0]);
     const corners = bar
       ? [0, half, back, half, back, stem, lap, stem, lap, -stem, back, -stem, back, -half, 0, -half]
       : [0, 0, -length, half, notch, 0, -length, -half];
