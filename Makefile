@@ -72,7 +72,7 @@ test-elsewhere: needs $(VENV)/tested page-check
 
 # Each ROS is in an environment of its own, in which NeuroVis is used in place.
 test-ros: needs-ros $(VENV)/tested .ros/one/made .ros/kilted/made .ros/jazzy/made
-	$(BIN)/python tests/isolated.py $(BIN)/python -m pytest -m ros $(PYTEST_ARGS)
+	$(BIN)/python tests/isolated.py $(BIN)/python -m pytest -m ros $(wildcard tests/test_ros*.py) $(PYTEST_ARGS)
 
 .ros/one/made: pyproject.toml
 	@echo "installing into .ros/one, beside ROS 1"

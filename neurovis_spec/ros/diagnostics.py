@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from neurovis_spec.ros.fields import Definition, Value, definition, encode
+from neurovis_spec.ros.fields import Definition, Value, encode
 from neurovis_spec.ros.middleware import MiddlewareError, Node, Publisher, Quality
 from neurovis_spec.ros.summary import Summary, numbers
 
@@ -30,7 +30,7 @@ class Diagnostics:
     def of(cls, node: Node, name: str) -> Diagnostics:
         """Diagnostics of a node, where the package is there."""
         try:
-            type_ = definition(TYPE, node.definition(TYPE))
+            type_ = Definition.parse(TYPE, node.definition(TYPE))
         except MiddlewareError:
             return cls(node, name)
         return cls(node, name, type_, node.publisher("/diagnostics", TYPE, Quality()))

@@ -6,17 +6,19 @@ is there before anything is made of them, so that no message costs more than its
 
 from __future__ import annotations
 
-import re
 import struct
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, Literal, TypeAlias, cast
+from typing import Final, TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
 
-Encoding: TypeAlias = Literal["ros1", "cdr"]
+from neurovis_spec.language.ros_types import plain
+from neurovis_spec.ros.definitions import fields_of_text, inner_name, sections
+from neurovis_spec.ros.wire import Cursor, Encoding, WireError
+
 #: what a message is made of: numbers, texts, lists of values, fields by name; what is left out is 0 or empty
 Value: TypeAlias = "float | int | str | Sequence[Value] | Mapping[str, Value]"
 
@@ -25,12 +27,8 @@ _NUMBERS: Final[Mapping[str, str]] = {
     "bool": "B", "byte": "B", "char": "B", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i",
     "uint32": "I", "int64": "q", "uint64": "Q", "float32": "f", "float64": "d",
 }  # fmt: skip
-_LINE: Final = re.compile(r"([A-Za-z][\w/]*)(?:<=\d+)?(\[(?:<=)?\d*\])?\s+([A-Za-z]\w*)\s*(=)?")
-_DEEPEST: Final = 20
-
-
-class FieldError(ValueError):
-    """Bytes that are not a message of the type, or a value that it cannot hold."""
+_DEEPEST: Final = 32
+_HEADER: Final = "std_msgs/Header"
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +40,12 @@ class Field:
     array: int | None = None
 
 
+#: what ROS 1 has as primitives; ROS 2 defines them, of as many bytes
+_TIMES: Final[Mapping[str, tuple[Field, ...]]] = {
+    name: (Field("sec", "int32"), Field("nanosec", "uint32")) for name in ("time", "duration")
+}
+
+
 @dataclass(frozen=True)
 class Definition:
     """A type, and the fields of each type that it refers to (``package/Name``)."""
@@ -51,29 +55,32 @@ class Definition:
 
     @classmethod
     def parse(cls, type_: str, text: str) -> Definition:
-        """The definition that recordings hold. Raises FieldError.
+        """The definition that recordings hold. Raises WireError.
 
         >>> text = "float64[] x  # m\\nuint8 K=3\\nC c\\n" + "=" * 80 + "\\nMSG: a/C\\nstring<=9 s"
         >>> Definition.parse("a/B", text).types["a/B"]
         (Field(name='x', type='float64', array=-1), Field(name='c', type='a/C', array=None))
         """
-        first, *others = re.split(r"^={80}\s*$", text, flags=re.MULTILINE)
-        types = {type_: tuple(_fields(first, type_))}
-        for other in others:
-            head, _, body = other.strip().partition("\n")
-            name = _plain(head.removeprefix("MSG:").strip())
-            types[name] = tuple(_fields(body, name))
-        made = cls(type_, types)
-        made._check(type_, 0)
+        texts = sections(type_, text)
+        types = dict(_TIMES)
+        for name, inner in texts.items():
+            package = name.partition("/")[0]
+            types[name] = tuple(
+                Field(field, base if _simple(base) else inner_name(base, package, texts), _length(behind))
+                for base, behind, field, value in fields_of_text(inner)
+                if value is None
+            )
+        made = cls(plain(type_), types)
+        made._check(made.type, 0)
         return made
 
     def _check(self, type_: str, depth: int) -> None:
         if depth > _DEEPEST:
-            raise FieldError(f"the definition of {self.type} refers to itself")
+            raise WireError(f"the definition of {self.type} refers to itself")
         for field in self.types[type_]:
             if field.type not in _NUMBERS and field.type != "string":
                 if field.type not in self.types:
-                    raise FieldError(f"the definition of {self.type} does not say what {field.type} is")
+                    raise WireError(f"the definition of {self.type} does not say what {field.type} is")
                 self._check(field.type, depth + 1)
 
     @cached_property
@@ -110,96 +117,42 @@ class Definition:
     @property
     def stamped(self) -> bool:
         """Whether it begins with a header."""
-        return self.types[self.type][:1] == (Field("header", "std_msgs/Header"),)
+        return self.types[self.type][:1] == (Field("header", _HEADER),)
 
 
-def _plain(name: str) -> str:
-    """``package/Name``, however it is written."""
-    return name.replace("/msg/", "/")
+def _simple(base: str) -> bool:
+    return base in _NUMBERS or base == "string" or base in _TIMES
 
 
-def _fields(text: str, owner: str) -> Iterator[Field]:
-    for line in text.splitlines():
-        match = _LINE.match(line.partition("#")[0].strip())
-        if match is None or match[4]:
-            continue
-        base, brackets, name = _plain(match[1]), match[2], match[3]
-        if base in ("time", "duration"):
-            base = f"builtin_interfaces/{base.title()}"
-        elif base in ("Header", "roslib/Header"):
-            base = "std_msgs/Header"
-        elif base not in _NUMBERS and base != "string" and "/" not in base:
-            base = f"{owner.partition('/')[0]}/{base}"
-        length = None if brackets is None else brackets.strip("[]")
-        yield Field(name, base, None if length is None else int(length) if length.isdigit() else -1)
+def _length(behind: str) -> int | None:
+    """How many values a field has, by what is behind its type."""
+    if "[" not in behind:
+        return None
+    length = behind.partition("[")[2].removesuffix("]")
+    return int(length) if length.isdigit() else -1
 
 
-#: what ROS 1 has as primitives; ROS 2 defines them, with signed seconds, of as many bytes
-TIMES: Final[Mapping[str, tuple[Field, ...]]] = {
-    f"builtin_interfaces/{name}": (Field("sec", "int32"), Field("nanosec", "uint32")) for name in ("Time", "Duration")
-}
-
-
-def definition(type_: str, text: str) -> Definition:
-    """The definition of a type. Raises FieldError."""
-    parts = "".join(
-        f"\n{'=' * 80}\nMSG: {name}\n" + "\n".join(f"{field.type} {field.name}" for field in fields)
-        for name, fields in TIMES.items()
-        if f"MSG: {name}" not in text
-    )
-    return Definition.parse(_plain(type_), text + parts)
-
-
-@dataclass
 class _Reader:
     """Reads values from the bytes of a message."""
 
-    definition: Definition
-    data: bytes
-    encoding: Encoding
-    at: int = 0
-    order: str = "<"
-
-    def __post_init__(self) -> None:
-        self.start = 0
-        if self.encoding == "cdr":
-            if len(self.data) < 4 or self.data[0] != 0 or self.data[1] not in (0, 1):
-                raise FieldError("not encoded as CDR")
-            self.order = "<" if self.data[1] else ">"
-            self.at = self.start = 4
-
-    def align(self, size: int) -> None:
-        if self.encoding == "cdr":
-            self.at += (self.start - self.at) % size
+    def __init__(self, definition: Definition, data: bytes, encoding: Encoding) -> None:
+        self.definition, self._cursor = definition, Cursor(data, encoding)
 
     def numbers(self, code: str, count: int) -> tuple[float, ...]:
-        size = struct.calcsize(code)
+        size, cursor = struct.calcsize(code), self._cursor
         if count:
-            self.align(size)
-        self.need(size * count)
-        found = struct.unpack_from(f"{self.order}{count}{code}", self.data, self.at)
-        self.at += size * count
-        return found
+            cursor.align(size)
+        return struct.unpack(f"{cursor.order}{count}{code}", cursor.take(size * count))
 
     def need(self, size: int) -> None:
-        if size > len(self.data) - self.at:
-            raise FieldError("the message is shorter than it says")
-
-    def count(self) -> int:
-        return int(self.numbers("I", 1)[0])
-
-    def text(self) -> str:
-        length = self.count()
-        self.need(length)
-        raw = self.data[self.at : self.at + length]
-        self.at += length
-        return (raw.removesuffix(b"\0") if self.encoding == "cdr" else raw).decode(errors="replace")
+        if size > len(self._cursor.data) - self._cursor.at:
+            raise WireError("the message is shorter than it says")
 
     def several(self, field: Field) -> int:
         """How many values a field has, as far as there is room for them."""
         if field.array is None:
             return 1
-        count = self.count() if field.array < 0 else field.array
+        count = self._cursor.integer() if field.array < 0 else field.array
         self.need(count * self.definition.least[field.type])
         return count
 
@@ -207,17 +160,19 @@ class _Reader:
         """The values of a field of numbers or texts."""
         count = self.several(field)
         if field.type == "string":
-            return [self.text() for _ in range(count)]
+            return [self._cursor.string().decode(errors="replace") for _ in range(count)]
         return self.numbers(_NUMBERS[field.type], count)
 
     def skip(self, field: Field) -> None:
         if field.type in _NUMBERS or field.type == "string":
             self.values(field)
             return
-        count = self.several(field)
-        if self.definition.least[field.type]:
+        count, fields = self.several(field), self.definition.types[field.type]
+        if not fields and self._cursor.origin is not None:  # ROS 2 gives an empty message a byte
+            self._cursor.take(count)
+        elif self.definition.least[field.type]:
             for _ in range(count):
-                for inner in self.definition.types[field.type]:
+                for inner in fields:
                     self.skip(inner)
 
     def find(self, type_: str, path: Sequence[str]) -> Sequence[float] | Sequence[str]:
@@ -229,24 +184,24 @@ class _Reader:
                 return self.find(field.type, path[1:])
             else:
                 return self.values(field)
-        raise FieldError(f"there is no field '{path[0]}'")
+        raise WireError(f"there is no field '{path[0]}'")
 
 
 def numbers_at(definition: Definition, path: str, encoding: Encoding) -> Callable[[bytes], Sequence[float]]:
-    """What reads the numbers at a path. Raises FieldError where there are none; the reader raises it for bytes that are
+    """What reads the numbers at a path. Raises WireError where there are none; the reader raises it for bytes that are
     no such message."""
     field = definition.field(path)
     if field is None or field.type not in _NUMBERS:
-        raise FieldError(f"messages of type {definition.type} have no numbers at '{path}'")
+        raise WireError(f"messages of type {definition.type} have no numbers at '{path}'")
     parts = path.split(".")
     return lambda data: cast("Sequence[float]", _Reader(definition, data, encoding).find(definition.type, parts))
 
 
 def texts_at(definition: Definition, path: str, encoding: Encoding) -> Callable[[bytes], Sequence[str]]:
-    """What reads the texts at a path. Raises FieldError, as ``numbers_at`` does."""
+    """What reads the texts at a path. Raises WireError, as ``numbers_at`` does."""
     field = definition.field(path)
     if field is None or field.type != "string":
-        raise FieldError(f"messages of type {definition.type} have no texts at '{path}'")
+        raise WireError(f"messages of type {definition.type} have no texts at '{path}'")
     parts = path.split(".")
     return lambda data: cast("Sequence[str]", _Reader(definition, data, encoding).find(definition.type, parts))
 
@@ -271,7 +226,7 @@ class _Writer:
         try:
             self.data += struct.pack(f"<{len(values)}{code}", *values)
         except (struct.error, OverflowError) as error:
-            raise FieldError(f"a number that a field cannot hold: {error}") from None
+            raise WireError(f"a number that a field cannot hold: {error}") from None
 
     def text(self, value: str) -> None:
         raw = value.encode() + (b"\0" if self.encoding == "cdr" else b"")
@@ -286,9 +241,11 @@ class _Writer:
         else:
             given = cast("Mapping[str, Value]", value or {})
             if unknown := [name for name in given if all(name != field.name for field in self.definition.types[type_])]:
-                raise FieldError(f"messages of type {type_} have no field '{unknown[0]}'")
+                raise WireError(f"messages of type {type_} have no field '{unknown[0]}'")
             for field in self.definition.types[type_]:
                 self.field(field, given.get(field.name), f"{path}.{field.name}" if path else field.name)
+            if not self.definition.types[type_] and self.encoding == "cdr":
+                self.data += b"\0"
 
     def field(self, field: Field, value: Value | None, path: str) -> None:
         if field.array is None:
@@ -301,7 +258,7 @@ class _Writer:
         if field.array < 0:
             self.numbers("I", [len(values)])
         elif len(values) > field.array:
-            raise FieldError(f"'{path}' holds {field.array} values, not {len(values)}")
+            raise WireError(f"'{path}' holds {field.array} values, not {len(values)}")
         else:
             zero: Value = "" if field.type == "string" else 0 if field.type in _NUMBERS else {}
             values += [zero] * (field.array - len(values))
@@ -320,9 +277,9 @@ class _Writer:
 
 
 def encode(definition: Definition, value: Mapping[str, Value], encoding: Encoding) -> bytes:
-    """The bytes of a message with these fields. Raises FieldError.
+    """The bytes of a message with these fields. Raises WireError.
 
-    >>> encode(definition("std_msgs/Float64", "float64 data"), {"data": 1.5}, "ros1").hex()
+    >>> encode(Definition.parse("std_msgs/Float64", "float64 data"), {"data": 1.5}, "ros1").hex()
     '000000000000f83f'
     """
     writer = _Writer(definition, encoding)
@@ -331,10 +288,9 @@ def encode(definition: Definition, value: Mapping[str, Value], encoding: Encodin
 
 
 class Form:
-    """A message in which nothing but the numbers at a path changes, and the time of its header, if it has one; ``rest``
-    are its other fields.
+    """A message in which nothing but the numbers at a path changes, and the time of its header, if it has one.
 
-    Numbers for a field of integers are rounded and kept within what it holds. Raises FieldError where the field is none
+    Numbers for a field of integers are rounded and kept within what it holds. Raises WireError where the field is none
     of numbers, or holds another number of them.
     """
 
@@ -344,18 +300,17 @@ class Form:
         path: str,
         size: int,
         encoding: Encoding,
-        rest: Mapping[str, Value] | None = None,
     ) -> None:
         field = definition.field(path)
         if field is None or field.type not in _NUMBERS:
-            raise FieldError(f"messages of type {definition.type} have no numbers at '{path}'")
+            raise WireError(f"messages of type {definition.type} have no numbers at '{path}'")
         if field.array is None and size != 1:
-            raise FieldError(f"'{path}' of {definition.type} is one number, not {size}")
+            raise WireError(f"'{path}' of {definition.type} is one number, not {size}")
         value: Value = 0 if field.array is None else [0] * size
         for name in reversed(path.split(".")):
             value = {name: value}
         writer = _Writer(definition, encoding, path)
-        writer.value(definition.type, {**(rest or {}), **cast("Mapping[str, Value]", value)}, "")
+        writer.value(definition.type, value, "")
         shift = 4 if encoding == "cdr" else 0
         self._data, at = bytearray(writer.bytes()), writer.found + shift
         code = _NUMBERS[field.type]
@@ -363,15 +318,15 @@ class Form:
         self._bounds = None if code in "fd" else _bounds(field.type, code)
         self._stamp: int | None = None
         if definition.stamped:
-            numbered = definition.types["std_msgs/Header"][0].name == "seq"
+            numbered = definition.types[_HEADER][0].name == "seq"
             self._stamp = shift + (4 if numbered else 0)
 
     def fill(self, numbers: npt.ArrayLike, nanoseconds: int) -> bytes:
-        """The message with these numbers, at this time. Raises FieldError for a number that the field cannot hold."""
+        """The message with these numbers, at this time. Raises WireError for a number that the field cannot hold."""
         given = np.asarray(numbers, dtype=np.float64)
         if self._bounds is not None:
             if not np.isfinite(given).all():
-                raise FieldError("a field of integers cannot hold what is not finite")
+                raise WireError("a field of integers cannot hold what is not finite")
             given = np.clip(np.round(given), *self._bounds)
         with np.errstate(all="ignore"):
             self._numbers[:] = given

@@ -14,8 +14,9 @@ import numpy as np
 from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.ros_settings import Subscription as Settings
 from neurovis_spec.ros.counts import REASONS, Counts, Reason, Teller
-from neurovis_spec.ros.fields import Definition, Encoding, FieldError, numbers_at, texts_at
+from neurovis_spec.ros.fields import Definition, numbers_at, texts_at
 from neurovis_spec.ros.middleware import Arrival
+from neurovis_spec.ros.wire import Encoding, WireError
 
 
 class _Reading:
@@ -30,7 +31,7 @@ class _Reading:
         self.silent = False
 
     def values(self, data: bytes) -> FloatArray | Reason:
-        """The values of a message, or why it has none. Raises FieldError."""
+        """The values of a message, or why it has none. Raises WireError."""
         numbers = np.array(self._numbers(data), dtype=np.float64)
         if self._names is not None:
             names = list(self._names(data))
@@ -59,7 +60,7 @@ class InputTopic:
             return
         try:
             found = [reading.values(arrival.data) for reading in self.readings]
-        except FieldError:
+        except WireError:
             self._reject("parse")
             return
         now = self.clock()
@@ -95,7 +96,7 @@ class Inputs:
         clock: Callable[[], float],
         teller: Teller,
     ) -> Inputs:
-        """The inputs of a spec, whose topics are absolute; ``definitions`` by type. Raises FieldError where a type has
+        """The inputs of a spec, whose topics are absolute; ``definitions`` by type. Raises WireError where a type has
         no such numbers."""
         found = dict[tuple[str, str], list[_Reading]]()
         for one in settings:

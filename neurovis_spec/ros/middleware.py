@@ -14,6 +14,8 @@ from importlib.util import find_spec
 from typing import Final, Literal, NamedTuple, Protocol, TypeAlias
 from urllib.parse import urlsplit
 
+from neurovis_spec.ros.wire import Encoding
+
 Ros: TypeAlias = Literal[1, 2]
 #: the module that each ROS is imported as
 MODULES: Final[Mapping[Ros, str]] = {1: "rospy", 2: "rclpy"}
@@ -119,7 +121,7 @@ class Node(Protocol):
 
     ros: Ros
     #: how messages are written
-    encoding: Literal["ros1", "cdr"]
+    encoding: Encoding
     #: its name, with its namespace
     name: str
     #: how often it had to be registered anew

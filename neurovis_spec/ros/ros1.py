@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from http.client import HTTPConnection
 from threading import Event, Lock, Thread
-from typing import IO, Final, Literal, cast
+from typing import IO, Final, cast
 from xmlrpc.client import ServerProxy, Transport
 
 import genpy
@@ -34,6 +34,7 @@ from neurovis_spec.ros.middleware import (
     Tell,
     Wish,
 )
+from neurovis_spec.ros.wire import Encoding
 
 #: seconds between two questions to the master, to the cache of parameters, and until the master counts as away
 _WATCH, _LOOK, _AWAY = 1.0, 0.05, 2.0
@@ -148,7 +149,7 @@ class Ros1Node:
     """The node of ROS 1."""
 
     ros: Ros = 1
-    encoding: Literal["ros1", "cdr"] = "ros1"
+    encoding: Encoding = "ros1"
 
     def __init__(self, wish: Wish, tell: Tell) -> None:
         self.tell, self.reconnects, self.closed = tell, 0, False

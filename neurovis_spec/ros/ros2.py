@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
 from threading import Lock, Thread
-from typing import Final, Literal
+from typing import Final
 
 import rclpy
 from rclpy.context import Context
@@ -35,6 +35,7 @@ from neurovis_spec.ros.middleware import (
     Tell,
     Wish,
 )
+from neurovis_spec.ros.wire import Encoding
 
 _HUGE: Final = 1.7976931348623157e308
 #: names of primitives in interfaces, where they are others than in messages
@@ -188,7 +189,7 @@ class Ros2Node:
     """A node of ROS 2."""
 
     ros: Ros = 2
-    encoding: Literal["ros1", "cdr"] = "cdr"
+    encoding: Encoding = "cdr"
     reconnects = 0
 
     def __init__(self, wish: Wish, tell: Tell) -> None:

@@ -17,19 +17,19 @@ import numpy as np
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.ros.accept import ARRAY, STRING
 from neurovis_spec.ros.counts import Counts, Teller
 from neurovis_spec.ros.diagnostics import Diagnostics
-from neurovis_spec.ros.fields import FieldError, Form, Value, definition, encode
+from neurovis_spec.ros.fields import Definition, Form
 from neurovis_spec.ros.inputs import Inputs
 from neurovis_spec.ros.middleware import LATCHED, MiddlewareError, Node, Parameter, Publisher, Quality, Tell
 from neurovis_spec.ros.pace import Clock, Pace, SimulatedClock, SteadyClock
 from neurovis_spec.ros.summary import Summary
+from neurovis_spec.ros.wire import ArrayForm, WireError, text_message
 from neurovis_spec.runtime.backend import BackendError, choose_backend
 from neurovis_spec.runtime.ros_messages import label_of
 from neurovis_spec.runtime.simulation import ParameterError, Simulation
 
-ARRAY: Final = "std_msgs/Float64MultiArray"
-STRING: Final = "std_msgs/String"
 #: a run has no end: what compiling costs is soon paid for
 _ENDLESS: Final = 1 << 40
 
@@ -85,56 +85,52 @@ def absolute(topic: str, node: str) -> str:
     return f"{node.rpartition('/')[0]}/{topic}"
 
 
+@dataclass
 class _Sender:
-    """A publisher whose messages a witness sees."""
+    """A publisher whose messages witnesses see."""
 
-    def __init__(self, publisher: Publisher, form: Form, witnesses: list[Witness]) -> None:
-        self.publisher, self._form, self._witnesses = publisher, form, witnesses
+    publisher: Publisher
+    witnesses: list[Witness]
 
-    def send(self, numbers: FloatArray, nanoseconds: int) -> None:
-        """Send numbers. Raises FieldError."""
-        data = self._form.fill(numbers, nanoseconds)
+    def send(self, data: bytes, nanoseconds: int) -> None:
+        """Send a message."""
         self.publisher.publish(data)
-        for witness in self._witnesses:
+        for witness in self.witnesses:
             witness.sent(self.publisher.topic, self.publisher.type, data, nanoseconds)
 
 
+@dataclass
 class _Array(_Sender):
     """An array of the network's, with its prelude."""
 
-    def __init__(self, publisher: Publisher, form: Form, witnesses: list[Witness], size: int) -> None:
-        super().__init__(publisher, form, witnesses)
-        self._numbers = np.zeros(size + 2)
+    form: ArrayForm
 
-    def step(self, step: int, seconds: float, values: FloatArray) -> None:
+    def step(self, step: int, nanoseconds: int, values: FloatArray) -> None:
         """The array of a step."""
-        self._numbers[0], self._numbers[1], self._numbers[2:] = step, seconds, values
-        self.send(self._numbers, 0)
+        self.send(self.form.message(step, nanoseconds / 1e9, values), nanoseconds)
 
 
+@dataclass
 class _Output(_Sender):
     """An output. What is not finite is not sent: its safe value is, where it has one."""
 
-    def __init__(
-        self, publisher: Publisher, form: Form, witnesses: list[Witness], name: str, size: int, safe: float | None
-    ) -> None:
-        super().__init__(publisher, form, witnesses)
-        self.name, self.safe, self.withheld = name, None if safe is None else np.full(size, safe), 0
+    form: Form
+    name: str
+    safe: FloatArray | None
+    withheld: int = 0
 
     def put(self, values: FloatArray, nanoseconds: int) -> None:
         """The output of a step."""
-        given = np.atleast_1d(values)
-        if not np.isfinite(given).all():
+        if np.isfinite(values).all():
+            self.send(self.form.fill(values, nanoseconds), nanoseconds)
+        else:
             self.withheld += 1
-            if self.safe is None:
-                return
-            given = self.safe
-        self.send(given, nanoseconds)
+            self.end(nanoseconds)
 
     def end(self, nanoseconds: int) -> None:
-        """The last message, where there is one for the end."""
+        """The safe values, where there are some."""
         if self.safe is not None:
-            self.send(self.safe, nanoseconds)
+            self.send(self.form.fill(self.safe, nanoseconds), nanoseconds)
 
 
 class NodeRun:
@@ -153,7 +149,7 @@ class NodeRun:
         try:
             self._inputs = self._subscribe()
             self._publish()
-        except FieldError as error:
+        except WireError as error:
             raise MiddlewareError(str(error)) from None
         self._offer()
         self._diagnostics = Diagnostics.of(node, f"{node.name.lstrip('/')}: network")
@@ -163,7 +159,7 @@ class NodeRun:
     def _subscribe(self) -> Inputs:
         node, settings = self.node, self.network.ros
         wanted = [replace(one, topic=absolute(one.topic, node.name)) for one in settings.subscribe]
-        definitions = {one.type: definition(one.type, node.definition(one.type)) for one in wanted}
+        definitions = {one.type: Definition.parse(one.type, node.definition(one.type)) for one in wanted}
         sizes = {entry.name: entry.size for entry in self.network.inputs}
         inputs = Inputs.of(wanted, sizes, definitions, node.encoding, self._clock.now, self._teller)
         quality = Quality("offered", "volatile", 10)
@@ -182,21 +178,17 @@ class NodeRun:
         sizes = {output.name: output.size for output in network.outputs}
         self._outputs = []
         for one in settings.publish:
-            type_ = definition(one.type, node.definition(one.type))
-            form = Form(type_, one.field, sizes[one.output], node.encoding)
+            size = sizes[one.output]
+            form = Form(Definition.parse(one.type, node.definition(one.type)), one.field, size, node.encoding)
             publisher = node.publisher(absolute(one.topic, node.name), one.type, quality)
-            made = _Output(publisher, form, self.witnesses, one.output, sizes[one.output], one.safe)
-            self._outputs.append(made)
+            safe = None if one.safe is None else np.full(size, one.safe)
+            self._outputs.append(_Output(publisher, self.witnesses, form, one.output, safe))
         self._spec = node.publisher(f"{base}/spec", STRING, LATCHED)
-        text = definition(STRING, node.definition(STRING))
-        self._spec.publish(encode(text, {"data": self._compiled.text()}, node.encoding))
+        self._spec.publish(text_message(self._compiled.text(), node.encoding))
 
     def _array(self, topic: str, size: int, quality: Quality) -> _Array:
-        type_ = definition(ARRAY, self.node.definition(ARRAY))
-        dimension: Value = {"label": label_of(self.network.hash), "size": size, "stride": size}
-        layout: dict[str, Value] = {"layout": {"dim": [dimension], "data_offset": 2}}
-        form = Form(type_, "data", size + 2, self.node.encoding, layout)
-        return _Array(self.node.publisher(topic, ARRAY, quality), form, self.witnesses, size)
+        form = ArrayForm.of(label_of(self.network.hash), size, self.node.encoding)
+        return _Array(self.node.publisher(topic, ARRAY, quality), self.witnesses, form)
 
     def _offer(self) -> None:
         network, spec = self.network, self._compiled.spec
@@ -275,10 +267,10 @@ class NodeRun:
                 outputs = run.outputs
             activity = run.activity
         for output in self._outputs:
-            output.put(np.asarray(outputs[output.name], dtype=np.float64), now)
-        self._activity.step(step, now / 1e9, activity)
+            output.put(np.atleast_1d(outputs[output.name]), now)
+        self._activity.step(step, now, activity)
         if self._weights is not None and weights is not None:
-            self._weights.step(step, now / 1e9, weights)
+            self._weights.step(step, now, weights)
         if all_weights is not None:
             for witness in self.witnesses:
                 witness.stepped(step, activity, all_weights)
