@@ -10,6 +10,7 @@ import pytest
 
 import neurovis_spec as nv
 from neurovis_spec.live.commands import Pause, Play, Seek, Step
+from neurovis_spec.live.history import Bins, Members
 from neurovis_spec.live.run import Run, Shown
 from neurovis_spec.live.source import Reach, SourceError
 from neurovis_spec.live.view import view_of
@@ -107,6 +108,19 @@ def test_weights_are_those_of_their_step(source: ReceivedSource, first: str) -> 
     assert snapshot.weights.tolist() == [3.5, 3.25, 0.25]
     assert snapshot.previous_weights is not None
     assert snapshot.previous_weights.tolist() == [2.5, 2.25, 0.25]
+
+
+def test_traces_are_read_of_what_came(source: ReceivedSource) -> None:
+    for seq in (0, 1, 2, 6, 7):
+        source.hear_activity(seq, seq, np.full(3, float(seq)))
+        source.hear_weights(seq, np.full(2, seq + 0.5))
+    source.hear_activity(8, 8, np.zeros(3))
+    bins = Bins(0, 1, 9)
+    nan = float("nan")
+    found = source.history.read(Members(True, np.array([1])), bins)
+    assert np.array_equal(found[:, 0], [0, 1, 2, nan, nan, nan, 6, 7, nan], equal_nan=True)
+    found = source.history.read(Members(False, np.array([0])), bins)
+    assert np.array_equal(found[:, 1], [0.5, 1.5, 2.5, nan, nan, nan, 6.5, 7.5, nan], equal_nan=True)
 
 
 def until(true: Callable[[], bool]) -> None:

@@ -93,6 +93,20 @@ async def serve(
     loop = asyncio.get_running_loop()
     ended: asyncio.Future[int] = loop.create_future()
     _heed_signals(loop, ended)
+    await serve_until(ended, stage, sock, access, announce, edits)
+    raise Ended(ended.result())
+
+
+async def serve_until(
+    ended: asyncio.Future[int],
+    stage: Stage,
+    sock: socket.socket,
+    access: Access,
+    announce: Callable[[], None],
+    edits: Callable[[Run, Callable[[str], None]], Watch] | None = None,
+) -> None:
+    """Serve until it is at its end; where the run cannot go on that is now, and what has happened is raised."""
+    loop = asyncio.get_running_loop()
     hub = Hub(loop)
     run = Run(*stage, hub.show, lambda: hub.watched, lambda: loop.call_soon_threadsafe(_fail, ended))
     server = Server(access, hub, run)
@@ -107,7 +121,7 @@ async def serve(
         if watch is not None:
             watch.start()
         announce()
-        number = await ended
+        await ended
     finally:
         if watch is not None:
             watch.end()
@@ -115,7 +129,6 @@ async def serve(
         await server.stop()
     if run.failure is not None:
         raise run.failure
-    raise Ended(number)
 
 
 def _fail(ended: asyncio.Future[int]) -> None:

@@ -17,6 +17,7 @@ import numpy as np
 from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.clock import FRAMES
+from neurovis_spec.live.history import Ring
 from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned
 from neurovis_spec.live.turns import Turn
 from neurovis_spec.runtime.recording import Snapshot
@@ -29,6 +30,8 @@ _EACH: Final = 400
 _FARTHEST: Final = 1_000_000
 #: steps back in which weights look for the activities of their step
 _BESIDE: Final = 16
+#: steps that are lost between two that are known, in a trace
+_GAP: Final = 1000
 _FRAME_TIME: Final = 10**9 // FRAMES
 
 
@@ -58,6 +61,8 @@ class ReceivedSource:
         self._rows = [_Row(0, None, 0, np.zeros(len(network.neurons)), self._weights, None)]
         self._each = _EACH + 8 * len(network.neurons) + 8 * len(self._changing)
         self._fading = Fading(network)
+        self._unknown = np.full(len(network.neurons), np.nan), np.full(len(network.connections), np.nan)
+        self.history = Ring(len(network.neurons), len(network.connections))
         self._at, self._time = self._rows[0], 0
         self._offset, self._begun, self._following = 0, False, True
         self._shown: _Row | None = None
@@ -75,10 +80,19 @@ class ReceivedSource:
             row = _Row(step, seq, time, activity, known, seen)
             if not self._begun:
                 self._rows, self._begun = [], True
-            elif len(self._rows) * self._each > self._room:
+            else:
+                self._note(self._rows[-1], step)  # whose weights have come by now
+            if len(self._rows) * self._each > self._room:
                 del self._rows[: max(1, len(self._rows) // 8)]
             self._rows.append(row)
             self.came += 1
+
+    def _note(self, row: _Row, following: int) -> None:
+        """Keep a step for traces, and that those up to the next one are not known."""
+        self.history.note(row.step, row.activity, self._all_weights(row))
+        if following - row.step <= _GAP:
+            for step in range(row.step + 1, following):
+                self.history.note(step, *self._unknown)
 
     def hear_weights(self, seq: int | None, weights: FloatArray) -> None:
         """The weights of the plastic connections at a step, whose activities may have come already."""

@@ -51,7 +51,8 @@ class Recorder:
         self._files, self._definitions, self._tell, self._heard, self._room = files, definitions, tell, heard, room
         self._teller = Teller(tell)
         self._waiting = Condition()
-        self._queue: deque[tuple[Stream, Arrival]] = deque()
+        #: None in place of a message: connections were made anew before the next one
+        self._queue: deque[tuple[Stream, Arrival | None]] = deque()
         self._held = 0
         #: messages that the queue could not take, by stream
         self._missed: dict[Stream, int] = {}
@@ -75,9 +76,17 @@ class Recorder:
                 self._missed[stream] = self._missed.get(stream, 0) + 1
                 return
             self._held += size
-            self._queue.append((stream, arrival))
-            if len(self._queue) == 1:
-                self._waiting.notify()
+            self._append(stream, arrival)
+
+    def anew(self, stream: Stream) -> None:
+        """The connection was made anew: gaps in the numbers of messages from here on are no losses."""
+        with self._waiting:
+            self._append(stream, None)
+
+    def _append(self, stream: Stream, arrival: Arrival | None) -> None:
+        self._queue.append((stream, arrival))
+        if len(self._queue) == 1:
+            self._waiting.notify()
 
     def end(self) -> None:
         """Write all that came, and close the files."""
@@ -91,14 +100,17 @@ class Recorder:
         try:
             while (some := self._next()) is not None:
                 for stream, arrival in some:
-                    self._take(stream, arrival)
+                    if arrival is None:
+                        stream.anew()
+                    else:
+                        self._take(stream, arrival)
                 self._look()
             self._close()
         except Exception as failure:
             self.failure = failure
             self._tell(f"the recorder has failed: {failure}")
 
-    def _next(self) -> deque[tuple[Stream, Arrival]] | None:
+    def _next(self) -> deque[tuple[Stream, Arrival | None]] | None:
         """What has come, after waiting for it until something else is due; None at the end."""
         with self._waiting:
             if not self._queue and not self._ending:

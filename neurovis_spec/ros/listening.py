@@ -1,0 +1,140 @@
+"""One network's topics: what arrives on them is judged, counted, recorded and shown.
+
+In: a compiled network, which ROS, where to record, whether to show. Out: a Listening, to which arrivals are handed by
+any thread; its source is what the live page shows, its counts are those of the summary.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.ros.accept import ARRAY, STRING, Accepted, Judge, Stream, anything, arrays, headed
+from neurovis_spec.ros.counts import Counts
+from neurovis_spec.ros.definitions import definition
+from neurovis_spec.ros.files import Files, Rotation
+from neurovis_spec.ros.logs import topic_of
+from neurovis_spec.ros.middleware import Arrival, Ros
+from neurovis_spec.ros.received import ReceivedSource
+from neurovis_spec.ros.recorder import Recorder
+from neurovis_spec.ros.wire import ENCODINGS, text_message
+from neurovis_spec.version import __version__
+
+ACTIVITY: Final = "activity"
+WEIGHTS: Final = "weights"
+SPEC: Final = "spec"
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What is wanted of a network's topics: a recording, and that they are shown."""
+
+    record: Path | None = None
+    rotation: Rotation = field(default_factory=Rotation)
+    force: bool = False
+    shown: bool = False
+
+
+def base_of(compiled: CompiledNetwork) -> str:
+    """What the names of a network's topics begin with."""
+    return f"{compiled.network.ros.namespace.rstrip('/')}/{compiled.network.name}"
+
+
+class Listening:
+    """The topics of a network. ``definitions`` gives the text of a type that is not in the table of the usual ones.
+    Raises OSError where there can be no recording."""
+
+    def __init__(
+        self,
+        compiled: CompiledNetwork,
+        ros: Ros,
+        wanted: Wanted,
+        tell: Callable[[str], None],
+        definitions: Callable[[str], str] = lambda type_: "",
+    ) -> None:
+        network = compiled.network
+        self.compiled, self.ros, self._definitions_of = compiled, ros, definitions
+        self._base = base_of(compiled)
+        self.streams: dict[str, Stream] = {}
+        self._definitions: dict[str, str] = {}
+        self.source = ReceivedSource(network) if wanted.shown else None
+        self._files = None if wanted.record is None else self._recording(wanted.record, wanted)
+        self.recorder = Recorder(self._files, self._definitions, tell, self._heard)
+        self.activity = self._add(
+            ACTIVITY, f"{self._base}/{ACTIVITY}", ARRAY, arrays(network.hash, len(network.neurons))
+        )
+        changing = len(network.changing)
+        if changing:
+            self._add(WEIGHTS, f"{self._base}/{WEIGHTS}", ARRAY, arrays(network.hash, changing))
+
+    def _recording(self, path: Path, wanted: Wanted) -> Files:
+        network = self.compiled.network
+        about = {"network": network.name, "hash": network.hash, "dt": repr(network.dt), "version": __version__}
+        topic = topic_of(f"{self._base}/{SPEC}", STRING, self._definition(STRING), self.ros)
+        first = [(topic, text_message(self.compiled.text(), ENCODINGS[self.ros]))]
+        return Files(path, self.ros, about, first, wanted.rotation, wanted.force)
+
+    def _definition(self, type_: str) -> str:
+        return definition(type_, self.ros) or self._definitions_of(type_)
+
+    def add(self, topic: str, type_: str) -> Stream:
+        """Another topic, which is recorded as it comes; the summary has it under its name."""
+        if topic in self.streams:
+            return self.streams[topic]
+        text = self._definition(type_)
+        has_header = text.split("\n", 1)[0].split() in (["std_msgs/Header", "header"], ["Header", "header"])
+        return self._add(topic, topic, type_, headed if has_header else anything)
+
+    def _add(self, name: str, topic: str, type_: str, judge: Judge) -> Stream:
+        self._definitions[type_] = self._definition(type_)
+        made = self.streams[topic] = Stream(name, topic, type_, ENCODINGS[self.ros], judge)
+        return made
+
+    def start(self) -> None:
+        """Begin."""
+        self.recorder.start()
+
+    def put(self, topic: str, arrival: Arrival) -> None:
+        """A message; those of topics that are not known are passed over."""
+        stream = self.streams.get(topic)
+        if stream is not None:
+            self.recorder.put(stream, arrival)
+
+    def anew(self) -> None:
+        """Connections were made anew."""
+        for stream in self.streams.values():
+            self.recorder.anew(stream)
+
+    def end(self) -> None:
+        """Write all that came, and close the files. Raises what has kept them from being written."""
+        self.recorder.end()
+        if self.recorder.failure is not None:
+            raise self.recorder.failure
+
+    def _heard(self, stream: Stream, arrival: Arrival, accepted: Accepted) -> None:
+        if self.source is None:
+            return
+        if stream is self.activity:
+            self.source.hear_activity(accepted.seq, arrival.received, accepted.numbers)
+        elif stream.name == WEIGHTS:
+            self.source.hear_weights(accepted.seq, accepted.numbers)
+
+    @property
+    def counts(self) -> dict[str, Counts]:
+        """What became of the messages, by topic."""
+        return {stream.name: stream.counts for stream in self.streams.values()}
+
+    @property
+    def shown(self) -> tuple[int, int]:
+        """How many steps were shown, and how many skipped."""
+        if self.source is None:
+            return 0, 0
+        return self.source.shown, self.source.came - self.source.shown
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """The files of the recording."""
+        return () if self._files is None else tuple(map(str, self._files.paths))
