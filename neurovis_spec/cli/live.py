@@ -131,12 +131,12 @@ def _show(
     import asyncio
 
     from neurovis_spec.live.access import Access
-    from neurovis_spec.live.live import Edits, listen, serve
+    from neurovis_spec.live.live import Edits, serve
     from neurovis_spec.live.show import Show
 
     show = Show(recording, start, theme, engine, backend)
     stage = show.stage(network)
-    sock = _listen(listen, host, port)
+    sock = bound(host, port)
     access = Access(host, sock.getsockname()[1], viewers)
 
     def announce() -> None:
@@ -158,8 +158,11 @@ def _show(
     asyncio.run(serve(stage, sock, access, announce, None if again is None else edits))
 
 
-def _listen(listen: Callable[[str, int], socket.socket], host: str, port: int) -> socket.socket:
+def bound(host: str, port: int) -> socket.socket:
+    """A socket where the page is served."""
     import errno
+
+    from neurovis_spec.live.live import listen
 
     try:
         return listen(host, port)

@@ -13,6 +13,8 @@ from neurovis_spec.cli.options import examples
 #: Each is ``neurovis_spec.cli.ros_NAME:command``.
 COMMANDS: Final[Mapping[str, str]] = {
     "run": "Run a network as a node: inputs from topics, outputs to topics.",
+    "view": "Show and record a network that runs elsewhere.",
+    "play": "Publish a recording as it came.",
 }
 
 

@@ -1,0 +1,131 @@
+"""What the commands of ``neurovis ros`` that listen share: the page, the recording.
+
+In: texts of the command line. Out: a Desk, which opens both for a block.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+import click
+
+from neurovis_spec.cli.completion import paths
+from neurovis_spec.cli.failure import fault
+from neurovis_spec.cli.options import engine_option, theme_option
+from neurovis_spec.cli.ros_options import tell
+
+if TYPE_CHECKING:
+    from neurovis_spec.compiled import CompiledNetwork
+    from neurovis_spec.ros.files import Rotation
+    from neurovis_spec.ros.listening import Listening
+    from neurovis_spec.ros.middleware import Node
+
+F = TypeVar("F", bound=Callable[..., object])
+
+
+@dataclass(frozen=True)
+class Desk:
+    """Where what arrives is shown (a port; None: nowhere) and recorded."""
+
+    live: int | None
+    record: str | None
+    rotation: Rotation
+    force: bool
+    theme: str | None
+    engine: str | None
+
+    def __bool__(self) -> bool:
+        return self.live is not None or self.record is not None
+
+    @contextmanager
+    def open(self, compiled: CompiledNetwork, node: Node) -> Iterator[Listening]:
+        """A network's topics, heard for a block, and shown in the page where that is wanted."""
+        from neurovis_spec.ros.files import refusal
+        from neurovis_spec.ros.listening import Listening, Wanted
+
+        path = None if self.record is None else Path(self.record)
+        if path is not None and (why := refusal(path, node.ros)) is not None:
+            raise fault(f"{path}: {why}")
+        wanted = Wanted(path, self.rotation, self.force, self.live is not None)
+        try:
+            listening = Listening(compiled, node.ros, wanted, tell, node.definition)
+        except FileExistsError as error:
+            raise fault(f"{error.filename} exists", "--force overwrites it") from None
+        with self._page(listening):
+            listening.start()
+            try:
+                yield listening
+            finally:
+                listening.end()
+
+    @contextmanager
+    def _page(self, listening: Listening) -> Iterator[None]:
+        if self.live is None or listening.source is None:
+            yield
+            return
+        if find_spec("aiohttp") is None:
+            raise fault(
+                "the live view needs aiohttp", "pip install 'neurovis-spec[live]'; in a clone: pip install '.[live]'"
+            )
+        from neurovis_spec.cli.live import bound
+        from neurovis_spec.ros.page import Page, stage_of
+
+        stage = stage_of(listening.compiled, listening.source, self.theme, self.engine)
+        with Page(stage, bound("127.0.0.1", self.live)).served() as url:
+            tell(f"live: {url}")
+            yield
+
+
+def shown_options(always: bool) -> Callable[[F], F]:
+    """The options of the page and the recording, as one argument ``desk``; ``always``: what is not recorded is seen."""
+
+    def add(command: F) -> F:
+        @functools.wraps(command)
+        def with_desk(
+            *args: object,
+            live: int | None,
+            record: str | None,
+            rotate: str | None,
+            force: bool,
+            theme: str | None,
+            engine: str | None,
+            **rest: object,
+        ) -> object:
+            from neurovis_spec.ros.files import Rotation, rotation
+
+            turns = Rotation() if rotate is None else rotation(rotate)
+            if turns is None:
+                raise click.UsageError(f"--rotate takes a size or seconds (1GiB, 500MB, 60s, 10min), not '{rotate}'")
+            if always and record is None and live is None:
+                live = 0
+            return command(*args, desk=Desk(live, record, turns, force, theme, engine), **rest)
+
+        default = "; default without --record: one that is free" if always else ""
+        options = (
+            click.option(
+                "--live", type=click.IntRange(0, 65535), metavar="PORT",
+                help=f"Show it in the browser, at this port; 0: one that is free{default}.",
+            ),
+            click.option(
+                "--record", metavar="FILE", shell_complete=paths,
+                help="Record: .mcap, .bag (ROS 1), or a folder without suffix (ROS 2).",
+            ),
+            click.option(
+                "--rotate", metavar="SIZE|SECONDS", help="Begin a new file at this size or time; default: 1GiB."
+            ),
+            click.option("--force", is_flag=True, help="Overwrite a recording that is there."),
+            theme_option,
+            engine_option,
+        )  # fmt: skip
+        result: Callable[..., object] = with_desk
+        for option in reversed(options):
+            result = option(result)
+        return result  # type: ignore[return-value]
+
+    return add

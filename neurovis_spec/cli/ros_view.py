@@ -1,0 +1,80 @@
+"""``neurovis ros view``: a network that runs elsewhere, shown and recorded."""
+
+from __future__ import annotations
+
+import sys
+import time
+from functools import partial
+
+import click
+
+from neurovis_spec.cli.completion import paths
+from neurovis_spec.cli.failure import fault
+from neurovis_spec.cli.files import network_of, show_findings
+from neurovis_spec.cli.options import examples, set_option
+from neurovis_spec.cli.ros_options import Meeting, meeting_options, tell
+from neurovis_spec.cli.ros_shown import Desk, shown_options
+from neurovis_spec.interrupts import heeded
+
+
+@click.command(
+    epilog=examples(
+        "neurovis ros view",
+        "neurovis ros view first.yaml --live 8080",
+        "neurovis ros view --record run.mcap --rotate 10min",
+    )
+)
+@click.argument("spec", metavar="[SPEC]", required=False, shell_complete=paths)
+@click.option("--network", metavar="NAME", help="Which network, where several announce themselves.")
+@set_option
+@shown_options(always=True)
+@meeting_options(wait=0)
+def command(spec: str | None, network: str | None, settings: dict[str, float], desk: Desk, meeting: Meeting) -> None:
+    """Show and record a network that runs elsewhere, on a robot.
+
+    Without SPEC it is the one that announces itself. The page shows the newest step, and goes back over those that
+    came; the recording has every message. Ctrl-C ends it.
+    """
+    from neurovis_spec.ros.announced import find
+    from neurovis_spec.ros.listening import ACTIVITY
+    from neurovis_spec.ros.middleware import DISPLAY, RECORDER
+    from neurovis_spec.ros.summary import Summary
+
+    begun = time.monotonic()
+    compiled = None if spec is None else network_of(spec, settings)
+    sys.setswitchinterval(0.0005)
+    with meeting.node("neurovis_view", anonymous=True) as node, heeded() as asked:
+
+        def stopped() -> bool:
+            over = meeting.seconds is not None and time.monotonic() - begun >= meeting.seconds
+            return bool(asked) or node.ended or over
+
+        if compiled is None:
+            tell("waiting for a network that announces itself")
+            compiled = find(node, network, stopped)
+            if compiled is None:
+                raise fault("no network has announced itself", "name its spec: neurovis ros view SPEC")
+            show_findings(compiled)
+        with desk.open(compiled, node) as listening:
+            quality = DISPLAY if desk.record is None else RECORDER
+            reconnects = node.reconnects
+            subscriptions = [
+                node.subscription(topic, stream.type, quality, partial(listening.put, topic))
+                for topic, stream in listening.streams.items()
+            ]
+            tell(f"ready: {compiled.name}, ROS {node.ros}, {subscriptions[0].topic.removesuffix(ACTIVITY)}")
+            while not stopped():
+                if node.reconnects != reconnects:
+                    reconnects = node.reconnects
+                    listening.anew()
+                time.sleep(0.02)
+            for subscription in subscriptions:
+                subscription.close()
+            listening.end()
+            shown, skipped = listening.shown
+            summary = Summary(
+                network=compiled.name, hash=compiled.hash, ros=node.ros, seconds=time.monotonic() - begun,
+                reconnects=node.reconnects, shown=shown, skipped=skipped, files=listening.paths,
+                topics=listening.counts,
+            )  # fmt: skip
+    meeting.show(summary)
