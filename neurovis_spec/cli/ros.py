@@ -14,6 +14,7 @@ from neurovis_spec.cli.options import examples
 COMMANDS: Final[Mapping[str, str]] = {
     "run": "Run a network as a node: inputs from topics, outputs to topics.",
     "view": "Show and record a network that runs elsewhere.",
+    "legacy": "Show, record or write as a spec what speaks to the first NeuroVis.",
     "play": "Publish a recording as it came.",
 }
 

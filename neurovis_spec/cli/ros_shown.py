@@ -8,7 +8,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -42,6 +42,10 @@ class Desk:
 
     def __bool__(self) -> bool:
         return self.live is not None or self.record is not None
+
+    def in_the_browser(self) -> Desk:
+        """The same, shown at a port that is free."""
+        return replace(self, live=0)
 
     @contextmanager
     def open(self, compiled: CompiledNetwork, node: Node) -> Iterator[Listening]:

@@ -1,0 +1,72 @@
+"""``neurovis ros legacy``: a controller of the first NeuroVis, shown, recorded, and written as a spec."""
+
+from __future__ import annotations
+
+import sys
+import time
+from contextlib import ExitStack
+
+import click
+
+from neurovis_spec.cli.completion import paths
+from neurovis_spec.cli.failure import fault
+from neurovis_spec.cli.options import examples
+from neurovis_spec.cli.ros_options import Meeting, meeting_options, tell
+from neurovis_spec.cli.ros_shown import Desk, shown_options
+from neurovis_spec.interrupts import heeded
+
+
+@click.command(
+    epilog=examples(
+        "neurovis ros legacy",
+        "neurovis ros legacy -o robot.yaml --seconds 10",
+        "neurovis ros legacy --record robot.bag --network robot",
+    )
+)
+@click.option("-o", "--output", metavar="SPEC", shell_complete=paths, help="Write the network as a spec, at the end.")
+@click.option("--namespace", default="/neurovis", show_default=True, metavar="NS", help="Where its topics are.")
+@click.option("--network", default="legacy", show_default=True, metavar="NAME", help="How the network is called.")
+@shown_options(always=False)
+@meeting_options(wait=0)
+def command(output: str | None, namespace: str, network: str, desk: Desk, meeting: Meeting) -> None:
+    """Listen to a controller that speaks to the first NeuroVis: its network is shown, recorded, or written as a spec.
+
+    Without -o and --record it is shown in the browser. Nothing in the controller has to be changed. Ctrl-C ends it.
+    """
+    from neurovis_spec.ros.legacy_listener import LegacyListener
+    from neurovis_spec.ros.summary import Summary
+    from neurovis_spec.runtime.files import replacing
+
+    if not desk and output is None:
+        desk = desk.in_the_browser()
+    begun = time.monotonic()
+    sys.setswitchinterval(0.0005)
+    with meeting.node("neurovis_legacy", anonymous=True) as node, ExitStack() as stack, heeded() as asked:
+        listener, listening = LegacyListener(node, namespace, network, tell), None
+        listener.look()
+        tell(f"ready: {namespace}, ROS {node.ros}")
+        while not (
+            asked or node.ended or (meeting.seconds is not None and time.monotonic() - begun >= meeting.seconds)
+        ):
+            listener.hear(0.05)
+            if desk and listening is None and listener.settled:
+                listening = stack.enter_context(desk.open(listener.compiled(), node))
+                listener.to(listening)
+                tell(f"{len(listener.legacy.names)} neurons, {len(listener.legacy.edges)} connections")
+        if listening is not None:
+            listening.end()
+        listener.end()
+        if not listener.legacy.names:
+            raise fault(f"no network was described under {namespace}", "its controller publishes neuronName")
+        compiled = listener.compiled() if listening is None else listening.compiled
+        if output is not None:
+            with replacing(output) as file:
+                file.write(listener.legacy.spec(network).encode())
+        shown, skipped = (0, 0) if listening is None else listening.shown
+        files = () if listening is None else listening.paths
+        summary = Summary(
+            network=compiled.name, hash=compiled.hash, ros=node.ros, seconds=time.monotonic() - begun,
+            reconnects=node.reconnects, shown=shown, skipped=skipped,
+            files=(*files, *(() if output is None else (output,))), topics=listener.counts,
+        )  # fmt: skip
+    meeting.show(summary)

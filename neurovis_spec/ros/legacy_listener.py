@@ -1,0 +1,152 @@
+"""The topics of the first NeuroVis on a node: what comes describes a network, and then shows how it runs.
+
+In: a Node. Out: a Legacy that learns; once it knows a network, its activities and weights as messages of this version.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from queue import Empty, SimpleQueue
+from time import monotonic
+from typing import Final
+
+import numpy as np
+
+from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.language.ros_types import plain
+from neurovis_spec.ros.accept import ARRAY
+from neurovis_spec.ros.announced import compiled_from
+from neurovis_spec.ros.counts import REASONS, Counts, Reason, Teller
+from neurovis_spec.ros.legacy import KINDS, Kind, Legacy, types_of
+from neurovis_spec.ros.listening import ACTIVITY, WEIGHTS, Listening
+from neurovis_spec.ros.middleware import Arrival, Node, Quality, Tell
+from neurovis_spec.ros.wire import ArrayForm, WireError
+from neurovis_spec.runtime.ros_messages import label_of
+
+_QUALITY: Final = Quality("offered", "volatile", 4000)
+#: messages that wait to be read
+_ROOM: Final = 100_000
+#: a description is taken when it has stayed as it is for so many seconds
+_SETTLED: Final = 0.5
+_LOOK: Final = 0.2
+
+
+class LegacyListener:
+    """Listens to the topics under a namespace. ``counts`` are those of the topics, under their names."""
+
+    def __init__(self, node: Node, namespace: str, network: str, tell: Tell) -> None:
+        self._node, self._network, self._tell, self._teller = node, network, tell, Teller(tell)
+        self.legacy = Legacy()
+        self.counts: dict[str, Counts] = {kind: Counts() for kind in KINDS}
+        self._topics = {f"{namespace.rstrip('/')}/{kind}": kind for kind in KINDS}
+        self._heard = set[tuple[str, str]]()
+        self._came: SimpleQueue[tuple[Kind, Arrival]] = SimpleQueue()
+        self._looked, self._changed = 0.0, monotonic()
+        self._described: tuple[object, ...] = ()
+        self._to: Listening | None = None
+        self._forms: dict[str, tuple[str, ArrayForm]] = {}
+        #: how many messages of each topic of this version there were
+        self._made = {ACTIVITY: 0, WEIGHTS: 0}
+
+    def look(self) -> None:
+        """Listen to the topics that have publishers by now, with the types that these have."""
+        for topic, types in self._node.topics().items():
+            kind = self._topics.get(topic)
+            if kind is None:
+                continue
+            for type_ in map(plain, types):
+                if (topic, type_) in self._heard:
+                    continue
+                self._heard.add((topic, type_))
+                if type_ not in types_of(kind):
+                    self._tell(f"{topic}: its messages are {type_}, not {' or '.join(types_of(kind))}")
+                elif self._node.ros == 2 or all(one != topic for one, _ in self._heard - {(topic, type_)}):
+                    self._node.subscription(topic, type_, _QUALITY, partial(self._arrived, kind))
+
+    def _arrived(self, kind: Kind, arrival: Arrival) -> None:
+        if self._came.qsize() < _ROOM:
+            self._came.put((kind, arrival))
+        else:
+            self.counts[kind].lost += 1
+
+    def hear(self, seconds: float) -> None:
+        """Take what has come, for about so long."""
+        end = monotonic() + seconds
+        while (left := end - monotonic()) > 0:
+            if monotonic() - self._looked >= _LOOK:
+                self._looked = monotonic()
+                self.look()
+            try:
+                self._take(*self._came.get(timeout=left))
+            except Empty:
+                break
+        self._teller.look()
+
+    def _take(self, kind: Kind, arrival: Arrival) -> None:
+        counts = self.counts[kind]
+        counts.received += 1
+        why = self._judged(kind, arrival)
+        if why is not None:
+            counts.rejected[why] += 1
+            self._teller.note(f"{REASONS[why]} on {kind}")
+
+    def _judged(self, kind: Kind, arrival: Arrival) -> Reason | None:
+        type_ = plain(arrival.type)
+        if type_ not in types_of(kind):
+            return "type"
+        legacy = self.legacy
+        try:
+            found = legacy.hear(kind, arrival.data, self._node.encoding, type_)
+        except WireError:
+            return "parse"
+        if isinstance(found, str):
+            return found
+        if kind in ("activity", "weightsAll"):
+            self.counts[kind].not_finite += not np.isfinite(found).all()
+            self._hand_on(ACTIVITY if kind == "activity" else WEIGHTS, found, arrival.received)
+        else:
+            described = (legacy.names, dict(legacy.positions), dict(legacy.edges))
+            if described != self._described:
+                if self._to is not None:
+                    self._tell("the network has changed: what is shown and recorded is as it was; begin anew")
+                self._described, self._changed = described, monotonic()
+        return None
+
+    @property
+    def settled(self) -> bool:
+        """Whether there is a network that has stayed as it is."""
+        return self.legacy.described and monotonic() - self._changed >= _SETTLED
+
+    def compiled(self) -> CompiledNetwork:
+        """The network as it is known. Raises SpecError."""
+        return compiled_from(self.legacy.spec(self._network), self._network)
+
+    def to(self, listening: Listening) -> None:
+        """From now on activities and weights go there, as messages of this version."""
+        self._to = listening
+        network, encoding = listening.compiled.network, self._node.encoding
+        sizes = {ACTIVITY: len(network.neurons), WEIGHTS: len(network.changing)}
+        for topic, stream in listening.streams.items():
+            form = ArrayForm.of(label_of(network.hash), sizes[stream.name], encoding)
+            self._forms[stream.name] = topic, form
+
+    def _hand_on(self, name: str, numbers: FloatArray, received: int) -> None:
+        if self._to is None or name not in self._forms:
+            return
+        topic, form = self._forms[name]
+        data = form.message(self._made[name], received / 1e9, numbers)
+        self._made[name] += 1
+        self._to.put(topic, Arrival(data, received, None, ARRAY))
+
+    def end(self) -> None:
+        """What was recorded, and entries that were left out, which count as not to be read."""
+        if self._to is not None:
+            recorded = {stream.name: stream.counts.recorded for stream in self._to.streams.values()}
+            self.counts["activity"].recorded = recorded[ACTIVITY]
+            self.counts["weightsAll"].recorded = recorded.get(WEIGHTS, 0)
+        for kind, count in self.legacy.left_out.items():
+            if count:
+                self.counts[kind].rejected["parse"] += count
+                self._tell(f"{count} entries of {kind} say nothing, or more than one thing, and are left out")
+        self._teller.rest()
