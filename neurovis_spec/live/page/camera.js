@@ -66,9 +66,9 @@ export class Camera {
   }
 
   /** See a part of the picture in the middle of the window, as large as it can be. @param {number[]} rect least x and y,
-   * largest x and y, in units */
-  see([x0, y0, x1, y1]) {
-    const scale = Math.min(this.window[0] / (x1 - x0), this.window[1] / (y1 - y0));
+   * largest x and y, in units @param {number} [least] the least pixels for a unit: of what is larger then, the middle is seen */
+  see([x0, y0, x1, y1], least = 0) {
+    const scale = Math.max(least, Math.min(this.window[0] / (x1 - x0), this.window[1] / (y1 - y0)));
     const zoom = Math.min(64, Math.max(0.25, scale / this.whole)), at = zoom * this.whole;
     this.go([zoom, at * (this.size[0] - x0 - x1) / 2, at * (this.size[1] - y0 - y1) / 2]);
   }

@@ -175,7 +175,8 @@ function go(id) {
   if (box) {
     const [x0, y0, x1, y1] = box.rect, room = 0.1 * Math.max(x1 - x0, y1 - y0);
     choose(false);
-    camera.see([x0 - room, y0 - room, x1 + room, y1 + room]);
+    attention.point('', [0, 0]);
+    camera.see([x0 - room, y0 - room, x1 + room, y1 + room], 1.01 * zoom.opening(box));
     if (look) say(zoom.words(id, look).replaceAll('\n', ', '));
   } else {
     attention.hold(id);

@@ -65,6 +65,11 @@ export class Zoom {
     return closed;
   }
 
+  /** The least pixels for a unit at which a box is open. @param {Box} box @returns {number} */
+  opening({ radius }) {
+    return this.scene ? devicePixelRatio * Math.min(OWN * this.scene.density, TINY / radius) : 0;
+  }
+
   /** The scene as it is seen from here; the same as long as it is drawn the same way. @param {Camera} camera @returns {Scene | null} */
   seen(camera) {
     const { scene } = this;
