@@ -67,7 +67,7 @@ export function flattened(points, scale, [left, top]) {
 }
 
 /** A part of the window: which pixels have colours that change, where each one's entries end, the sum of what stays.
- * @typedef {{left: number, top: number, lines: Set<number>, discs: Set<number>, slots: Uint32Array,
+ * @typedef {{left: number, top: number, lines: number[], discs: number[], slots: Uint32Array,
  *   where: Uint32Array, ends: Uint32Array, entries: Uint32Array, base: Float64Array}} Tile */
 
 /** Works out the entries of tiles, one after the other: everything is put in from front to back. */

@@ -4,7 +4,7 @@
 
 import { channels, palette } from './colours.js';
 import { flattened, packed } from './coverage.js';
-import { Mosaic } from './mosaic.js';
+import { enter, leave, Mosaic } from './mosaic.js';
 
 /** @typedef {import('./protocol.js').Scene} Scene */
 /** @typedef {import('./protocol.js').Shape} Shape */
@@ -263,9 +263,11 @@ export class Drawing {
       if (laid && (laid.x !== x || laid.y !== y)) this.moves++;
       const radius = shape.radius * scale, ring = (Math.max(0, shape.width) / 2) * scale;
       const tiles = mosaic.around(x, y, radius + ring + 1);
-      for (const tile of laid ? laid.tiles : []) tile.discs.delete(at);
-      for (const tile of tiles) tile.discs.add(at);
-      mosaic.spoil(laid ? laid.tiles : []);
+      if (laid) {
+        leave(laid.tiles, 'discs', at);
+        mosaic.spoil(laid.tiles);
+      }
+      enter(tiles, 'discs', at);
       mosaic.spoil(tiles);
       disc.laid = { x, y, radius, ring, colour: ring ? whole(shape.stroke) : 0, tiles, share };
     });
@@ -285,9 +287,11 @@ export class Drawing {
       }
       const chain = same ? laid.chain : flattened(points, scale, camera.origin);
       const tiles = mosaic.beside(chain, reach + SPARE, end.x, end.y, room + SPARE);
-      for (const tile of laid ? laid.tiles : []) tile.lines.delete(at);
-      for (const tile of tiles) tile.lines.add(at);
-      mosaic.spoil(laid ? laid.tiles : []);
+      if (laid) {
+        leave(laid.tiles, 'lines', at);
+        mosaic.spoil(laid.tiles);
+      }
+      enter(tiles, 'lines', at);
       mosaic.spoil(tiles);
       line.laid = { ...now, reach: reach + SPARE, room: room + SPARE, box: around(points), chain, tiles };
     });
@@ -297,14 +301,13 @@ export class Drawing {
   fill(coverage, tile) {
     const { lines, discs, pictures, colours } = this, half = this.seen.scale / 2 / this.constants.fineness;
     coverage.picture(pictures.front);
-    for (const at of Uint32Array.from(tile.discs).sort().reverse()) {
-      const { laid } = discs[at], slot = lines.length + at;
+    for (let last = tile.discs.length - 1; last >= 0; last--) {
+      const at = tile.discs[last], { laid } = discs[at], slot = lines.length + at;
       if (laid) coverage.disc(laid, slot, pictures.words, slot + discs.length);
     }
     coverage.picture(pictures.between);
-    for (const at of Uint32Array.from(tile.lines).sort().reverse()) {
-      if (!coverage.open) break;
-      const { laid } = lines[at];
+    for (let last = tile.lines.length - 1; last >= 0 && coverage.open; last--) {
+      const at = tile.lines[last], { laid } = lines[at];
       if (!laid) continue;
       coverage.head(laid.end, laid.share, at);
       coverage.line(laid.chain, laid.width * half, laid.glow * half, laid.share, at, colours.glow);

@@ -8,6 +8,23 @@ import { blend, Coverage, SIDE } from './coverage.js';
 /** @typedef {import('./coverage.js').Chain} Chain */
 /** @typedef {import('./coverage.js').Tile} Tile */
 
+/** Something comes into tiles, whose things stay in order. @param {Tile[]} tiles @param {'lines' | 'discs'} kind
+ * @param {number} at */
+export function enter(tiles, kind, at) {
+  for (const tile of tiles) {
+    const list = tile[kind];
+    let place = list.length;
+    while (place && list[place - 1] > at) place--;
+    if (place === list.length) list.push(at);
+    else list.splice(place, 0, at);
+  }
+}
+
+/** Something goes out of tiles. @param {Tile[]} tiles @param {'lines' | 'discs'} kind @param {number} at */
+export function leave(tiles, kind, at) {
+  for (const tile of tiles) tile[kind].splice(tile[kind].indexOf(at), 1);
+}
+
 /** Tiles that fill a window. */
 export class Mosaic {
   /** @param {number[]} window in pixels @param {number} slots how many colours there are that change */
@@ -22,7 +39,7 @@ export class Mosaic {
     const none = new Uint32Array(0);
     /** @type {Tile[]} */
     this.tiles = Array.from({ length: this.columns * this.rows }, (_, at) => ({
-      left: SIDE * (at % this.columns), top: SIDE * Math.floor(at / this.columns), lines: new Set(), discs: new Set(),
+      left: SIDE * (at % this.columns), top: SIDE * Math.floor(at / this.columns), lines: [], discs: [],
       slots: none, where: none, ends: none, entries: none, base: new Float64Array(0),
     }));
     /** those that are to be worked out anew, the longest waiting first @type {Set<Tile>} */
