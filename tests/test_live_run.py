@@ -167,6 +167,17 @@ def test_a_recording_ends() -> None:
     made.run.end()
 
 
+def test_a_recording_that_has_ended_plays_from_its_beginning() -> None:
+    made = Driven(RecordedSource(COMPILED.network, COMPILED.run(steps=50)))
+    shown = made.ask(Seek(49))
+    assert (shown.status.ended, shown.status.playing) == (True, False)
+    made.run.ask(Play())
+    shown = made.until(lambda shown: shown.status.playing)
+    assert not shown.status.ended
+    assert shown.look.step < 49
+    made.run.end()
+
+
 def test_nothing_is_shown_to_nobody() -> None:
     shown: list[Shown] = []
     run = Run(SimulatedSource(COMPILED.simulator()), VIEW, shown.append, lambda: False)

@@ -165,7 +165,9 @@ class Run:
         source, now = self._source, time.perf_counter()
         match asked:
             case Play():
-                self._playing, self._target = not self._ended, None
+                if self._ended:
+                    source.restart()
+                self._playing, self._ended, self._target = True, False, None
                 self._clock.start(now)
             case Pause():
                 self._playing, self._target = False, None
