@@ -23,15 +23,18 @@ import pytest
 from aiohttp import ClientWebSocketResponse, WSMsgType
 
 import neurovis_spec as nv
+from neurovis_spec.layout.model import Layout
 from neurovis_spec.live.access import Access
+from neurovis_spec.live.appearance import Appearance
 from neurovis_spec.live.commands import Pause, Seek
+from neurovis_spec.live.desk import Desk
 from neurovis_spec.live.hub import AHEAD, Hub
 from neurovis_spec.live.live import listen
 from neurovis_spec.live.protocol import FRAME, LARGEST, MESSAGES, SCENE, TRACE
 from neurovis_spec.live.run import Run
 from neurovis_spec.live.server import BURST, MOST_CLIENTS, MOST_CONNECTIONS, Server
 from neurovis_spec.live.simulated import SimulatedSource
-from neurovis_spec.live.view import view_of
+from neurovis_spec.live.view import View, view_of
 
 COMPILED = nv.compile_text("""neurovis: 1
 name: live
@@ -48,6 +51,10 @@ render: {gain: {activity: 1, signal: 1, thickness: 4, change: 10}}
 VIEW = view_of(COMPILED, COMPILED.gains)
 
 
+def draw(compiled: nv.CompiledNetwork, appearance: Appearance, layout: Layout) -> View:
+    return view_of(compiled, compiled.gains, appearance=appearance, layout=layout)
+
+
 @dataclass
 class Live:
     """A server of a run, and a session of a browser that knows nothing."""
@@ -55,6 +62,7 @@ class Live:
     access: Access
     hub: Hub
     run: Run
+    desk: Desk
     session: aiohttp.ClientSession
 
     @property
@@ -71,18 +79,21 @@ class Live:
 
 @asynccontextmanager
 async def serving() -> AsyncIterator[Live]:
-    hub = Hub(asyncio.get_running_loop())
+    hub, call = Hub(asyncio.get_running_loop()), asyncio.get_running_loop().call_soon_threadsafe
     run = Run(SimulatedSource(COMPILED.simulator()), VIEW, hub.show, lambda: hub.watched)
     sock = listen("127.0.0.1", 0)
     access = Access("127.0.0.1", sock.getsockname()[1], viewers=True)
-    server = Server(access, hub, run)
+    desk = Desk(COMPILED, None, draw, run, lambda text: call(hub.tell, text, "placed"))
+    server = Server(access, hub, run, desk)
     await server.start(sock)
     run.start()
+    desk.start()
     connector = aiohttp.TCPConnector(limit=0)
     async with aiohttp.ClientSession(connector=connector) as session:
         try:
-            yield Live(access, hub, run, session)
+            yield Live(access, hub, run, desk, session)
         finally:
+            desk.end()
             run.end()
             await server.stop()
     assert run.failure is None
@@ -378,11 +389,49 @@ def test_a_viewer_looks_on_and_can_ask_for_nothing() -> None:
                 await eyes.ask(kind)
                 await eyes.until(lambda: eyes.told[-1]["type"] == "refused")
                 eyes.told.append({"type": ""})
+            await eyes.ask("place", neuron="B", at=[3, 3], done=True)
+            await eyes.ask("save", into="spec")
+            await eyes.ask("write")
             await eyes.ask("lesion", part="B")
             here = eyes.step
             await eyes.until(lambda: eyes.step > here + 5)
             assert eyes.status["turned"] == []
             assert eyes.status["playing"]
+            assert live.desk.placed.moved == ()
+            assert not any(told["type"] in ("moved", "saving") for told in eyes.told)
+
+    served(test)
+
+
+def test_an_owner_puts_neurons_by_hand_and_everybody_is_told() -> None:
+    async def test(live: Live) -> None:
+        async with live.stream(live.access.owner) as stream, live.stream(live.access.viewer) as other:
+            eyes, witness = Eyes(stream), Eyes(other)
+            await eyes.until(lambda: eyes.step > 2)
+            before = eyes.scene["groups"]
+
+            def told(of: Eyes, kind: str) -> dict[str, Any]:
+                return next((entry for entry in reversed(of.told) if entry["type"] == kind), {})
+
+            await eyes.ask("place", neuron="B", at=[4, 3], done=False)
+            await eyes.until(lambda: bool(told(eyes, "moved")))
+            assert set(told(eyes, "moved")["discs"]) == {"n3"}
+            assert set(told(eyes, "moved")["lines"]) == {f"c{index}" for index in range(6)}
+            assert eyes.scene["groups"] == before
+            await eyes.ask("place", neuron="B", at=[4, 3], done=True)
+            await eyes.until(lambda: eyes.scene["groups"] != before)
+            await witness.until(lambda: told(witness, "placed").get("neurons") == ["B"])
+            assert live.desk.placed.layout.positions["B"] == (4, 3)
+            await eyes.ask("save", into="spec")
+            await eyes.until(lambda: told(eyes, "refused").get("reason") == "there is no file to save to")
+            await eyes.ask("place", neuron="X", at=[4, 3], done=True)
+            await eyes.until(lambda: "no neuron 'X'" in told(eyes, "refused")["reason"])
+            await eyes.ask("write")
+            await eyes.ask("unplace")
+            await eyes.until(lambda: eyes.scene["groups"] == before)
+            await witness.until(lambda: told(witness, "placed")["neurons"] == [])
+            await eyes.ask("unplace")
+            await eyes.until(lambda: told(eyes, "refused")["reason"] == "nothing was put by hand")
 
     served(test)
 
@@ -411,6 +460,9 @@ BROKEN: list[str | bytes] = [
             *({"items": [f"n{index}" for index in range(17)]}, {"first": 0.5}, {"more": 1}),
         )
     ),
+    *('{"type": "place", "neuron": "B", "at": [0, 0]}', '{"type": "place", "neuron": "B", "at": [0], "done": true}'),
+    *('{"type": "place", "neuron": "B", "at": [0, 1e9], "done": true}', '{"type": "save", "into": "/etc/passwd"}'),
+    *('{"type": "place", "neuron": "B", "at": "00", "done": true}', '{"type": "write", "path": "x"}'),
     *(b"", b"\x00", b"\x00" * 5, b"\x00" * 1000, '{"type": "pl\x00ay"}', '{"type": "step", "by": ' + "9" * 5000 + "}"),
 ]
 
@@ -439,7 +491,21 @@ def test_random_messages_do_no_harm() -> None:
     async def test(live: Live) -> None:
         for _ in range(60):
             async with live.stream(live.access.owner) as stream:
-                keys = ("by", "step", "value", "values", "part", "neurons", "connections", "on", "name")
+                keys = (
+                    "by",
+                    "step",
+                    "value",
+                    "values",
+                    "part",
+                    "neurons",
+                    "connections",
+                    "on",
+                    "name",
+                    "at",
+                    "done",
+                    "neuron",
+                    "into",
+                )
                 for _ in range(5):
                     message = {key: draw.choice(values) for key in draw.sample(keys, draw.randint(0, 2))}
                     if not stream.closed:

@@ -7,7 +7,7 @@ recording, an array; or an error that ends the command.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -36,15 +36,30 @@ def compiled(spec: str, parameters: Mapping[str, float] | None = None) -> Compil
     """The network of a SPEC, ``-`` being standard input, with the command's --root and --limit. Raises SpecError."""
     from neurovis_spec import api
 
-    context = click.get_current_context(silent=True)
-    given = {} if context is None else context.meta
-    root, limit = given.get("neurovis.root"), given.get("neurovis.limit")
+    root, limit = _options()
     with progress("compiling"):
         if spec == "-":
             folder = Path.cwd()
             text = standard_input()
             return api.compile_text(text, file=STDIN, folder=folder, parameters=parameters, root=root, limit=limit)
         return api.compile(spec, parameters=parameters, root=root, limit=limit)
+
+
+def compiler_in_place(spec: str, parameters: Mapping[str, float]) -> Callable[[str], CompiledNetwork]:
+    """What compiles a text as if it stood in the file of a SPEC, also when the command has long begun. It raises
+    SpecError."""
+    from neurovis_spec import api
+
+    root, limit = _options()
+    folder = Path(spec).parent
+    return lambda text: api.compile_text(text, file=spec, folder=folder, parameters=parameters, root=root, limit=limit)
+
+
+def _options() -> tuple[Path | None, int | None]:
+    """The command's --root and --limit."""
+    context = click.get_current_context(silent=True)
+    given = {} if context is None else context.meta
+    return given.get("neurovis.root"), given.get("neurovis.limit")
 
 
 def network_of(spec: str, parameters: Mapping[str, float] | None = None) -> CompiledNetwork:

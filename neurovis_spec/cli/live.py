@@ -12,7 +12,7 @@ import click
 
 from neurovis_spec.cli.completion import paths
 from neurovis_spec.cli.failure import fault
-from neurovis_spec.cli.files import compiled, network_of, recording_of
+from neurovis_spec.cli.files import compiled, compiler_in_place, network_of, recording_of
 from neurovis_spec.cli.options import backend_option, compile_options, engine_option, examples, set_option, theme_option
 
 if TYPE_CHECKING:
@@ -92,15 +92,16 @@ def command(
             "the live view needs aiohttp", "pip install 'neurovis-spec[live]'; in a clone: pip install '.[live]'"
         )
     network, played = _network(spec, recording_of(recording), settings, watch or start is not None)
+    compile = None if spec == "-" or _is_recording(spec) else compiler_in_place(spec, settings)
     _show(network, played, recording_of(start), partial(compiled, spec, settings) if watch else None,
-          spec, host, port, viewers, browse, theme, engine, backend)  # fmt: skip
+          compile, spec, host, port, viewers, browse, theme, engine, backend)  # fmt: skip
 
 
 def _network(
     spec: str, recording: Recording | None, settings: dict[str, float], runs: bool
 ) -> tuple[CompiledNetwork, Recording | None]:
     """The network, and the recording of it that is played, if one is."""
-    if Path(spec).suffix.lower() not in _RECORDINGS:
+    if not _is_recording(spec):
         return network_of(spec, settings), recording
     if recording is not None or runs:
         raise click.UsageError(f"'{spec}' is a recording: SPEC is the spec that it was made of")
@@ -114,11 +115,16 @@ def _network(
     return api.compile_text(played.spec, file=f"{spec} (spec)", parameters=settings), played
 
 
+def _is_recording(spec: str) -> bool:
+    return Path(spec).suffix.lower() in _RECORDINGS
+
+
 def _show(
     network: CompiledNetwork,
     recording: Recording | None,
     start: Recording | None,
     again: Callable[[], CompiledNetwork] | None,
+    compile: Callable[[str], CompiledNetwork] | None,
     spec: str,
     host: str,
     port: int,
@@ -131,6 +137,7 @@ def _show(
     import asyncio
 
     from neurovis_spec.live.access import Access
+    from neurovis_spec.live.desk import Desk, Written
     from neurovis_spec.live.live import Edits, serve
     from neurovis_spec.live.show import Show
 
@@ -149,13 +156,16 @@ def _show(
 
             webbrowser.open(access.url())
 
-    def edits(run: Run, tell: Callable[[str], None]) -> Watch:
+    def desk(run: Run, tell: Callable[[str], None]) -> Desk:
+        return Desk(network, engine, show.view, run, tell, None if compile is None else Written(Path(spec), compile))
+
+    def edits(run: Run, tell: Callable[[str], None], desk: Desk) -> Watch:
         assert again is not None
-        return Edits(show, again, partial(_files, spec), network, run, tell).watch()
+        return Edits(show, again, partial(_files, spec), network, run, tell, desk.renew).watch()
 
     # frames are due 60 times a second: threads must not wait for each other as long as Python lets them
     sys.setswitchinterval(0.0005)
-    asyncio.run(serve(stage, sock, access, announce, None if again is None else edits))
+    asyncio.run(serve(stage, sock, access, announce, desk, None if again is None else edits))
 
 
 def bound(host: str, port: int) -> socket.socket:

@@ -40,7 +40,11 @@ def dump(layout: Layout) -> str:
       A: [0, 0.5]
     routes: {}
     """
-    lines = [f"neurovis_layout: {VERSION}", f"network: {_text(layout.network)}", f"engine: {_text(layout.engine)}"]
+    lines = [
+        f"neurovis_layout: {VERSION}",
+        f"network: {name_text(layout.network)}",
+        f"engine: {name_text(layout.engine)}",
+    ]
     positions = sorted(layout.positions, key=natural_key)
     lines += _section("positions", [(name, _point(layout.positions[name])) for name in positions])
     routes = sorted(layout.routes, key=edge_key)
@@ -55,22 +59,22 @@ def _section(title: str, entries: list[tuple[str, str]]) -> list[str]:
         return [f"{title}: {{}}"]
     lines = [f"{title}:"]
     for name, value in entries:
-        key = _text(name)
+        key = name_text(name)
         lines += [f"  {key}: {value}"] if len(key) < _LONG_KEY else [f"  ? {key}", f"  : {value}"]
     return lines
 
 
-def _text(text: str) -> str:
+def name_text(text: str) -> str:
     """Plain where every reader of YAML takes it for a text, else in double quotes (JSON's are YAML's, too)."""
     plain = _PLAIN.fullmatch(text) is not None and text.casefold() not in _SPECIAL
     return text if plain else json.dumps(text, ensure_ascii=True)
 
 
 def _point(point: Point) -> str:
-    return f"[{_number(point[0])}, {_number(point[1])}]"
+    return f"[{number_text(point[0])}, {number_text(point[1])}]"
 
 
-def _number(value: float) -> str:
+def number_text(value: float) -> str:
     """The shortest text that reads back as this number; whole ones without a point."""
     value = float(value) + 0.0
     if value.is_integer() and abs(value) < 2**53:

@@ -84,7 +84,8 @@ class Hub:
         self._rest = 0.0
         self._reader: asyncio.TimerHandle | None = None
         self._statuses: dict[bool, str] = {}
-        self._findings = ""
+        #: what those who come later are told, too, by its type
+        self._kept: dict[str, str] = {}
 
     def __len__(self) -> int:
         return len(self._clients)
@@ -104,24 +105,28 @@ class Hub:
     def join(self, client: Client) -> None:
         """Somebody has come."""
         self._clients.add(client)
-        if self._findings:
-            client.tell(self._findings)
+        for text in self._kept.values():
+            client.tell(text)
         client.wake.set()
 
     def leave(self, client: Client) -> None:
         """Somebody has gone."""
         self._clients.discard(client)
 
-    def tell(self, text: str, keep: bool = False) -> None:
-        """Tell all; with ``keep`` those who come later, too, until something else is kept."""
+    def tell(self, text: str, keep: str = "") -> None:
+        """Tell all; with ``keep`` those who come later, too, until something else is kept by this name."""
         if keep:
-            self._findings = text
+            self._kept[keep] = text
         for client in self._clients:
             client.tell(text)
 
     def refuse(self, client: Client, reason: str) -> None:
         """Tell a client why what it asked is not done; from any thread."""
-        self._loop.call_soon_threadsafe(client.tell, refused_message(reason))
+        self.answer(client, refused_message(reason))
+
+    def answer(self, client: Client, text: str) -> None:
+        """Tell a client something, from any thread."""
+        self._loop.call_soon_threadsafe(client.tell, text)
 
     def look_at(self, client: Client, items: tuple[str, ...]) -> None:
         """A client wants values: now, and with each frame."""

@@ -10,14 +10,17 @@ import signal
 import socket
 import sys
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from pathlib import Path
+from typing import TypeAlias
 
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.diagnostics import Diagnostic, SpecError
 from neurovis_spec.findings import show_text
 from neurovis_spec.interrupts import ENDING, Ended
-from neurovis_spec.layout.model import LayoutRefusalError
+from neurovis_spec.layout.model import Layout, LayoutRefusalError
 from neurovis_spec.live.access import Access
+from neurovis_spec.live.desk import Desk
 from neurovis_spec.live.hub import Hub
 from neurovis_spec.live.protocol import findings_message
 from neurovis_spec.live.run import Run, Stage
@@ -25,6 +28,9 @@ from neurovis_spec.live.server import Server
 from neurovis_spec.live.show import Show
 from neurovis_spec.live.watch import Watch
 from neurovis_spec.runtime.recording import RecordingError
+
+#: Tells everybody, and those who come later.
+Tell: TypeAlias = Callable[[str], None]
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -53,9 +59,11 @@ class Edits:
         files: Callable[[CompiledNetwork], Iterable[Path]],
         known: CompiledNetwork,
         run: Run,
-        tell: Callable[[str], None],
+        tell: Tell,
+        layout: Callable[[CompiledNetwork], Layout],
     ) -> None:
         self._show, self._compile, self._files, self._run, self._tell = show, compile, files, run, tell
+        self._layout = layout
         self._watched = set(files(known))
 
     def watch(self) -> Watch:
@@ -65,7 +73,7 @@ class Edits:
     def _edited(self) -> Iterable[Path]:
         try:
             compiled = self._compile()
-            change = self._show.changed(compiled, self._run.appearance)
+            change = self._show.changed(compiled, self._run.appearance, self._layout(compiled))
         except SpecError as error:
             self._tell(findings_message(show_text(error.diagnostics, error.sources), errors=True))
             return self._watched
@@ -87,13 +95,14 @@ async def serve(
     sock: socket.socket,
     access: Access,
     announce: Callable[[], None],
-    edits: Callable[[Run, Callable[[str], None]], Watch] | None = None,
+    desk: Callable[[Run, Tell], Desk],
+    edits: Callable[[Run, Tell, Desk], Watch] | None = None,
 ) -> None:
     """Serve until a signal asks for an end. Raises Ended."""
     loop = asyncio.get_running_loop()
     ended: asyncio.Future[int] = loop.create_future()
     _heed_signals(loop, ended)
-    await serve_until(ended, stage, sock, access, announce, edits)
+    await serve_until(ended, stage, sock, access, announce, desk, edits)
     raise Ended(ended.result())
 
 
@@ -103,21 +112,25 @@ async def serve_until(
     sock: socket.socket,
     access: Access,
     announce: Callable[[], None],
-    edits: Callable[[Run, Callable[[str], None]], Watch] | None = None,
+    desk: Callable[[Run, Tell], Desk] | None = None,
+    edits: Callable[[Run, Tell, Desk], Watch] | None = None,
 ) -> None:
-    """Serve until it is at its end; where the run cannot go on that is now, and what has happened is raised."""
+    """Serve until it is at its end; without a ``desk`` nothing is put elsewhere or saved; where the run cannot go on that is now, and what has happened is raised."""
     loop = asyncio.get_running_loop()
     hub = Hub(loop)
     run = Run(*stage, hub.show, lambda: hub.watched, lambda: loop.call_soon_threadsafe(_fail, ended))
-    server = Server(access, hub, run)
 
-    def tell(text: str) -> None:
-        loop.call_soon_threadsafe(hub.tell, text, True)
+    def told(kind: str) -> Tell:
+        return lambda text: _call(loop, hub.tell, text, kind)
 
-    watch = None if edits is None else edits(run, tell)
+    at_desk = None if desk is None else desk(run, told("placed"))
+    server = Server(access, hub, run, at_desk)
+    watch = None if edits is None or at_desk is None else edits(run, told("findings"), at_desk)
     await server.start(sock)
     try:
         run.start()
+        if at_desk is not None:
+            at_desk.start()
         if watch is not None:
             watch.start()
         announce()
@@ -125,10 +138,18 @@ async def serve_until(
     finally:
         if watch is not None:
             watch.end()
+        if at_desk is not None:
+            at_desk.end()
         run.end()
         await server.stop()
     if run.failure is not None:
         raise run.failure
+
+
+def _call(loop: asyncio.AbstractEventLoop, what: Callable[[str, str], None], text: str, kind: str) -> None:
+    """Have the loop call something, if it still runs."""
+    with suppress(RuntimeError):
+        loop.call_soon_threadsafe(what, text, kind)
 
 
 def _fail(ended: asyncio.Future[int]) -> None:

@@ -10,17 +10,21 @@ import json
 import math
 import re
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Final, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec.compiler.pins import FARTHEST
+from neurovis_spec.layout.model import Point
 from neurovis_spec.live.appearance import MOST, Appearance
 from neurovis_spec.live.clock import SPEEDS
 from neurovis_spec.live.commands import Branch, Command, Draw, Event, Pause, Play, Restart, Seek, Speed, Step
 from neurovis_spec.live.history import Bins, Range
+from neurovis_spec.live.moved import Moved
+from neurovis_spec.live.requests import Place, Request, Save, Unplace, Write
 from neurovis_spec.live.run import Status
 from neurovis_spec.live.source import Reach, Turned
 from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set
@@ -122,6 +126,21 @@ def findings_message(text: str, errors: bool) -> str:
     return _text("findings", text=text, errors=errors)
 
 
+def moved_message(moved: Moved) -> str:
+    """Where discs and lines are while a neuron is dragged, in units of the picture."""
+    return _text("moved", discs=dict(moved.discs), lines={name: list(line) for name, line in moved.lines.items()})
+
+
+def placed_message(neurons: Sequence[str], undo: bool, files: bool) -> str:
+    """The neurons that were put by hand and are not saved; whether that can be undone, and saved."""
+    return _text("placed", neurons=list(neurons), undo=undo, files=files)
+
+
+def saving_message(files: Sequence[str], diff: str, written: bool) -> str:
+    """What would change in which files, or that these are written."""
+    return _text("saving", files=list(files), diff=diff, written=written)
+
+
 def refused_message(reason: str) -> str:
     """Why what was asked is not done."""
     return _text("refused", reason=reason)
@@ -168,7 +187,7 @@ def acknowledged(data: bytes) -> Acknowledged:
     return Acknowledged(int.from_bytes(data, "little"))
 
 
-def command_of(text: str) -> Command | LookAt | Trace:
+def command_of(text: str) -> Command | Request | LookAt | Trace:
     """A text message. Raises ProtocolError."""
     if len(text) > LARGEST:
         raise ProtocolError("the message is too long")
@@ -254,6 +273,24 @@ def _numbers(value: object) -> tuple[float, ...]:
     return tuple(_number(number) for number in value)
 
 
+def _point(value: object) -> Point:
+    if not isinstance(value, list) or len(value) != 2:
+        raise ProtocolError("a point is wanted")
+    x, y = (_number(number) for number in value)
+    if max(abs(x), abs(y)) > FARTHEST:
+        raise ProtocolError(f"a point lies within {FARTHEST:g} of the origin")
+    return x, y
+
+
+def _one_of(*texts: str) -> Check:
+    def check(value: object) -> str:
+        if not isinstance(value, str) or value not in texts:
+            raise ProtocolError(f"one of these is wanted: {', '.join(texts)}")
+        return value
+
+    return check
+
+
 def _items(value: object) -> tuple[str, ...]:
     if isinstance(value, list) and len(value) <= _WATCHED:
         found = [item for item in value if isinstance(item, str) and _ITEM.fullmatch(item)]
@@ -268,7 +305,7 @@ def _trace(items: tuple[str, ...], first: int, every: int, bins: int) -> Trace:
     return Trace(items, Bins(first, every, bins))
 
 
-_MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command | LookAt | Trace]]]] = {
+_MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command | Request | LookAt | Trace]]]] = {
     "look": ({"items": _items}, LookAt),
     "trace": (
         {"items": _items, "first": _whole(0, _MOST), "every": _whole(1, _EVERY), "bins": _whole(1, _BINS)},
@@ -290,6 +327,10 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "lesion": ({"part": _name}, Lesion),
     "mend": ({"part": _name}, Mend),
     "learn": ({"connections": _name, "on": _truth}, Learn),
+    "place": ({"neuron": _name, "at": _point, "done": _truth}, Place),
+    "unplace": ({}, Unplace),
+    "save": ({"into": _one_of("spec", "file")}, Save),
+    "write": ({}, Write),
 }
 #: Members that a message need not have.
 _OPTIONAL: Final = {"moving"}

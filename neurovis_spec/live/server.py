@@ -18,6 +18,7 @@ from aiohttp import WSCloseCode, WSMsgType, web
 
 from neurovis_spec.live.access import PAGE, Access
 from neurovis_spec.live.commands import Present
+from neurovis_spec.live.desk import Desk
 from neurovis_spec.live.hub import Client, Hub
 from neurovis_spec.live.protocol import LARGEST, ProtocolError
 from neurovis_spec.live.reception import Reception
@@ -62,11 +63,11 @@ def headers(csp: str) -> dict[str, str]:
 
 
 class Server:
-    """Serves a run to whoever has a token."""
+    """Serves a run to whoever has a token; with a ``desk`` neurons can be put by hand, and files saved."""
 
-    def __init__(self, access: Access, hub: Hub, run: Run) -> None:
+    def __init__(self, access: Access, hub: Hub, run: Run, desk: Desk | None = None) -> None:
         self._access, self._hub, self._run = access, hub, run
-        self._reception = Reception(hub, run)
+        self._reception = Reception(hub, run, desk)
         self._html = page()
         self._headers = headers(policy(self._html))
         self._streams: WeakSet[web.WebSocketResponse] = WeakSet()

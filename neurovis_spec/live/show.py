@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.layout.model import Layout
 from neurovis_spec.live.appearance import AS_IT_IS, Appearance
 from neurovis_spec.live.carry import carried
 from neurovis_spec.live.recorded import RecordedSource
@@ -33,11 +34,13 @@ class Show:
 
     def stage(self, compiled: CompiledNetwork) -> Stage:
         """The source and its view. Raises RecordingError, BackendError, LayoutRefusalError."""
-        return self._source(compiled), self._view(compiled)
+        return self._source(compiled), self.view(compiled)
 
-    def changed(self, compiled: CompiledNetwork, appearance: Appearance = AS_IT_IS) -> Change:
-        """What shows an edited network at the step that is shown. Raises as ``stage`` does."""
-        view = self._view(compiled, appearance)
+    def changed(
+        self, compiled: CompiledNetwork, appearance: Appearance = AS_IT_IS, layout: Layout | None = None
+    ) -> Change:
+        """What shows an edited network, in this layout, at the step that is shown. Raises as ``stage`` does."""
+        view = self.view(compiled, appearance, layout)
         if self.recording is not None:
             recorded = RecordedSource(compiled.network, self.recording)
 
@@ -59,5 +62,6 @@ class Show:
             return RecordedSource(compiled.network, self.recording)
         return SimulatedSource(compiled.simulator(self.backend, start=self.start))
 
-    def _view(self, compiled: CompiledNetwork, appearance: Appearance = AS_IT_IS) -> View:
-        return view_of(compiled, compiled.gains_for(self.recording), self.theme, self.engine, appearance)
+    def view(self, compiled: CompiledNetwork, appearance: Appearance = AS_IT_IS, layout: Layout | None = None) -> View:
+        """How a network is drawn, by default in its own layout. Raises LayoutRefusalError."""
+        return view_of(compiled, compiled.gains_for(self.recording), self.theme, self.engine, appearance, layout)

@@ -15,10 +15,12 @@ import numpy.typing as npt
 
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.layout.model import Layout
 from neurovis_spec.live.appearance import AS_IT_IS, Appearance
 from neurovis_spec.live.declared import declared
 from neurovis_spec.live.drawing import content
 from neurovis_spec.live.history import Members
+from neurovis_spec.live.moved import Moved, moved
 from neurovis_spec.live.source import Mask, Seen
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.scene import Scene
@@ -65,6 +67,7 @@ class View:
     plan: Plan
     #: of each line, the largest weight that there is on its scale
     largest: FloatArray
+    layout: Layout
     #: all that stays, as a page gets it
     content: bytes
     appearance: Appearance
@@ -113,6 +116,10 @@ class View:
         of, count = (self.drawn.unit, len(self.drawn.sizes)) if neurons else (self.drawn.bundle, len(self.drawn.counts))
         return Members(neurons, np.flatnonzero(of == index)) if index < count else None
 
+    def moved(self, layout: Layout) -> Moved:
+        """What stands, and runs, elsewhere in another layout."""
+        return moved(self.plan, self.layout, layout)
+
     def _lesioned(self, seen: Seen) -> tuple[Mask, Mask]:
         """What is drawn as lesioned: a glyph, or a line between glyphs, where all that it stands for is."""
         drawn = self.drawn
@@ -137,27 +144,33 @@ def view_of(
     theme: str | None = None,
     engine: str | None = None,
     appearance: Appearance = AS_IT_IS,
+    layout: Layout | None = None,
 ) -> View:
-    """How a compiled network is drawn. Raises LayoutRefusalError, RendererError."""
+    """How a compiled network is drawn, by default in the layout of an engine. Raises LayoutRefusalError,
+    RendererError."""
     network = compiled.network
     settings = compiled.settings_for(appearance.theme or theme)
     drawn = gathered(network, settings.collapse)
     seen = appearance.gains(gains)
-    layout = laid_out(drawn, compiled.drawn(engine).value)
-    planned = plan(drawn, layout, seen, settings)
+    stands = laid_out(drawn, compiled.drawn(engine).value if layout is None else layout)
+    planned = plan(drawn, stands, seen, settings)
     largest = np.ones(len(seen.thickness))
     for scale in seen.thickness_scales:
         largest[seen.thickness == scale.gain] = scale.reaches or 1.0
+    frame = planned.frame
     kinds = {"isBar": BAR, "isFaint": FAINT, "isNegative": NEGATIVE, "isClamped": CLAMPED}
-    constants = {"levels": LEVELS, "fineness": FINENESS, "shares": SHARES, "share": _SHARE, **kinds}
+    # of a picture in which something is collapsed nothing can be put elsewhere
+    where = {"scale": 0.0 if drawn.any else frame.scale, "left": frame.left, "top": frame.top}
+    constants = {"levels": LEVELS, "fineness": FINENESS, "shares": SHARES, "share": _SHARE, **kinds, **where}
     scene = _scene(planned, seen)
-    rows = order_of(drawn.network, layout, range(len(drawn.network.neurons)))
+    rows = order_of(drawn.network, stands, range(len(drawn.network.neurons)))
     written = compiled.spec.render
     themed = theme is not None or (written is not None and written.theme is not None)
     words = content(
         drawn.network, scene, rows, constants, {**declared(compiled), "themes": list(THEMES), "themed": themed}
     )
-    return View(drawn, seen, planned, largest, words, appearance, partial(view_of, compiled, gains, theme, engine))
+    otherwise = partial(view_of, compiled, gains, theme, engine, layout=layout)
+    return View(drawn, seen, planned, largest, stands, words, appearance, otherwise)
 
 
 def _scene(planned: Plan, gains: Gains) -> Scene:

@@ -151,4 +151,5 @@ class Session:
         self._loop.call_soon_threadsafe(self._follow)
 
     def _fail(self) -> None:
-        self._loop.call_soon_threadsafe(self._hub.tell, findings_message(str(self._run.failure), errors=True), True)
+        words = findings_message(str(self._run.failure), errors=True)
+        self._loop.call_soon_threadsafe(self._hub.tell, words, "findings")

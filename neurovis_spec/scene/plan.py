@@ -123,7 +123,7 @@ def plan(
     centres = frame.map(positions)
     radii = factors * frame.scale
     radius = RADIUS * frame.scale
-    gap, head = min(1.5, 0.1 * radius), _head(radius)
+    gap, head = _gap(radius), _head(radius)
     ends = np.stack([radii[network.connections.sources], radii[network.connections.targets]], axis=1)
     kept = np.flatnonzero(seen.lines).tolist()
     trim = trimmed([frame.map(routes[index]) for index in kept], ends[kept], gap, head)
@@ -193,6 +193,20 @@ def _in_user_units(made: Plan, unit: float) -> Plan:
         front=tuple(scaled_group(group, unit) for group in made.front),
         unit=unit,
     )
+
+
+def rerouted(planned: Plan, layout: Layout, connections: Sequence[int]) -> list[Line]:
+    """How some connections run in another layout, on the same picture."""
+    network, frame, unit = planned.network, planned.frame, planned.unit
+    names, ends = network.neurons.names, network.connections
+    pairs = [(int(ends.sources[index]), int(ends.targets[index])) for index in connections]
+    radii = np.array(planned.radii) + np.array(planned.rings) / 2
+    radius = RADIUS * frame.scale / unit
+    routes = routes_of(
+        [network.connection_names[index] for index in connections], [(names[a], names[b]) for a, b in pairs], layout
+    )
+    discs = np.array([(radii[a], radii[b]) for a, b in pairs]).reshape(-1, 2)
+    return trimmed([frame.map(route) for route in routes], discs, unit * _gap(radius), unit * _head(radius))
 
 
 def _lengths(routes: Sequence[FloatArray]) -> FloatArray:
@@ -350,6 +364,11 @@ def _order(network: Network, widths: FloatArray, lines: npt.NDArray[np.bool_]) -
     fixed[network.changing] = False
     order = np.lexsort((np.arange(len(widths)), np.nan_to_num(widths, posinf=np.inf), fixed))
     return tuple(order[lines[order]].tolist())
+
+
+def _gap(radius: float) -> float:
+    """What lines keep of discs."""
+    return min(1.5, 0.1 * radius)
 
 
 def _head(radius: float) -> float:

@@ -117,6 +117,12 @@ export class Drawing {
     }
   }
 
+  /** Take over that the shapes of a group have other places. @param {Group} group */
+  reshape({ id, shapes }) {
+    const line = this.lines.find((one) => one.id === id);
+    if (line) [line.points, line.head] = [shapes[0].points, { ...shapes[1] }];
+  }
+
   /** Draw a look; true where there is more to be drawn in the next frame.
    * @param {Context} context @param {Camera} camera @param {Look} look @returns {boolean} */
   draw(context, camera, look) {

@@ -13,6 +13,7 @@ import { Matrix } from './matrix.js';
 import { Outline } from './outline.js';
 import { under } from './pick.js';
 import { followFingers } from './pinch.js';
+import { Placing } from './place.js';
 import { Pointer } from './pointer.js';
 import { Link } from './protocol.js';
 import { Refusal } from './refusal.js';
@@ -119,6 +120,7 @@ const link = new Link({
     strips.use();
     turning.use(scene);
     outline.use(scene);
+    placing.use(scene);
     redraw();
   },
   traces(traces) {
@@ -134,9 +136,18 @@ const link = new Link({
       controls.status(message);
       scrubber.status(message);
       turning.status(message);
+      placing.status(message);
     } else if (message.type === 'values') attention.take(message);
     else if (message.type === 'findings') controls.found(message);
-    else if (message.type === 'refused') refusal.tell(message.reason);
+    else if (message.type === 'moved') placing.take(message);
+    else if (message.type === 'placed') placing.told(message);
+    else if (message.type === 'saving') {
+      placing.saving(message);
+      if (message.written) controls.tell(`saved ${message.files.join(', ')}`);
+    } else if (message.type === 'refused') {
+      refusal.tell(message.reason);
+      if (placing.waiting) placing.cancel();
+    }
   },
   link(open) {
     if (open) attention.ask();
@@ -189,7 +200,8 @@ function go(id) {
 
 new ResizeObserver(resize).observe(canvas);
 followFingers(canvas, camera, redraw);
-new Pointer(canvas, camera, attention, {
+const placing = new Placing(link, () => (matrix ? null : drawing), redraw, part);
+new Pointer(canvas, camera, attention, placing, {
   pointed(x, y) {
     const { look } = link;
     if (matrix) return matrix.under(camera, x, y);
@@ -240,5 +252,10 @@ Object.assign(controls.keys, {
   Escape: ['let go of what is held', () => attention.hold('')],
   ']': ['hold the next neuron', () => attention.next(1)],
   '[': ['hold the neuron before', () => attention.next(-1)],
+  'shift+←': ['put what is held further left', () => placing.step(attention.held, -1, 0)],
+  'shift+→': ['put it further right', () => placing.step(attention.held, 1, 0)],
+  'shift+↑': ['put it further up', () => placing.step(attention.held, 0, -1)],
+  'shift+↓': ['put it further down', () => placing.step(attention.held, 0, 1)],
+  z: ['undo the last placing', () => placing.undo()],
   '?': ['list the keys, or close the list', help],
 });

@@ -1,9 +1,11 @@
 /**
- * The pointer: what it is over, what a click holds, and a drag that moves the picture.
+ * The pointer: what it is over, what a click holds, and drags: of a neuron, which puts it elsewhere or, up and down with
+ * shift, clamps it; of anything else, which moves the picture.
  */
 
 /** @typedef {import('./attention.js').Attention} Attention */
 /** @typedef {import('./camera.js').Camera} Camera */
+/** @typedef {import('./place.js').Placing} Placing */
 /** What a pointer must know of the page: the id of what lies under a pixel, and how to draw anew.
  * @typedef {{pointed: (x: number, y: number) => string, redraw: () => void}} Ground */
 
@@ -15,16 +17,22 @@ const pixel = (event) => [event.offsetX * devicePixelRatio, event.offsetY * devi
 
 /** Follows the pointer over the picture. */
 export class Pointer {
-  /** @param {HTMLCanvasElement} canvas @param {Camera} camera @param {Attention} attention @param {Ground} ground */
-  constructor(canvas, camera, attention, ground) {
+  /** @param {HTMLCanvasElement} canvas @param {Camera} camera @param {Attention} attention @param {Placing} placing
+   * @param {Ground} ground */
+  constructor(canvas, camera, attention, placing, ground) {
     this.canvas = canvas;
     this.camera = camera;
     this.attention = attention;
+    this.placing = placing;
     this.ground = ground;
+    /** how far it was dragged, what was under it when it went down, and how far from its middle */
     this.dragged = 0;
+    this.on = '';
+    this.off = [0, 0];
     canvas.addEventListener('wheel', (event) => this.wheel(event), { passive: false });
-    canvas.addEventListener('pointerdown', () => { this.dragged = 0; });
+    canvas.addEventListener('pointerdown', (event) => this.down(event));
     canvas.addEventListener('pointerup', (event) => this.up(event));
+    canvas.addEventListener('pointercancel', () => placing.cancel());
     canvas.addEventListener('pointermove', (event) => this.move(event));
     canvas.addEventListener('pointerleave', () => attention.point('', [0, 0]));
   }
@@ -39,23 +47,41 @@ export class Pointer {
     this.ground.redraw();
   }
 
-  /** A click holds. @param {PointerEvent} event */
+  /** A drag may begin; with a finger only what is held is dragged. @param {PointerEvent} event */
+  down(event) {
+    const [x, y] = pixel(event), id = this.ground.pointed(x, y), { placing } = this;
+    if (placing.dragged) placing.cancel();
+    this.dragged = 0;
+    this.on = event.button === 0 && placing.can(id) && (event.pointerType === 'mouse' || id === this.attention.held) ? id : '';
+    if (!this.on) return;
+    this.canvas.setPointerCapture(event.pointerId);
+    const [across, down] = this.camera.unit(x, y), [left, top] = placing.stand(id).at[0];
+    this.off = [left - across, top - down];
+  }
+
+  /** A click holds; a neuron stays where it was dragged to. @param {PointerEvent} event */
   up(event) {
     const [x, y] = pixel(event);
     if (this.dragged < STILL && event.button === 0) this.attention.hold(this.ground.pointed(x, y));
+    this.placing.drop();
+    this.on = '';
   }
 
-  /** Say what is pointed at, or move the picture. @param {PointerEvent} event */
+  /** Say what is pointed at, or drag. @param {PointerEvent} event */
   move(event) {
-    const [x, y] = pixel(event);
+    const [x, y] = pixel(event), at = this.camera.unit(x, y);
     if (event.buttons !== 1) {
       const id = this.ground.pointed(x, y);
       this.canvas.style.cursor = id ? 'pointer' : '';
-      this.attention.point(id, this.camera.unit(x, y));
+      this.attention.point(id, at);
       return;
     }
     this.dragged += Math.abs(event.movementX) + Math.abs(event.movementY);
-    this.camera.move(event.movementX * devicePixelRatio, event.movementY * devicePixelRatio);
-    this.ground.redraw();
+    if (!this.on) {
+      this.camera.move(event.movementX * devicePixelRatio, event.movementY * devicePixelRatio);
+      this.ground.redraw();
+    } else if (this.dragged >= STILL) {
+      this.placing.drag(this.on, [at[0] + this.off[0], at[1] + this.off[1]]);
+    }
   }
 }

@@ -1,0 +1,187 @@
+"""The desk: a thread that carries out what takes a while: layouts by hand, files.
+
+In: requests of the owner. Out: answers; a View that is shown in place of another. Neither the run nor anybody who
+looks on waits for it. While a neuron is dragged the latest place counts alone.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Condition, RLock, Thread
+from typing import Final, TypeAlias
+
+from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.diagnostics import SpecError
+from neurovis_spec.findings import show_text
+from neurovis_spec.layout.model import Layout
+from neurovis_spec.live.appearance import Appearance
+from neurovis_spec.live.pins import Compile, Saving, SavingError, saving
+from neurovis_spec.live.placing import Placed, placed
+from neurovis_spec.live.protocol import moved_message, placed_message, refused_message, saving_message
+from neurovis_spec.live.requests import Place, Request, Save, Unplace, Write
+from neurovis_spec.live.run import Run, Stage
+from neurovis_spec.live.source import Source, SourceError
+from neurovis_spec.live.view import View
+
+#: Tells who has asked.
+Answer: TypeAlias = Callable[[str], None]
+
+#: Requests that wait, and placings that can be undone.
+_WAITING: Final = 64
+_UNDONE: Final = 200
+
+
+@dataclass(frozen=True)
+class Written:
+    """The file of a spec, and what compiles a text in its place."""
+
+    path: Path
+    compile: Compile
+
+
+class Desk:
+    """Carries out requests, one after the other. ``draw`` makes a View of a network, ``tell`` tells
+    everybody what is put by hand; ``spec`` is where it can be saved, if anywhere."""
+
+    def __init__(
+        self,
+        compiled: CompiledNetwork,
+        engine: str | None,
+        draw: Callable[[CompiledNetwork, Appearance, Layout], View],
+        run: Run,
+        tell: Callable[[str], object],
+        spec: Written | None = None,
+    ) -> None:
+        self._draw, self._run, self._tell, self._spec = draw, run, tell, spec
+        self._placed = placed(compiled, engine)
+        self._view: View | None = None
+        self._before: deque[Placed] = deque(maxlen=_UNDONE)
+        self._saving: Saving | None = None
+        self._asked: deque[tuple[Request, Answer]] = deque()
+        self._wake, self._work_lock = Condition(), RLock()
+        self._ended = False
+        self._thread = Thread(target=self._work, name="live desk", daemon=True)
+
+    def start(self) -> None:
+        """Begin."""
+        self._say()
+        self._thread.start()
+
+    def end(self) -> None:
+        """Stop; a layout that is being made is not waited for long."""
+        with self._wake:
+            self._ended = True
+            self._wake.notify()
+        self._thread.join(1.0)
+
+    def ask(self, request: Request, answer: Answer) -> None:
+        """Have a request carried out."""
+        with self._wake:
+            if self._asked and _replaces(request, self._asked[-1][0]):
+                self._asked.pop()
+            if len(self._asked) >= _WAITING:
+                answer(refused_message("too much is asked at once"))
+                return
+            self._asked.append((request, answer))
+            self._wake.notify()
+
+    @property
+    def placed(self) -> Placed:
+        """What is put by hand."""
+        return self._placed
+
+    def renew(self, compiled: CompiledNetwork) -> Layout:
+        """The layout of an edited network, with what was put by hand. Raises LayoutRefusalError."""
+        with self._work_lock:
+            self._placed = self._placed.carried(compiled)
+            self._view, self._saving = None, None
+            self._before.clear()
+            self._say()
+            return self._placed.layout
+
+    def _work(self) -> None:
+        while True:
+            with self._wake:
+                self._wake.wait_for(lambda: self._asked or self._ended)
+                if self._ended:
+                    return
+                request, answer = self._asked.popleft()
+            try:
+                with self._work_lock:
+                    self._carry_out(request, answer)
+            except SpecError as error:
+                answer(refused_message(show_text(error.diagnostics, error.sources)))
+            except Exception as error:  # an engine, ours or anybody's, may fail: the view goes on
+                answer(refused_message(str(error.args[0] if isinstance(error, KeyError) else error)))
+
+    def _carry_out(self, request: Request, answer: Answer) -> None:
+        match request:
+            case Place(done=False):
+                view = self._shown()
+                answer(moved_message(view.moved(self._placed.put(request.neuron, request.at).layout)))
+            case Place():
+                before, self._placed = self._placed, self._placed.put(request.neuron, request.at)
+                self._before.append(before)
+                self._show(answer)
+            case Unplace():
+                if not self._before:
+                    raise SavingError("nothing was put by hand")
+                self._placed = self._before.pop()
+                self._show(answer)
+            case Save():
+                self._saving = saving(self._placed, self._written().path, self._written().compile, request.into)
+                names = [str(file.path) for file in self._saving.files]
+                answer(saving_message(names, self._saving.diff, written=False))
+            case Write():
+                self._write(answer)
+
+    def _written(self) -> Written:
+        if self._spec is None:
+            raise SavingError("there is no file to save to")
+        return self._spec
+
+    def _write(self, answer: Answer) -> None:
+        spec, chosen = self._written(), self._saving
+        if chosen is None:
+            raise SavingError("nothing was chosen to be saved")
+        chosen.write()
+        compiled = spec.compile(spec.path.read_text(encoding="utf-8-sig"))
+        self._placed = Placed(compiled, self._placed.engine, self._placed.layout)
+        self._saving = None
+        self._before.clear()
+        self._say()
+        answer(saving_message([str(file.path) for file in chosen.files], "", written=True))
+
+    def _shown(self) -> View:
+        """The view of what is put."""
+        wanted = self._run.appearance
+        if self._view is None or self._view.appearance != wanted:
+            self._view = self._draw(self._placed.compiled, wanted, self._placed.layout)
+        return self._view
+
+    def _show(self, answer: Answer) -> None:
+        """Have what is put shown, at the step that is shown."""
+        self._view, self._saving = None, None
+        view, shown = self._shown(), self._placed.compiled.hash
+
+        def change(source: Source) -> Stage:
+            if source.network.hash != shown:
+                raise SourceError("the spec was edited meanwhile")
+            return source, view
+
+        self._run.change(change, lambda reason: answer(refused_message(reason)))
+        self._say()
+
+    def _say(self) -> None:
+        """Tell everybody what is put by hand."""
+        self._tell(placed_message(self._placed.moved, undo=bool(self._before), files=self._spec is not None))
+
+
+def _replaces(request: Request, before: Request) -> bool:
+    """Whether a request makes one that waits superfluous: a neuron is dragged on."""
+    if not (isinstance(request, Place) and isinstance(before, Place)):
+        return False
+    return not before.done and before.neuron == request.neuron

@@ -1,0 +1,208 @@
+/**
+ * Placing: a neuron is dragged, its mirror image and the routes follow, and what was put by hand is saved or undone.
+ */
+
+/** @typedef {import('./draw.js').Drawing} Drawing */
+/** @typedef {import('./protocol.js').Group} Group */
+/** @typedef {import('./protocol.js').Link} Link */
+/** @typedef {import('./protocol.js').Scene} Scene */
+/** Where a group stands: of a disc and its label the points, of a line its points and the tip of its head.
+ * @typedef {{at: number[][], points: number[], along: number[]}} Stand */
+/** @typedef {{neurons: string[], undo: boolean, files: boolean}} Put */
+/** @typedef {{discs: Object<string, number[]>, lines: Object<string, number[][]>}} Moved */
+
+/** How far a key moves a neuron, in units of the layout. */
+const KEYSTEP = 0.125;
+
+/** Neurons put by hand. */
+export class Placing {
+  /** @param {Link} link @param {() => (Drawing | null)} drawing @param {() => void} redraw
+   * @param {(id: string) => HTMLElement} find */
+  constructor(link, drawing, redraw, find) {
+    this.link = link;
+    this.drawing = drawing;
+    this.redraw = redraw;
+    this.find = find;
+    this.owner = false;
+    /** what is put by hand @type {Put} */
+    this.put = { neurons: [], undo: false, files: false };
+    /** @type {Map<string, Group>} */
+    this.groups = new Map();
+    /** the neuron that is dragged, and where to, in units of the picture */
+    this.dragged = '';
+    this.at = [0, 0];
+    /** the last place that was sent, and whether its answer is still awaited */
+    this.sent = [NaN, NaN];
+    this.waiting = false;
+    /** where everything stands in the scene, and by the last answer @type {Map<string, Stand>} */
+    this.first = new Map();
+    /** @type {Map<string, Stand>} */
+    this.last = new Map();
+    find('unplace').onclick = () => this.undo();
+    find('tospec').onclick = () => this.link.ask('save', { into: 'spec' });
+    find('tofile').onclick = () => this.link.ask('save', { into: 'file' });
+    find('write').onclick = () => this.link.ask('write');
+    find('leave').onclick = () => this.dialog.close();
+  }
+
+  /** @returns {HTMLDialogElement} */
+  get dialog() {
+    return /** @type {HTMLDialogElement} */ (this.find('saving'));
+  }
+
+  /** Another network, or another layout of it. @param {Scene} scene */
+  use(scene) {
+    this.groups = new Map(scene.groups.map((group) => [group.id, group]));
+    this.first.clear();
+    this.last.clear();
+    this.dragged = '';
+    this.waiting = false;
+  }
+
+  /** Whether this can be dragged. @param {string} id @returns {boolean} */
+  can(id) {
+    return this.owner && /^n\d/.test(id) && this.constants.scale > 0 && this.drawing() !== null;
+  }
+
+  /** @returns {Object<string, any>} */
+  get constants() {
+    return this.link.scene ? this.link.scene.constants : {};
+  }
+
+  /** How a group stands now. @param {string} id @returns {Stand} */
+  stand(id) {
+    const { shapes } = /** @type {Group} */ (this.groups.get(id));
+    const along = id[0] === 'c' ? shapes[1].along : [];
+    return { at: shapes.map(({ at }) => at), points: shapes[0].points, along };
+  }
+
+  /** Have a group stand so. @param {string} id @param {Stand} stand */
+  set(id, stand) {
+    const drawing = this.drawing(), group = /** @type {Group} */ (this.groups.get(id)), { shapes } = group;
+    if (!this.first.has(id)) this.first.set(id, this.stand(id));
+    shapes.forEach((shape, place) => { shape.at = stand.at[place]; });
+    if (id[0] === 'c') [shapes[0].points, shapes[1].along] = [stand.points, stand.along];
+    if (drawing) drawing.reshape(group);
+  }
+
+  /** How a group stands by the last answer, else in the scene. @param {string} id @returns {Stand} */
+  known(id) {
+    return this.last.get(id) || this.first.get(id) || this.stand(id);
+  }
+
+  /** Drag a neuron to a point of the picture. @param {string} id @param {number[]} at */
+  drag(id, at) {
+    [this.dragged, this.at] = [id, at];
+    this.follow();
+    if (!this.waiting) this.send(false);
+  }
+
+  /** The disc at the pointer, and the lines from and to it on the way to their routes. */
+  follow() {
+    const id = this.dragged, { neuron } = /** @type {Group} */ (this.groups.get(id)).data, from = this.known(id);
+    const by = [0, 1].map((axis) => this.at[axis] - from.at[0][axis]);
+    const shift = (/** @type {number[]} */ point, share = 1) => point && [point[0] + share * by[0], point[1] + share * by[1]];
+    this.set(id, { ...from, at: from.at.map((point) => shift(point)) });
+    for (const [line, { data }] of this.groups) {
+      const [start, end] = [data.from === neuron ? 1 : 0, data.to === neuron ? 1 : 0];
+      if (data.connection === undefined || !(start || end)) continue;
+      const { at, points, along } = this.known(line), count = points.length / 2 - 1;
+      const part = (/** @type {number} */ place) => start + (end - start) * (place / count);
+      this.set(line, {
+        along,
+        at: at.map((point, place) => shift(point, place === 1 ? end : 0.5 * (start + end))),
+        points: points.map((value, place) => value + part(place >> 1) * by[place & 1]),
+      });
+    }
+    this.redraw();
+  }
+
+  /** Say where the neuron is, and whether it stays there. @param {boolean} done */
+  send(done) {
+    const { scale, left, top } = this.constants;
+    const at = [(this.at[0] - left) / scale, (this.at[1] - top) / scale].map((value) => Number(value.toFixed(4)));
+    this.sent = this.at;
+    this.waiting = true;
+    this.link.ask('place', { neuron: /** @type {Group} */ (this.groups.get(this.dragged)).data.neuron, at, done });
+  }
+
+  /** Leave the neuron where it is. */
+  drop() {
+    if (!this.dragged) return;
+    this.send(true);
+    this.dragged = '';
+  }
+
+  /** Let the neuron stand where it was. */
+  cancel() {
+    this.dragged = '';
+    this.waiting = false;
+    for (const [id, stand] of this.first) this.set(id, stand);
+    this.last.clear();
+    this.redraw();
+  }
+
+  /** Move a neuron by steps. @param {string} id @param {number} across @param {number} down */
+  step(id, across, down) {
+    if (!this.can(id)) return;
+    const [x, y] = this.stand(id).at[0], by = KEYSTEP * this.constants.scale;
+    this.drag(id, [x + across * by, y + down * by]);
+    this.drop();
+  }
+
+  /** Undo the last placing. */
+  undo() {
+    this.link.ask('unplace');
+  }
+
+  /** Where everything would be. @param {Moved} moved */
+  take(moved) {
+    if (!this.dragged) return;
+    this.waiting = false;
+    for (const id of this.last.keys()) {
+      const stand = this.first.get(id);
+      if (stand && !(id in moved.discs || id in moved.lines)) this.set(id, stand);
+    }
+    this.last.clear();
+    for (const [id, [x, y]] of Object.entries(moved.discs)) {
+      const from = this.first.get(id) || this.stand(id), [a, b] = from.at[0];
+      this.last.set(id, { ...from, at: from.at.map((point) => point && [point[0] + x - a, point[1] + y - b]) });
+    }
+    for (const [id, [points, tip, along]] of Object.entries(moved.lines)) {
+      const { at } = this.first.get(id) || this.stand(id);
+      this.last.set(id, { at: [at[0], tip, ...at.slice(2)], points, along });
+    }
+    for (const [id, stand] of this.last) this.set(id, stand);
+    this.follow();
+    if (this.sent[0] !== this.at[0] || this.sent[1] !== this.at[1]) this.send(false);
+  }
+
+  /** @param {any} status */
+  status(status) {
+    this.owner = status.owner;
+    this.told(this.put);
+  }
+
+  /** What is put by hand. @param {Put} put */
+  told(put) {
+    const { find } = this, { neurons, undo, files } = put;
+    this.put = put;
+    find('placed').textContent = neurons.join(', ');
+    const off = { unplace: !undo, tospec: !(files && neurons.length), tofile: !(files && neurons.length) };
+    for (const [id, no] of Object.entries(off)) {
+      /** @type {HTMLButtonElement} */ (find(id)).disabled = no || !this.owner;
+    }
+  }
+
+  /** What would be written, or was. @param {{files: string[], diff: string, written: boolean}} saving */
+  saving(saving) {
+    const { dialog, find } = this;
+    find('diff').textContent = saving.diff || 'nothing has changed';
+    find('write').hidden = !saving.diff;
+    if (saving.written) {
+      dialog.close();
+    } else if (!dialog.open) {
+      dialog.showModal();
+    }
+  }
+}

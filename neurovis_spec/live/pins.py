@@ -1,0 +1,161 @@
+"""Pins into files: what was put by hand is written into the spec, or into its layout file.
+
+In: a Placed, the path of its spec. Out: the files as they would be, tried out before anybody sees them: what is saved
+is drawn as it was shown. Comments stay; a spec is formatted as ``neurovis fmt`` does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal, TypeAlias
+
+from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.differences import difference
+from neurovis_spec.language.fmt_edit import Path as Keys
+from neurovis_spec.language.fmt_edit import Value, put
+from neurovis_spec.layout.file import dump, name_text, number_text
+from neurovis_spec.layout.model import GRID, Layout, Point
+from neurovis_spec.live.placing import Placed
+from neurovis_spec.runtime.files import replacing
+
+#: Where it is written: into ``layout.positions`` of the spec, or into the layout file that the spec (then) names.
+Into: TypeAlias = Literal["spec", "file"]
+#: Compiles a text in place of that of the spec's file. Raises SpecError.
+Compile: TypeAlias = Callable[[str], CompiledNetwork]
+
+#: Places nearer than this are the same.
+_SAME: Final = 16 * GRID
+#: How often further pins are added.
+_ROUNDS: Final = 4
+
+
+class SavingError(ValueError):
+    """Nothing is written, and why."""
+
+
+@dataclass(frozen=True, slots=True)
+class File:
+    """A file as it is (None where there is none) and as it is to be."""
+
+    path: Path
+    before: bytes | None
+    after: str
+
+    @property
+    def diff(self) -> str:
+        """What changes."""
+        return difference((self.before or b"").decode("utf-8", "replace"), self.after, self.path.name)
+
+
+@dataclass(frozen=True, slots=True)
+class Saving:
+    """Files that are to be written."""
+
+    files: tuple[File, ...]
+
+    @property
+    def diff(self) -> str:
+        """What changes in all of them."""
+        return "".join(file.diff for file in self.files)
+
+    def write(self) -> None:
+        """Write them, each as a whole. Raises SavingError where one has changed meanwhile, OSError."""
+        for file in self.files:
+            if _bytes(file.path) != file.before:
+                raise SavingError(f"{file.path.name} has changed meanwhile: look at the difference again")
+        for file in self.files:
+            with replacing(file.path) as opened:
+                opened.write(file.after.encode())
+
+
+def saving(shown: Placed, spec: Path, compile: Compile, into: Into) -> Saving:
+    """What there is to write. Raises SavingError, SpecError, LayoutRefusalError, OSError."""
+    data = _bytes(spec)
+    if data is None:
+        raise SavingError(f"{spec.name} is no longer there")
+    text = data.decode("utf-8-sig")
+    now = compile(text)
+    if now.hash != shown.compiled.hash:
+        raise SavingError(f"{spec.name} is another network by now than the one that is shown: use --watch")
+    values = _file(shown, now, spec) if into == "file" else _pins(shown, now, text, compile)
+    written = put(text, values) if values else text
+    files = [File(spec, data, written)] if values else []
+    if into == "file":
+        _check(shown, compile(written).layout(shown.engine, earlier=shown.layout).value)
+        path = now.layout_file or _beside(spec)
+        files.insert(0, File(path, _bytes(path), dump(shown.layout)))
+    return Saving(tuple(file for file in files if file.before != file.after.encode()))
+
+
+def _bytes(path: Path) -> bytes | None:
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        return None
+
+
+def _beside(spec: Path) -> Path:
+    """The layout file of a spec that names none."""
+    return spec.with_name(f"{spec.stem}.layout.yaml")
+
+
+def _file(shown: Placed, now: CompiledNetwork, spec: Path) -> dict[Keys, Value]:
+    """What the spec must say so that the layout file is heard: its name, and no other places."""
+    values = _positions(shown, now, set(_moved(shown, _stated(now))))
+    if now.layout_file is None:
+        path = _beside(spec)
+        if path.exists():
+            raise SavingError(f"{path.name} is there already, and the spec does not name it (layout: {{file: …}})")
+        values["layout", "file"] = name_text(path.name)
+    return values
+
+
+def _pins(shown: Placed, now: CompiledNetwork, text: str, compile: Compile) -> dict[Keys, Value]:
+    """Pins that give the layout that is shown: those by hand, and where these are not enough, since the rest is fitted
+    to them, all that would stand elsewhere."""
+    names = {*shown.moved, *_moved(shown, _stated(now))}
+    for _ in range(_ROUNDS):
+        values = _positions(shown, now, names)
+        made = compile(put(text, values) if values else text).layout(shown.engine).value
+        others = _moved(shown, made.positions)
+        if not others:
+            return values
+        names |= set(others)
+    raise SavingError("pins in the spec do not give this layout: save a layout file")
+
+
+def _stated(now: CompiledNetwork) -> dict[str, Point]:
+    """The places that the spec says."""
+    names = now.network.neurons.names
+    return {names[index]: point for index, point in now.network.layout.positions.items()}
+
+
+def _moved(shown: Placed, positions: Mapping[str, Point]) -> list[str]:
+    """The neurons that are shown elsewhere."""
+    return [name for name, point in positions.items() if math.dist(point, shown.layout.positions[name]) > _SAME]
+
+
+def _check(shown: Placed, made: Layout) -> None:
+    others = _moved(shown, made.positions)
+    if others:
+        raise SavingError(f"'{others[0]}' would not stand where it is shown")
+
+
+def _positions(shown: Placed, now: CompiledNetwork, names: set[str]) -> dict[Keys, Value]:
+    """Pins of these neurons, by the keys that the spec has for them; in the order of the network."""
+    written = () if now.spec.layout is None else tuple(now.spec.layout.positions)
+    groups = {group.name: group.indices for group in now.network.neurons.groups}
+    known = {}
+    for key in written:
+        members = groups.get(key, ())
+        known[now.network.neurons.names[members[0]] if len(members) == 1 else key] = key
+    values: dict[Keys, Value] = {}
+    for name in now.network.neurons.names:
+        if name in names:
+            x, y = shown.layout.positions[name]
+            key = known.get(name) or name_text(name)
+            values["layout", "positions", key] = (number_text(x), number_text(y))
+    return values

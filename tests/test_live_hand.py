@@ -1,0 +1,217 @@
+"""The layout by hand in Chromium: a neuron is dragged, routes follow, what was put is undone, saved and clamped."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import shutil
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+from chromium import Page, chromium
+from PIL import Image
+from renderer_conformance import similarity
+from test_live_browser import SPECS, STEP, fit, pause
+from test_live_looking import places
+
+import neurovis_spec as nv
+from neurovis_spec.live.access import Access
+from neurovis_spec.live.desk import Desk, Written
+from neurovis_spec.live.hub import Hub
+from neurovis_spec.live.live import listen
+from neurovis_spec.live.run import Run
+from neurovis_spec.live.server import Server
+from neurovis_spec.live.show import Show
+
+pytestmark = pytest.mark.browser
+
+TOLD = "document.querySelector('#told').textContent"
+
+
+@asynccontextmanager
+async def at_hand(
+    folder: Path, name: str = "cpg_rbf.yaml", owner: bool = True, pins: str = ""
+) -> AsyncIterator[tuple[Page, Desk, Path]]:
+    """A live view of a copy of an example, which can be saved."""
+    where = folder / "spec"
+    shutil.copytree(SPECS, where)
+    spec = where / name
+    if pins:
+        spec.write_text(spec.read_text().replace("direction: down}", f"direction: down, {pins}}}"))
+    compiled = nv.compile(spec)
+    show = Show()
+    hub, loop = Hub(asyncio.get_running_loop()), asyncio.get_running_loop()
+    run = Run(*show.stage(compiled), hub.show, lambda: hub.watched)
+    written = Written(spec, lambda text: nv.compile_text(text, file=str(spec), folder=spec.parent))
+    desk = Desk(
+        compiled, None, show.view, run, lambda text: loop.call_soon_threadsafe(hub.tell, text, "placed"), written
+    )
+    sock = listen("127.0.0.1", 0)
+    access = Access("127.0.0.1", sock.getsockname()[1], viewers=True)
+    server = Server(access, hub, run, desk)
+    await server.start(sock)
+    run.start()
+    desk.start()
+    frame = show.view(compiled).plan.frame
+    try:
+        async with chromium(folder) as opened:
+            size = round(frame.width * frame.density), round(frame.height * frame.density)
+            await opened.size(*size)
+            await opened.call("Page.navigate", url=access.url(owner))
+            await opened.until(f"{STEP} >= 0")
+            await fit(opened, *size)
+            yield opened, desk, spec
+            assert opened.errors == []
+    finally:
+        desk.end()
+        run.end()
+        await server.stop()
+
+
+async def drag(
+    opened: Page, start: tuple[float, float], end: tuple[float, float], release_it: bool = True, shift: bool = False
+) -> None:
+    """Press the left button, move, and release it."""
+    more = {"modifiers": 8 if shift else 0, "button": "left"}
+    await opened.point(*start)
+    await opened.call("Input.dispatchMouseEvent", type="mousePressed", x=start[0], y=start[1], clickCount=1, **more)
+    for part in range(1, 9):
+        x, y = (a + (b - a) * part / 8 for a, b in zip(start, end, strict=True))
+        await opened.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y, buttons=1, **more)
+        await asyncio.sleep(0.02)
+    if release_it:
+        await release(opened, end)
+
+
+async def release(opened: Page, at: tuple[float, float]) -> None:
+    """Release the left button."""
+    await opened.call("Input.dispatchMouseEvent", type="mouseReleased", x=at[0], y=at[1], button="left", clickCount=1)
+
+
+def above(shot: bytes, x: float, y: float) -> Image.Image:
+    """A part of a screenshot, in which lines run to a neuron."""
+    image = Image.open(io.BytesIO(shot)).convert("RGB")
+    return image.crop((round(x) - 80, round(y) - 80, round(x) + 80, round(y) - 40))
+
+
+PUT = "document.querySelector('#placed').textContent"
+
+
+async def still(opened: Page) -> None:
+    """Wait until the page has drawn what it has."""
+    await opened.ask("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+async def holds(opened: Page, at: tuple[float, float], name: str) -> None:
+    """A pointer finds a neuron there."""
+    for _ in range(50):
+        await opened.point(at[0] + 1, at[1])
+        await opened.point(*at)
+        await still(opened)
+        found = await opened.ask("document.querySelector('#tip').textContent.split('\\n')[0]")
+        if found == name:
+            return
+        await asyncio.sleep(0.1)
+    raise AssertionError(f"{found} is there, not {name}")
+
+
+def test_a_neuron_is_dragged_and_put_back(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with at_hand(tmp_path) as (opened, desk, _):
+            await pause(opened)
+            x, y = places(desk.placed.compiled)["O"]
+            end = (x + 99, y - 24.75)  # whole steps of what is put by hand
+            before = await opened.shot()
+            await drag(opened, (x, y), end, release_it=False)
+            await asyncio.sleep(0.2)
+            await holds(opened, end, "O")
+            (tmp_path / "dragging.png").write_bytes(dragging := await opened.shot())
+            assert desk.placed.moved == (), "it is not put before it is let go"
+            await release(opened, end)
+            await opened.until(f"{PUT} == 'O'")
+            await holds(opened, end, "O")
+            (tmp_path / "dragged.png").write_bytes(await opened.shot())
+            dragged = await opened.shot()
+            assert similarity(above(dragging, *end), above(dragged, *end)) > 0.95, "routes are those that it gets"
+            assert similarity(above(before, *end), above(dragged, *end)) < 0.9
+            await opened.key("z")
+            await opened.until(f"{PUT} == ''")
+            await holds(opened, (x, y), "O")
+
+    asyncio.run(main())
+
+
+def test_a_mirror_image_follows_a_key(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with at_hand(tmp_path, "hexapod/hexapod.yaml") as (opened, desk, _):
+            await pause(opened)
+            names = desk.placed.compiled.network.neurons.names
+            before = desk.placed.layout.positions
+            for _ in range(names.index("left1.BC") + 1):
+                await opened.key("]")
+            await opened.call("Input.dispatchKeyEvent", type="keyDown", key="ArrowUp", modifiers=8)
+            await opened.until(f"{PUT} == 'left1.BC'")
+            after = desk.placed.layout.positions
+            assert {name for name in names if before[name] != after[name]} == {
+                f"{side}{number}.BC" for side in ("left", "right") for number in (1, 2, 3)
+            }
+
+    asyncio.run(main())
+
+
+def test_what_was_put_is_written_after_the_difference_is_shown(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with at_hand(tmp_path) as (opened, desk, spec):
+            text = spec.read_text()
+            x, y = places(desk.placed.compiled)["O"]
+            await drag(opened, (x, y), (x + 60, y))
+            await opened.until(f"{PUT} == 'O'")
+            await opened.key("t")
+            await opened.ask("document.querySelector('#tospec').click()")
+            await opened.until("document.querySelector('#saving').open")
+            diff = await opened.ask("document.querySelector('#diff').textContent")
+            (tmp_path / "difference.png").write_bytes(await opened.shot())
+            assert isinstance(diff, str)
+            assert "+  positions:\n" in diff
+            assert spec.read_text() == text
+            await opened.ask("document.querySelector('#leave').click()")
+            await opened.until("!document.querySelector('#saving').open")
+            await opened.ask("document.querySelector('#tofile').click()")
+            await opened.until("document.querySelector('#diff').textContent.includes('routes:')")
+            assert spec.read_text() == text
+            await opened.ask("document.querySelector('#write').click()")
+            await opened.until("!document.querySelector('#saving').open")
+            await opened.until(f"{PUT} == ''")
+            assert "file: cpg_rbf.layout.yaml" in spec.read_text()
+            assert nv.compile(spec).layout().positions == desk.placed.layout.positions
+            assert await opened.ask("document.querySelector('#tospec').disabled")
+
+    asyncio.run(main())
+
+
+def test_a_place_that_cannot_be_is_told_and_left(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with at_hand(tmp_path, pins="positions: {C1: [2.5, 0], O: [3.5, 4]}") as (opened, desk, _):
+            await pause(opened)
+            found = places(desk.placed.compiled)
+            await drag(opened, found["O"], (found["C1"][0] + 5, found["C1"][1]))
+            await holds(opened, found["O"], "O")
+            await holds(opened, found["C1"], "C1")
+            assert desk.placed.moved == ()
+
+    asyncio.run(main())
+
+
+def test_a_viewer_moves_the_picture_instead(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with at_hand(tmp_path, owner=False) as (opened, desk, _):
+            x, y = places(desk.placed.compiled)["O"]
+            await drag(opened, (x, y), (x + 60, y))
+            await holds(opened, (x + 60, y), "O")
+            assert desk.placed.moved == ()
+            for button in ("unplace", "tospec", "tofile"):
+                assert await opened.ask(f"document.querySelector('#{button}').disabled")
+
+    asyncio.run(main())
