@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import io
+import re
 import shutil
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -17,6 +18,7 @@ from test_live_browser import SPECS, STEP, fit, pause
 from test_live_looking import places
 
 import neurovis_spec as nv
+from neurovis_spec import pipeline
 from neurovis_spec.live.access import Access
 from neurovis_spec.live.desk import Desk, Written
 from neurovis_spec.live.hub import Hub
@@ -213,5 +215,52 @@ def test_a_viewer_moves_the_picture_instead(tmp_path: Path) -> None:
             assert desk.placed.moved == ()
             for button in ("unplace", "tospec", "tofile"):
                 assert await opened.ask(f"document.querySelector('#{button}').disabled")
+
+    asyncio.run(main())
+
+
+def test_a_disc_dragged_up_with_shift_clamps_its_neuron(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with at_hand(tmp_path) as (opened, desk, _):
+            await pause(opened)
+            x, y = places(desk.placed.compiled)["O"]
+            await opened.point(x, y)
+            await opened.until("/^activity /m.test(document.querySelector('#tip').textContent)")
+            told = await opened.ask("document.querySelector('#tip').textContent.match(/activity (.*)/)[1]")
+            assert isinstance(told, str)
+            await drag(opened, (x, y), (x, y - 80), shift=True)
+            await opened.until("document.querySelectorAll('#turned li').length == 1")
+            words = await opened.ask("document.querySelector('#turned li').textContent")
+            assert isinstance(words, str)
+            found = re.search(r"clamp O = (-?[\d.]+)", words)
+            assert found is not None
+            assert float(found[1]) == pytest.approx(float(told.replace("−", "-")) + 0.8, abs=0.02)
+            assert desk.placed.moved == ()
+            (tmp_path / "clamped.png").write_bytes(await opened.shot())
+
+    asyncio.run(main())
+
+
+def test_the_whole_picture_is_saved_as_png(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with at_hand(tmp_path, owner=False) as (opened, desk, _):
+            await opened.until(f"{STEP} > 5")
+            await opened.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
+            for _ in range(6):
+                await opened.key("+")
+            await opened.ask("document.querySelector('#png').click()")
+            saved = tmp_path / "cpg_rbf.png"
+            for _ in range(200):
+                if saved.exists():
+                    break
+                await asyncio.sleep(0.02)
+            picture, compiled = Image.open(saved).convert("RGB"), desk.placed.compiled
+            snapshot = compiled.run(8).snapshot(7)
+            scene = pipeline.picture(
+                compiled.network, desk.placed.layout, snapshot, compiled.gains, compiled.network.render
+            )
+            drawn = Image.open(io.BytesIO(pipeline.draw(scene, ".png"))).convert("RGB")
+            assert picture.size == drawn.size
+            assert similarity(picture, drawn) >= 0.95, "the step is about the same"
 
     asyncio.run(main())

@@ -17,6 +17,7 @@ import { Placing } from './place.js';
 import { Pointer } from './pointer.js';
 import { Link } from './protocol.js';
 import { Refusal } from './refusal.js';
+import { savePng } from './save.js';
 import { Scrubber } from './scrubber.js';
 import { Strips } from './strips.js';
 import { say } from './say.js';
@@ -230,6 +231,7 @@ function tellAll() {
 function help() {
   listKeys(/** @type {HTMLDialogElement} */ (part('keys')), controls.keys);
 }
+part('png').onclick = () => { if (link.scene && link.look) savePng(link.scene, link.look); };
 part('help').onclick = help;
 part('matrix').onclick = () => choose(!matrix);
 part('shut').onclick = help;

@@ -11,6 +11,8 @@
 
 /** How far a pointer may move, in pixels of a page, before a click is a drag. */
 const STILL = 5;
+/** How far a disc is dragged up for its activity to be 1 larger, in pixels of a page, and milliseconds between two clamps. */
+const ONE = 100, OFTEN = 50;
 
 /** Where a pointer is, in pixels of the display. @param {MouseEvent} event @returns {number[]} */
 const pixel = (event) => [event.offsetX * devicePixelRatio, event.offsetY * devicePixelRatio];
@@ -29,6 +31,8 @@ export class Pointer {
     this.dragged = 0;
     this.on = '';
     this.off = [0, 0];
+    /** where a clamp began, from which value, and when it was last sent @type {{y: number, from: number, last: number} | null} */
+    this.clamp = null;
     canvas.addEventListener('wheel', (event) => this.wheel(event), { passive: false });
     canvas.addEventListener('pointerdown', (event) => this.down(event));
     canvas.addEventListener('pointerup', (event) => this.up(event));
@@ -55,6 +59,7 @@ export class Pointer {
     this.on = event.button === 0 && placing.can(id) && (event.pointerType === 'mouse' || id === this.attention.held) ? id : '';
     if (!this.on) return;
     this.canvas.setPointerCapture(event.pointerId);
+    this.clamp = event.shiftKey ? { y: event.offsetY, from: this.attention.values[id] ?? 0, last: 0 } : null;
     const [across, down] = this.camera.unit(x, y), [left, top] = placing.stand(id).at[0];
     this.off = [left - across, top - down];
   }
@@ -63,8 +68,19 @@ export class Pointer {
   up(event) {
     const [x, y] = pixel(event);
     if (this.dragged < STILL && event.button === 0) this.attention.hold(this.ground.pointed(x, y));
+    if (this.clamp && this.dragged >= STILL) this.hold(event, false);
     this.placing.drop();
     this.on = '';
+    this.clamp = null;
+  }
+
+  /** Clamp the neuron to what its disc was dragged to. @param {PointerEvent} event @param {boolean} moving */
+  hold(event, moving) {
+    const { clamp, placing } = this;
+    if (!clamp || (moving && event.timeStamp - clamp.last < OFTEN)) return;
+    clamp.last = event.timeStamp;
+    const value = Number((clamp.from + (clamp.y - event.offsetY) / ONE).toFixed(2));
+    placing.link.ask('hold', { neurons: placing.groups.get(this.on)?.data.neuron, value, moving });
   }
 
   /** Say what is pointed at, or drag. @param {PointerEvent} event */
@@ -80,6 +96,8 @@ export class Pointer {
     if (!this.on) {
       this.camera.move(event.movementX * devicePixelRatio, event.movementY * devicePixelRatio);
       this.ground.redraw();
+    } else if (this.clamp) {
+      this.hold(event, true);
     } else if (this.dragged >= STILL) {
       this.placing.drag(this.on, [at[0] + this.off[0], at[1] + this.off[1]]);
     }
