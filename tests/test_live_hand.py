@@ -264,3 +264,28 @@ def test_the_whole_picture_is_saved_as_png(tmp_path: Path) -> None:
             assert similarity(picture, drawn) >= 0.95, "the step is about the same"
 
     asyncio.run(main())
+
+
+def test_the_owner_has_the_picture_a_film_and_the_recording_as_files(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with at_hand(tmp_path) as (opened, desk, _):
+            await opened.until(f"{STEP} > 30")
+            step = await pause(opened)
+            await opened.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
+
+            async def saved(button: str, name: str) -> bytes:
+                await opened.ask(f"document.querySelector('#{button}').click()")
+                for _ in range(300):
+                    if (tmp_path / name).exists():
+                        break
+                    await asyncio.sleep(0.05)
+                return (tmp_path / name).read_bytes()
+
+            assert b"<svg" in (picture := await saved("svg", "cpg_rbf.svg"))
+            (tmp_path / "cpg_rbf.svg").unlink()
+            assert len(await saved("film", "cpg_rbf.svg")) > len(picture)
+            await saved("npz", "cpg_rbf.npz")
+            found, run = nv.load(tmp_path / "cpg_rbf.npz"), desk.placed.compiled.run(step)
+            assert (found.activity == run.activity).all()
+
+    asyncio.run(main())

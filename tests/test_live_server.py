@@ -462,6 +462,7 @@ BROKEN: list[str | bytes] = [
     ),
     *('{"type": "place", "neuron": "B", "at": [0, 0]}', '{"type": "place", "neuron": "B", "at": [0], "done": true}'),
     *('{"type": "place", "neuron": "B", "at": [0, 1e9], "done": true}', '{"type": "save", "into": "/etc/passwd"}'),
+    *('{"type": "fetch", "what": "exe", "seconds": 5}', '{"type": "fetch", "what": "svg", "seconds": 61}'),
     *('{"type": "place", "neuron": "B", "at": "00", "done": true}', '{"type": "write", "path": "x"}'),
     *(b"", b"\x00", b"\x00" * 5, b"\x00" * 1000, '{"type": "pl\x00ay"}', '{"type": "step", "by": ' + "9" * 5000 + "}"),
 ]

@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from threading import Condition, RLock, Thread
 from typing import Final, TypeAlias
 
@@ -20,18 +21,21 @@ from neurovis_spec.layout.model import Layout
 from neurovis_spec.live.appearance import Appearance
 from neurovis_spec.live.pins import Compile, Saving, SavingError, saving
 from neurovis_spec.live.placing import Placed, placed
-from neurovis_spec.live.protocol import moved_message, placed_message, refused_message, saving_message
-from neurovis_spec.live.requests import Place, Request, Save, Unplace, Write
+from neurovis_spec.live.protocol import file_message, moved_message, placed_message, refused_message, saving_message
+from neurovis_spec.live.requests import Fetch, Place, Request, Save, Unplace, Write
 from neurovis_spec.live.run import Run, Stage
-from neurovis_spec.live.source import Source, SourceError
+from neurovis_spec.live.saving import film, picture, recall, recording, steps_for
+from neurovis_spec.live.source import Seen, Source, SourceError
 from neurovis_spec.live.view import View
 
 #: Tells who has asked.
-Answer: TypeAlias = Callable[[str], None]
+Answer: TypeAlias = Callable[[str | bytes], None]
 
 #: Requests that wait, and placings that can be undone.
 _WAITING: Final = 64
 _UNDONE: Final = 200
+#: Seconds in which the run has told its last steps.
+_PATIENCE: Final = 30.0
 
 
 @dataclass(frozen=True)
@@ -137,6 +141,28 @@ class Desk:
                 answer(saving_message(names, self._saving.diff, written=False))
             case Write():
                 self._write(answer)
+            case Fetch():
+                answer(self._fetch(request))
+
+    def _fetch(self, request: Fetch) -> bytes:
+        """A file of what was shown."""
+        view, name = self._shown(), self._placed.compiled.name
+        network = self._placed.compiled.network
+        steps = {"svg": 1, "npz": steps_for(network, None)}.get(request.what, steps_for(network, request.seconds))
+        found: SimpleQueue[tuple[list[Seen], dict[str, float]]] = SimpleQueue()
+
+        def look(source: Source) -> None:
+            if source.network.hash == network.hash:
+                found.put((recall(source, steps), source.parameters))
+
+        self._run.inquire(look)
+        try:
+            seen, parameters = found.get(timeout=_PATIENCE)
+        except Empty:
+            raise SavingError("the steps could not be had: the spec was edited, or the run has ended") from None
+        if request.what == "npz":
+            return file_message(f"{name}.npz", recording(network, seen, parameters))
+        return file_message(f"{name}.svg", picture(view, seen[-1]) if request.what == "svg" else film(view, seen))
 
     def _written(self) -> Written:
         if self._spec is None:

@@ -54,10 +54,10 @@ class Client:
     #: the traces that it wants, and those that it is to be sent
     wanted: Trace | None = None
     traces: bytes = b""
-    texts: deque[str] = field(default_factory=lambda: deque(maxlen=_TEXTS))
+    texts: deque[str | bytes] = field(default_factory=lambda: deque(maxlen=_TEXTS))
     wake: asyncio.Event = field(default_factory=asyncio.Event)
 
-    def tell(self, text: str) -> None:
+    def tell(self, text: str | bytes) -> None:
         """Send a text when there is room."""
         self.texts.append(text)
         self.wake.set()
@@ -124,7 +124,7 @@ class Hub:
         """Tell a client why what it asked is not done; from any thread."""
         self.answer(client, refused_message(reason))
 
-    def answer(self, client: Client, text: str) -> None:
+    def answer(self, client: Client, text: str | bytes) -> None:
         """Tell a client something, from any thread."""
         self._loop.call_soon_threadsafe(client.tell, text)
 

@@ -24,15 +24,16 @@ from neurovis_spec.live.clock import SPEEDS
 from neurovis_spec.live.commands import Branch, Command, Draw, Event, Pause, Play, Restart, Seek, Speed, Step
 from neurovis_spec.live.history import Bins, Range
 from neurovis_spec.live.moved import Moved
-from neurovis_spec.live.requests import Place, Request, Save, Unplace, Write
+from neurovis_spec.live.requests import Fetch, Place, Request, Save, Unplace, Write
 from neurovis_spec.live.run import Status
+from neurovis_spec.live.saving import MOST_SECONDS
 from neurovis_spec.live.source import Reach, Turned
 from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Release, Set
 from neurovis_spec.live.view import Look
 from neurovis_spec.themes import THEMES
 
 #: The first byte of a binary message from the server.
-SCENE, FRAME, TRACE = 1, 2, 3
+SCENE, FRAME, TRACE, FILE = 1, 2, 3, 4
 #: kind, scene
 _SCENE_HEAD = struct.Struct("<BxH")
 #: kind, scene, serial, changed, step, first, last, bytes of the caption, of what follows it none
@@ -124,6 +125,12 @@ def trace_message(version: int, traces: Mapping[int, Range], bins: Bins) -> byte
 def findings_message(text: str, errors: bool) -> str:
     """What was noticed about an edited spec, as ``validate`` shows it; nothing: all is well."""
     return _text("findings", text=text, errors=errors)
+
+
+def file_message(name: str, data: bytes) -> bytes:
+    """A file to be saved by a browser: kind, bytes of the name, the name, the file."""
+    words = name.encode()
+    return struct.pack("<BxH", FILE, len(words)) + words + data
 
 
 def moved_message(moved: Moved) -> str:
@@ -282,6 +289,13 @@ def _point(value: object) -> Point:
     return x, y
 
 
+def _seconds(value: object) -> float:
+    number = _number(value)
+    if not 0 < number <= MOST_SECONDS:
+        raise ProtocolError(f"at most {MOST_SECONDS} seconds are wanted")
+    return number
+
+
 def _one_of(*texts: str) -> Check:
     def check(value: object) -> str:
         if not isinstance(value, str) or value not in texts:
@@ -331,6 +345,7 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "unplace": ({}, Unplace),
     "save": ({"into": _one_of("spec", "file")}, Save),
     "write": ({}, Write),
+    "fetch": ({"what": _one_of("svg", "film", "npz"), "seconds": _seconds}, Fetch),
 }
 #: Members that a message need not have.
 _OPTIONAL: Final = {"moving"}

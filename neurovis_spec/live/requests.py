@@ -6,10 +6,13 @@ In: what ``protocol`` has checked. Out: frozen values that ``desk`` carries out.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 from neurovis_spec.layout.model import Point
 from neurovis_spec.live.pins import Into
+
+#: What can be had as a file.
+What: TypeAlias = Literal["svg", "film", "npz"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,4 +41,12 @@ class Write:
     """Write what was said."""
 
 
-Request: TypeAlias = Place | Unplace | Save | Write
+@dataclass(frozen=True, slots=True)
+class Fetch:
+    """Have the picture, a film of the last ``seconds``, or the recording."""
+
+    what: What
+    seconds: float
+
+
+Request: TypeAlias = Place | Unplace | Save | Write | Fetch

@@ -71,6 +71,13 @@ class _Drawn:
     view: View
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Inquiry:
+    """Something to be done with the source."""
+
+    what: Callable[[Source], object]
+
+
 def _ignore(message: str) -> None:
     """Nobody is told."""
 
@@ -92,7 +99,7 @@ class Run:
         failed: Callable[[], object] = lambda: None,
     ) -> None:
         self._source, self._view, self._show, self._wanted, self._failed = source, view, show, wanted, failed
-        self._asked: SimpleQueue[tuple[Command | Change | _Drawn | None, Refuse, Done]] = SimpleQueue()
+        self._asked: SimpleQueue[tuple[Command | Change | _Drawn | _Inquiry | None, Refuse, Done]] = SimpleQueue()
         self._playing, self._ended = True, False
         #: how the picture is wanted, and whether it is being drawn so
         self.appearance, self._drawing = view.appearance, False
@@ -113,6 +120,10 @@ class Run:
     def change(self, change: Change, refuse: Refuse = _ignore) -> None:
         """Have another network shown, from between two steps on."""
         self._asked.put((change, refuse, _nothing))
+
+    def inquire(self, what: Callable[[Source], object]) -> None:
+        """Have something done with the source between two steps, which afterwards stands where it stood."""
+        self._asked.put((_Inquiry(what), _ignore, _nothing))
 
     def end(self) -> None:
         """Stop, and wait until it has."""
@@ -161,7 +172,7 @@ class Run:
                 self._present()
                 done()
 
-    def _carry_out(self, asked: Command | Change | _Drawn) -> None:
+    def _carry_out(self, asked: Command | Change | _Drawn | _Inquiry) -> None:
         source, now = self._source, time.perf_counter()
         match asked:
             case Play():
@@ -193,6 +204,8 @@ class Run:
                 if asked.instead_of is self._view:
                     self._view = asked.view
                 self._redraw()
+            case _Inquiry():
+                asked.what(source)
             case Present():
                 pass
             case _ if callable(asked):

@@ -80,7 +80,7 @@ class View:
         snapshot = drawn.snapshot(whole)
         shown = looks(drawn.network, snapshot, self.gains, self.plan.frame.widest, drawn.signals(whole))
         words = self.plan.caption_shape(caption(drawn.whole, whole.step, whole.activity))
-        neurons, lines = self._lesioned(seen)
+        neurons, lines = self.lesioned(seen)
         bars = shown.bars & (self.plan.theme.ends == "signs")
         of_lines = bars * BAR + lines * FAINT + shown.bars * NEGATIVE + self._shares(snapshot.weights) * _SHARE
         return Look(
@@ -120,7 +120,7 @@ class View:
         """What stands, and runs, elsewhere in another layout."""
         return moved(self.plan, self.layout, layout)
 
-    def _lesioned(self, seen: Seen) -> tuple[Mask, Mask]:
+    def lesioned(self, seen: Seen) -> tuple[Mask, Mask]:
         """What is drawn as lesioned: a glyph, or a line between glyphs, where all that it stands for is."""
         drawn = self.drawn
         if not drawn.any:

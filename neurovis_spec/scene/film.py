@@ -79,10 +79,10 @@ def films(
             peaks = np.fmax(peaks, np.abs(drawn.snapshot(snapshot).weights))
         if planned is None or not np.array_equal(peaks, reached):
             planned, reached = plan(drawn, placed, gains, settings, peaks, narrowest), peaks
-        yield _filmed(drawn, planned, snapshots, gains, fps)
+        yield filmed(drawn, planned, snapshots, gains, fps)
 
 
-def _filmed(drawn: Gathered, planned: Plan, snapshots: Collection[Snapshot], gains: Gains, fps: float) -> Film:
+def filmed(drawn: Gathered, planned: Plan, snapshots: Collection[Snapshot], gains: Gains, fps: float) -> Film:
     """Snapshots by a plan."""
     network, whole, frames = drawn.network, drawn.whole, len(snapshots)
     neurons, connections = len(network.neurons), len(network.connections)

@@ -17,7 +17,7 @@ import { Placing } from './place.js';
 import { Pointer } from './pointer.js';
 import { Link } from './protocol.js';
 import { Refusal } from './refusal.js';
-import { savePng } from './save.js';
+import { download, savePng } from './save.js';
 import { Scrubber } from './scrubber.js';
 import { Strips } from './strips.js';
 import { say } from './say.js';
@@ -127,6 +127,9 @@ const link = new Link({
   traces(traces) {
     strips.take(traces);
   },
+  file(name, blob) {
+    download(blob, name);
+  },
   frame() {
     fresh = true;
     if (isStill()) setTimeout(redraw, shown + CALM - performance.now());
@@ -232,6 +235,9 @@ function help() {
   listKeys(/** @type {HTMLDialogElement} */ (part('keys')), controls.keys);
 }
 part('png').onclick = () => { if (link.scene && link.look) savePng(link.scene, link.look); };
+for (const what of ['svg', 'film', 'npz']) {
+  part(what).onclick = () => link.ask('fetch', { what, seconds: Number(/** @type {HTMLInputElement} */ (part('seconds')).value) });
+}
 part('help').onclick = help;
 part('matrix').onclick = () => choose(!matrix);
 part('shut').onclick = help;

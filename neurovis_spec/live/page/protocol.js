@@ -18,10 +18,10 @@
 /** @typedef {{first: number, every: number, ranges: Map<string, Float32Array>}} Traces */
 /** @typedef {{serial: number, step: number, first: number, last: number, caption: string, discs: Int8Array,
  *   lines: Int8Array, widths: Uint16Array, glows: Uint16Array, kinds: Uint8Array}} Look */
-/** @typedef {{scene: (scene: Scene) => void, frame: () => void, traces: (traces: Traces) => void,
+/** @typedef {{scene: (scene: Scene) => void, frame: () => void, file: (name: string, blob: Blob) => void, traces: (traces: Traces) => void,
  *   text: (message: any) => void, link: (open: boolean) => void}} Listener */
 
-const SCENE = 1, FRAME = 2, TRACE = 3, HEAD = 40;
+const SCENE = 1, FRAME = 2, TRACE = 3, FILE = 4, HEAD = 40;
 
 /** Unpack a scene. @param {ArrayBuffer} buffer @returns {Promise<Scene>} */
 async function unpack(buffer) {
@@ -152,6 +152,9 @@ export class Link {
       this.listener.scene(this.scene);
     } else if (kind === FRAME && this.scene && this.look && take(data, this.scene.version, this.look)) {
       this.listener.frame();
+    } else if (kind === FILE) {
+      const from = 4 + new DataView(data).getUint16(2, true);
+      this.listener.file(new TextDecoder().decode(data.slice(4, from)), new Blob([data.slice(from)]));
     } else if (kind === TRACE && this.scene && new DataView(data).getUint16(2, true) === this.scene.version) {
       this.listener.traces(unpackTraces(data, this.scene.lines));
     }

@@ -1,0 +1,91 @@
+"""Saving: what was shown, as files: a picture, a film of the last steps, a recording.
+
+In: what was seen, step by step, and how it is drawn. Out: the bytes of a file, of the same picture as the page has.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from neurovis_spec import pipeline
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.live.source import Mask, Seen, Source
+from neurovis_spec.live.view import View
+from neurovis_spec.runtime.columns import columns_of
+from neurovis_spec.runtime.recording import After, Numbers, Recording, recording_of
+from neurovis_spec.scene import Film
+from neurovis_spec.scene.film import filmed
+from neurovis_spec.scene.film_size import frames_a_second
+
+#: The most steps that are looked back, the most numbers in them, and the most seconds of a film.
+MOST_STEPS, _NUMBERS, MOST_SECONDS = 10_000, 8_000_000, 60
+
+
+def steps_for(network: Network, seconds: float | None) -> int:
+    """How many steps are looked back: those of so many seconds of a film, or as many as there is room for."""
+    room = max(1, _NUMBERS // max(1, len(network.neurons) + len(network.connections)))
+    wanted = MOST_STEPS if seconds is None else round(seconds * frames_a_second(network))
+    return max(1, min(wanted, room, MOST_STEPS))
+
+
+def recall(source: Source, steps: int) -> list[Seen]:
+    """What was seen of the last steps, as many as are within reach. The source stands afterwards where it stood."""
+    here = source.step
+    source.go(max(source.reach.first, here - steps + 1))
+    found = [source.seen()]
+    while source.step < here and source.advance():
+        found.append(source.seen())
+    return found
+
+
+def picture(view: View, seen: Seen) -> bytes:
+    """A step as SVG."""
+    return pipeline.draw(pipeline.frame(_film(view, [seen]), 0), ".svg")
+
+
+def film(view: View, seen: Sequence[Seen]) -> bytes:
+    """Steps as a moving SVG."""
+    return pipeline.animate(_film(view, seen), ".svg")
+
+
+def _film(view: View, seen: Sequence[Seen]) -> Film:
+    network = view.drawn.network
+    made = filmed(view.drawn, view.plan, [one.snapshot for one in seen], view.gains, frames_a_second(network))
+    masks = [view.lesioned(one) for one in seen]
+    faint = _first("n", [neurons for neurons, _ in masks]) | _first("c", [lines for _, lines in masks])
+    return replace(made, faint=faint)
+
+
+def _first(kind: str, masks: Sequence[Mask]) -> dict[str, int]:
+    """The frame from which on something is lesioned to the end."""
+    stays = np.logical_and.accumulate(np.stack(masks)[::-1])[::-1]
+    return {f"{kind}{index}": int(stays[:, index].argmax()) for index in np.flatnonzero(stays[-1]).tolist()}
+
+
+def recording(network: Network, seen: Sequence[Seen], parameters: Mapping[str, float]) -> bytes:
+    """Steps as a recording (``.npz``), but for the last, whose weights are those after it."""
+    *rows, last = seen
+    changing = network.changing
+    numbers = Numbers(
+        np.array([one.snapshot.step for one in rows], np.int64),
+        np.array([one.snapshot.activity for one in rows]).reshape(len(rows), len(network.neurons)),
+        np.array([one.snapshot.weights[changing] for one in rows]).reshape(len(rows), len(changing)),
+        np.zeros((len(rows), 0)),
+    )
+    weights = last.snapshot.weights
+    given = {name: value for name, value in parameters.items() if value != network.parameters[name]}
+    lesioned = np.flatnonzero(last.lesioned_neurons), np.flatnonzero(last.lesioned_connections)
+    after = After(weights[changing], last.snapshot.step, given, *lesioned)
+    return _npz(recording_of(network, columns_of(replace(network, outputs=())), numbers, weights, after))
+
+
+def _npz(made: Recording) -> bytes:
+    with tempfile.TemporaryDirectory(prefix="neurovis-") as folder:
+        path = Path(folder) / "recording.npz"
+        made.save(path)
+        return path.read_bytes()
