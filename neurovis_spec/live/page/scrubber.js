@@ -98,10 +98,9 @@ export class Scrubber {
     const coming = this.known.filter((turn) => turn > step + 1 && turn <= last);
     this.known = [...new Set([...this.turned, ...coming])];
     if (!scrub.matches(':active')) {
-      const outside = step < this.low || step > this.high;
-      const atEdge = (step === this.low && step > first) || (step === this.high && step < last);
+      const low = this.high - span, inside = (step > low || step === first) && step < this.high;
       if (step === last || last - first <= span) this.high = last;
-      else if (outside || atEdge) this.high = Math.round(step + span / 2);
+      else if (!inside) this.high = Math.round(step + span / 2);
       this.high = Math.min(last, Math.max(this.high, first + span));
       this.low = Math.max(first, this.high - span);
       [scrub.min, scrub.max] = [String(this.low), String(this.high)];
