@@ -3,7 +3,7 @@
  */
 
 import { Attention } from './attention.js';
-import { Camera, isStill } from './camera.js';
+import { Camera } from './camera.js';
 import { channels, luminance } from './colours.js';
 import { Controls, part } from './controls.js';
 import { Drawing } from './draw.js';
@@ -27,8 +27,6 @@ import { Zoom } from './zoom.js';
 const canvas = /** @type {HTMLCanvasElement} */ (document.getElementById('picture'));
 const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d', { alpha: false }));
 const camera = new Camera(), zoom = new Zoom();
-/** Where little is to move, pictures of a run come so many milliseconds after each other: fewer than three flashes a second. */
-const CALM = 400;
 /** What is gone to is seen with so many radii of a neuron around it. */
 const ROOM = 12;
 /** @type {Drawing | null} */
@@ -37,7 +35,7 @@ let drawing = null;
 let marks = null;
 /** what is shown in place of the drawing, where it is @type {Matrix | null} */
 let matrix = null;
-let fresh = false, asked = false, density = 0, shown = 0;
+let fresh = false, asked = false, density = 0;
 
 /** Draw before the display's next frame. */
 function redraw() {
@@ -78,7 +76,6 @@ function show() {
   if (more) redraw();
   if (fresh) {
     fresh = false;
-    shown = performance.now();
     link.drawn();
   }
 }
@@ -132,8 +129,7 @@ const link = new Link({
   },
   frame() {
     fresh = true;
-    if (isStill()) setTimeout(redraw, shown + CALM - performance.now());
-    else redraw();
+    redraw();
   },
   text(message) {
     if (message.type === 'status') {

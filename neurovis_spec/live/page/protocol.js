@@ -2,6 +2,8 @@
  * The protocol: the connection to the server, and what its messages mean (docs/live.md).
  */
 
+import { isStill } from './camera.js';
+
 /** @typedef {{kind: string, at: number[], points: number[], size: number[], along: number[], colours: string[],
  *   dash: number[], font: number, radius: number, width: number, length: number, half: number, fill: string, stroke: string,
  *   opacity: number, bar: boolean, text: string, subscript: string, anchor: string, weight: number, halo: string,
@@ -21,6 +23,8 @@
 /** @typedef {{scene: (scene: Scene) => void, frame: () => void, file: (name: string, blob: Blob) => void, traces: (traces: Traces) => void,
  *   text: (message: any) => void, link: (open: boolean) => void}} Listener */
 
+/** Where little is to move, frames are taken over so many milliseconds after each other: fewer than three flashes a second. */
+const CALM = 400;
 const SCENE = 1, FRAME = 2, TRACE = 3, FILE = 4, HEAD = 40;
 
 /** Unpack a scene. @param {ArrayBuffer} buffer @returns {Promise<Scene>} */
@@ -111,6 +115,8 @@ export class Link {
     this.socket = null;
     this.wait = 250;
     this.work = Promise.resolve();
+    /** when the last frame was taken over */
+    this.taken = -Infinity;
     this.open();
   }
 
@@ -142,6 +148,11 @@ export class Link {
       return;
     }
     const kind = new Uint8Array(data)[0];
+    if (kind === FRAME) {
+      const wait = isStill() ? this.taken + CALM - performance.now() : 0;
+      if (wait > 0) await new Promise((done) => { setTimeout(done, wait); });
+      this.taken = performance.now();
+    }
     if (kind === SCENE) {
       this.scene = await unpack(data);
       const { lines, discs } = this.scene;
