@@ -9,8 +9,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from threading import Event, Lock, Thread
-from typing import Final, Protocol
+from typing import Final
 
 import numpy as np
 
@@ -22,7 +23,8 @@ from neurovis_spec.ros.counts import Counts, Teller
 from neurovis_spec.ros.diagnostics import Diagnostics
 from neurovis_spec.ros.fields import Definition, Form
 from neurovis_spec.ros.inputs import Inputs
-from neurovis_spec.ros.middleware import LATCHED, MiddlewareError, Node, Parameter, Publisher, Quality, Tell
+from neurovis_spec.ros.listening import ACTIVITY, SPEC, WEIGHTS, Listening, base_of
+from neurovis_spec.ros.middleware import LATCHED, Arrival, MiddlewareError, Node, Parameter, Publisher, Quality, Tell
 from neurovis_spec.ros.pace import Clock, Pace, SimulatedClock, SteadyClock
 from neurovis_spec.ros.summary import Summary
 from neurovis_spec.ros.wire import ArrayForm, WireError, text_message
@@ -32,18 +34,6 @@ from neurovis_spec.runtime.simulation import ParameterError, Simulation
 
 #: a run has no end: what compiling costs is soon paid for
 _ENDLESS: Final = 1 << 40
-
-
-class Witness(Protocol):
-    """Who is shown what a node publishes: a recorder, a display. It must not wait."""
-
-    def sent(self, topic: str, type_: str, data: bytes, nanoseconds: int) -> None:
-        """A message that was published, at this time."""
-        ...
-
-    def stepped(self, step: int, activity: FloatArray, weights: FloatArray) -> None:
-        """A step that was made, with w[t] of all connections."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,16 +77,17 @@ def absolute(topic: str, node: str) -> str:
 
 @dataclass
 class _Sender:
-    """A publisher whose messages witnesses see."""
+    """A publisher; who listens in this process gets its messages, too."""
 
     publisher: Publisher
-    witnesses: list[Witness]
+    listening: Listening | None
 
     def send(self, data: bytes, nanoseconds: int) -> None:
         """Send a message."""
         self.publisher.publish(data)
-        for witness in self.witnesses:
-            witness.sent(self.publisher.topic, self.publisher.type, data, nanoseconds)
+        if self.listening is not None:
+            arrival = Arrival(data, time.time_ns(), nanoseconds, self.publisher.type)
+            self.listening.put(self.publisher.topic, arrival)
 
 
 @dataclass
@@ -134,12 +125,18 @@ class _Output(_Sender):
 
 
 class NodeRun:
-    """A network that runs as a node. What it says goes to ``tell``."""
+    """A network that runs as a node. What it says goes to ``tell``, and what it sends and receives to ``listening``."""
 
-    def __init__(self, compiled: CompiledNetwork, node: Node, course: Course, tell: Tell) -> None:
+    def __init__(
+        self,
+        compiled: CompiledNetwork,
+        node: Node,
+        course: Course,
+        tell: Tell,
+        listening: Listening | None = None,
+    ) -> None:
         self._compiled, self.network, self.node, self._course = compiled, compiled.network, node, course
-        self._tell, self._teller = tell, Teller(tell)
-        self.witnesses: list[Witness] = []
+        self._tell, self._teller, self._listening = tell, Teller(tell), listening
         self._lock, self._end = Lock(), Event()
         self._simulation = simulation(self.network, course.backend)
         self._clock: Clock = SimulatedClock(node.now) if course.sim_time else SteadyClock()
@@ -164,6 +161,9 @@ class NodeRun:
         inputs = Inputs.of(wanted, sizes, definitions, node.encoding, self._clock.now, self._teller)
         quality = Quality("offered", "volatile", 10)
         for topic in inputs.topics:
+            if self._listening is not None:
+                self._listening.add(topic.topic, topic.type)
+                topic.heard = partial(self._listening.put, topic.topic)
             node.subscription(topic.topic, topic.type, quality, topic.take)
         return inputs
 
@@ -171,10 +171,10 @@ class NodeRun:
         node, network = self.node, self.network
         settings = network.ros
         quality = Quality(settings.reliability, settings.durability, settings.depth)
-        base = f"{settings.namespace.rstrip('/')}/{network.name}"
-        self._activity = self._array(f"{base}/activity", len(network.neurons), quality)
+        base = base_of(self._compiled)
+        self._activity = self._array(f"{base}/{ACTIVITY}", len(network.neurons), quality)
         changing = len(network.changing)
-        self._weights = self._array(f"{base}/weights", changing, quality) if changing else None
+        self._weights = self._array(f"{base}/{WEIGHTS}", changing, quality) if changing else None
         sizes = {output.name: output.size for output in network.outputs}
         self._outputs = []
         for one in settings.publish:
@@ -182,13 +182,13 @@ class NodeRun:
             form = Form(Definition.parse(one.type, node.definition(one.type)), one.field, size, node.encoding)
             publisher = node.publisher(absolute(one.topic, node.name), one.type, quality)
             safe = None if one.safe is None else np.full(size, one.safe)
-            self._outputs.append(_Output(publisher, self.witnesses, form, one.output, safe))
-        self._spec = node.publisher(f"{base}/spec", STRING, LATCHED)
+            self._outputs.append(_Output(publisher, self._listening, form, one.output, safe))
+        self._spec = node.publisher(f"{base}/{SPEC}", STRING, LATCHED)
         self._spec.publish(text_message(self._compiled.text(), node.encoding))
 
     def _array(self, topic: str, size: int, quality: Quality) -> _Array:
         form = ArrayForm.of(label_of(self.network.hash), size, self.node.encoding)
-        return _Array(self.node.publisher(topic, ARRAY, quality), self.witnesses, form)
+        return _Array(self.node.publisher(topic, ARRAY, quality), self._listening, form)
 
     def _offer(self) -> None:
         network, spec = self.network, self._compiled.spec
@@ -258,7 +258,6 @@ class NodeRun:
                 return False
         run, now = self._simulation, self.node.now()
         with self._lock:
-            all_weights = run.connection_weights if self.witnesses else None
             weights = run.weights if self._weights is not None else None
             try:
                 outputs = run.step(inputs)
@@ -271,9 +270,6 @@ class NodeRun:
         self._activity.step(step, now, activity)
         if self._weights is not None and weights is not None:
             self._weights.step(step, now, weights)
-        if all_weights is not None:
-            for witness in self.witnesses:
-                witness.stepped(step, activity, all_weights)
         return True
 
     # ---- how it goes -------------------------------------------------------------------------------------------
@@ -291,10 +287,15 @@ class NodeRun:
 
     def summary(self) -> Summary:
         """How it has gone so far. What was withheld of outputs counts as not finite."""
-        topics = {"activity": Counts(), "weights": Counts()}
-        topics |= {topic.topic: topic.counts for topic in self._inputs.topics}
+        listening = self._listening
+        heard = {} if listening is None else listening.counts
+        topics = {name: heard.get(name, Counts()) for name in (ACTIVITY, WEIGHTS)}
+        for topic in self._inputs.topics:
+            kept = heard.get(topic.topic, Counts())
+            topics[topic.topic] = replace(topic.counts, recorded=kept.recorded, lost=kept.lost)
         for output in self._outputs:
             topics[output.publisher.topic] = Counts(not_finite=output.withheld)
+        shown, skipped = (0, 0) if listening is None else listening.shown
         return Summary(
             network=self.network.name,
             hash=self.network.hash,
@@ -303,5 +304,8 @@ class NodeRun:
             steps=self._simulation.k,
             late=self._pace.late,
             reconnects=self.node.reconnects,
+            shown=shown,
+            skipped=skipped,
+            files=() if listening is None else listening.paths,
             topics=topics,
         )
