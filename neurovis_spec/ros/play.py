@@ -58,10 +58,10 @@ def spec_of(bag: Bag, network: str | None = None) -> str | None:
 
 
 class _Way:
-    """Where the messages of a topic go, and how."""
+    """Where the messages of a topic go, and how; who comes late gets the last of a ``latched`` one all the same."""
 
-    def __init__(self, publisher: Publisher, converter: Converter | None, counts: Counts) -> None:
-        self.publisher, self._converter, self.counts = publisher, converter, counts
+    def __init__(self, publisher: Publisher, converter: Converter | None, latched: bool) -> None:
+        self.publisher, self._converter, self.latched, self.counts = publisher, converter, latched, Counts()
 
     def made(self, data: bytes) -> bytes:
         """The bytes that are sent. Raises WireError."""
@@ -91,7 +91,7 @@ class Player:
         latched = is_spec(topic, self._bag)
         quality = Quality("reliable", "transient_local", 1) if latched else Quality("reliable", "volatile", 1000)
         publisher = self._node.publisher(topic.name, topic.type, quality)
-        self._ways[topic.name, topic.type] = _Way(publisher, converter, Counts())
+        self._ways[topic.name, topic.type] = _Way(publisher, converter, latched)
 
     @property
     def counts(self) -> dict[str, Counts]:
@@ -101,8 +101,9 @@ class Player:
     def wait(self, stopped: Callable[[], bool]) -> None:
         """Wait for subscribers, as long as the course says."""
         end = time.monotonic() + self._course.wait
+        awaited = [way.publisher for way in self._ways.values() if not way.latched]
         while time.monotonic() < end and not stopped():
-            if all(way.publisher.subscribers for way in self._ways.values()):
+            if all(publisher.subscribers for publisher in awaited):
                 return
             time.sleep(0.01)
 

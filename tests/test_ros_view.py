@@ -1,0 +1,221 @@
+"""``neurovis ros view``, ``play`` and ``legacy`` with real ROS: nothing is lost, whatever becomes of the others."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ros_worlds import NAMES, World, world
+
+import neurovis_spec as nv
+from neurovis_spec.ros.accept import ARRAY
+from neurovis_spec.ros.bags import read_bag
+from neurovis_spec.ros.convert import Converter
+from neurovis_spec.ros.definitions import definition
+from neurovis_spec.ros.files import Files
+from neurovis_spec.ros.logs import Stored, topic_of
+from neurovis_spec.ros.wire import ArrayForm, text_message
+from neurovis_spec.runtime.ros_messages import label_of
+
+pytestmark = pytest.mark.ros
+
+SPEC = """
+neurovis: 1
+name: big
+time: {dt: 0.001}
+neurons: {A: {count: 150, initial: 0}}
+"""
+TOPIC = "/neurovis/big/activity"
+NETWORK = nv.compile_text(SPEC).network
+FORM = ArrayForm.of(label_of(NETWORK.hash), 150, "cdr")
+START = 1_700_000_000_000_000_000
+
+
+@pytest.fixture(params=NAMES)
+def ros(request: pytest.FixtureRequest) -> Iterator[World]:
+    with world(request.param) as made:
+        yield made
+
+
+@pytest.fixture
+def spec(tmp_path: Path) -> Path:
+    path = tmp_path / "big.yaml"
+    path.write_text(SPEC)
+    return path
+
+
+def step(number: float) -> bytes:
+    return FORM.message(number, number / 1000, np.full(150, float(number)))
+
+
+def recording(path: Path, messages: Sequence[bytes], rate: int = 1000) -> Path:
+    """A recording of ROS 2 of these messages, with their spec."""
+    spec, text = topic_of("/neurovis/big/spec", "std_msgs/String", "string data\n", 2), text_message(SPEC, "cdr")
+    activity = topic_of(TOPIC, ARRAY, str(definition(ARRAY, 2)), 2)
+    files = Files(path, 2, {"network": "big", "hash": NETWORK.hash}, [(spec, text)])
+    for number, data in enumerate(messages):
+        time_ = START + number * 10**9 // rate
+        files.write([Stored(activity, number, time_, time_, data)])
+    files.close()
+    return path
+
+
+def arrays_in(path: Path) -> list[bytes]:
+    """The activities in a recording, as ROS 2 has them."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        bag = read_bag(path)
+    found = [one.data for one in bag.messages() if one.topic.name == TOPIC]
+    if bag.ros == 2:
+        return found
+    converter = Converter(ARRAY, str(definition(ARRAY, 1)), "ros1")
+    return [converter.convert(data) for data in found]
+
+
+def name_of(ros: World) -> str:
+    return "x.bag" if ros.ros == 1 else "x"
+
+
+def test_a_kilohertz_of_150_neurons_is_recorded_whole_beside_a_page(ros: World, spec: Path, tmp_path: Path) -> None:
+    """Play equals live: what is played is what is recorded, byte for byte, also from one ROS to the other."""
+    messages = [step(number) for number in range(8000)]
+    file, out = recording(tmp_path / "played.mcap", messages), tmp_path / name_of(ros)
+    view = ros.neurovis("ros", "view", spec, "--record", out, "--live", "0", "--format", "json")
+    view.wait_for("ready")
+    play = ros.neurovis("ros", "play", file, "--wait", "20", "--format", "json")
+    assert play.end() == 0
+    assert play.json()["topics"][TOPIC]["received"] == 8000
+    time.sleep(1)
+    assert view.stop() == 0
+    counts = view.json()["topics"]["activity"]
+    assert (counts["received"], counts["recorded"], counts["lost"]) == (8000, 8000, 0)
+    assert arrays_in(out) == messages
+
+
+def test_the_network_that_announces_itself_is_viewed(ros: World, tmp_path: Path) -> None:
+    file = recording(tmp_path / "played.mcap", [step(number) for number in range(20)], rate=10)
+    play = ros.neurovis("ros", "play", file, "--loop")
+    view = ros.neurovis("ros", "view", "--record", tmp_path / "x.mcap", "--format", "json")
+    view.wait_for("ready: big")
+    time.sleep(1.5)
+    assert view.stop() == 0
+    found = view.json()
+    assert (found["network"], found["hash"]) == ("big", NETWORK.hash)
+    assert found["topics"]["activity"]["recorded"] > 5
+    assert found["topics"]["activity"]["lost"] == 0  # beginning anew is no loss
+    assert play.stop() == 0
+    (first, *_) = read_bag(tmp_path / "x.mcap").messages()
+    assert first.topic.name == "/neurovis/big/spec"
+
+
+def test_hostile_messages_are_counted_and_survived(ros: World, spec: Path, tmp_path: Path) -> None:
+    good = [step(number) for number in range(100)]
+    other = ArrayForm.of("neurovis/1:other", 150, "cdr").message(0, 0, np.zeros(150))
+    short = ArrayForm.of(label_of(NETWORK.hash), 149, "cdr").message(0, 0, np.zeros(149))
+    bare = ArrayForm.of("", 150, "cdr").message(float("nan"), -1, np.full(150, float("nan")))
+    odd = bytearray(good[0])
+    odd[good[0].index(b"\x02\0\0\0\x98\0\0\0")] = 7  # data_offset
+    messages = [data for one in good for data in (one, other, short, bare, bytes(odd))] * 2
+    file, out = recording(tmp_path / "played.mcap", messages), tmp_path / "x.mcap"
+    view = ros.neurovis("ros", "view", spec, "--record", out, "--format", "json")
+    view.wait_for("ready")
+    assert ros.neurovis("ros", "play", file, "--wait", "20").end() == 0
+    time.sleep(1)
+    assert view.stop() == 0
+    counts = view.json()["topics"]["activity"]
+    assert counts["received"] == 1000
+    assert counts["rejected"] == {"type": 0, "parse": 200, "hash": 200, "length": 200}
+    assert (counts["recorded"], counts["unlabelled"], counts["not_finite"]) == (400, 200, 200)
+    assert len(arrays_in(out)) == 400
+
+
+def test_kill_9_of_the_recorder_and_of_the_publisher(ros: World, spec: Path, tmp_path: Path) -> None:
+    messages = [step(number) for number in range(20_000)]
+    file, out = recording(tmp_path / "played.mcap", messages), tmp_path / name_of(ros)
+    first = ros.neurovis("ros", "view", spec, "--record", out)
+    second = ros.neurovis("ros", "view", spec, "--record", tmp_path / "y.mcap", "--format", "json")
+    first.wait_for("ready")
+    second.wait_for("ready")
+    play = ros.neurovis("ros", "play", file, "--wait", "20")
+    play.wait_for("ready")
+    time.sleep(3)
+    first.kill()
+    found = arrays_in(out)
+    assert len(found) > 100
+    start = messages.index(found[0])
+    assert found == messages[start : start + len(found)]
+    play.kill()
+    again = ros.neurovis("ros", "play", file, "--wait", "20", "--seconds", "1")
+    assert again.end() == 0
+    time.sleep(1)
+    assert second.stop() == 0
+    counts = second.json()["topics"]["activity"]
+    assert counts["lost"] == 0
+    assert counts["received"] == counts["recorded"] > len(found)
+
+
+def test_the_master_of_ros_1_may_begin_anew(spec: Path, tmp_path: Path) -> None:
+    file = recording(tmp_path / "played.mcap", [step(number) for number in range(1000)])
+    with world("one") as ros:
+        view = ros.neurovis("ros", "view", spec, "--record", tmp_path / "x.bag", "--format", "json")
+        view.wait_for("ready")
+        assert ros.neurovis("ros", "play", file, "--wait", "20").end() == 0
+        ros.stop_core()
+        view.wait_for("away")
+        ros.start_core()
+        view.wait_for("is back")
+        assert ros.neurovis("ros", "play", file, "--wait", "20").end() == 0
+        time.sleep(1)
+        assert view.stop() == 0
+        found = view.json()
+        assert found["reconnects"] == 1
+        assert found["topics"]["activity"]["recorded"] == 2000
+        assert found["topics"]["activity"]["lost"] == 0
+
+
+def test_a_run_records_what_it_publishes_and_its_inputs(ros: World, tmp_path: Path) -> None:
+    spec, out = tmp_path / "run.yaml", tmp_path / "x.mcap"
+    spec.write_text(
+        "neurovis: 1\nname: run\ntime: {dt: 0.01}\ninputs: {target: {}}\nneurons: {A: {input: target}, B: {initial: 1}}"
+        "\nconnections: {B -> A: 0.5, A -> B: {weight: -0.5, plasticity: {oja: {rate: 0.01}}}}\n"
+        "ros: {subscribe: {target: {topic: /target}}}\n"
+    )
+    run = ros.neurovis("ros", "run", spec, "--record", out, "--seconds", "6", "--format", "json")
+    run.wait_for("ready")
+    ros.peer(send=[{"topic": "/target", "type": "std_msgs/Float64", "values": {"data": 2.5}, "count": 20, "rate": 20}])
+    assert run.end() == 0
+    counts = run.json()["topics"]
+    steps = counts["activity"]["recorded"]
+    assert steps == counts["weights"]["recorded"] == run.json()["steps"] > 100
+    assert counts["/target"]["recorded"] == 20
+    names = [one.topic.name for one in read_bag(out).messages()]
+    assert names[0] == "/neurovis/run/spec"
+    assert (names.count("/neurovis/run/activity"), names.count("/target")) == (steps, 20)
+
+
+def test_a_controller_of_the_first_neurovis_is_recorded_and_described(ros: World, tmp_path: Path) -> None:
+    texts = {"neuronName": "A_1/B-2/", "neuronPos": "A_1_1_0_0/B-2_2_1_0/", "connections": "0,0.5,0.25,0"}
+    send = [
+        {"topic": f"/neurovis/{kind}", "type": "std_msgs/String", "values": {"data": text}, "count": 100, "rate": 10}
+        for kind, text in texts.items()
+    ]
+    activity = [{"data": [float(number), -1.0]} for number in range(100)]
+    type_ = "std_msgs/Float32MultiArray"
+    send.append({"topic": "/neurovis/activity", "type": type_, "values": activity, "count": 100, "rate": 10})
+    out, spec = tmp_path / "x.mcap", tmp_path / "old.yaml"
+    legacy = ros.neurovis("ros", "legacy", "-o", spec, "--record", out, "--network", "old", "--format", "json")
+    legacy.wait_for("ready")
+    ros.peer(send=send)
+    legacy.wait_for("2 neurons, 2 connections")
+    time.sleep(2)
+    assert legacy.stop() == 0
+    network = nv.compile(spec).network
+    assert (network.name, network.neurons.labels) == ("old", ("A_1", "B-2"))
+    assert network.connections.weights.tolist() == [0.5, 0.25]
+    counts = legacy.json()["topics"]["activity"]
+    assert counts["recorded"] == sum(one.topic.name == "/neurovis/old/activity" for one in read_bag(out).messages()) > 5
+    assert read_bag(out).about["hash"] == network.hash == legacy.json()["hash"]
