@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 from ros_worlds import NAMES, World, world
 
 import neurovis_spec
@@ -375,3 +376,31 @@ def test_a_type_whose_package_is_missing_is_named(tmp_path: Path) -> None:
             run = ros.neurovis("ros", "run", spec)
             assert run.end() == 1
             assert "'acme_msgs'" in "".join(run.err)
+
+
+def test_a_run_is_recorded_and_shown(ros: World, arm: Path, tmp_path: Path) -> None:
+    file = tmp_path / "run.mcap"
+    run = ros.neurovis("ros", "run", arm, "--record", file, "--live", "0", "--format", "json")
+    assert run.wait_for("live: ").startswith("live: http://127.0.0.1:")
+    run.wait_for("ready")
+    peer = ros.peer(send=[targets(1.5, 30), targets(float("nan"), 3)], seconds=1.0)
+    assert peer.end() == 0
+    assert run.stop() == 0
+    summary = run.json()
+    steps = summary["steps"]
+    assert steps > 30
+    assert summary["files"] == [str(file)]
+    assert summary["topics"]["activity"]["received"] == summary["topics"]["activity"]["recorded"] == steps
+    assert summary["topics"]["/target"]["recorded"] == 33
+    assert summary["shown"] + summary["skipped"] == steps
+    with file.open("rb") as opened:
+        messages = list(make_reader(opened).iter_messages())
+    topics = [channel.topic for _, channel, _ in messages]
+    assert topics[0] == "/neurovis/arm/spec"
+    assert topics.count("/target") == 33
+    activity = [message for _, channel, message in messages if channel.topic == "/neurovis/arm/activity"]
+    assert [message.sequence for message in activity] == list(range(steps))
+    assert {channel.message_encoding for _, channel, _ in messages} == {"ros1" if ros.ros == 1 else "cdr"}
+    again = ros.neurovis("ros", "run", arm, "--record", file)
+    assert again.end() == 1
+    assert "--force" in again.err[-1]

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import sys
-from contextlib import ExitStack
-from dataclasses import replace
+from contextlib import nullcontext
 
 import click
 
@@ -20,7 +19,7 @@ from neurovis_spec.interrupts import heeded
     epilog=examples(
         "neurovis ros run first.yaml",
         "neurovis ros run first.yaml --rate 100 --seconds 60",
-        "neurovis ros run first.yaml --live 8080 --record first.mcap",
+        "neurovis ros run first.yaml --live 8080 --record run.mcap",
         "neurovis ros run first.yaml --ros 1 --steps 1000 --wait 5 --format json",
     )
 )
@@ -54,31 +53,18 @@ def command(
     if backend == "list":
         raise click.UsageError("'neurovis run --backend list' lists the backends")
     compiled = network_of(spec, settings)
-    from neurovis_spec.ros.listening import RunWitness
     from neurovis_spec.ros.run import Course, NodeRun
 
     network = compiled.network
     course = Course(rate or network.ros.rate, steps, meeting.seconds, meeting.wait, backend, meeting.sim_time)
     sys.setswitchinterval(0.0005)  # steps are due, and threads must not wait for each other as long as Python lets them
-    with meeting.node(network.name, network.ros.namespace) as node, ExitStack() as stack, heeded() as asked:
-        run, listening = NodeRun(compiled, node, course, tell), None
-        if desk:
-            listening = stack.enter_context(desk.open(compiled, node))
-            run.witnesses.append(RunWitness(listening, run.input_topics))
-        tell(f"ready: {node.name}, ROS {node.ros}, {course.rate:g} steps a second")
-        run.wait(lambda: bool(asked))
-        run.run(lambda: bool(asked))
+    with meeting.node(network.name, network.ros.namespace) as node, heeded() as asked:
+        with desk.open(compiled, node) if desk else nullcontext() as listening:
+            run = NodeRun(compiled, node, course, tell, listening)
+            tell(f"ready: {node.name}, ROS {node.ros}, {course.rate:g} steps a second")
+            run.wait(lambda: bool(asked))
+            run.run(lambda: bool(asked))
         summary = run.summary()
-        if listening is not None:
-            listening.end()
-            shown, skipped = listening.shown
-            summary = replace(
-                summary,
-                shown=shown,
-                skipped=skipped,
-                files=listening.paths,
-                topics={**summary.topics, **listening.counts},
-            )
     meeting.show(summary)
     if run.why is not None:
         raise fault(run.why, "it is to stop the run: on_timeout in the section ros.subscribe of the spec")

@@ -15,7 +15,7 @@ from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.ros_settings import Subscription as Settings
 from neurovis_spec.ros.counts import REASONS, Counts, Reason, Teller
 from neurovis_spec.ros.fields import Definition, numbers_at, texts_at
-from neurovis_spec.ros.middleware import Arrival
+from neurovis_spec.ros.middleware import Arrival, Arrived
 from neurovis_spec.ros.wire import Encoding, WireError
 
 
@@ -41,6 +41,10 @@ class _Reading:
         return numbers if len(numbers) == self.size else "length"
 
 
+def _ignore(arrival: Arrival) -> None:
+    """Nobody else wants it."""
+
+
 @dataclass(eq=False)
 class InputTopic:
     """A topic that inputs come from; ``clock`` gives the seconds by which messages grow old."""
@@ -51,6 +55,8 @@ class InputTopic:
     clock: Callable[[], float]
     teller: Teller
     counts: Counts = field(default_factory=Counts)
+    #: called with each message that is not rejected
+    heard: Arrived = _ignore
 
     def take(self, arrival: Arrival) -> None:
         """A message."""
@@ -68,6 +74,8 @@ class InputTopic:
         values = [(reading, one) for reading, one in zip(self.readings, found, strict=True) if not isinstance(one, str)]
         if reasons:
             self._reject(reasons[0])
+        else:
+            self.heard(arrival)
         if any(not np.isfinite(one).all() for _, one in values):
             self.counts.not_finite += 1
             self.teller.note(f"not finite on {self.topic}")

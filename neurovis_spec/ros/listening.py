@@ -6,14 +6,12 @@ any thread; its source is what the live page shows, its counts are those of the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from time import time_ns
 from typing import Final
 
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.ros.accept import ARRAY, STRING, Accepted, Judge, Stream, anything, arrays, headed
 from neurovis_spec.ros.counts import Counts
 from neurovis_spec.ros.definitions import definition
@@ -140,23 +138,3 @@ class Listening:
     def paths(self) -> tuple[str, ...]:
         """The files of the recording."""
         return () if self._files is None else tuple(map(str, self._files.paths))
-
-
-class RunWitness:
-    """Has a run's own messages, and those of its inputs, heard as if they came from elsewhere."""
-
-    def __init__(self, listening: Listening, inputs: Mapping[str, str]) -> None:
-        self._listening = listening
-        for topic, type_ in inputs.items():
-            listening.add(topic, type_)
-
-    def sent(self, topic: str, type_: str, data: bytes, nanoseconds: int) -> None:
-        """A message that was published."""
-        self._listening.put(topic, Arrival(data, time_ns(), nanoseconds or None, type_))
-
-    def came(self, topic: str, arrival: Arrival) -> None:
-        """A message that came for an input."""
-        self._listening.put(topic, arrival)
-
-    def stepped(self, step: int, activity: FloatArray, weights: FloatArray) -> None:
-        """A step that was made: its messages say so."""
