@@ -115,7 +115,8 @@ async def serve_until(
     desk: Callable[[Run, Tell], Desk] | None = None,
     edits: Callable[[Run, Tell, Desk], Watch] | None = None,
 ) -> None:
-    """Serve until it is at its end; without a ``desk`` nothing is put elsewhere or saved; where the run cannot go on that is now, and what has happened is raised."""
+    """Serve until it is at its end; without a ``desk`` nothing is put elsewhere or saved. Where the run cannot go
+    on that is now, and what has happened is raised."""
     loop = asyncio.get_running_loop()
     hub = Hub(loop)
     run = Run(*stage, hub.show, lambda: hub.watched, lambda: loop.call_soon_threadsafe(_fail, ended))
