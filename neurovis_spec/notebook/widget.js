@@ -13,14 +13,16 @@ const named = () => Math.random().toString(36).slice(2);
 
 /** Show the page until what comes back is called. @param {{model: Model, el: HTMLElement}} where @returns {() => void} */
 function render({ model, el }) {
-  const box = document.createElement('div'), frame = document.createElement('iframe');
+  const box = document.createElement('div'),
+    frame = document.createElement('iframe');
   box.style.cssText = 'width: 100%; min-height: 160px; overflow: hidden; resize: vertical;';
   frame.setAttribute('sandbox', 'allow-scripts allow-downloads');
   frame.allow = 'clipboard-write *';
   frame.title = model.get('title');
   frame.style.cssText = 'display: block; width: 100%; height: 100%; border: 0;';
   el.append(box);
-  let view = named(), open = false;
+  let view = named(),
+    open = false;
   /** @type {MessagePort | null} */
   let port = null;
 
@@ -36,7 +38,8 @@ function render({ model, el }) {
     leave();
     const channel = new MessageChannel();
     [view, open, port] = [named(), true, channel.port1];
-    const { port1, port2 } = channel, own = view;
+    const { port1, port2 } = channel,
+      own = view;
     port1.onmessage = ({ data }) => {
       if (typeof data === 'string') model.send({ view: own, text: data });
       else model.send({ view: own }, undefined, [data.buffer]);
@@ -58,7 +61,9 @@ function render({ model, el }) {
       }
     }
   };
-  const size = () => { box.style.height = `${model.get('height')}px`; };
+  const size = () => {
+    box.style.height = `${model.get('height')}px`;
+  };
   size();
   model.on('msg:custom', take);
   model.on('change:height', size);

@@ -8,16 +8,21 @@ import { Sliders } from './sliders.js';
 
 /** What is coloured, or drawn thicker. @type {Object<string, string>} */
 const GAINS = {
-  activity: 'colour of neurons', signal: 'colour of connections', thickness: 'thickness of connections', change: 'glow where weights change',
+  activity: 'colour of neurons',
+  signal: 'colour of connections',
+  thickness: 'thickness of connections',
+  change: 'glow where weights change',
 };
 
 /** What is drawn otherwise than the spec says: in words, and what takes it back. @param {Object<string, any>} shown
  * @returns {{words: string, back: object}[]} */
 export function drawnOtherwise(shown) {
-  return Object.entries(shown).filter(([name, value]) => value !== (name === 'theme' ? '' : 1)).map(([name, value]) => ({
-    words: name === 'theme' ? `theme ${value}` : `gain of ${name} × ${value}`,
-    back: { ...shown, [name]: name === 'theme' ? '' : 1 },
-  }));
+  return Object.entries(shown)
+    .filter(([name, value]) => value !== (name === 'theme' ? '' : 1))
+    .map(([name, value]) => ({
+      words: name === 'theme' ? `theme ${value}` : `gain of ${name} × ${value}`,
+      back: { ...shown, [name]: name === 'theme' ? '' : 1 },
+    }));
 }
 
 /** A choice of themes, and a slider for each gain. */
@@ -42,8 +47,9 @@ export class Appearance {
     this.isDark.onchange = () => this.follow();
     this.sliders = new Sliders(place);
     for (const [name, description] of Object.entries(GAINS)) {
-      this.sliders.add({ name, value: 1, low: 1 / 64, high: 64, description, log: true }, `gain-${name}`,
-        (value) => ask({ [name]: value ?? 1 }));
+      this.sliders.add({ name, value: 1, low: 1 / 64, high: 64, description, log: true }, `gain-${name}`, (value) =>
+        ask({ [name]: value ?? 1 }),
+      );
     }
   }
 
@@ -59,7 +65,8 @@ export class Appearance {
   /** Be dark where the system is, unless somebody has chosen a theme. */
   follow() {
     const { matches } = this.isDark;
-    if (!this.isFree || !this.owner || matches === this.isFollowed || this.shown.theme !== (matches ? '' : 'dark')) return;
+    if (!this.isFree || !this.owner || matches === this.isFollowed || this.shown.theme !== (matches ? '' : 'dark'))
+      return;
     this.isFollowed = matches;
     this.ask({ theme: matches ? 'dark' : '' });
   }

@@ -53,7 +53,8 @@ export class Attention {
 
   /** Another network; what has the same name in it stays held. @param {Scene} scene */
   use(scene) {
-    const before = this.groups.get(this.held), name = before && JSON.stringify(before.data);
+    const before = this.groups.get(this.held),
+      name = before && JSON.stringify(before.data);
     this.groups = new Map(scene.groups.filter(({ id }) => /^[nc]\d+$/.test(id)).map((group) => [group.id, group]));
     this.signals = scene.groups.filter(({ data }) => data.signal !== undefined);
     this.pointed = '';
@@ -100,14 +101,18 @@ export class Attention {
   next(by) {
     const neurons = [...this.groups.keys()].filter((id) => id[0] === 'n');
     const at = neurons.indexOf(this.held);
-    if (neurons.length) this.hold(neurons[(at < 0 ? (by > 0 ? 0 : neurons.length - 1) : at + by + neurons.length) % neurons.length]);
+    if (neurons.length)
+      this.hold(neurons[(at < 0 ? (by > 0 ? 0 : neurons.length - 1) : at + by + neurons.length) % neurons.length]);
   }
 
   /** What a neuron's inputs and outputs are, or a connection's ends. @param {string} id @returns {string[]} */
   around(id) {
-    const { data } = /** @type {Group} */ (this.groups.get(id)), all = [...this.groups.values()];
-    const lines = data.neuron === undefined ? [this.groups.get(id)]
-      : all.filter((line) => line.data.from === data.neuron || line.data.to === data.neuron);
+    const { data } = /** @type {Group} */ (this.groups.get(id)),
+      all = [...this.groups.values()];
+    const lines =
+      data.neuron === undefined
+        ? [this.groups.get(id)]
+        : all.filter((line) => line.data.from === data.neuron || line.data.to === data.neuron);
     const dotted = this.signals.filter((signal) => signal.data.signal.split(' -> ').includes(data.neuron));
     const ends = new Set(lines.flatMap((line) => (line ? [line.data.from, line.data.to] : [])));
     for (const signal of dotted) for (const end of signal.data.signal.split(' -> ')) ends.add(end);
@@ -136,12 +141,21 @@ export class Attention {
   words(id, look) {
     const group = this.groups.get(id);
     if (!group) return this.zoom.words(id, look);
-    const [name, ...more] = group.title.split('\n'), { neuron, delay } = group.data;
-    const told = id in this.values ? [`${neuron === undefined ? 'weight' : 'activity'} ${signed(this.values[id])}`] : [];
+    const [name, ...more] = group.title.split('\n'),
+      { neuron, delay } = group.data;
+    const told =
+      id in this.values ? [`${neuron === undefined ? 'weight' : 'activity'} ${signed(this.values[id])}`] : [];
     if (delay !== undefined && !more.some((line) => line.startsWith('delay '))) told.push(`delay ${delay}`);
     const item = Number(id.slice(1)) + (neuron === undefined ? 0 : look.widths.length);
-    const { isClamped = 0, isFaint = 0 } = this.link.scene?.constants ?? {}, kind = look.kinds[item];
-    return [name, ...told, ...more, ...(neuron !== undefined && kind & isClamped ? ['clamped'] : []), ...(kind & isFaint ? ['lesioned'] : [])].join('\n');
+    const { isClamped = 0, isFaint = 0 } = this.link.scene?.constants ?? {},
+      kind = look.kinds[item];
+    return [
+      name,
+      ...told,
+      ...more,
+      ...(neuron !== undefined && kind & isClamped ? ['clamped'] : []),
+      ...(kind & isFaint ? ['lesioned'] : []),
+    ].join('\n');
   }
 
   /** Where a neuron is, or the tip of a connection. @param {string} id @returns {number[]} */
@@ -153,7 +167,9 @@ export class Attention {
 
   /** Show the tooltip beside what is pointed at, or else held. @param {Camera} camera @param {Look} look */
   show(camera, look) {
-    const id = this.pointed || this.held, words = this.words(id, look), { tip } = this;
+    const id = this.pointed || this.held,
+      words = this.words(id, look),
+      { tip } = this;
     tip.hidden = !words;
     if (!words) return;
     if (tip.textContent !== words) tip.textContent = words;

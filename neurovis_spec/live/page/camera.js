@@ -69,8 +69,9 @@ export class Camera {
    * largest x and y, in units @param {number} [least] the least pixels for a unit: of what is larger then, the middle is seen */
   see([x0, y0, x1, y1], least = 0) {
     const scale = Math.max(least, Math.min(this.window[0] / (x1 - x0), this.window[1] / (y1 - y0)));
-    const zoom = Math.min(64, Math.max(0.25, scale / this.whole)), at = zoom * this.whole;
-    this.go([zoom, at * (this.size[0] - x0 - x1) / 2, at * (this.size[1] - y0 - y1) / 2]);
+    const zoom = Math.min(64, Math.max(0.25, scale / this.whole)),
+      at = zoom * this.whole;
+    this.go([zoom, (at * (this.size[0] - x0 - x1)) / 2, (at * (this.size[1] - y0 - y1)) / 2]);
   }
 
   /** Go to a zoom and a shift, at once where little is to move. @param {number[]} to */
@@ -81,7 +82,8 @@ export class Camera {
   /** Go on, where it is on the way to somewhere; whether it still is. @returns {boolean} */
   glide() {
     if (!this.way) return false;
-    const { to, from, since } = this.way, share = Math.min(1, (performance.now() - since) / GLIDE);
+    const { to, from, since } = this.way,
+      share = Math.min(1, (performance.now() - since) / GLIDE);
     const [zoom, x, y] = to.map((end, at) => from[at] + (end - from[at]) * share * (2 - share));
     this.zoom = zoom;
     this.shift = [x, y];

@@ -25,9 +25,12 @@ function contrast(one, other) {
  * @param {Theme} theme @param {number} levels @returns {{fills: string[], texts: string[], channels: number[][]}} */
 export function palette(theme, levels) {
   const [negative, zero, positive] = [theme.negative, theme.zero, theme.positive].map(channels);
-  const fills = [], texts = [], all = [];
+  const fills = [],
+    texts = [],
+    all = [];
   for (let level = -levels; level <= levels; level++) {
-    const end = level < 0 ? negative : positive, share = Math.abs(level) / levels;
+    const end = level < 0 ? negative : positive,
+      share = Math.abs(level) / levels;
     const rgb = zero.map((from, at) => Math.round(from + (end[at] - from) * share));
     const light = contrast(channels(theme.light), rgb);
     all.push(rgb);

@@ -6,10 +6,13 @@
 /** Pixels along the side of a tile. */
 export const SIDE = 32;
 /** The weights of a pixel add up to this; an entry is a slot, of which colours are known, and in its low bits a weight. */
-const WHOLE = 256, LOW = 511, BITS = 9;
+const WHOLE = 256,
+  LOW = 511,
+  BITS = 9;
 /** The least weight that is seen. */
 const SEEN = 3;
-const OPAQUE = 255 << 24, UP = 65536;
+const OPAQUE = 255 << 24,
+  UP = 65536;
 
 /** Red, green and blue in one number, so that a weighted sum is one sum. @param {number[]} rgb @returns {number} */
 export function packed([red, green, blue]) {
@@ -18,7 +21,8 @@ export function packed([red, green, blue]) {
 
 /** The pixel of a weighted sum. @param {number} sum @returns {number} */
 function pixelOf(sum) {
-  const low = sum | 0, high = (sum / (UP * UP)) | 0;
+  const low = sum | 0,
+    high = (sum / (UP * UP)) | 0;
   return OPAQUE | ((high & 0xff00) << 8) | ((low >>> 16) & 0xff00) | ((low >>> 8) & 0xff);
 }
 
@@ -43,21 +47,39 @@ function inside(far) {
 export function flattened(points, scale, [left, top]) {
   const at = [points[0] * scale + left, points[1] * scale + top];
   for (let i = 2; i + 5 < points.length; i += 6) {
-    const ax = points[i - 2] * scale + left, ay = points[i - 1] * scale + top, bx = points[i] * scale + left;
-    const by = points[i + 1] * scale + top, cx = points[i + 2] * scale + left, cy = points[i + 3] * scale + top;
-    const dx = points[i + 4] * scale + left, dy = points[i + 5] * scale + top;
-    const bend = Math.max(Math.hypot(ax - 2 * bx + cx, ay - 2 * by + cy), Math.hypot(bx - 2 * cx + dx, by - 2 * cy + dy));
+    const ax = points[i - 2] * scale + left,
+      ay = points[i - 1] * scale + top,
+      bx = points[i] * scale + left;
+    const by = points[i + 1] * scale + top,
+      cx = points[i + 2] * scale + left,
+      cy = points[i + 3] * scale + top;
+    const dx = points[i + 4] * scale + left,
+      dy = points[i + 5] * scale + top;
+    const bend = Math.max(
+      Math.hypot(ax - 2 * bx + cx, ay - 2 * by + cy),
+      Math.hypot(bx - 2 * cx + dx, by - 2 * cy + dy),
+    );
     const count = Math.max(1, Math.ceil(Math.sqrt(7.5 * bend)));
     for (let k = 1; k <= count; k++) {
-      const t = k / count, s = 1 - t, p = s * s * s, q = 3 * s * s * t, u = 3 * s * t * t, v = t * t * t;
-      const x = p * ax + q * bx + u * cx + v * dx, y = p * ay + q * by + u * cy + v * dy, last = at.length - 2;
+      const t = k / count,
+        s = 1 - t,
+        p = s * s * s,
+        q = 3 * s * s * t,
+        u = 3 * s * t * t,
+        v = t * t * t;
+      const x = p * ax + q * bx + u * cx + v * dx,
+        y = p * ay + q * by + u * cy + v * dy,
+        last = at.length - 2;
       if (Math.abs(x - at[last]) + Math.abs(y - at[last + 1]) > 1e-3) at.push(x, y);
     }
   }
   // at a joint between the directions of both parts, so that each pixel belongs to one of them
-  const along = new Float64Array(at.length), last = at.length - 2;
+  const along = new Float64Array(at.length),
+    last = at.length - 2;
   for (let i = 0; i < last; i += 2) {
-    const dx = at[i + 2] - at[i], dy = at[i + 3] - at[i + 1], length = Math.sqrt(dx * dx + dy * dy);
+    const dx = at[i + 2] - at[i],
+      dy = at[i + 3] - at[i + 1],
+      length = Math.sqrt(dx * dx + dy * dy);
     along[i] += dx / length;
     along[i + 1] += dy / length;
     along[i + 2] = dx / length;
@@ -107,7 +129,8 @@ export class Coverage {
   /** The weight of what covers a part of a pixel: none where nobody would see it, and all that is left where nobody would
    * see what lies further back. @param {number} pixel @param {number} share @returns {number} */
   take(pixel, share) {
-    const room = this.room[pixel], weight = (room * share + 0.5) | 0;
+    const room = this.room[pixel],
+      weight = (room * share + 0.5) | 0;
     if (weight < SEEN) return 0;
     if (room - weight >= SEEN) {
       this.room[pixel] = room - weight;
@@ -164,29 +187,48 @@ export class Coverage {
   /** A line with its glow, if that is wider than 0. @param {Chain} chain @param {number} half of its width, in pixels
    * @param {number} glow half of its glow's @param {number} share @param {number} slot @param {number} colour of the glow */
   line({ at, along, parts }, half, glow, share, slot, colour) {
-    const reach = Math.max(half, glow) + 0.5, { left, top, room } = this;
+    const reach = Math.max(half, glow) + 0.5,
+      { left, top, room } = this;
     for (let part = 0; part < parts; part++) {
-      const i = 2 * part, x0 = at[i] - left, y0 = at[i + 1] - top, x1 = at[i + 2] - left, y1 = at[i + 3] - top;
+      const i = 2 * part,
+        x0 = at[i] - left,
+        y0 = at[i + 1] - top,
+        x1 = at[i + 2] - left,
+        y1 = at[i + 3] - top;
       const low = Math.max(0, Math.ceil(Math.min(y0, y1) - reach - 0.5));
       const high = Math.min(this.down - 1, Math.floor(Math.max(y0, y1) + reach - 0.5));
       const least = Math.max(0, Math.ceil(Math.min(x0, x1) - reach - 0.5));
       const most = Math.min(this.across - 1, Math.floor(Math.max(x0, x1) + reach - 0.5));
       if (low > high || least > most) continue;
-      const dx = x1 - x0, dy = y1 - y0, length = Math.sqrt(dx * dx + dy * dy), nx = -dy / length, ny = dx / length;
-      const fromX = along[i], fromY = along[i + 1], toX = along[i + 2], toY = along[i + 3];
-      const begins = part === 0, ends = part === parts - 1, steep = Math.abs(nx) > 1e-3;
+      const dx = x1 - x0,
+        dy = y1 - y0,
+        length = Math.sqrt(dx * dx + dy * dy),
+        nx = -dy / length,
+        ny = dx / length;
+      const fromX = along[i],
+        fromY = along[i + 1],
+        toX = along[i + 2],
+        toY = along[i + 3];
+      const begins = part === 0,
+        ends = part === parts - 1,
+        steep = Math.abs(nx) > 1e-3;
       for (let y = low; y <= high; y++) {
-        const down = y + 0.5 - y0, past = y + 0.5 - y1;
-        let from = least, to = most;
+        const down = y + 0.5 - y0,
+          past = y + 0.5 - y1;
+        let from = least,
+          to = most;
         if (steep) {
-          const middle = x0 - (down * ny) / nx - 0.5, beside = reach / Math.abs(nx);
+          const middle = x0 - (down * ny) / nx - 0.5,
+            beside = reach / Math.abs(nx);
           from = Math.max(from, Math.ceil(middle - beside));
           to = Math.min(to, Math.floor(middle + beside));
         }
         for (let x = from; x <= to; x++) {
           const pixel = y * SIDE + x;
           if (!room[pixel]) continue;
-          const over = x + 0.5 - x0, since = over * fromX + down * fromY, until = (x + 0.5 - x1) * toX + past * toY;
+          const over = x + 0.5 - x0,
+            since = over * fromX + down * fromY,
+            until = (x + 0.5 - x1) * toX + past * toY;
           let seen = share;
           if (since < 0) {
             if (!begins || since <= -0.5) continue;
@@ -212,8 +254,10 @@ export class Coverage {
    * @param {number} x @param {number} y @param {number} reach
    * @param {(pixel: number, x: number, y: number) => void} shape */
   near(x, y, reach, shape) {
-    const across = x - this.left - 0.5, down = y - this.top - 0.5;
-    const high = Math.min(this.down - 1, Math.floor(down + reach)), most = Math.min(this.across - 1, Math.floor(across + reach));
+    const across = x - this.left - 0.5,
+      down = y - this.top - 0.5;
+    const high = Math.min(this.down - 1, Math.floor(down + reach)),
+      most = Math.min(this.across - 1, Math.floor(across + reach));
     for (let row = Math.max(0, Math.ceil(down - reach)); row <= high; row++) {
       for (let column = Math.max(0, Math.ceil(across - reach)); column <= most; column++) {
         const pixel = row * SIDE + column;
@@ -224,13 +268,19 @@ export class Coverage {
 
   /** The end of a line: an arrowhead with a notch, or a bar. @param {End} end @param {number} share @param {number} slot */
   head({ x, y, dx, dy, length, half, notch, back, lap, stem, bar, room }, share, slot) {
-    if (x + room < this.left || y + room < this.top || x - room > this.left + SIDE || y - room > this.top + SIDE) return;
-    const flank = Math.hypot(half, length), inner = Math.hypot(half, length + notch);
+    if (x + room < this.left || y + room < this.top || x - room > this.left + SIDE || y - room > this.top + SIDE)
+      return;
+    const flank = Math.hypot(half, length),
+      inner = Math.hypot(half, length + notch);
     this.near(x, y, room, (pixel, right, down) => {
-      const along = right * dx + down * dy, beside = Math.abs(down * dx - right * dy);
+      const along = right * dx + down * dy,
+        beside = Math.abs(down * dx - right * dy);
       const far = bar
         ? Math.max(along, Math.min(Math.max(back - along, beside - half), Math.max(lap - along, beside - stem)))
-        : Math.max((along * half + beside * length) / flank, ((notch - along) * half - beside * (length + notch)) / inner);
+        : Math.max(
+            (along * half + beside * length) / flank,
+            ((notch - along) * half - beside * (length + notch)) / inner,
+          );
       if (far < 0.5) this.put(pixel, share * inside(far), slot);
     });
   }
@@ -241,7 +291,8 @@ export class Coverage {
     this.near(x, y, radius + ring + 1, (pixel, right, down) => {
       const far = Math.sqrt(right * right + down * down) - radius;
       if (words) {
-        const row = this.top + ((pixel / SIDE) | 0), alpha = words[4 * (row * this.width + this.left + (pixel % SIDE)) + 3];
+        const row = this.top + ((pixel / SIDE) | 0),
+          alpha = words[4 * (row * this.width + this.left + (pixel % SIDE)) + 3];
         if (alpha && far < 0) this.put(pixel, (share * alpha) / 255, ink);
       }
       if (ring) this.fix(pixel, share * band(Math.abs(far), ring), colour);
@@ -251,7 +302,8 @@ export class Coverage {
 
   /** End a tile: keep its entries, and show the pixels that stay. @param {Tile} tile @param {Uint32Array} out */
   end(tile, out) {
-    let count = 0, used = 0;
+    let count = 0,
+      used = 0;
     const { first, next, base, entries, across, down } = this;
     for (let y = 0; y < down; y++) for (let x = 0; x < across; x++) if (first[y * SIDE + x] >= 0) count++;
     tile.where = new Uint32Array(count);
@@ -262,7 +314,8 @@ export class Coverage {
     count = 0;
     for (let y = 0; y < down; y++) {
       for (let x = 0; x < across; x++) {
-        const pixel = y * SIDE + x, where = (this.top + y) * this.width + this.left + x;
+        const pixel = y * SIDE + x,
+          where = (this.top + y) * this.width + this.left + x;
         let entry = first[pixel];
         if (entry < 0) {
           out[where] = pixelOf(base[pixel]);

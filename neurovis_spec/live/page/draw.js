@@ -55,7 +55,9 @@ const layoutOf = (camera) => [...camera.window, camera.scale, ...camera.origin].
 const RECEDING = 0.12;
 /** Milliseconds of a frame in which tiles are worked out; a picture that takes longer is shown as it was, moved, while
  * the camera moves, for so many times as long. */
-const BUDGET = 10, SLOW = 30, PATIENCE = 3;
+const BUDGET = 10,
+  SLOW = 30,
+  PATIENCE = 3;
 /** How much further than it needs a line is looked for, in pixels, so that it may become wider. */
 const SPARE = 2;
 
@@ -66,7 +68,9 @@ export class Drawing {
     this.scene = scene;
     this.constants = scene.constants;
     this.palette = palette(scene.theme, this.constants.levels);
-    this.family = this.constants.families.map((/** @type {string} */ name) => (name === 'sans-serif' ? name : `"${name}"`));
+    this.family = this.constants.families.map((/** @type {string} */ name) =>
+      name === 'sans-serif' ? name : `"${name}"`,
+    );
     /** @type {Group[]} */
     this.back = [];
     /** @type {Group[]} */
@@ -126,13 +130,15 @@ export class Drawing {
   /** Draw a look; true where there is more to be drawn in the next frame.
    * @param {Context} context @param {Camera} camera @param {Look} look @returns {boolean} */
   draw(context, camera, look) {
-    const begun = performance.now(), isPassing = this.isPassing(camera);
+    const begun = performance.now(),
+      isPassing = this.isPassing(camera);
     this.asked = layoutOf(camera);
     if (isPassing) {
       this.preview(context, camera);
       return true;
     }
-    const anew = this.prepare(camera), mosaic = /** @type {Mosaic} */ (this.mosaic);
+    const anew = this.prepare(camera),
+      mosaic = /** @type {Mosaic} */ (this.mosaic);
     this.lay(camera, look);
     this.dress(camera, look);
     const left = mosaic.work((coverage, tile) => this.fill(coverage, tile), anew ? Infinity : begun + BUDGET);
@@ -152,13 +158,21 @@ export class Drawing {
   /** Whether the camera is on its way, and a picture of what it sees would take long. @param {Camera} camera @returns {boolean} */
   isPassing(camera) {
     const { mosaic, cost } = this;
-    return layoutOf(camera) !== this.asked && cost > SLOW && performance.now() - this.since < PATIENCE * cost && mosaic !== null
-      && mosaic.image.width === camera.window[0] && mosaic.image.height === camera.window[1];
+    return (
+      layoutOf(camera) !== this.asked &&
+      cost > SLOW &&
+      performance.now() - this.since < PATIENCE * cost &&
+      mosaic !== null &&
+      mosaic.image.width === camera.window[0] &&
+      mosaic.image.height === camera.window[1]
+    );
   }
 
   /** Show the latest picture where the camera would see it. @param {Context} context @param {Camera} camera */
   preview(context, camera) {
-    const [width, height] = camera.window, { scale, origin } = this.seen, by = camera.scale / scale;
+    const [width, height] = camera.window,
+      { scale, origin } = this.seen,
+      by = camera.scale / scale;
     if (!this.shot) {
       this.shot = document.createElement('canvas');
       [this.shot.width, this.shot.height] = camera.window;
@@ -189,7 +203,8 @@ export class Drawing {
    * @returns {Uint8ClampedArray | null} */
   picture(camera, shapes, more) {
     if (!shapes.length && !more) return null;
-    const canvas = document.createElement('canvas'), [width, height] = camera.window;
+    const canvas = document.createElement('canvas'),
+      [width, height] = camera.window;
     [canvas.width, canvas.height] = [width, height];
     const context = /** @type {Context} */ (canvas.getContext('2d', { willReadFrequently: true }));
     this.place(context, camera);
@@ -207,13 +222,18 @@ export class Drawing {
 
   /** Draw the pictures of what stays where they are other ones now. @param {Camera} camera @param {Look} look */
   dress(camera, look) {
-    const { lines, discs, near, mosaic } = this, { isFaint } = this.constants, { kinds } = look;
-    const faint = [...lines.filter(({ rest, index }) => rest.length && kinds[index] & isFaint),
-      ...discs.filter(({ index }) => kinds[look.widths.length + index] & isFaint)].map(({ id }) => id);
+    const { lines, discs, near, mosaic } = this,
+      { isFaint } = this.constants,
+      { kinds } = look;
+    const faint = [
+      ...lines.filter(({ rest, index }) => rest.length && kinds[index] & isFaint),
+      ...discs.filter(({ index }) => kinds[look.widths.length + index] & isFaint),
+    ].map(({ id }) => id);
     const dressed = [this.held, this.moves, ...faint, ':', ...this.near].join();
     if (dressed === this.dressed || !mosaic) return;
     this.dressed = dressed;
-    const before = this.pictures, isWord = (/** @type {Shape} */ shape) => shape.kind === 'text' && shape.onDisc;
+    const before = this.pictures,
+      isWord = (/** @type {Shape} */ shape) => shape.kind === 'text' && shape.onDisc;
     /** @param {Context} context @param {(Line | Disc)[]} items */
     const draw = (context, items) => {
       for (const { rest, laid } of items) {
@@ -221,10 +241,12 @@ export class Drawing {
         for (const shape of rest) if (!isWord(shape)) this.shape(context, shape);
       }
     };
-    const words = discs.flatMap(({ rest }) => rest.filter(isWord)), beads = lines.filter(({ rest }) => rest.length);
+    const words = discs.flatMap(({ rest }) => rest.filter(isWord)),
+      beads = lines.filter(({ rest }) => rest.length);
     this.pictures = {
       back: this.picture(camera, [], (context) => {
-        const [left, top] = camera.unit(0, 0), [right, bottom] = camera.unit(camera.window[0], camera.window[1]);
+        const [left, top] = camera.unit(0, 0),
+          [right, bottom] = camera.unit(camera.window[0], camera.window[1]);
         context.fillStyle = this.scene.theme.background;
         context.fillRect(left, top, right - left, bottom - top);
         for (const { id, data, shapes } of this.back) {
@@ -255,19 +277,27 @@ export class Drawing {
 
   /** Lay out what lies otherwise than before, and have all in its colours. @param {Camera} camera @param {Look} look */
   lay(camera, look) {
-    const { lines, discs, constants, near, fills } = this, { scale } = camera, [left, top] = camera.origin;
-    const mosaic = /** @type {Mosaic} */ (this.mosaic), { fineness, levels, isFaint, isBar } = constants;
+    const { lines, discs, constants, near, fills } = this,
+      { scale } = camera,
+      [left, top] = camera.origin;
+    const mosaic = /** @type {Mosaic} */ (this.mosaic),
+      { fineness, levels, isFaint, isBar } = constants;
     /** @param {string} id @param {number} kind */
     const shareOf = (id, kind) => (kind & isFaint ? constants.faint : 1) * (!near.size || near.has(id) ? 1 : RECEDING);
     discs.forEach((disc, at) => {
-      const kind = look.kinds[look.widths.length + disc.index], share = shareOf(disc.id, kind), { shape, laid } = disc;
-      const level = look.discs[disc.index] + levels, slot = lines.length + at;
+      const kind = look.kinds[look.widths.length + disc.index],
+        share = shareOf(disc.id, kind),
+        { shape, laid } = disc;
+      const level = look.discs[disc.index] + levels,
+        slot = lines.length + at;
       mosaic.paint(slot, fills[level]);
       mosaic.paint(slot + discs.length, this.inks[level]);
-      const x = shape.at[0] * scale + left, y = shape.at[1] * scale + top;
+      const x = shape.at[0] * scale + left,
+        y = shape.at[1] * scale + top;
       if (laid && laid.x === x && laid.y === y && laid.share === share) return;
       if (laid && (laid.x !== x || laid.y !== y)) this.moves++;
-      const radius = shape.radius * scale, ring = (Math.max(0, shape.width) / 2) * scale;
+      const radius = shape.radius * scale,
+        ring = (Math.max(0, shape.width) / 2) * scale;
       const tiles = mosaic.around(x, y, radius + ring + 1);
       if (laid) {
         leave(laid.tiles, 'discs', at);
@@ -278,13 +308,18 @@ export class Drawing {
       disc.laid = { x, y, radius, ring, colour: ring ? whole(shape.stroke) : 0, tiles, share };
     });
     lines.forEach((line, at) => {
-      const { index, points, laid } = line, kind = look.kinds[index], share = shareOf(line.id, kind);
-      const width = look.widths[index], glow = look.glows[index], bar = (kind & isBar) !== 0;
+      const { index, points, laid } = line,
+        kind = look.kinds[index],
+        share = shareOf(line.id, kind);
+      const width = look.widths[index],
+        glow = look.glows[index],
+        bar = (kind & isBar) !== 0;
       mosaic.paint(at, fills[look.lines[index] + levels]);
       const same = laid && laid.points === points && laid.head === line.head;
       if (same && laid.width === width && laid.glow === glow && laid.bar === bar && laid.share === share) return;
       const end = this.end(line.head, width / fineness, bar, scale, camera.origin);
-      const reach = (Math.max(width, glow) / 2 / fineness) * scale + 0.5, { room } = end;
+      const reach = (Math.max(width, glow) / 2 / fineness) * scale + 0.5,
+        { room } = end;
       const now = { points, head: line.head, end, width, glow, bar, share };
       if (same && reach <= laid.reach && room <= laid.room) {
         Object.assign(laid, now);
@@ -305,15 +340,19 @@ export class Drawing {
 
   /** Put in all that is in a tile, from front to back. @param {Coverage} coverage @param {Tile} tile */
   fill(coverage, tile) {
-    const { lines, discs, pictures, colours } = this, half = this.seen.scale / 2 / this.constants.fineness;
+    const { lines, discs, pictures, colours } = this,
+      half = this.seen.scale / 2 / this.constants.fineness;
     coverage.picture(pictures.front);
     for (let last = tile.discs.length - 1; last >= 0; last--) {
-      const at = tile.discs[last], { laid } = discs[at], slot = lines.length + at;
+      const at = tile.discs[last],
+        { laid } = discs[at],
+        slot = lines.length + at;
       if (laid) coverage.disc(laid, slot, pictures.words, slot + discs.length);
     }
     coverage.picture(pictures.between);
     for (let last = tile.lines.length - 1; last >= 0 && coverage.open; last--) {
-      const at = tile.lines[last], { laid } = lines[at];
+      const at = tile.lines[last],
+        { laid } = lines[at];
       if (!laid) continue;
       coverage.head(laid.end, laid.share, at);
       coverage.line(laid.chain, laid.width * half, laid.glow * half, laid.share, at, colours.glow);
@@ -324,12 +363,27 @@ export class Drawing {
   /** The end of a line of a width, in pixels. @param {Shape} shape @param {number} width @param {boolean} bar
    * @param {number} scale @param {number[]} origin @returns {End} */
   end({ at, along, length: long }, width, bar, scale, origin) {
-    const { constants } = this, length = long * scale, notch = -constants.notch * length, lap = notch - constants.lap * length;
-    const half = Math.max(constants.headOfLength * length + constants.headOfWidth * width * scale,
-      (0.5 / constants.notch) * width * scale + constants.headMore * scale);
+    const { constants } = this,
+      length = long * scale,
+      notch = -constants.notch * length,
+      lap = notch - constants.lap * length;
+    const half = Math.max(
+      constants.headOfLength * length + constants.headOfWidth * width * scale,
+      (0.5 / constants.notch) * width * scale + constants.headMore * scale,
+    );
     return {
-      x: at[0] * scale + origin[0], y: at[1] * scale + origin[1], dx: along[0], dy: along[1], length, half, notch,
-      back: -constants.bar * length, lap, stem: (width / 2) * scale, bar, room: Math.hypot(half, bar ? lap : length) + 1,
+      x: at[0] * scale + origin[0],
+      y: at[1] * scale + origin[1],
+      dx: along[0],
+      dy: along[1],
+      length,
+      half,
+      notch,
+      back: -constants.bar * length,
+      lap,
+      stem: (width / 2) * scale,
+      bar,
+      room: Math.hypot(half, bar ? lap : length) + 1,
     };
   }
 
@@ -343,7 +397,8 @@ export class Drawing {
     context.fillStyle = colour;
     context.beginPath();
     for (let i = 0; i < corners.length; i += 2) {
-      const along = corners[i], across = corners[i + 1];
+      const along = corners[i],
+        across = corners[i + 1];
       context.lineTo(x + along * dx - across * dy, y + along * dy + across * dx);
     }
     context.fill();
@@ -351,7 +406,8 @@ export class Drawing {
 
   /** A shape as it stands. @param {Context} context @param {Shape} shape */
   shape(context, shape) {
-    const [x, y] = shape.at || [0, 0], [across, down] = shape.size || [0, 0];
+    const [x, y] = shape.at || [0, 0],
+      [across, down] = shape.size || [0, 0];
     switch (shape.kind) {
       case 'disc':
       case 'box':
@@ -380,7 +436,8 @@ export class Drawing {
         this.head(context, shape, shape.width || 0.6, shape.fill, shape.bar);
         break;
       case 'ramp': {
-        const step = across / shape.colours.length, last = shape.colours.length - 1;
+        const step = across / shape.colours.length,
+          last = shape.colours.length - 1;
         shape.colours.forEach((colour, at) => {
           context.fillStyle = colour;
           context.fillRect(x + at * step, y, at === last ? step : step + 0.75, down);
@@ -397,9 +454,11 @@ export class Drawing {
 
   /** @param {Context} context @param {Shape} shape */
   image(context, shape) {
-    const cells = document.createElement('canvas'), { columns, rows } = shape;
+    const cells = document.createElement('canvas'),
+      { columns, rows } = shape;
     [cells.width, cells.height] = [columns, rows];
-    const pixels = Uint8Array.from(atob(shape.pixels), (c) => c.charCodeAt(0)), data = new ImageData(columns, rows);
+    const pixels = Uint8Array.from(atob(shape.pixels), (c) => c.charCodeAt(0)),
+      data = new ImageData(columns, rows);
     for (let i = 0; i < columns * rows; i++) {
       data.data.set([pixels[3 * i], pixels[3 * i + 1], pixels[3 * i + 2], 255], 4 * i);
     }
@@ -410,9 +469,13 @@ export class Drawing {
 
   /** @param {Context} context @param {Shape} shape @param {string} fill */
   text(context, shape, fill) {
-    const { constants } = this, { font: size, anchor, weight } = shape, small = constants.subscriptSize * size;
+    const { constants } = this,
+      { font: size, anchor, weight } = shape,
+      small = constants.subscriptSize * size;
     /** @param {number} at */
-    const choose = (at) => { context.font = `${weight} ${at}px ${this.family}`; };
+    const choose = (at) => {
+      context.font = `${weight} ${at}px ${this.family}`;
+    };
     let [x, y] = shape.at;
     if (shape.upward) {
       context.save();

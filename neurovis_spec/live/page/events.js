@@ -16,7 +16,8 @@ export function eventsOf(turned) {
   /** @type {{at: number, words: string}[]} */
   const events = [];
   for (const entry of turned) {
-    const at = entry.step + 1, what = { lesion: 'part', mend: 'part', hold: 'clamp', release: 'clamp' }[entry.type] || entry.type;
+    const at = entry.step + 1,
+      what = { lesion: 'part', mend: 'part', hold: 'clamp', release: 'clamp' }[entry.type] || entry.type;
     const of = entry.part || entry.neurons || entry.connections || entry.name || '';
     if (entry.type === 'set') {
       for (const [name, value] of Object.entries(entry.values)) {
@@ -34,7 +35,10 @@ export function eventsOf(turned) {
       events.push({ at, words: `{at: ${at}, set: {${plain(name)}: ${value}}}` });
     } else if (type === 'hold') {
       const end = all.slice(place + 1).find((other) => other.entry.neurons === neurons);
-      events.push({ at, words: `{from: ${at}, ${end ? `to: ${end.at}, ` : ''}clamp: {${plain(neurons)}: ${entry.value}}}` });
+      events.push({
+        at,
+        words: `{from: ${at}, ${end ? `to: ${end.at}, ` : ''}clamp: {${plain(neurons)}: ${entry.value}}}`,
+      });
     } else if (type === 'lesion' || type === 'mend') {
       events.push({ at, words: `{at: ${at}, ${type}: ${plain(entry.part)}}` });
     } else if (type === 'learn') {
@@ -47,7 +51,8 @@ export function eventsOf(turned) {
 /** The message that takes a turn back from the step that is shown on. @param {Turned[]} turned @param {number} place
  * @param {Declared[]} declared @returns {{type: string, [member: string]: any}} */
 export function takenBack(turned, place, declared) {
-  const { type, part, neurons, connections, on, name, values } = turned[place], before = turned.slice(0, place).reverse();
+  const { type, part, neurons, connections, on, name, values } = turned[place],
+    before = turned.slice(0, place).reverse();
   switch (type) {
     case 'set': {
       /** @param {string} one @returns {number} */
@@ -62,9 +67,12 @@ export function takenBack(turned, place, declared) {
       const held = before.find((entry) => entry.neurons === neurons);
       return held && held.type === 'hold' ? { type: 'hold', neurons, value: held.value } : { type: 'release', neurons };
     }
-    case 'lesion': return { type: 'mend', part };
-    case 'mend': return { type: 'lesion', part };
-    case 'learn': return { type, connections, on: !on };
+    case 'lesion':
+      return { type: 'mend', part };
+    case 'mend':
+      return { type: 'lesion', part };
+    case 'learn':
+      return { type, connections, on: !on };
     default: {
       const fed = before.find((entry) => entry.type === 'feed' && entry.name === name);
       return { type, name, values: fed ? fed.values : [] };

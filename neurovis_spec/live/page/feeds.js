@@ -35,12 +35,19 @@ export class Feeds {
       const names = this.names(entry);
       names.forEach((name, at) => {
         const description = at === names.length - 1 ? entry.description : '';
-        this.sliders.add({ name, value: 0, low: null, high: null, description }, `feed-${name.replace(' ', '-')}`,
+        this.sliders.add(
+          { name, value: 0, low: null, high: null, description },
+          `feed-${name.replace(' ', '-')}`,
           (value, moving) => {
             const values = names.map((_, other) => (this.fed[entry.name] || [])[other] || 0);
             values[at] = value || 0;
-            this.link.ask('feed', { name: entry.name, values: value === null && !values.some(Boolean) ? [] : values, moving });
-          });
+            this.link.ask('feed', {
+              name: entry.name,
+              values: value === null && !values.some(Boolean) ? [] : values,
+              moving,
+            });
+          },
+        );
       });
     }
   }
@@ -48,7 +55,10 @@ export class Feeds {
   /** @param {Object<string, number[]>} fed */
   show(fed) {
     this.fed = fed;
-    this.sliders.show(Object.fromEntries(this.declared.flatMap((entry) => this.names(entry)
-      .map((name, at) => [name, (fed[entry.name] || [])[at] || 0]))));
+    this.sliders.show(
+      Object.fromEntries(
+        this.declared.flatMap((entry) => this.names(entry).map((name, at) => [name, (fed[entry.name] || [])[at] || 0])),
+      ),
+    );
   }
 }

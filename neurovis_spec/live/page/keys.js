@@ -7,7 +7,12 @@
 
 /** How keys are called that are not called by what they write. @type {Object<string, string>} */
 const CALLED = {
-  ' ': 'space', ArrowRight: '→', ArrowLeft: '←', ArrowUp: '↑', ArrowDown: '↓', '-': '−',
+  ' ': 'space',
+  ArrowRight: '→',
+  ArrowLeft: '←',
+  ArrowUp: '↑',
+  ArrowDown: '↓',
+  '-': '−',
 };
 /** The keys that a slider takes for itself. */
 const SLIDES = /^(Arrow|Home|End|Page)/;
@@ -15,7 +20,8 @@ const SLIDES = /^(Arrow|Home|End|Page)/;
 /** Do what keys do, but where they write, choose or press something. @param {Keys} keys */
 export function followKeys(keys) {
   addEventListener('keydown', (event) => {
-    const at = /** @type {Element} */ (event.target), { key } = event;
+    const at = /** @type {Element} */ (event.target),
+      { key } = event;
     if (event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented) return;
     if (at.matches('input[type=range]') ? SLIDES.test(key) : at.closest('input, select, textarea')) return;
     if (key === ' ' && at.closest('button, summary')) return;
@@ -35,11 +41,13 @@ export function listKeys(dialog, keys) {
     return;
   }
   const list = /** @type {HTMLElement} */ (dialog.querySelector('dl'));
-  list.replaceChildren(...Object.entries(keys).flatMap(([key, [words]]) => {
-    const [name, what] = ['dt', 'dd'].map((tag) => document.createElement(tag));
-    name.textContent = CALLED[key] || key;
-    what.textContent = words;
-    return [name, what];
-  }));
+  list.replaceChildren(
+    ...Object.entries(keys).flatMap(([key, [words]]) => {
+      const [name, what] = ['dt', 'dd'].map((tag) => document.createElement(tag));
+      name.textContent = CALLED[key] || key;
+      what.textContent = words;
+      return [name, what];
+    }),
+  );
   dialog.showModal();
 }

@@ -18,15 +18,16 @@ import { Pointer } from './pointer.js';
 import { Link } from './protocol.js';
 import { Refusal } from './refusal.js';
 import { download, savePng } from './save.js';
+import { say } from './say.js';
 import { Scrubber } from './scrubber.js';
 import { Strips } from './strips.js';
-import { say } from './say.js';
 import { Turning } from './turning.js';
 import { Zoom } from './zoom.js';
 
 const canvas = /** @type {HTMLCanvasElement} */ (document.getElementById('picture'));
 const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d', { alpha: false }));
-const camera = new Camera(), zoom = new Zoom();
+const camera = new Camera(),
+  zoom = new Zoom();
 /** What is gone to is seen with so many radii of a neuron around it. */
 const ROOM = 12;
 /** @type {Drawing | null} */
@@ -35,7 +36,9 @@ let drawing = null;
 let marks = null;
 /** what is shown in place of the drawing, where it is @type {Matrix | null} */
 let matrix = null;
-let fresh = false, asked = false, density = 0;
+let fresh = false,
+  asked = false,
+  density = 0;
 
 /** Draw before the display's next frame. */
 function redraw() {
@@ -157,11 +160,17 @@ const link = new Link({
 const controls = new Controls(link);
 const turning = new Turning(link, part);
 const refusal = new Refusal(part('refusal'));
-const attention = new Attention(link, zoom, redraw, (group) => {
-  turning.hold(group);
-  outline.hold();
-  strips.hold(group);
-}, (id) => go(id));
+const attention = new Attention(
+  link,
+  zoom,
+  redraw,
+  (group) => {
+    turning.hold(group);
+    outline.hold();
+    strips.hold(group);
+  },
+  (id) => go(id),
+);
 const outline = new Outline(attention, part, (id) => go(id));
 const scrubber = new Scrubber(link, part, redraw);
 const strips = new Strips(link, attention, scrubber, part('strips'));
@@ -170,7 +179,8 @@ const strips = new Strips(link, attention, scrubber, part('strips'));
 function choose(asMatrix) {
   const { scene } = link;
   if (!scene) return;
-  const cells = asMatrix ? new Matrix(scene) : null, changed = !cells !== !matrix;
+  const cells = asMatrix ? new Matrix(scene) : null,
+    changed = !cells !== !matrix;
   matrix = cells;
   camera.size = cells ? cells.size : [scene.width, scene.height];
   if (changed) camera.fit();
@@ -182,16 +192,19 @@ function choose(asMatrix) {
 
 /** Hold a neuron or a connection, or go to a box; where it is not seen, the picture is moved. @param {string} id */
 function go(id) {
-  const box = zoom.boxes.find((one) => one.id === id), { look } = link;
+  const box = zoom.boxes.find((one) => one.id === id),
+    { look } = link;
   if (box) {
-    const [x0, y0, x1, y1] = box.rect, room = 0.1 * Math.max(x1 - x0, y1 - y0);
+    const [x0, y0, x1, y1] = box.rect,
+      room = 0.1 * Math.max(x1 - x0, y1 - y0);
     choose(false);
     attention.point('', [0, 0]);
     camera.see([x0 - room, y0 - room, x1 + room, y1 + room], 1.01 * zoom.opening(box));
     if (look) say(zoom.words(id, look).replaceAll('\n', ', '));
   } else {
     attention.hold(id);
-    const [x, y] = attention.middle(id), room = ROOM * (drawing?.discs[0]?.shape.radius ?? 20);
+    const [x, y] = attention.middle(id),
+      room = ROOM * (drawing?.discs[0]?.shape.radius ?? 20);
     const outside = camera.pixel(x, y).some((pixel, axis) => pixel < 0 || pixel > camera.window[axis]);
     if (outside || (!matrix && zoom.under([x, y]))) camera.see([x - room, y - room, x + room, y + room]);
   }
@@ -224,15 +237,21 @@ function tellAll() {
   const { look, scene } = link;
   if (!look || !scene) return;
   if (attention.held) attention.say(look);
-  else say(`${scene.title}, ${look.caption || `step ${look.step}`}, ${controls.playing ? 'playing' : 'paused'}, neurons ${scene.discs}, connections ${scene.lines}`);
+  else
+    say(
+      `${scene.title}, ${look.caption || `step ${look.step}`}, ${controls.playing ? 'playing' : 'paused'}, neurons ${scene.discs}, connections ${scene.lines}`,
+    );
 }
 /** List the keys, or close the list. */
 function help() {
   listKeys(/** @type {HTMLDialogElement} */ (part('keys')), controls.keys);
 }
-part('png').onclick = () => { if (link.scene && link.look) savePng(link.scene, link.look); };
+part('png').onclick = () => {
+  if (link.scene && link.look) savePng(link.scene, link.look);
+};
 for (const what of ['svg', 'film', 'npz']) {
-  part(what).onclick = () => link.ask('fetch', { what, seconds: Number(/** @type {HTMLInputElement} */ (part('seconds')).value) });
+  part(what).onclick = () =>
+    link.ask('fetch', { what, seconds: Number(/** @type {HTMLInputElement} */ (part('seconds')).value) });
 }
 part('help').onclick = help;
 part('matrix').onclick = () => choose(!matrix);
@@ -240,7 +259,13 @@ part('shut').onclick = help;
 Object.assign(controls.keys, {
   '+': ['come closer', () => nearer(1.25)],
   '-': ['go further away', () => nearer(0.8)],
-  0: ['see all of it', () => { camera.fit(); redraw(); }],
+  0: [
+    'see all of it',
+    () => {
+      camera.fit();
+      redraw();
+    },
+  ],
   h: ['see more on the left', () => pan(0.1, 0)],
   j: ['see more below', () => pan(0, -0.1)],
   k: ['see more above', () => pan(0, 0.1)],

@@ -8,11 +8,13 @@
 /** @typedef {{id: string, item: number, ends: number[], at: number[], reach: number}} Mark */
 
 /** How far the arms of a cross reach: in a disc, as a share of its radius; on a line, in pixels of a page. */
-const IN_DISC = 0.6, ON_LINE = 5;
+const IN_DISC = 0.6,
+  ON_LINE = 5;
 
 /** The middle of a cubic spline. @param {number[]} points @returns {number[]} */
 function middle(points) {
-  const pieces = (points.length - 2) / 6, first = 6 * Math.floor(pieces / 2);
+  const pieces = (points.length - 2) / 6,
+    first = 6 * Math.floor(pieces / 2);
   return [0, 1].map((axis) => {
     const [a, b, c, d] = [0, 2, 4, 6].map((further) => points[first + further + axis]);
     return pieces % 2 ? (a + 3 * b + 3 * c + d) / 8 : a;
@@ -26,11 +28,14 @@ export class Marks {
     this.scene = scene;
     /** @type {Map<string, number>} */
     const items = new Map();
-    for (const { id, data } of scene.groups) if (data.neuron !== undefined) items.set(data.neuron, scene.lines + Number(id.slice(1)));
+    for (const { id, data } of scene.groups)
+      if (data.neuron !== undefined) items.set(data.neuron, scene.lines + Number(id.slice(1)));
     /** @type {Mark[]} */
     this.marks = scene.groups.flatMap(({ id, data, shapes }) => {
       if (data.neuron !== undefined) {
-        return [{ id, item: items.get(data.neuron) ?? 0, ends: [], at: shapes[0].at, reach: IN_DISC * shapes[0].radius }];
+        return [
+          { id, item: items.get(data.neuron) ?? 0, ends: [], at: shapes[0].at, reach: IN_DISC * shapes[0].radius },
+        ];
       }
       if (data.connection === undefined) return [];
       const ends = [data.from, data.to].flatMap((name) => items.get(name) ?? []);
@@ -41,21 +46,31 @@ export class Marks {
   /** Cross out what is lesioned, but no line of a neuron that is. What recedes does so with its cross.
    * @param {CanvasRenderingContext2D} context @param {Camera} camera @param {Look} look @param {Set<string>} near */
   draw(context, camera, look, near) {
-    const { constants, theme } = this.scene, [left, top] = camera.origin;
+    const { constants, theme } = this.scene,
+      [left, top] = camera.origin;
     const gone = (/** @type {number} */ item) => (look.kinds[item] & constants.isFaint) !== 0;
     context.setTransform(1, 0, 0, 1, 0, 0);
     for (const { id, item, ends, at, reach } of this.marks) {
       if (!gone(item) || ends.some(gone)) continue;
-      const x = left + at[0] * camera.scale, y = top + at[1] * camera.scale;
+      const x = left + at[0] * camera.scale,
+        y = top + at[1] * camera.scale;
       const arm = reach * camera.scale || ON_LINE * devicePixelRatio;
       context.globalAlpha = near.size && !near.has(id) ? 0.3 : 1;
       context.beginPath();
-      for (const [across, down] of [[-1, -1], [1, -1], [1, 1], [-1, 1]]) {
+      for (const [across, down] of [
+        [-1, -1],
+        [1, -1],
+        [1, 1],
+        [-1, 1],
+      ]) {
         const inner = reach ? arm / 2 : 0; // which leaves room for a label
         context.moveTo(x + across * inner, y + down * inner);
         context.lineTo(x + across * arm, y + down * arm);
       }
-      for (const [colour, width] of [[theme.background, 5], [theme.ink, 2]]) {
+      for (const [colour, width] of [
+        [theme.background, 5],
+        [theme.ink, 2],
+      ]) {
         context.strokeStyle = colour;
         context.lineWidth = width * devicePixelRatio;
         context.stroke();

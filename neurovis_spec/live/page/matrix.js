@@ -12,9 +12,13 @@ import { palette } from './colours.js';
 /** @typedef {{row: number, column: number, lines: number[]}} Cell */
 
 /** The side of a cell, the size of a name, the most neurons with a name each, how far names reach: in units. */
-const CELL = 20, NAMED_CELL = 11, NAMES = 80, LONGEST = 130;
+const CELL = 20,
+  NAMED_CELL = 11,
+  NAMES = 80,
+  LONGEST = 130;
 /** The least sides of cells, in pixels of a page, that have their sign written in them, and names. */
-const SIGNED = 12, LEGIBLE = 8;
+const SIGNED = 12,
+  LEGIBLE = 8;
 /** How much is seen of what recedes. */
 const PALE = 0.12;
 
@@ -36,13 +40,16 @@ export class Matrix {
     /** @type {Map<number, Cell>} */
     this.cells = new Map();
     scene.ends[0].forEach((source, line) => {
-      const row = rows[source], column = rows[scene.ends[1][line]], place = row * this.rows.length + column;
+      const row = rows[source],
+        column = rows[scene.ends[1][line]],
+        place = row * this.rows.length + column;
       const known = this.cells.get(place);
       if (known) known.lines.push(line);
       else this.cells.set(place, { row, column, lines: [line] });
     });
     this.family = scene.constants.families.map((/** @type {string} */ name) => JSON.stringify(name)).join();
-    const count = this.rows.length, letters = Math.max(...this.rows.map(({ data }) => data.neuron.length));
+    const count = this.rows.length,
+      letters = Math.max(...this.rows.map(({ data }) => data.neuron.length));
     this.each = count <= NAMES;
     this.font = this.each ? NAMED_CELL : 0.016 * count * CELL;
     this.margin = this.each ? Math.min(LONGEST, 20 + 0.7 * NAMED_CELL * letters) : 8 * this.font;
@@ -59,7 +66,8 @@ export class Matrix {
       { margin, font } = this,
       count = this.rows.length,
       [left, top] = camera.origin;
-    const pixels = (CELL * camera.scale) / devicePixelRatio, gap = 0.5;
+    const pixels = (CELL * camera.scale) / devicePixelRatio,
+      gap = 0.5;
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.globalAlpha = 1;
     context.fillStyle = theme.background;
@@ -70,7 +78,9 @@ export class Matrix {
     context.textAlign = 'center';
     context.font = `600 ${0.7 * CELL}px ${this.family}`;
     for (const { row, column, lines } of this.cells.values()) {
-      const x = margin + column * CELL, y = margin + row * CELL, level = this.level(lines, look);
+      const x = margin + column * CELL,
+        y = margin + row * CELL,
+        level = this.level(lines, look);
       const isFaint = lines.every((line) => look.kinds[line] & constants.isFaint);
       const held = this.rows[row].id === this.held || this.rows[column].id === this.held;
       context.globalAlpha =
@@ -93,7 +103,8 @@ export class Matrix {
     context.lineWidth = 0.06 * font;
     context.beginPath();
     for (const [start] of this.scene.bands.slice(1)) {
-      const at = margin + start * CELL, end = margin + count * CELL;
+      const at = margin + start * CELL,
+        end = margin + count * CELL;
       context.moveTo(at, margin);
       context.lineTo(at, end);
       context.moveTo(margin, at);
@@ -111,7 +122,10 @@ export class Matrix {
   /** The name of a row and a column, with the colour of the neuron. @param {Context} context @param {Group} group
    * @param {number} row @param {Look} look @param {number} pixels */
   name(context, { id, data }, row, look, pixels) {
-    const { margin } = this, { theme, constants } = this.scene, at = margin + row * CELL, index = Number(id.slice(1));
+    const { margin } = this,
+      { theme, constants } = this.scene,
+      at = margin + row * CELL,
+      index = Number(id.slice(1));
     context.globalAlpha = this.share([id]);
     context.fillStyle = this.palette.fills[look.discs[index] + constants.levels];
     context.fillRect(margin - 9, at + 1, 7, CELL - 2);
@@ -129,7 +143,9 @@ export class Matrix {
   /** Write a name before a row and above a column. @param {Context} context @param {string} name @param {number} row
    * @param {number} away */
   write(context, name, row, away) {
-    const { margin, font } = this, at = margin + row * CELL + 0.36 * font, room = margin - away;
+    const { margin, font } = this,
+      at = margin + row * CELL + 0.36 * font,
+      room = margin - away;
     let text = name;
     // names that begin alike are told apart by their ends
     while (text.length > 2 && context.measureText(text).width > room) text = `…${text.slice(2)}`;
@@ -175,7 +191,9 @@ export class Matrix {
 
   /** Where something is, in units. @param {string} id @returns {number[]} */
   at(id) {
-    const { margin } = this, row = this.rows.findIndex((group) => group.id === id), line = Number(id.slice(1));
+    const { margin } = this,
+      row = this.rows.findIndex((group) => group.id === id),
+      line = Number(id.slice(1));
     if (row >= 0) return [margin, margin + (row + 0.5) * CELL];
     const cell = [...this.cells.values()].find(({ lines }) => lines.includes(line));
     return cell ? [margin + (cell.column + 0.5) * CELL, margin + (cell.row + 0.5) * CELL] : [0, 0];

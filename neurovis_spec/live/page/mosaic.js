@@ -39,8 +39,15 @@ export class Mosaic {
     const none = new Uint32Array(0);
     /** @type {Tile[]} */
     this.tiles = Array.from({ length: this.columns * this.rows }, (_, at) => ({
-      left: SIDE * (at % this.columns), top: SIDE * Math.floor(at / this.columns), lines: [], discs: [],
-      slots: none, where: none, ends: none, entries: none, base: new Float64Array(0),
+      left: SIDE * (at % this.columns),
+      top: SIDE * Math.floor(at / this.columns),
+      lines: [],
+      discs: [],
+      slots: none,
+      where: none,
+      ends: none,
+      entries: none,
+      base: new Float64Array(0),
     }));
     /** those that are to be worked out anew, the longest waiting first @type {Set<Tile>} */
     this.stale = new Set(this.tiles);
@@ -56,7 +63,9 @@ export class Mosaic {
   /** Two pictures of what stays: tiles in which they differ are stale. @param {Uint8ClampedArray | null} one
    * @param {Uint8ClampedArray | null} other */
   compare(one, other) {
-    const [a, b] = [one, other].map((data) => (data && data.length === 4 * this.out.length ? new Uint32Array(data.buffer) : null));
+    const [a, b] = [one, other].map((data) =>
+      data && data.length === 4 * this.out.length ? new Uint32Array(data.buffer) : null,
+    );
     if (!a || !b) {
       if (a || b) this.spoil(this.tiles);
       return;
@@ -64,7 +73,9 @@ export class Mosaic {
     const { width } = this.image;
     for (let at = 0; at < a.length; at++) {
       if (a[at] === b[at]) continue;
-      const y = Math.floor(at / width), x = at - y * width, column = Math.floor(x / SIDE);
+      const y = Math.floor(at / width),
+        x = at - y * width,
+        column = Math.floor(x / SIDE);
       this.stale.add(this.tiles[Math.floor(y / SIDE) * this.columns + column]);
       at += Math.min(width, (column + 1) * SIDE) - x - 1;
     }
@@ -80,7 +91,8 @@ export class Mosaic {
   /** The tiles that a box touches, which none of this stamp were yet.
    * @param {number} left @param {number} top @param {number} right @param {number} bottom @param {Tile[]} found */
   touched(left, top, right, bottom, found) {
-    const last = Math.min(this.columns - 1, Math.floor(right / SIDE)), end = Math.min(this.rows - 1, Math.floor(bottom / SIDE));
+    const last = Math.min(this.columns - 1, Math.floor(right / SIDE)),
+      end = Math.min(this.rows - 1, Math.floor(bottom / SIDE));
     for (let row = Math.max(0, Math.floor(top / SIDE)); row <= end; row++) {
       for (let column = Math.max(0, Math.floor(left / SIDE)); column <= last; column++) {
         const at = row * this.columns + column;
@@ -105,13 +117,17 @@ export class Mosaic {
   beside({ at, parts }, reach, x, y, room) {
     const found = this.around(x, y, room);
     for (let i = 0; i < 2 * parts; i += 2) {
-      const [x0, y0, x1, y1] = [at[i], at[i + 1], at[i + 2], at[i + 3]], least = Math.min(y0, y1) - reach;
-      const most = Math.min(Math.max(y0, y1) + reach, this.rows * SIDE), steep = Math.abs(y1 - y0) > 1 ? (x1 - x0) / (y1 - y0) : 0;
+      const [x0, y0, x1, y1] = [at[i], at[i + 1], at[i + 2], at[i + 3]],
+        least = Math.min(y0, y1) - reach;
+      const most = Math.min(Math.max(y0, y1) + reach, this.rows * SIDE),
+        steep = Math.abs(y1 - y0) > 1 ? (x1 - x0) / (y1 - y0) : 0;
       for (let top = Math.max(0, Math.floor(least / SIDE) * SIDE); top <= most; top += SIDE) {
         let [from, to] = [x0, x1];
         if (steep) {
           // the part of it that lies in this row of tiles
-          const [begin, end] = [top - reach, top + SIDE + reach].map((y) => Math.max(Math.min(y, Math.max(y0, y1)), Math.min(y0, y1)));
+          const [begin, end] = [top - reach, top + SIDE + reach].map((y) =>
+            Math.max(Math.min(y, Math.max(y0, y1)), Math.min(y0, y1)),
+          );
           [from, to] = [x0 + (begin - y0) * steep, x0 + (end - y0) * steep];
         }
         this.touched(Math.min(from, to) - reach, top, Math.max(from, to) + reach, top, found);

@@ -10,7 +10,8 @@ import { search } from './search.js';
 /** @typedef {import('./search.js').Entry} Entry */
 
 /** As many are listed, and the values of so many are asked for: those around the one that is chosen. */
-const LISTED = 100, VALUED = 24;
+const LISTED = 100,
+  VALUED = 24;
 
 /** The panel with the list. */
 export class Outline {
@@ -41,10 +42,16 @@ export class Outline {
   use(scene) {
     // boxes first, then neurons, then connections
     const rank = (/** @type {Entry} */ { id }) => 'nc'.indexOf(id[0]);
-    this.entries = scene.groups.filter(({ id }) => /^([nc]\d+$|box:|instance:)/.test(id)).map(({ id, data, title }) => {
-      const [first, ...more] = title.split('\n');
-      return { id, name: data.neuron === undefined ? first : data.neuron, more: [first, ...more].join('\n') };
-    }).sort((one, other) => rank(one) - rank(other) || (rank(one) < 0 ? 0 : Number(one.id.slice(1)) - Number(other.id.slice(1))));
+    this.entries = scene.groups
+      .filter(({ id }) => /^([nc]\d+$|box:|instance:)/.test(id))
+      .map(({ id, data, title }) => {
+        const [first, ...more] = title.split('\n');
+        return { id, name: data.neuron === undefined ? first : data.neuron, more: [first, ...more].join('\n') };
+      })
+      .sort(
+        (one, other) =>
+          rank(one) - rank(other) || (rank(one) < 0 ? 0 : Number(one.id.slice(1)) - Number(other.id.slice(1))),
+      );
     this.fill();
   }
 
@@ -71,11 +78,16 @@ export class Outline {
 
   /** What is listed without a search: what is held with its inputs and outputs, else all. @returns {Entry[]} */
   first() {
-    const { held, near, groups } = this.attention, one = groups.get(held);
+    const { held, near, groups } = this.attention,
+      one = groups.get(held);
     if (!one) return this.entries;
     const to = (/** @type {Entry} */ { id }) => groups.get(id)?.data.to === one.data.neuron;
     const found = this.entries.filter(({ id }) => id !== held && near.has(id) && (id[0] === 'c') === (held[0] === 'n'));
-    return [...this.entries.filter(({ id }) => id === held), ...found.filter(to), ...found.filter((entry) => !to(entry))];
+    return [
+      ...this.entries.filter(({ id }) => id === held),
+      ...found.filter(to),
+      ...found.filter((entry) => !to(entry)),
+    ];
   }
 
   /** List what fits. */
@@ -86,13 +98,16 @@ export class Outline {
     }
     const found = this.field.value.trim() ? search(this.entries, this.field.value) : this.first();
     this.shown = found.slice(0, LISTED);
-    this.list.replaceChildren(...this.shown.map(({ id }) => {
-      const row = document.createElement('li'), [name, more] = ['b', 'span'].map((tag) => document.createElement(tag));
-      row.id = `found-${id}`;
-      row.setAttribute('role', 'option');
-      row.append(name, ' ', more);
-      return row;
-    }));
+    this.list.replaceChildren(
+      ...this.shown.map(({ id }) => {
+        const row = document.createElement('li'),
+          [name, more] = ['b', 'span'].map((tag) => document.createElement(tag));
+        row.id = `found-${id}`;
+        row.setAttribute('role', 'option');
+        row.append(name, ' ', more);
+        return row;
+      }),
+    );
     const left = found.length - this.shown.length;
     this.find('more').textContent = left ? `and ${left} more` : found.length ? '' : 'nothing is called so';
     this.to(0);
@@ -101,12 +116,19 @@ export class Outline {
   /** Go to a row. @param {number} at */
   to(at) {
     this.at = Math.max(0, Math.min(this.shown.length - 1, at));
-    [...this.list.children].forEach((row, place) => { row.setAttribute('aria-selected', String(place === this.at)); });
+    [...this.list.children].forEach((row, place) => {
+      row.setAttribute('aria-selected', String(place === this.at));
+    });
     const row = this.list.children[this.at];
     this.field.setAttribute('aria-activedescendant', row ? row.id : '');
     if (row) row.scrollIntoView({ block: 'nearest' });
     const from = Math.max(0, this.at - VALUED / 3);
-    this.value(this.shown.slice(from, from + VALUED).map(({ id }) => id).filter((id) => /^[nc]\d+$/.test(id)));
+    this.value(
+      this.shown
+        .slice(from, from + VALUED)
+        .map(({ id }) => id)
+        .filter((id) => /^[nc]\d+$/.test(id)),
+    );
   }
 
   /** Ask for the values of these. @param {string[]} ids */
@@ -128,9 +150,12 @@ export class Outline {
   key(event) {
     /** @type {Object<string, () => void>} */
     const does = {
-      ArrowDown: () => this.to(this.at + 1), ArrowUp: () => this.to(this.at - 1),
-      PageDown: () => this.to(this.at + 10), PageUp: () => this.to(this.at - 10),
-      Enter: () => this.choose(this.at), Escape: () => this.toggle(),
+      ArrowDown: () => this.to(this.at + 1),
+      ArrowUp: () => this.to(this.at - 1),
+      PageDown: () => this.to(this.at + 10),
+      PageUp: () => this.to(this.at - 10),
+      Enter: () => this.choose(this.at),
+      Escape: () => this.toggle(),
     };
     if (does[event.key]) {
       does[event.key]();
@@ -145,7 +170,8 @@ export class Outline {
     this.shown.forEach(({ id }, at) => {
       const [name, more] = /** @type {Iterable<HTMLElement>} */ (this.list.children[at].children);
       if (name.textContent && !around.has(id) && /^[nc]\d+$/.test(id)) return;
-      const [first, ...rest] = this.attention.words(id, look).split('\n'), words = rest.join(', ');
+      const [first, ...rest] = this.attention.words(id, look).split('\n'),
+        words = rest.join(', ');
       if (name.textContent !== first) name.textContent = first;
       if (more.textContent !== words) more.textContent = words;
     });

@@ -18,7 +18,8 @@ export function followFingers(canvas, camera, redraw) {
   /** @param {PointerEvent} event */
   const follow = (event) => {
     if (event.pointerType !== 'touch') return;
-    const { type, pointerId: id } = event, at = [event.offsetX, event.offsetY].map((pixel) => pixel * devicePixelRatio);
+    const { type, pointerId: id } = event,
+      at = [event.offsetX, event.offsetY].map((pixel) => pixel * devicePixelRatio);
     const before = fingers.size === 2 ? spread([...fingers.values()]) : null;
     if (type === 'pointerdown' ? fingers.size < 2 : fingers.has(id)) fingers.set(id, at);
     if (type === 'pointerup' || type === 'pointercancel') fingers.delete(id);

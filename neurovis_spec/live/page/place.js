@@ -78,9 +78,13 @@ export class Placing {
 
   /** Have a group stand so. @param {string} id @param {Stand} stand */
   set(id, stand) {
-    const drawing = this.drawing(), group = /** @type {Group} */ (this.groups.get(id)), { shapes } = group;
+    const drawing = this.drawing(),
+      group = /** @type {Group} */ (this.groups.get(id)),
+      { shapes } = group;
     if (!this.first.has(id)) this.first.set(id, this.stand(id));
-    shapes.forEach((shape, place) => { shape.at = stand.at[place]; });
+    shapes.forEach((shape, place) => {
+      shape.at = stand.at[place];
+    });
     if (id[0] === 'c') [shapes[0].points, shapes[1].along] = [stand.points, stand.along];
     if (drawing) drawing.reshape(group);
   }
@@ -99,14 +103,18 @@ export class Placing {
 
   /** The disc at the pointer, and the lines from and to it on the way to their routes. */
   follow() {
-    const id = this.dragged, { neuron } = /** @type {Group} */ (this.groups.get(id)).data, from = this.known(id);
+    const id = this.dragged,
+      { neuron } = /** @type {Group} */ (this.groups.get(id)).data,
+      from = this.known(id);
     const by = [0, 1].map((axis) => this.at[axis] - from.at[0][axis]);
-    const shift = (/** @type {number[]} */ point, share = 1) => point && [point[0] + share * by[0], point[1] + share * by[1]];
+    const shift = (/** @type {number[]} */ point, share = 1) =>
+      point && [point[0] + share * by[0], point[1] + share * by[1]];
     this.set(id, { ...from, at: from.at.map((point) => shift(point)) });
     for (const [line, { data }] of this.groups) {
       const [start, end] = [data.from === neuron ? 1 : 0, data.to === neuron ? 1 : 0];
       if (data.connection === undefined || !(start || end)) continue;
-      const { at, points, along } = this.known(line), count = points.length / 2 - 1;
+      const { at, points, along } = this.known(line),
+        count = points.length / 2 - 1;
       const part = (/** @type {number} */ place) => start + (end - start) * (place / count);
       this.set(line, {
         along,
@@ -145,7 +153,8 @@ export class Placing {
   /** Move a neuron by steps. @param {string} id @param {number} across @param {number} down */
   step(id, across, down) {
     if (!this.can(id)) return;
-    const [x, y] = this.stand(id).at[0], by = KEYSTEP * this.constants.scale;
+    const [x, y] = this.stand(id).at[0],
+      by = KEYSTEP * this.constants.scale;
     this.drag(id, [x + across * by, y + down * by]);
     this.drop();
   }
@@ -165,7 +174,8 @@ export class Placing {
     }
     this.last.clear();
     for (const [id, [x, y]] of Object.entries(moved.discs)) {
-      const from = this.first.get(id) || this.stand(id), [a, b] = from.at[0];
+      const from = this.first.get(id) || this.stand(id),
+        [a, b] = from.at[0];
       this.last.set(id, { ...from, at: from.at.map((point) => point && [point[0] + x - a, point[1] + y - b]) });
     }
     for (const [id, [points, tip, along]] of Object.entries(moved.lines)) {
@@ -185,7 +195,8 @@ export class Placing {
 
   /** What is put by hand. @param {Put} put */
   told(put) {
-    const { find } = this, { neurons, undo, files } = put;
+    const { find } = this,
+      { neurons, undo, files } = put;
     this.put = put;
     find('placed').textContent = neurons.join(', ');
     const off = { unplace: !undo, tospec: !(files && neurons.length), tofile: !(files && neurons.length) };

@@ -12,7 +12,8 @@
 /** How far a pointer may move, in pixels of a page, before a click is a drag. */
 const STILL = 5;
 /** How far a disc is dragged up for its activity to be 1 larger, in pixels of a page, and milliseconds between two clamps. */
-const ONE = 100, OFTEN = 50;
+const ONE = 100,
+  OFTEN = 50;
 
 /** Where a pointer is, in pixels of the display. @param {MouseEvent} event @returns {number[]} */
 const pixel = (event) => [event.offsetX * devicePixelRatio, event.offsetY * devicePixelRatio];
@@ -53,14 +54,18 @@ export class Pointer {
 
   /** A drag may begin; with a finger only what is held is dragged. @param {PointerEvent} event */
   down(event) {
-    const [x, y] = pixel(event), id = this.ground.pointed(x, y), { placing } = this;
+    const [x, y] = pixel(event),
+      id = this.ground.pointed(x, y),
+      { placing } = this;
     if (placing.dragged) placing.cancel();
     this.dragged = 0;
-    this.on = event.button === 0 && placing.can(id) && (event.pointerType === 'mouse' || id === this.attention.held) ? id : '';
+    this.on =
+      event.button === 0 && placing.can(id) && (event.pointerType === 'mouse' || id === this.attention.held) ? id : '';
     if (!this.on) return;
     this.canvas.setPointerCapture(event.pointerId);
     this.clamp = event.shiftKey ? { y: event.offsetY, from: this.attention.values[id] ?? 0, last: 0 } : null;
-    const [across, down] = this.camera.unit(x, y), [left, top] = placing.stand(id).at[0];
+    const [across, down] = this.camera.unit(x, y),
+      [left, top] = placing.stand(id).at[0];
     this.off = [left - across, top - down];
   }
 
@@ -85,7 +90,8 @@ export class Pointer {
 
   /** Say what is pointed at, or drag. @param {PointerEvent} event */
   move(event) {
-    const [x, y] = pixel(event), at = this.camera.unit(x, y);
+    const [x, y] = pixel(event),
+      at = this.camera.unit(x, y);
     if (event.buttons !== 1) {
       const id = this.ground.pointed(x, y);
       this.canvas.style.cursor = id ? 'pointer' : '';

@@ -25,7 +25,11 @@ import { isStill } from './camera.js';
 
 /** Where little is to move, frames are taken over so many milliseconds after each other: fewer than three flashes a second. */
 const CALM = 400;
-const SCENE = 1, FRAME = 2, TRACE = 3, FILE = 4, HEAD = 40;
+const SCENE = 1,
+  FRAME = 2,
+  TRACE = 3,
+  FILE = 4,
+  HEAD = 40;
 
 /** Unpack a scene. @param {ArrayBuffer} buffer @returns {Promise<Scene>} */
 async function unpack(buffer) {
@@ -38,10 +42,13 @@ async function unpack(buffer) {
 /** Take a frame over into a look; false where it is of another scene.
  * @param {ArrayBuffer} buffer @param {number} version @param {Look} look @returns {boolean} */
 export function take(buffer, version, look) {
-  const view = new DataView(buffer), lines = look.widths.length, discs = look.kinds.length - lines;
+  const view = new DataView(buffer),
+    lines = look.widths.length,
+    discs = look.kinds.length - lines;
   if (view.getUint16(2, true) !== version) return false;
   look.serial = view.getUint32(4, true);
-  const changed = view.getUint32(8, true), words = view.getUint16(36, true);
+  const changed = view.getUint32(8, true),
+    words = view.getUint16(36, true);
   [look.step, look.first, look.last] = [12, 20, 28].map((at) => view.getFloat64(at, true));
   const items = new Uint32Array(buffer, HEAD, changed);
   const widths = new Uint16Array(buffer, HEAD + 4 * changed, changed);
@@ -65,7 +72,9 @@ export function take(buffer, version, look) {
 /** Unpack traces: by id, the least and the largest value of each bin. @param {ArrayBuffer} buffer @param {number} lines
  * @returns {Traces} */
 function unpackTraces(buffer, lines) {
-  const view = new DataView(buffer), count = view.getUint32(4, true), bins = view.getUint32(20, true);
+  const view = new DataView(buffer),
+    count = view.getUint32(4, true),
+    bins = view.getUint32(20, true);
   const ranges = new Map();
   new Uint32Array(buffer, 24, count).forEach((item, at) => {
     const id = item < lines ? `c${item}` : `n${item - lines}`;
@@ -88,12 +97,16 @@ class Handed {
     this.onclose = () => {};
     /** @type {(event: MessageEvent) => void} */
     this.onmessage = () => {};
-    addEventListener('message', (event) => {
-      [this.port] = event.ports;
-      this.readyState = WebSocket.OPEN;
-      this.onopen();
-      this.port.onmessage = (message) => this.onmessage(message);
-    }, { once: true });
+    addEventListener(
+      'message',
+      (event) => {
+        [this.port] = event.ports;
+        this.readyState = WebSocket.OPEN;
+        this.onopen();
+        this.port.onmessage = (message) => this.onmessage(message);
+      },
+      { once: true },
+    );
   }
 
   /** @param {string | Uint32Array<ArrayBuffer>} data */
@@ -132,7 +145,9 @@ export class Link {
       this.listener.link(true);
     };
     // one message after the other: a scene takes a while to unpack
-    socket.onmessage = (event) => { this.work = this.work.then(() => this.receive(event.data)); };
+    socket.onmessage = (event) => {
+      this.work = this.work.then(() => this.receive(event.data));
+    };
     socket.onclose = () => {
       this.listener.link(false);
       setTimeout(() => this.open(), this.wait);
@@ -150,15 +165,26 @@ export class Link {
     const kind = new Uint8Array(data)[0];
     if (kind === FRAME) {
       const wait = isStill() ? this.taken + CALM - performance.now() : 0;
-      if (wait > 0) await new Promise((done) => { setTimeout(done, wait); });
+      if (wait > 0)
+        await new Promise((done) => {
+          setTimeout(done, wait);
+        });
       this.taken = performance.now();
     }
     if (kind === SCENE) {
       this.scene = await unpack(data);
       const { lines, discs } = this.scene;
       this.look = {
-        serial: 0, step: 0, first: 0, last: 0, caption: '', discs: new Int8Array(discs), lines: new Int8Array(lines),
-        widths: new Uint16Array(lines), glows: new Uint16Array(lines), kinds: new Uint8Array(lines + discs),
+        serial: 0,
+        step: 0,
+        first: 0,
+        last: 0,
+        caption: '',
+        discs: new Int8Array(discs),
+        lines: new Int8Array(lines),
+        widths: new Uint16Array(lines),
+        glows: new Uint16Array(lines),
+        kinds: new Uint8Array(lines + discs),
       };
       this.listener.scene(this.scene);
     } else if (kind === FRAME && this.scene && this.look && take(data, this.scene.version, this.look)) {

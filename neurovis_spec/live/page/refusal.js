@@ -7,7 +7,14 @@ export class Refusal {
   /** @param {HTMLElement} place */
   constructor(place) {
     this.place = place;
-    for (const name of ['pointerdown', 'keydown']) addEventListener(name, () => { place.hidden = true; }, true);
+    for (const name of ['pointerdown', 'keydown'])
+      addEventListener(
+        name,
+        () => {
+          place.hidden = true;
+        },
+        true,
+      );
   }
 
   /** @param {string} reason */

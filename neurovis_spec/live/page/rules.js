@@ -18,15 +18,18 @@ export class Rules {
   /** Another network. @param {Scene['rules']} declared */
   use(declared) {
     this.switches.clear();
-    this.place.replaceChildren(...declared.map(({ connections, rule }) => {
-      const label = document.createElement('label'), about = document.createElement('small');
-      const one = Object.assign(document.createElement('input'), { type: 'checkbox' });
-      one.onchange = () => this.link.ask('learn', { connections, on: one.checked });
-      about.textContent = rule;
-      label.append(one, ` ${connections} `, about);
-      this.switches.set(connections, one);
-      return label;
-    }));
+    this.place.replaceChildren(
+      ...declared.map(({ connections, rule }) => {
+        const label = document.createElement('label'),
+          about = document.createElement('small');
+        const one = Object.assign(document.createElement('input'), { type: 'checkbox' });
+        one.onchange = () => this.link.ask('learn', { connections, on: one.checked });
+        about.textContent = rule;
+        label.append(one, ` ${connections} `, about);
+        this.switches.set(connections, one);
+        return label;
+      }),
+    );
   }
 
   /** Which learn now, null where some do. @param {Object<string, boolean | null>} learning */

@@ -19,11 +19,15 @@ export function download(blob, name) {
 
 /** Save the whole picture as pixels, whatever part of it is seen. @param {Scene} scene @param {Look} look */
 export function savePng(scene, look) {
-  const canvas = document.createElement('canvas'), camera = new Camera(), { width, height, density } = scene;
+  const canvas = document.createElement('canvas'),
+    camera = new Camera(),
+    { width, height, density } = scene;
   camera.size = [width, height];
   camera.window = [Math.round(width * density), Math.round(height * density)];
   [canvas.width, canvas.height] = camera.window;
   const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d', { alpha: false }));
   new Drawing(scene).draw(context, camera, look);
-  canvas.toBlob((blob) => { if (blob) download(blob, `${scene.name}.png`); });
+  canvas.toBlob((blob) => {
+    if (blob) download(blob, `${scene.name}.png`);
+  });
 }

@@ -7,5 +7,7 @@ export function say(text) {
   const place = /** @type {HTMLElement} */ (document.getElementById('said'));
   place.textContent = '';
   // a text that is put back within the same task is no change to a screen reader
-  setTimeout(() => { place.textContent = text; }, 50);
+  setTimeout(() => {
+    place.textContent = text;
+  }, 50);
 }

@@ -8,7 +8,8 @@
 /** Half the width of a slider's thumb: so far from its ends lie the first and the last step, in pixels of a page. */
 export const THUMB = 8;
 /** Milliseconds for which the thumb stays where a key has put it, and between two steps that are sought. */
-const KEPT = 300, AGAIN = 30;
+const KEPT = 300,
+  AGAIN = 30;
 
 /** Shows the steps from `low` to `high`, the latest `span` of them, or those around the step that is shown. */
 export class Scrubber {
@@ -94,11 +95,14 @@ export class Scrubber {
 
   /** @param {Look} look */
   show(look) {
-    const { first, last, step } = look, span = Number(this.span.value) || Infinity, { scrub } = this;
+    const { first, last, step } = look,
+      span = Number(this.span.value) || Infinity,
+      { scrub } = this;
     const coming = this.known.filter((turn) => turn > step + 1 && turn <= last);
     this.known = [...new Set([...this.turned, ...coming])];
     if (!scrub.matches(':active')) {
-      const low = this.high - span, inside = (step > low || step === first) && step < this.high;
+      const low = this.high - span,
+        inside = (step > low || step === first) && step < this.high;
       if (step === last || last - first <= span) this.high = last;
       else if (!inside) this.high = Math.round(step + span / 2);
       this.high = Math.min(last, Math.max(this.high, first + span));
@@ -117,10 +121,12 @@ export class Scrubber {
 
   /** Mark what happened: a filled triangle for an event of the spec, a ring for a turn. @param {number} width */
   mark(width) {
-    const happened = this.happened(), layout = [width, devicePixelRatio, this.low, this.high, ...happened].join(' ');
+    const happened = this.happened(),
+      layout = [width, devicePixelRatio, this.low, this.high, ...happened].join(' ');
     if (layout === this.drawn) return;
     this.drawn = layout;
-    const { marks } = this, context = /** @type {CanvasRenderingContext2D} */ (marks.getContext('2d'));
+    const { marks } = this,
+      context = /** @type {CanvasRenderingContext2D} */ (marks.getContext('2d'));
     [marks.width, marks.height] = [width * devicePixelRatio, 9 * devicePixelRatio];
     context.scale(devicePixelRatio, devicePixelRatio);
     context.fillStyle = context.strokeStyle = getComputedStyle(marks).color;

@@ -14,7 +14,8 @@ const BETWEEN = 50;
 /** Where a slider goes: the bounds, and where there is none as far from the value as 0 is, or by 1.
  * @param {Declared} entry @returns {number[]} */
 function range({ value, low, high }) {
-  const reach = Math.abs(value) || 1, least = low === null ? Math.min(value - reach, (high ?? Infinity) - reach) : low;
+  const reach = Math.abs(value) || 1,
+    least = low === null ? Math.min(value - reach, (high ?? Infinity) - reach) : low;
   return [least, high === null ? Math.max(value + reach, least + reach) : high];
 }
 
@@ -40,10 +41,15 @@ export class Sliders {
 
   /** A row. @param {Row} entry @param {string} id @param {Given} given */
   add(entry, id, given) {
-    const { name, value, description, log } = entry, [min, max] = range(entry).map(log ? Math.log2 : Number);
+    const { name, value, description, log } = entry,
+      [min, max] = range(entry).map(log ? Math.log2 : Number);
     const slid = () => (log ? Number((2 ** Number(slider.value)).toPrecision(3)) : Number(slider.value));
-    const row = document.createElement('div'), label = document.createElement('label'), about = document.createElement('small');
-    const [slider, field] = ['range', 'number'].map((type) => Object.assign(document.createElement('input'), { type, step: 'any' }));
+    const row = document.createElement('div'),
+      label = document.createElement('label'),
+      about = document.createElement('small');
+    const [slider, field] = ['range', 'number'].map((type) =>
+      Object.assign(document.createElement('input'), { type, step: 'any' }),
+    );
     row.className = 'slider';
     slider.id = id;
     [slider.min, slider.max, slider.title] = [String(min), String(max), 'a double click or Delete resets'];
@@ -62,8 +68,12 @@ export class Sliders {
     };
     // several keys in a row are one way
     slider.onchange = () => given(slid(), this.pressed);
-    slider.onkeyup = () => { this.pressed = false; };
-    field.onchange = () => { if (field.value && field.checkValidity()) given(Number(field.value), false); };
+    slider.onkeyup = () => {
+      this.pressed = false;
+    };
+    field.onchange = () => {
+      if (field.value && field.checkValidity()) given(Number(field.value), false);
+    };
     slider.ondblclick = () => given(null, false);
     slider.onkeydown = (event) => {
       this.pressed = true;
@@ -79,7 +89,8 @@ export class Sliders {
   show(values) {
     for (const [name, inputs] of this.inputs) {
       if (!(name in values) || inputs[0].matches(':active') || document.activeElement === inputs[1]) continue;
-      const [slider, field] = inputs, value = values[name];
+      const [slider, field] = inputs,
+        value = values[name];
       [slider.value, field.value] = [String(this.log.has(name) ? Math.log2(value) : value), String(value)];
       slider.setAttribute('aria-valuetext', field.value);
     }

@@ -14,7 +14,9 @@ import { THUMB } from './scrubber.js';
  *   ends: HTMLElement[], pin: HTMLButtonElement, parts: HTMLElement[]}} Strip */
 
 /** The most strips that are pinned; milliseconds between two traces that are asked for, and until one is asked for again. */
-const PINS = 8, PACE = 40, LOST = 2000;
+const PINS = 8,
+  PACE = 40,
+  LOST = 2000;
 
 /** A new element with a class. @param {string} tag @param {string} of @returns {any} */
 function element(tag, of) {
@@ -46,9 +48,14 @@ export class Strips {
 
   /** A strip of nothing. @returns {Strip} */
   strip() {
-    const name = element('button', 'of'), value = element('span', 'now'), label = element('div', 'label');
-    const canvas = element('canvas', 'trace'), ends = [element('span', 'end'), element('span', 'end')];
-    const pin = element('button', 'pin'), scale = element('div', 'scale'), numbers = element('div', 'ends');
+    const name = element('button', 'of'),
+      value = element('span', 'now'),
+      label = element('div', 'label');
+    const canvas = element('canvas', 'trace'),
+      ends = [element('span', 'end'), element('span', 'end')];
+    const pin = element('button', 'pin'),
+      scale = element('div', 'scale'),
+      numbers = element('div', 'ends');
     /** @type {Strip} */
     const strip = { id: '', data: '', name, value, canvas, ends, pin, parts: [label, canvas, scale] };
     label.append(name, value);
@@ -67,7 +74,8 @@ export class Strips {
 
   /** Say what a strip is of. @param {Strip} strip @param {Group | undefined} group */
   of(strip, group) {
-    const name = group ? group.title.split('\n')[0] : '', isPinned = strip !== this.held;
+    const name = group ? group.title.split('\n')[0] : '',
+      isPinned = strip !== this.held;
     [strip.id, strip.data] = group ? [group.id, JSON.stringify(group.data)] : ['', ''];
     const again = !isPinned && this.pinned.some(({ id }) => id === strip.id);
     strip.name.textContent = name;
@@ -107,7 +115,8 @@ export class Strips {
 
   /** Pin what is held, or unpin it. @param {string} id */
   toggle(id) {
-    const group = this.attention.groups.get(id), known = this.pinned.findIndex((strip) => strip.id === id);
+    const group = this.attention.groups.get(id),
+      known = this.pinned.findIndex((strip) => strip.id === id);
     const focused = this.place.contains(document.activeElement);
     if (!group || (known < 0 && this.pinned.length >= PINS)) return;
     if (known < 0) {
@@ -140,10 +149,12 @@ export class Strips {
       width = Math.max(1, this.held.canvas.clientWidth - 2 * THUMB);
     const items = [...new Set([...this.pinned, this.held].map(({ id }) => id))].filter(Boolean);
     for (const { id, value } of [...this.pinned, this.held]) {
-      const now = this.attention.values[id], words = id && now !== undefined ? signed(now) : '';
+      const now = this.attention.values[id],
+        words = id && now !== undefined ? signed(now) : '';
       if (value.textContent !== words) value.textContent = words;
     }
-    const every = Math.max(1, Math.ceil((high - low + 1) / Math.min(width, 2000))), now = performance.now();
+    const every = Math.max(1, Math.ceil((high - low + 1) / Math.min(width, 2000))),
+      now = performance.now();
     const first = Math.floor(low / every) * every;
     const wanted = [look.last, low, high, width, devicePixelRatio, events.length, turned.length, ...items].join(' ');
     if (!items.length || wanted === this.asked) return;
@@ -170,13 +181,17 @@ export class Strips {
   /** Draw a trace: a line, up and down in each bin where it has several steps.
    * @param {Strip} strip @param {Float32Array} trace @param {Traces} traces */
   paint(strip, trace, { first, every }) {
-    const { canvas } = strip, context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
-    const { clientWidth: width, clientHeight: height } = canvas, style = getComputedStyle(canvas), { scrubber } = this;
+    const { canvas } = strip,
+      context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
+    const { clientWidth: width, clientHeight: height } = canvas,
+      style = getComputedStyle(canvas),
+      { scrubber } = this;
     let [low, high] = [Infinity, -Infinity];
     for (const value of trace) {
       if (Number.isFinite(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
     }
-    const known = low <= high, room = height - 8;
+    const known = low <= high,
+      room = height - 8;
     [high, low].forEach((end, at) => {
       strip.ends[at].textContent = known && (at === 0 || high > low) ? short(end) : '';
     });
@@ -205,7 +220,8 @@ export class Strips {
     context.beginPath();
     let before = NaN;
     for (let bin = 0; 2 * bin < trace.length; bin++) {
-      const [least, most] = [trace[2 * bin], trace[2 * bin + 1]], at = x(first + bin * every + (every - 1) / 2);
+      const [least, most] = [trace[2 * bin], trace[2 * bin + 1]],
+        at = x(first + bin * every + (every - 1) / 2);
       if (!Number.isNaN(least)) {
         // the end that is nearer to the last value first
         const up = Math.abs(least - before) <= Math.abs(most - before);

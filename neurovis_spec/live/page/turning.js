@@ -16,13 +16,21 @@ import { Sliders } from './sliders.js';
 
 /** A turn in words. @param {Turned} turn @returns {string} */
 function told(turn) {
-  const pairs = (/** @type {object} */ values) => Object.entries(values).map(([name, value]) => `${name} = ${value}`).join(', ');
+  const pairs = (/** @type {object} */ values) =>
+    Object.entries(values)
+      .map(([name, value]) => `${name} = ${value}`)
+      .join(', ');
   switch (turn.type) {
-    case 'set': return pairs(turn.values);
-    case 'hold': return `clamp ${turn.neurons} = ${turn.value}`;
-    case 'feed': return turn.values.length ? `feed ${turn.name} = ${turn.values.join(', ')}` : `feed ${turn.name} no more`;
-    case 'learn': return `learning of ${turn.connections} ${turn.on ? 'on' : 'off'}`;
-    default: return `${turn.type} ${turn.neurons || turn.part}`;
+    case 'set':
+      return pairs(turn.values);
+    case 'hold':
+      return `clamp ${turn.neurons} = ${turn.value}`;
+    case 'feed':
+      return turn.values.length ? `feed ${turn.name} = ${turn.values.join(', ')}` : `feed ${turn.name} no more`;
+    case 'learn':
+      return `learning of ${turn.connections} ${turn.on ? 'on' : 'off'}`;
+    default:
+      return `${turn.type} ${turn.neurons || turn.part}`;
   }
 }
 
@@ -101,9 +109,11 @@ export class Turning {
   /** List what was turned, the latest first, and after that what is drawn otherwise.
    * @param {Turned[]} turned @param {Object<string, any>} appearance */
   list(turned, appearance) {
-    const list = this.find('turned'), focused = list.contains(document.activeElement);
+    const list = this.find('turned'),
+      focused = list.contains(document.activeElement);
     const row = (/** @type {string} */ words, /** @type {() => {type: string}} */ taken) => {
-      const one = document.createElement('li'), undo = document.createElement('button');
+      const one = document.createElement('li'),
+        undo = document.createElement('button');
       undo.textContent = 'undo';
       undo.setAttribute('aria-label', `undo ${words}`);
       undo.onclick = () => {
@@ -115,8 +125,9 @@ export class Turning {
     };
     const rows = [
       ...drawnOtherwise(appearance).map(({ words, back }) => row(words, () => ({ type: 'draw', ...back }))),
-      ...turned.map((entry, place) => row(`step ${entry.step + 1}: ${told(entry)}`,
-        () => takenBack(turned, place, this.declared))),
+      ...turned.map((entry, place) =>
+        row(`step ${entry.step + 1}: ${told(entry)}`, () => takenBack(turned, place, this.declared)),
+      ),
     ];
     list.replaceChildren(...rows.reverse());
     if (focused) (list.querySelector('button') || this.find('copy')).focus();

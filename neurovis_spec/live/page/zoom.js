@@ -12,7 +12,9 @@
 
 /** A box is closed where its discs have a smaller radius than this, in pixels of a page, unless the picture is shown
  * almost in its own size, or it holds others and is so large. */
-const TINY = 3, OWN = 0.75, ROOMY = 150;
+const TINY = 3,
+  OWN = 0.75,
+  ROOMY = 150;
 /** The size of a closed box's name, in pixels of a page. */
 const NAMED = 12;
 
@@ -41,12 +43,16 @@ export class Zoom {
   /** Another network. @param {Scene} scene */
   use(scene) {
     const discs = scene.groups.filter(({ data }) => data.neuron !== undefined);
-    this.boxes = scene.groups.filter(({ id }) => /^(box|instance):/.test(id)).map(({ id, title, shapes: [{ at, size }] }) => {
-      const rect = [...at, at[0] + size[0], at[1] + size[1]], inside = discs.filter(({ shapes }) => within(rect, shapes[0].at));
-      const members = inside.map((disc) => Number(disc.id.slice(1)));
-      const radius = Math.min(...inside.map(({ shapes }) => shapes[0].radius));
-      return { id, path: title, rect, members, radius, holds: false };
-    }).filter(({ members }) => members.length);
+    this.boxes = scene.groups
+      .filter(({ id }) => /^(box|instance):/.test(id))
+      .map(({ id, title, shapes: [{ at, size }] }) => {
+        const rect = [...at, at[0] + size[0], at[1] + size[1]],
+          inside = discs.filter(({ shapes }) => within(rect, shapes[0].at));
+        const members = inside.map((disc) => Number(disc.id.slice(1)));
+        const radius = Math.min(...inside.map(({ shapes }) => shapes[0].radius));
+        return { id, path: title, rect, members, radius, holds: false };
+      })
+      .filter(({ members }) => members.length);
     for (const box of this.boxes) box.holds = this.boxes.some((other) => other !== box && within(box.rect, other.rect));
     this.scene = scene;
     this.made = null;
@@ -54,11 +60,13 @@ export class Zoom {
 
   /** The boxes that are closed, the outermost of those in each other. @param {Camera} camera @returns {Box[]} */
   shut(camera) {
-    const scale = camera.scale / devicePixelRatio, density = this.scene ? this.scene.density : 1;
+    const scale = camera.scale / devicePixelRatio,
+      density = this.scene ? this.scene.density : 1;
     /** @type {Box[]} */
     const closed = [];
     for (const box of scale < OWN * density ? this.boxes : []) {
-      const [x0, y0, x1, y1] = box.rect, roomy = box.holds && Math.min(x1 - x0, y1 - y0) * scale >= ROOMY;
+      const [x0, y0, x1, y1] = box.rect,
+        roomy = box.holds && Math.min(x1 - x0, y1 - y0) * scale >= ROOMY;
       const covered = closed.some(({ rect }) => within(rect, [x0, y0]) && within(rect, [x1, y1]));
       if (!covered && !roomy && box.radius * scale < TINY) closed.push(box);
     }
@@ -76,7 +84,8 @@ export class Zoom {
     const from = [camera.scale, camera.whole, devicePixelRatio].join();
     if (!scene || (this.made && from === this.from)) return this.made;
     this.from = from;
-    const ink = Math.min(1, Math.max(scene.density * devicePixelRatio, camera.whole) / camera.scale), closed = this.shut(camera);
+    const ink = Math.min(1, Math.max(scene.density * devicePixelRatio, camera.whole) / camera.scale),
+      closed = this.shut(camera);
     const key = `${ink.toFixed(3)} ${closed.map(({ id }) => id).join()}`;
     if (this.made && key === this.key) return this.made;
     this.key = key;
@@ -88,11 +97,14 @@ export class Zoom {
       if (box) this.around.set(data.neuron, box);
     }
     const { fineness, headMore } = scene.constants;
-    this.made = ink === 1 && !closed.length ? scene : {
-      ...scene,
-      constants: { ...scene.constants, fineness: fineness / ink, headMore: headMore * ink },
-      groups: scene.groups.filter((group) => !this.covers(group)).map((group) => this.inked(group)),
-    };
+    this.made =
+      ink === 1 && !closed.length
+        ? scene
+        : {
+            ...scene,
+            constants: { ...scene.constants, fineness: fineness / ink, headMore: headMore * ink },
+            groups: scene.groups.filter((group) => !this.covers(group)).map((group) => this.inked(group)),
+          };
     return this.made;
   }
 
@@ -101,46 +113,61 @@ export class Zoom {
     if (data.neuron !== undefined) return this.around.has(data.neuron);
     const [from, to] = data.signal === undefined ? [data.from, data.to] : data.signal.split(' -> ');
     if (from !== undefined) return this.around.has(from) && this.around.get(from) === this.around.get(to);
-    const [kind, ...path] = id.split(':'), known = ['box', 'instance', 'title'].includes(kind);
+    const [kind, ...path] = id.split(':'),
+      known = ['box', 'instance', 'title'].includes(kind);
     const one = known && this.boxes.find((box) => (kind === 'title' ? box.path === path.join(':') : box.id === id));
-    return Boolean(one) && this.closed.some(({ rect }) => one && within(rect, one.rect) && within(rect, one.rect.slice(2)));
+    return (
+      Boolean(one) && this.closed.some(({ rect }) => one && within(rect, one.rect) && within(rect, one.rect.slice(2)))
+    );
   }
 
   /** A group as it is drawn from here: near by with less ink, thinner lines and smaller labels. @param {Group} group
    * @returns {Group} */
   inked(group) {
-    const { ink } = this, { id, data, shapes } = group, [first] = shapes;
+    const { ink } = this,
+      { id, data, shapes } = group,
+      [first] = shapes;
     if (ink === 1 || !(Object.keys(data).length || /^(box|instance|title):/.test(id))) return group;
-    const { notch } = /** @type {Scene} */ (this.scene).constants, head = shapes.find(({ kind }) => kind === 'head');
-    return { ...group, shapes: shapes.map((shape) => {
-      const made = { ...shape, width: shape.width * ink };
-      if (shape.kind === 'head') return { ...made, length: shape.length * ink, half: shape.half * ink };
-      if (shape.kind === 'line') {
-        made.dash = shape.dash.map((length) => length * ink);
-        // the head is shorter, and the line goes on to it
-        if (head) {
-          const more = notch * head.length * (1 - ink), [x, y] = shape.points.slice(-2);
-          made.points = [...shape.points, ...[1 / 3, 2 / 3, 1].flatMap((share) => [
-            x + share * more * head.along[0], y + share * more * head.along[1],
-          ])];
+    const { notch } = /** @type {Scene} */ (this.scene).constants,
+      head = shapes.find(({ kind }) => kind === 'head');
+    return {
+      ...group,
+      shapes: shapes.map((shape) => {
+        const made = { ...shape, width: shape.width * ink };
+        if (shape.kind === 'head') return { ...made, length: shape.length * ink, half: shape.half * ink };
+        if (shape.kind === 'line') {
+          made.dash = shape.dash.map((length) => length * ink);
+          // the head is shorter, and the line goes on to it
+          if (head) {
+            const more = notch * head.length * (1 - ink),
+              [x, y] = shape.points.slice(-2);
+            made.points = [
+              ...shape.points,
+              ...[1 / 3, 2 / 3, 1].flatMap((share) => [
+                x + share * more * head.along[0],
+                y + share * more * head.along[1],
+              ]),
+            ];
+          }
         }
-      }
-      if (shape.kind === 'text') {
-        made.font = shape.font * ink;
-        if (first.kind === 'disc') {
-          // a label on a disc stays on it, and one beside it as close
-          const [dx, dy] = [0, 1].map((axis) => shape.at[axis] - first.at[axis]), far = Math.hypot(dx, dy);
-          const share = far > first.radius ? ink + (1 - ink) * first.radius / far : ink;
-          made.at = [first.at[0] + share * dx, first.at[1] + share * dy];
+        if (shape.kind === 'text') {
+          made.font = shape.font * ink;
+          if (first.kind === 'disc') {
+            // a label on a disc stays on it, and one beside it as close
+            const [dx, dy] = [0, 1].map((axis) => shape.at[axis] - first.at[axis]),
+              far = Math.hypot(dx, dy);
+            const share = far > first.radius ? ink + ((1 - ink) * first.radius) / far : ink;
+            made.at = [first.at[0] + share * dx, first.at[1] + share * dy];
+          }
         }
-      }
-      if (shape.kind === 'box' && data.connection !== undefined) {
-        made.size = shape.size.map((side) => side * ink);
-        made.at = shape.at.map((corner, axis) => corner + (shape.size[axis] - made.size[axis]) / 2);
-      }
-      if (shape.kind === 'box') made.radius = shape.radius * ink;
-      return made;
-    }) };
+        if (shape.kind === 'box' && data.connection !== undefined) {
+          made.size = shape.size.map((side) => side * ink);
+          made.at = shape.at.map((corner, axis) => corner + (shape.size[axis] - made.size[axis]) / 2);
+        }
+        if (shape.kind === 'box') made.radius = shape.radius * ink;
+        return made;
+      }),
+    };
   }
 
   /** The mean colour of a box's neurons, as a level. @param {Box} box @param {Look} look @returns {number} */
@@ -153,7 +180,7 @@ export class Zoom {
   words(id, look) {
     const box = this.boxes.find((one) => one.id === id);
     if (!box || !this.scene) return '';
-    const mean = Math.round(100 * this.mean(box, look) / this.scene.constants.levels);
+    const mean = Math.round((100 * this.mean(box, look)) / this.scene.constants.levels);
     const sign = mean < 0 ? '−' : mean > 0 ? '+' : '';
     return `${box.path}\nmean ${sign}${Math.abs(mean)} %\nneurons ${box.members.length}`;
   }
@@ -168,12 +195,15 @@ export class Zoom {
    * @param {{palette: {fills: string[], texts: string[]}, family: string[], near: Set<string>}} drawing */
   draw(context, camera, look, { palette, family, near }) {
     if (!this.scene || !this.closed.length) return;
-    const { theme, constants } = this.scene, page = devicePixelRatio;
+    const { theme, constants } = this.scene,
+      page = devicePixelRatio;
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.textAlign = 'center';
     for (const box of this.closed) {
-      const [x0, y0] = camera.pixel(box.rect[0], box.rect[1]), [x1, y1] = camera.pixel(box.rect[2], box.rect[3]);
-      const level = this.mean(box, look) + constants.levels, middle = (x0 + x1) / 2;
+      const [x0, y0] = camera.pixel(box.rect[0], box.rect[1]),
+        [x1, y1] = camera.pixel(box.rect[2], box.rect[3]);
+      const level = this.mean(box, look) + constants.levels,
+        middle = (x0 + x1) / 2;
       context.globalAlpha = !near.size || box.members.some((index) => near.has(`n${index}`)) ? 1 : 0.3;
       context.beginPath();
       context.roundRect(x0, y0, x1 - x0, y1 - y0, Math.min(6 * page, (x1 - x0) / 4, (y1 - y0) / 4));
@@ -183,13 +213,15 @@ export class Zoom {
       context.fill();
       context.stroke();
       context.fillStyle = palette.texts[level];
-      const [, mean] = this.words(box.id, look).split('\n'), room = x1 - x0 - 4 * page;
+      const [, mean] = this.words(box.id, look).split('\n'),
+        room = x1 - x0 - 4 * page;
       const lines = [box.path.split('.').pop() || '', mean.slice(5)];
       const fits = y1 - y0 > 2.6 * NAMED * page ? lines : lines.slice(0, 1);
       fits.forEach((text, at) => {
         context.font = `${at ? 400 : 600} ${NAMED * page}px ${family}`;
         const down = (at - (fits.length - 1) / 2) * 1.25 + 0.36;
-        if (context.measureText(text).width <= room) context.fillText(text, middle, (y0 + y1) / 2 + down * NAMED * page);
+        if (context.measureText(text).width <= room)
+          context.fillText(text, middle, (y0 + y1) / 2 + down * NAMED * page);
       });
     }
     context.textAlign = 'start';
