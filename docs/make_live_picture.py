@@ -19,7 +19,7 @@ sys.path.insert(0, str(HERE.parent / "tests"))
 from chromium import Page, chromium  # noqa: E402
 
 SPEC, TARGET = HERE.parent / "specs" / "cpg_rbf.yaml", HERE / "pictures" / "live.webp"
-SIZE = (860, 640)
+SIZE = (900, 760)
 #: Steps between two pictures, and how long each is seen, in milliseconds.
 STEPS, SEEN = 3, 80
 STEP = "Number(document.querySelector('#told')?.textContent.split(' ')[1])"
