@@ -4,7 +4,7 @@
 
 /** @typedef {{view: string, page?: string, text?: string}} Content */
 /** @typedef {(content: Content, buffers: DataView<ArrayBuffer>[]) => void} Take */
-/** @typedef {{get: (name: string) => any, send: (content: object, callbacks?: undefined, buffers?: ArrayBuffer[]) => void,
+/** @typedef {{get: (name: string) => string, send: (content: object, callbacks?: undefined, buffers?: ArrayBuffer[]) => void,
  *   on: (event: string, listener: Take | (() => void)) => void,
  *   off: (event: string, listener: Take | (() => void)) => void}} Model */
 

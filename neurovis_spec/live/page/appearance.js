@@ -4,6 +4,7 @@
 
 import { Sliders } from './sliders.js';
 
+/** @typedef {import('./protocol.js').Gains} Gains */
 /** @typedef {import('./protocol.js').Link} Link */
 
 /** What is coloured, or drawn thicker. @type {Object<string, string>} */
@@ -14,7 +15,7 @@ const GAINS = {
   change: 'glow where weights change',
 };
 
-/** What is drawn otherwise than the spec says: in words, and what takes it back. @param {Object<string, any>} shown
+/** What is drawn otherwise than the spec says: in words, and what takes it back. @param {Gains} shown
  * @returns {{words: string, back: object}[]} */
 export function drawnOtherwise(shown) {
   return Object.entries(shown)
@@ -30,8 +31,8 @@ export class Appearance {
   /** @param {Link} link @param {HTMLSelectElement} theme @param {HTMLElement} place */
   constructor(link, theme, place) {
     this.theme = theme;
-    /** @type {Object<string, any>} */
-    this.shown = {};
+    /** @type {Gains} */
+    this.shown = { theme: '', activity: 1, signal: 1, thickness: 1, change: 1 };
     /** whether the system says if it is to be dark: nobody else does */
     this.isFree = false;
     /** whether it is dark because this page has asked for it */
@@ -71,12 +72,13 @@ export class Appearance {
     this.ask({ theme: matches ? 'dark' : '' });
   }
 
-  /** @param {Object<string, any>} shown @param {boolean} owner */
+  /** @param {Gains} shown @param {boolean} owner */
   show(shown, owner) {
     this.shown = shown;
     this.owner = owner;
     this.follow();
-    this.theme.value = shown.theme;
-    this.sliders.show(shown);
+    const { theme, ...gains } = shown;
+    this.theme.value = theme;
+    this.sliders.show(gains);
   }
 }

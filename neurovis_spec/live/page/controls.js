@@ -5,6 +5,7 @@
 import { followKeys } from './keys.js';
 import { say } from './say.js';
 
+/** @typedef {import('./protocol.js').Status} Status */
 /** @typedef {import('./protocol.js').Link} Link */
 /** @typedef {import('./protocol.js').Look} Look */
 /** @typedef {import('./keys.js').Keys} Keys */
@@ -55,7 +56,7 @@ export class Controls {
     this.link.ask(this.playing ? 'pause' : 'play');
   }
 
-  /** How the run stands. @param {any} status */
+  /** How the run stands. @param {Status} status */
   status(status) {
     this.playing = status.playing;
     this.play.textContent = status.playing ? '❚❚' : '▶';

@@ -49,7 +49,7 @@ export function eventsOf(turned) {
 }
 
 /** The message that takes a turn back from the step that is shown on. @param {Turned[]} turned @param {number} place
- * @param {Declared[]} declared @returns {{type: string, [member: string]: any}} */
+ * @param {Declared[]} declared @returns {{type: string, [member: string]: unknown}} */
 export function takenBack(turned, place, declared) {
   const { type, part, neurons, connections, on, name, values } = turned[place],
     before = turned.slice(0, place).reverse();

@@ -67,10 +67,12 @@ export class Marks {
         context.moveTo(x + across * inner, y + down * inner);
         context.lineTo(x + across * arm, y + down * arm);
       }
-      for (const [colour, width] of [
+      /** @type {[string, number][]} */
+      const strokes = [
         [theme.background, 5],
         [theme.ink, 2],
-      ]) {
+      ];
+      for (const [colour, width] of strokes) {
         context.strokeStyle = colour;
         context.lineWidth = width * devicePixelRatio;
         context.stroke();

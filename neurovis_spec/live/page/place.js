@@ -3,6 +3,7 @@
  */
 
 /** @typedef {import('./draw.js').Drawing} Drawing */
+/** @typedef {import('./protocol.js').Status} Status */
 /** @typedef {import('./protocol.js').Group} Group */
 /** @typedef {import('./protocol.js').Link} Link */
 /** @typedef {import('./protocol.js').Scene} Scene */
@@ -64,9 +65,9 @@ export class Placing {
     return this.owner && /^n\d/.test(id) && this.constants.scale > 0 && this.drawing() !== null;
   }
 
-  /** @returns {Object<string, any>} */
+  /** Where layout units lie. @returns {{scale: number, left: number, top: number}} */
   get constants() {
-    return this.link.scene ? this.link.scene.constants : {};
+    return this.link.scene?.constants ?? { scale: 0, left: 0, top: 0 };
   }
 
   /** How a group stands now. @param {string} id @returns {Stand} */
@@ -187,7 +188,7 @@ export class Placing {
     if (this.sent[0] !== this.at[0] || this.sent[1] !== this.at[1]) this.send(false);
   }
 
-  /** @param {any} status */
+  /** @param {Status} status */
   status(status) {
     this.owner = status.owner;
     this.told(this.put);

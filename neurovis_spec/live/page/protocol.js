@@ -9,19 +9,35 @@ import { isStill } from './camera.js';
  *   opacity: number, bar: boolean, text: string, subscript: string, anchor: string, weight: number, halo: string,
  *   onDisc: boolean, upward: boolean, columns: number, rows: number, pixels: string}} Shape */
 /** @typedef {{id: string, data: Object<string, string>, title: string, shapes: Shape[]}} Group */
-/** @typedef {Object<string, any>} Theme */
+/** @typedef {Object<string, string>} Theme */
+/** @typedef {{theme: string, activity: number, signal: number, thickness: number, change: number}} Gains */
 /** @typedef {{name: string, value: number, low: number | null, high: number | null, description: string}} Declared */
-/** @typedef {{step: number, type: string, [member: string]: any}} Turned */
+/** A turn: of which members it has, `type` decides.
+ * @typedef {{step: number, type: string, name: string, neurons: string, part: string, connections: string, on: boolean,
+ *   value: number, values: Object<string, number>, moving?: boolean}} Turned */
+/** @typedef {{families: string[], halo: number, subscriptDrop: number, subscriptSize: number, headOfLength: number,
+ *   headOfWidth: number, headMore: number, notch: number, bar: number, lap: number, faint: number, levels: number,
+ *   fineness: number, shares: number, share: number, isBar: number, isFaint: number, isNegative: number,
+ *   isClamped: number, scale: number, left: number, top: number}} Constants */
 /** @typedef {{version: number, name: string, title: string, width: number, height: number, density: number,
  *   theme: Theme, dt: number | null, discs: number, lines: number, parameters: Declared[],
  *   inputs: {name: string, size: number, description: string}[], rules: {connections: string, rule: string}[], themes: string[],
- *   themed: boolean, order: number[], ends: number[][], bands: [number, string, number][], constants: Object<string, any>,
+ *   themed: boolean, order: number[], ends: number[][], bands: [number, string, number][], constants: Constants,
  *   groups: Group[]}} Scene */
 /** @typedef {{first: number, every: number, ranges: Map<string, Float32Array>}} Traces */
 /** @typedef {{serial: number, step: number, first: number, last: number, caption: string, discs: Int8Array,
  *   lines: Int8Array, widths: Uint16Array, glows: Uint16Array, kinds: Uint8Array}} Look */
+/** @typedef {{type: 'status', playing: boolean, speed: string, ended: boolean, owner: boolean,
+ *   can: {turns: boolean, ends: boolean, arrives: boolean}, parameters: Object<string, number>, fed: Object<string, number[]>,
+ *   learning: Object<string, boolean | null>, turned: Turned[], events: number[], appearance: Gains}} Status */
+/** @typedef {Status | {type: 'values', step: number, values: Object<string, number | null>}
+ *   | {type: 'findings', text: string, errors: boolean}
+ *   | {type: 'moved', discs: Object<string, number[]>, lines: Object<string, number[][]>}
+ *   | {type: 'placed', neurons: string[], undo: boolean, files: boolean}
+ *   | {type: 'saving', files: string[], diff: string, written: boolean}
+ *   | {type: 'refused', reason: string}} Message */
 /** @typedef {{scene: (scene: Scene) => void, frame: () => void, file: (name: string, blob: Blob) => void, traces: (traces: Traces) => void,
- *   text: (message: any) => void, link: (open: boolean) => void}} Listener */
+ *   text: (message: Message) => void, link: (open: boolean) => void}} Listener */
 
 /** Where little is to move, frames are taken over so many milliseconds after each other: fewer than three flashes a second. */
 const CALM = 400;

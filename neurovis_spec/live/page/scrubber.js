@@ -2,6 +2,7 @@
  * The scrubber: the time axis, which strips share, the step on it, how far back it reaches, and what happened when.
  */
 
+/** @typedef {import('./protocol.js').Status} Status */
 /** @typedef {import('./protocol.js').Link} Link */
 /** @typedef {import('./protocol.js').Look} Look */
 
@@ -65,7 +66,7 @@ export class Scrubber {
     this.changed();
   }
 
-  /** @param {any} status */
+  /** @param {Status} status */
   status(status) {
     this.scrub.disabled = !status.owner;
     this.events = status.events;

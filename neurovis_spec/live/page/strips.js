@@ -18,7 +18,8 @@ const PINS = 8,
   PACE = 40,
   LOST = 2000;
 
-/** A new element with a class. @param {string} tag @param {string} of @returns {any} */
+/** A new element with a class. @template {keyof HTMLElementTagNameMap} T @param {T} tag @param {string} of
+ * @returns {HTMLElementTagNameMap[T]} */
 function element(tag, of) {
   const made = document.createElement(tag);
   made.className = of;

@@ -8,6 +8,8 @@ import { Feeds } from './feeds.js';
 import { Rules } from './rules.js';
 import { Sliders } from './sliders.js';
 
+/** @typedef {import('./protocol.js').Gains} Gains */
+/** @typedef {import('./protocol.js').Status} Status */
 /** @typedef {import('./protocol.js').Declared} Declared */
 /** @typedef {import('./protocol.js').Group} Group */
 /** @typedef {import('./protocol.js').Link} Link */
@@ -20,13 +22,14 @@ function told(turn) {
     Object.entries(values)
       .map(([name, value]) => `${name} = ${value}`)
       .join(', ');
+  const fed = Object.values(turn.values ?? {});
   switch (turn.type) {
     case 'set':
       return pairs(turn.values);
     case 'hold':
       return `clamp ${turn.neurons} = ${turn.value}`;
     case 'feed':
-      return turn.values.length ? `feed ${turn.name} = ${turn.values.join(', ')}` : `feed ${turn.name} no more`;
+      return fed.length ? `feed ${turn.name} = ${fed.join(', ')}` : `feed ${turn.name} no more`;
     case 'learn':
       return `learning of ${turn.connections} ${turn.on ? 'on' : 'off'}`;
     default:
@@ -94,7 +97,7 @@ export class Turning {
     this.find('clamps').hidden = neuron === undefined;
   }
 
-  /** @param {any} status */
+  /** @param {Status} status */
   status(status) {
     /** @type {HTMLFieldSetElement} */ (this.find('turns')).disabled = !status.owner || !status.can.turns;
     /** @type {HTMLFieldSetElement} */ (this.find('drawn')).disabled = !status.owner;
@@ -107,7 +110,7 @@ export class Turning {
   }
 
   /** List what was turned, the latest first, and after that what is drawn otherwise.
-   * @param {Turned[]} turned @param {Object<string, any>} appearance */
+   * @param {Turned[]} turned @param {Gains} appearance */
   list(turned, appearance) {
     const list = this.find('turned'),
       focused = list.contains(document.activeElement);
