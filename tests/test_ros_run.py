@@ -187,6 +187,28 @@ def test_sigterm_ends_it_and_so_do_seconds(ros: World, arm: Path) -> None:
     assert run.out[0].startswith("arm: ")
 
 
+def test_a_node_that_others_shut_down_is_safe_before(arm: Path) -> None:
+    with world("one") as ros:
+        run = ros.neurovis("ros", "run", arm, "--format", "json")
+        run.wait_for("ready")
+        peer = ros.peer(listen=[COMMANDS], send=[targets(1.5, 200)], seconds=3)
+        peer.wait_for("ready")
+        time.sleep(1)
+        code = """
+import contextlib, rosgraph, xmlrpc.client
+uri = rosgraph.Master("/killer").lookupNode("/neurovis/arm")
+with contextlib.suppress(OSError):  # it may be gone before it answers
+    xmlrpc.client.ServerProxy(uri).shutdown("/killer", "enough")
+"""
+        assert ros.python(code).end() == 0
+        assert run.end() == 0
+        assert run.json()["steps"] > 0
+        assert peer.end() == 0
+        signals = [one[0] for one in peer.json()["/cmd_vel"]]
+        assert 0.75 in signals
+        assert signals[-1] == -1.0
+
+
 def test_the_spec_waits_for_who_comes_late(ros: World, arm: Path) -> None:
     run = ros.neurovis("ros", "run", arm)
     run.wait_for("ready")

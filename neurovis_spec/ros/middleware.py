@@ -129,7 +129,7 @@ class Node(Protocol):
 
     @property
     def ended(self) -> bool:
-        """Whether others have had the node shut down."""
+        """Whether others want the node to end: it goes when it is closed, at the latest after two seconds."""
         ...
 
     def now(self) -> int:

@@ -157,7 +157,7 @@ class Ros1Node:
         self._clock = 0 if wish.sim_time else None
         self._prefix, self._set = "", cast("SetParameters | None", None)
         self._seen: dict[str, object] = {}
-        self._end, self._away = Event(), False
+        self._end, self._gone, self._away, self._ending = Event(), Event(), False, False
         uri = os.environ.setdefault("ROS_MASTER_URI", "http://localhost:11311")
         os.environ["ROS_NAMESPACE"] = wish.namespace
         rospy.names._set_caller_id(rosgraph.names.make_global_ns(wish.namespace) + wish.name)
@@ -168,6 +168,7 @@ class Ros1Node:
             rospy.init_node(wish.name, remaps, anonymous=wish.anonymous, disable_signals=True, disable_rostime=True)
         except Exception as error:
             raise MiddlewareError(f"a node of ROS 1 cannot be made: {error}") from None
+        rospy.on_shutdown(self._asked_to_end)
         self.name = str(rospy.get_name())
         if self._clock is not None:
             self.subscription("/clock", "rosgraph_msgs/Clock", Quality(), self._tick)
@@ -199,8 +200,8 @@ class Ros1Node:
 
     @property
     def ended(self) -> bool:
-        """Whether others have had the node shut down."""
-        return bool(rospy.is_shutdown())
+        """Whether others want the node to end."""
+        return self._ending
 
     def publisher(self, topic: str, type_: str, quality: Quality) -> Publisher:
         """A publisher."""
@@ -357,17 +358,28 @@ class Ros1Node:
         publishers: object = self._ask(lambda master: master.registerSubscriber(self.name, one.topic, one.type, uri))
         ServerProxy(uri, transport=_Timely()).publisherUpdate("/master", one.topic, cast("list[str]", publishers))
 
-    def close(self) -> None:
-        """Go, once what waits has been sent."""
-        if self.closed:
-            return
-        self.closed = True
-        self._end.set()
+    def _asked_to_end(self) -> None:
+        """Others have the node end (``rosnode kill``): it may say a last word."""
+        if not self.closed:
+            self._ending = True
+            self._gone.wait(_AWAY)
+
+    def _send_rest(self) -> None:
+        """Wait until what is to be sent has been."""
         deadline = time.monotonic() + 0.5
         with self._lock:
             publishers = [one for one in self._there if isinstance(one, Ros1Publisher)]
         while any(one.waiting for one in publishers) and time.monotonic() < deadline:
             time.sleep(0.01)
         time.sleep(0.05)  # the last one is with the system by then
+
+    def close(self) -> None:
+        """Go, once what waits has been sent."""
+        if self.closed:
+            return
+        self.closed = True
+        self._end.set()
+        self._send_rest()
+        self._gone.set()
         self._thread.join(2 * _AWAY)
         rospy.signal_shutdown("the end")

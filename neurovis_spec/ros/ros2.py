@@ -250,7 +250,7 @@ class Ros2Node:
 
     @property
     def ended(self) -> bool:
-        """Whether others have had the node shut down: ROS 2 does not know that."""
+        """Whether others want the node to end: ROS 2 does not know that."""
         return False
 
     def publisher(self, topic: str, type_: str, quality: Quality) -> Publisher:

@@ -242,12 +242,16 @@ class NodeRun:
                 going = self._step(step)
                 step += 1
         finally:
-            now = self.node.now()
-            for output in self._outputs:
-                output.end(now)
+            self._make_safe()
             self._end.set()
             watch.join(2.0)
             self._teller.rest()
+
+    def _make_safe(self) -> None:
+        """Send the safe outputs."""
+        now = self.node.now()
+        for output in self._outputs:
+            output.end(now)
 
     def _step(self, step: int) -> bool:
         """Make a step and publish it; False where an input that has fallen silent ends the run."""
