@@ -5,9 +5,11 @@ In: a network. Out: for each entry with a rule what names its connections in a r
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from neurovis_spec.compiler.arrays import IntArray
 from neurovis_spec.compiler.network import Network
@@ -34,6 +36,13 @@ def rules(network: Network) -> tuple[Rule, ...]:
             words, others = found.get(reference, ([], members[:0]))
             found[reference] = ([*words, written], np.union1d(others, members))
     return tuple(Rule(name, "; ".join(dict.fromkeys(words)), members) for name, (words, members) in found.items())
+
+
+def carried_out(rules: Sequence[Rule], stopped: npt.NDArray[np.bool_]) -> dict[str, bool | None]:
+    """Whether rules are carried out, by their connections, where those of some connections are ``stopped`` (m,); None
+    where some are."""
+    off = {rule.connections: stopped[rule.members] for rule in rules}
+    return {name: None if some.any() and not some.all() else not some.any() for name, some in off.items()}
 
 
 def _reference(network: Network, name: str, members: IntArray) -> str:

@@ -17,9 +17,9 @@ import numpy as np
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.history import Ring
 from neurovis_spec.live.past import EVERY, ROOM, Kept, Past
-from neurovis_spec.live.rules import rules
+from neurovis_spec.live.rules import carried_out, rules
 from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned
-from neurovis_spec.live.turns import Feed, Hold, Set, Turn, same_value, turn
+from neurovis_spec.live.turns import Feed, Hold, Set, Turn, fed_by, same_value, turn
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.runtime.simulation import ParameterError, Simulation
 from neurovis_spec.runtime.state import State
@@ -96,8 +96,7 @@ class SimulatedSource:
         stopped = self._simulation.stopped
         if not stopped.any():
             return self._all_learn
-        off = {rule.connections: stopped[rule.members] for rule in self._rules}
-        return {name: None if some.any() and not some.all() else not some.any() for name, some in off.items()}
+        return carried_out(self._rules, stopped)
 
     def leave(self) -> State:
         """The state from which the step that it stands at is made; nobody uses this source after that."""
@@ -163,7 +162,7 @@ class SimulatedSource:
         """Take a turn, from the next step on. Raises SourceError."""
         try:
             if isinstance(what, Feed):
-                self._feed(what)
+                self._fed = fed_by(self.network, self._fed, what)
             else:
                 turn(self._simulation, what)
         except (ValueError, KeyError) as error:
@@ -178,17 +177,6 @@ class SimulatedSource:
     def _turned_seen(self) -> Seen:
         """What is seen of this step after a turn: what is lesioned and clamped is that of the next one."""
         return Seen(self._seen.snapshot, *self._simulation.lesioned, self._simulation.held)
-
-    def _feed(self, what: Feed) -> None:
-        entry = next((entry for entry in self.network.inputs if entry.name == what.name), None)
-        if entry is None:
-            raise SourceError(f"there is no input '{what.name}'")
-        if not what.values:
-            self._fed = {name: values for name, values in self._fed.items() if name != what.name}
-            return
-        if len(what.values) not in (1, entry.size):
-            raise SourceError(f"the input '{what.name}' takes {entry.size} numbers, not {len(what.values)}")
-        self._fed = {**self._fed, what.name: (what.values * entry.size)[: entry.size]}
 
     def _keep(self) -> None:
         self._past.keep(Kept(self._simulation.state(), self._fed, copy(self._fading)))

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.simulation import Simulation
 
 
@@ -98,3 +99,15 @@ def turn(simulation: Simulation, what: Set | Hold | Release | Lesion | Mend | Le
             simulation.mend(what.part)
         case Learn():
             simulation.learning(what.connections, what.on)
+
+
+def fed_by(network: Network, fed: Mapping[str, tuple[float, ...]], what: Feed) -> dict[str, tuple[float, ...]]:
+    """What inputs are given by hand after a turn. Raises ValueError."""
+    entry = next((entry for entry in network.inputs if entry.name == what.name), None)
+    if entry is None:
+        raise ValueError(f"there is no input '{what.name}'")
+    if not what.values:
+        return {name: values for name, values in fed.items() if name != what.name}
+    if len(what.values) not in (1, entry.size):
+        raise ValueError(f"the input '{what.name}' takes {entry.size} numbers, not {len(what.values)}")
+    return {**fed, what.name: (what.values * entry.size)[: entry.size]}

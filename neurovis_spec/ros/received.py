@@ -7,10 +7,11 @@ the newest step and skips the others, so that no picture holds a message up; wha
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
+from collections.abc import Mapping
 from dataclasses import dataclass
 from operator import attrgetter
 from threading import Lock
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 
@@ -18,8 +19,8 @@ from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.clock import FRAMES
 from neurovis_spec.live.history import Ring
-from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned
-from neurovis_spec.live.turns import Turn
+from neurovis_spec.live.source import Capabilities, Mask, Reach, Seen, SourceError, Turned
+from neurovis_spec.live.turns import Turn, same_value
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.scene.fading import Fading
 
@@ -32,7 +33,37 @@ _FARTHEST: Final = 1_000_000
 _BESIDE: Final = 16
 #: steps that are lost between two that are known, in a trace
 _GAP: Final = 1000
+#: turns that are listed
+_MOST_TURNS: Final = 999
 _FRAME_TIME: Final = 10**9 // FRAMES
+
+
+class Steering(Protocol):
+    """What turns the network whose steps arrive; any thread may call it."""
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """The parameters that can be set, as they are now."""
+        ...
+
+    @property
+    def fed(self) -> Mapping[str, tuple[float, ...]]:
+        """What inputs are given by hand."""
+        ...
+
+    @property
+    def learning(self) -> Mapping[str, bool | None]:
+        """Whether the rules are carried out, by their connections; None where some are."""
+        ...
+
+    @property
+    def touched(self) -> tuple[Mask, Mask, Mask]:
+        """Which neurons and connections are lesioned, and which neurons are clamped."""
+        ...
+
+    def turn(self, what: Turn) -> None:
+        """Take a turn, from the next step on. Raises SourceError."""
+        ...
 
 
 @dataclass(slots=True, eq=False)
@@ -51,10 +82,11 @@ class _Row:
 class ReceivedSource:
     """The steps that have arrived; at first step 0, at rest."""
 
-    capabilities = Capabilities(turns=False, ends=False, arrives=True)
-
     def __init__(self, network: Network, room: int = ROOM) -> None:
         self.network, self._room = network, room
+        self.capabilities = Capabilities(turns=False, ends=False, arrives=True)
+        self._steering: Steering | None = None
+        self._turned: tuple[Turned, ...] = ()
         self._changing = network.changing
         self._weights = network.connections.weights[self._changing].copy()
         self._lock = Lock()
@@ -68,6 +100,10 @@ class ReceivedSource:
         self._shown: _Row | None = None
         #: messages that were seen, and all that there were
         self.shown = self.came = 0
+
+    def steer(self, steering: Steering) -> None:
+        """The network takes turns, by this."""
+        self._steering, self.capabilities = steering, Capabilities(turns=True, ends=False, arrives=True)
 
     # ---- what arrives, in the thread that receives it ----------------------------------------------------------
 
@@ -131,23 +167,23 @@ class ReceivedSource:
 
     @property
     def turned(self) -> tuple[Turned, ...]:
-        """Nothing."""
-        return ()
+        """The turns taken here."""
+        return self._turned
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Nothing can be set."""
-        return {}
+        """The parameters that can be set, as they are now; none where the network takes no turns."""
+        return {} if self._steering is None else dict(self._steering.parameters)
 
     @property
     def fed(self) -> dict[str, tuple[float, ...]]:
-        """Nothing is given by hand."""
-        return {}
+        """What inputs are given by hand."""
+        return {} if self._steering is None else dict(self._steering.fed)
 
     @property
-    def learning(self) -> dict[str, bool | None]:
-        """No rule can be stopped."""
-        return {}
+    def learning(self) -> Mapping[str, bool | None]:
+        """Whether the rules are carried out, where the network takes turns."""
+        return {} if self._steering is None else self._steering.learning
 
     def seen(self) -> Seen:
         """What is seen of the step that it stands at."""
@@ -162,6 +198,8 @@ class ReceivedSource:
         if before is not None and before.step == at.step - 1:
             previous = self._all_weights(before)
         snapshot = Snapshot(at.step, at.activity, self._all_weights(at), previous, at.seen)
+        if self._steering is not None and self._following:
+            return Seen(snapshot, *self._steering.touched)
         neurons, connections = np.zeros(len(network.neurons), bool), np.zeros(len(network.connections), bool)
         return Seen(snapshot, neurons, connections, neurons)
 
@@ -215,5 +253,11 @@ class ReceivedSource:
         raise SourceError("what arrives goes on by itself")
 
     def turn(self, turn: Turn) -> None:
-        """Raises SourceError: the network runs elsewhere."""
-        raise SourceError("the network runs elsewhere, and is only shown here")
+        """Take a turn, from the network's next step on. Raises SourceError, also where the network takes none."""
+        if self._steering is None:
+            raise SourceError("the network runs elsewhere: it takes no turns")
+        self._steering.turn(turn)
+        step, before = self.reach.last, self._turned
+        if before and before[-1].step == step and same_value(before[-1].turn, turn):
+            before = before[:-1]
+        self._turned = (*before[-_MOST_TURNS:], Turned(step, turn))

@@ -26,6 +26,7 @@ from neurovis_spec.ros.inputs import Inputs
 from neurovis_spec.ros.listening import ACTIVITY, SPEC, WEIGHTS, Listening, base_of
 from neurovis_spec.ros.middleware import LATCHED, Arrival, MiddlewareError, Node, Parameter, Publisher, Quality, Tell
 from neurovis_spec.ros.pace import Clock, Pace, SimulatedClock, SteadyClock
+from neurovis_spec.ros.steering import RunSteering
 from neurovis_spec.ros.summary import Summary
 from neurovis_spec.ros.wire import ArrayForm, WireError, text_message
 from neurovis_spec.runtime.backend import BackendError, choose_backend
@@ -148,6 +149,9 @@ class NodeRun:
             self._publish()
         except WireError as error:
             raise MiddlewareError(str(error)) from None
+        self._steering = RunSteering(self._simulation, self._lock)
+        if listening is not None and listening.source is not None:
+            listening.source.steer(self._steering)
         self._offer()
         self._diagnostics = Diagnostics.of(node, f"{node.name.lstrip('/')}: network")
 
@@ -193,17 +197,13 @@ class NodeRun:
     def _offer(self) -> None:
         network, spec = self.network, self._compiled.spec
         parameters = []
-        for name, value in self._settable().items():
+        for name, value in self._steering.parameters.items():
             slot = network.settable.slots[network.settable.index[name]]
             low, high = (bound if isinstance(bound, float) and np.isfinite(bound) else None
                          for bound in (slot.low, slot.high))  # fmt: skip
             written = spec.parameters.get(name)
             parameters.append(Parameter(name, value, low, high, (written and written.description) or ""))
         self.node.declare(parameters, self._set)
-
-    def _settable(self) -> dict[str, float]:
-        now = self._simulation.parameters
-        return {name: value for name, value in now.items() if name not in self.network.structural}
 
     def _set(self, values: Mapping[str, float]) -> str | None:
         """Set parameters between two steps; gives why not."""
@@ -256,6 +256,9 @@ class NodeRun:
     def _step(self, step: int) -> bool:
         """Make a step and publish it; False where an input that has fallen silent ends the run."""
         inputs = self._inputs.values(self._clock.now())
+        inputs |= {
+            name: np.array(values) if len(values) > 1 else values[0] for name, values in self._steering.fed.items()
+        }
         for one in self._inputs.silent:
             if one.on_timeout == "stop":
                 self.why = f"the input '{one.input}' has fallen silent: no message on {one.topic} for {one.timeout:g} s"
@@ -281,9 +284,7 @@ class NodeRun:
     def _watch(self) -> None:
         while not self._end.wait(1.0):
             try:
-                with self._lock:
-                    now = self._settable()
-                self.node.follow(now)
+                self.node.follow(self._steering.parameters)
                 self._teller.look()
                 self._diagnostics.say(self.summary(), [one.input for one in self._inputs.silent], self._course.rate)
             except Exception as error:
