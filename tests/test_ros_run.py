@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import signal
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from urllib.parse import urlsplit
 
+import aiohttp
 import numpy as np
 import pytest
 from mcap.reader import make_reader
-from ros_worlds import NAMES, World, world
+from ros_worlds import NAMES, PATIENCE, World, world
 
 import neurovis_spec
 
@@ -426,3 +429,28 @@ def test_a_run_is_recorded_and_shown(ros: World, arm: Path, tmp_path: Path) -> N
     again = ros.neurovis("ros", "run", arm, "--record", file)
     assert again.end() == 1
     assert "--force" in again.err[-1]
+
+
+def test_the_live_page_turns_the_run(ros: World, tmp_path: Path) -> None:
+    run = ros.neurovis("ros", "run", written(tmp_path, "hold"), "--live", "0")
+    url = urlsplit(run.wait_for("live: ").removeprefix("live: "))
+    run.wait_for("ready")
+    token = (url.query or url.fragment).partition("=")[2]
+
+    async def turn() -> None:
+        async with (
+            aiohttp.ClientSession() as session,
+            session.ws_connect(f"http://{url.netloc}/live?token={token}", max_msg_size=1 << 24) as stream,
+        ):
+            await stream.send_str(json.dumps({"type": "set", "values": {"gain": 1.5}}))
+            async with asyncio.timeout(PATIENCE):
+                async for message in stream:
+                    told = json.loads(message.data) if message.type is aiohttp.WSMsgType.TEXT else {}
+                    if told.get("parameters", {}).get("gain") == 1.5:
+                        return
+
+    asyncio.run(turn())
+    peer = ros.peer(listen=[COMMANDS], send=[targets(2.0, 20)], until={"/cmd_vel": 60})
+    assert peer.end() == 0
+    assert 3.0 in [one[0] for one in peer.json()["/cmd_vel"]]
+    assert run.stop() == 0
