@@ -58,6 +58,23 @@ def test_the_cache_is_bounded_and_the_oldest_goes(cache: Path, monkeypatch: pyte
     assert {path.name for path in cache.iterdir()} == {place(TEXT % number).name for number in (3, 4)}
 
 
+def test_a_compiler_loads_no_library_of_the_wheels_of_ros(
+    cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compiler = tmp_path / "cc"
+    compiler.write_text(f'#!/bin/sh\nenv > {tmp_path}/environment\nexec gcc "$@"\n')
+    compiler.chmod(0o755)
+    monkeypatch.setenv("CC", str(compiler))
+    monkeypatch.setenv("LD_LIBRARY_PATH", "/nowhere")
+    for number, (wheels, given) in enumerate(((None, True), ("1", False))):
+        if wheels is not None:
+            monkeypatch.setenv("_ROS_WHEELS_BOOTSTRAP_COMPLETE", wheels)
+        assert load(TEXT % (50 + number)).answer() == 50 + number
+        told = (tmp_path / "environment").read_text()
+        assert ("LD_LIBRARY_PATH=/nowhere" in told) == given
+        assert "_ROS_WHEELS" not in told
+
+
 def test_several_may_compile_the_same_at_once(cache: Path) -> None:
     found: list[int] = []
     threads = [threading.Thread(target=lambda: found.append(load(TEXT % 45).answer())) for _ in range(4)]
