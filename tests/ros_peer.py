@@ -126,6 +126,8 @@ def main(plan: Wish) -> None:
         if time.monotonic() - begun > plan.get("wait", 10):
             break
         time.sleep(0.01)
+    if senders:
+        time.sleep(0.5)  # those who listen may learn later that somebody sends
     print("ready", flush=True)
     begun = time.monotonic()
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ros_worlds import NAMES, World, world
+from ros_worlds import NAMES, PATIENCE, World, world
 
 import neurovis_spec as nv
 from neurovis_spec.ros.accept import ARRAY
@@ -74,6 +74,17 @@ def arrays_in(path: Path) -> list[bytes]:
         return found
     converter = Converter(ARRAY, str(definition(ARRAY, 1)), "ros1")
     return [converter.convert(data) for data in found]
+
+
+def grown(path: Path, size: int) -> None:
+    """Wait until a recording has so many bytes."""
+    deadline = time.monotonic() + PATIENCE
+    while True:
+        files = [one for one in (path, *path.glob("*")) if one.is_file()]
+        if sum(one.stat().st_size for one in files) >= size:
+            return
+        assert time.monotonic() < deadline, files
+        time.sleep(0.05)
 
 
 def name_of(ros: World) -> str:
@@ -142,7 +153,7 @@ def test_kill_9_of_the_recorder_and_of_the_publisher(ros: World, spec: Path, tmp
     second.wait_for("ready")
     play = ros.neurovis("ros", "play", file, "--wait", "20")
     play.wait_for("ready")
-    time.sleep(3)
+    grown(out, 1 << 20)
     first.kill()
     found = arrays_in(out)
     assert len(found) > 100
