@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +15,13 @@ from neurovis_spec.live.history import Bins, Members
 from neurovis_spec.live.run import Run, Shown
 from neurovis_spec.live.source import Reach, SourceError
 from neurovis_spec.live.view import view_of
+from neurovis_spec.ros.accept import ARRAY
+from neurovis_spec.ros.bags import read_bag
+from neurovis_spec.ros.listening import Listening, Wanted
+from neurovis_spec.ros.middleware import Arrival
 from neurovis_spec.ros.received import ReceivedSource
+from neurovis_spec.ros.wire import ArrayForm, text_message
+from neurovis_spec.runtime.ros_messages import label_of
 
 SPEC = """
 neurovis: 1
@@ -128,6 +135,38 @@ def until(true: Callable[[], bool]) -> None:
     while not true():
         assert time.monotonic() < end
         time.sleep(0.002)
+
+
+def test_a_slow_display_stands_beside_a_complete_recorder(compiled: nv.CompiledNetwork, tmp_path: Path) -> None:
+    network = compiled.network
+    listening = Listening(compiled, 2, Wanted(tmp_path / "x.mcap", shown=True), print)
+    assert listening.source is not None
+    slow = list[int]()
+
+    def show(shown: Shown) -> None:
+        time.sleep(0.1)
+        slow.append(shown.look.step)
+
+    run = Run(listening.source, view_of(compiled, compiled.gains_for(None)), show)
+    listening.start()
+    run.start()
+    forms = {"activity": 3, "weights": 2}
+    for step in range(4000):
+        for name, size in forms.items():
+            data = ArrayForm.of(label_of(network.hash), size, "cdr").message(
+                step, step / 1000, np.full(size, float(step))
+            )
+            listening.put(f"/neurovis/x/{name}", Arrival(data, step * 10**6, None, ARRAY))
+    until(lambda: bool(slow) and slow[-1] == 3999)
+    run.end()
+    listening.end()
+    for name in forms:
+        assert (listening.counts[name].received, listening.counts[name].recorded) == (4000, 4000)
+    assert sum(listening.shown) == 4000
+    assert listening.shown[0] < 200
+    found = [one for one in read_bag(tmp_path / "x.mcap").messages() if one.topic.name.endswith("weights")]
+    assert [one.sequence for one in found] == list(range(4000))
+    assert next(read_bag(tmp_path / "x.mcap").messages()).data == text_message(compiled.text(), "cdr")
 
 
 def test_a_live_run_follows_pauses_and_goes_back(compiled: nv.CompiledNetwork, source: ReceivedSource) -> None:
