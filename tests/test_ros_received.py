@@ -169,6 +169,27 @@ def test_a_slow_display_stands_beside_a_complete_recorder(compiled: nv.CompiledN
     assert next(read_bag(tmp_path / "x.mcap").messages()).data == text_message(compiled.text(), "cdr")
 
 
+def test_what_was_recorded_is_a_recording_of_the_network(compiled: nv.CompiledNetwork, tmp_path: Path) -> None:
+    """It is drawn and gone on from as what ``neurovis run`` records."""
+    made, path = compiled.run(200), tmp_path / "x.mcap"
+    listening = Listening(compiled, 2, Wanted(path), print)
+    listening.start()
+    for row, step in enumerate(made.step.tolist()):
+        for name, values in (("activity", made.activity[row]), ("weights", made.weights[row])):
+            data = ArrayForm.of(label_of(made.hash), len(values), "cdr").message(step, 1e9 + step, values)
+            listening.put(f"/neurovis/x/{name}", Arrival(data, step * 10**6, None, ARRAY))
+    until(lambda: listening.counts["weights"].recorded == 200)
+    with pytest.warns(UserWarning, match="breaks off"):
+        assert len(nv.load(path)) == 200
+    listening.end()
+    read = nv.load(path)
+    assert read.step.tolist() == made.step.tolist()
+    assert np.array_equal(read.activity, made.activity)
+    assert np.array_equal(read.weights, made.weights)
+    assert (read.spec, read.hash) == (compiled.text(), made.hash)
+    assert compiled.run(5, start=read).reached > 200
+
+
 def test_a_live_run_follows_pauses_and_goes_back(compiled: nv.CompiledNetwork, source: ReceivedSource) -> None:
     shown = list[Shown]()
     run = Run(source, view_of(compiled, compiled.gains_for(None)), shown.append)

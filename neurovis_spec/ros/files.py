@@ -73,7 +73,8 @@ def place(path: Path, number: int) -> Path:
 
 @dataclass(eq=False)
 class Files:
-    """The files of a recording. ``first`` is what each begins with, as messages at the time of the file's first."""
+    """The files of a recording. ``first`` is what each begins with, as messages at the time of the file's first;
+    ``frame`` is what makes recordings of the network (``Recording``) of MCAP files."""
 
     path: Path
     ros: Ros
@@ -81,6 +82,7 @@ class Files:
     first: Sequence[tuple[Topic, bytes]] = ()
     rotation: Rotation = field(default_factory=Rotation)
     force: bool = False
+    frame: bytes = b""
     clock: Callable[[], float] = monotonic
 
     def __post_init__(self) -> None:
@@ -132,7 +134,7 @@ class Files:
     def _begin(self, message: Stored) -> None:
         format_, _ = _FORMATS[self.path.suffix.lower()]
         path = place(self.path, self._number)
-        log: Log = format_(path, self.ros, {**self.about, "recording": self._id, "part": str(self._number)})
+        log: Log = format_(path, self.ros, {**self.about, "recording": self._id, "part": str(self._number)}, self.frame)
         held = _Held(path)
         first = [Stored(topic, 0, message.log_time, message.publish_time, data) for topic, data in self.first]
         if first:

@@ -7,7 +7,7 @@ any thread; its source is what the live page shows, its counts are those of the 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
@@ -21,6 +21,9 @@ from neurovis_spec.ros.middleware import Arrival, Ros
 from neurovis_spec.ros.received import ReceivedSource
 from neurovis_spec.ros.recorder import Recorder
 from neurovis_spec.ros.wire import ENCODINGS, text_message
+from neurovis_spec.runtime.columns import Probe, columns_of
+from neurovis_spec.runtime.npz_file import frame_bytes
+from neurovis_spec.runtime.stream import frame_of
 from neurovis_spec.version import __version__
 
 ACTIVITY: Final = "activity"
@@ -41,6 +44,13 @@ class Wanted:
 def base_of(compiled: CompiledNetwork) -> str:
     """What the names of a network's topics begin with."""
     return f"{compiled.network.ros.namespace.rstrip('/')}/{compiled.network.name}"
+
+
+def _frame(compiled: CompiledNetwork) -> bytes:
+    """What makes of activities and weights a recording that can be drawn and gone on from."""
+    network = compiled.network
+    columns = replace(columns_of(network), probe=Probe((), ()), outputs={})
+    return frame_bytes(frame_of(network, columns, compiled.simulator("reference").state()))
 
 
 class Listening:
@@ -75,7 +85,8 @@ class Listening:
         about = {"network": network.name, "hash": network.hash, "dt": repr(network.dt), "version": __version__}
         topic = topic_of(f"{self._base}/{SPEC}", STRING, self._definition(STRING), self.ros)
         first = [(topic, text_message(self.compiled.text(), ENCODINGS[self.ros]))]
-        return Files(path, self.ros, about, first, wanted.rotation, wanted.force)
+        frame = _frame(self.compiled) if self.ros == 2 else b""
+        return Files(path, self.ros, about, first, wanted.rotation, wanted.force, frame)
 
     def _definition(self, type_: str) -> str:
         return definition(type_, self.ros) or self._definitions_of(type_)

@@ -17,6 +17,7 @@ from neurovis_spec.ros.definitions import md5sum, written
 from neurovis_spec.ros.middleware import Ros
 from neurovis_spec.ros.wire import ENCODINGS, Encoding
 from neurovis_spec.runtime import mcap_records as records
+from neurovis_spec.runtime.mcap_file import FRAME
 from neurovis_spec.version import __version__
 
 #: the metadata record of an MCAP file, and the field of a bag's header
@@ -91,14 +92,15 @@ class _Whole:
 
 
 class McapLog(_Whole):
-    """An MCAP file; ``about`` is its metadata record."""
+    """An MCAP file; ``about`` is its metadata record, ``frame`` what makes recordings of its messages."""
 
-    def __init__(self, path: Path, ros: Ros, about: Mapping[str, str]) -> None:
+    def __init__(self, path: Path, ros: Ros, about: Mapping[str, str], frame: bytes = b"") -> None:
         self._ros: Ros = ros
         self._schemas: dict[tuple[str, str], int] = {}
         self._channels: dict[Topic, int] = {}
         head = records.head(f"ros{ros}", f"neurovis {__version__}")
-        super().__init__(path, head + records.metadata(ABOUT, about))
+        attached = records.attachment(FRAME, frame) if frame else b""
+        super().__init__(path, head + records.metadata(ABOUT, about) + attached)
 
     def write(self, messages: Sequence[Stored]) -> None:
         """Add a chunk, and what names its topics where they are new. Raises OSError."""
@@ -166,7 +168,7 @@ class _ChunkInfo(NamedTuple):
 class BagLog(_Whole):
     """A bag of ROS 1, format 2.0; ``about`` stands in a field of its header, which others pass over."""
 
-    def __init__(self, path: Path, ros: Ros, about: Mapping[str, str]) -> None:
+    def __init__(self, path: Path, ros: Ros, about: Mapping[str, str], frame: bytes = b"") -> None:
         if ros != 1:
             raise ValueError("a .bag holds messages of ROS 1")
         self._about = records.mapping(about)

@@ -41,7 +41,9 @@ from neurovis_spec.runtime.rows import RowWriter, Steps
 from neurovis_spec.runtime.unfinished import Part, move, part_of
 from neurovis_spec.version import __version__
 
-_FRAME, _ABOUT, _AFTER = "neurovis/frame.npz", "neurovis", "neurovis/after"
+#: the attachment that holds what does not grow with the steps
+FRAME = "neurovis/frame.npz"
+_ABOUT, _AFTER = "neurovis", "neurovis/after"
 #: topics of arrays, by what they hold
 _ARRAYS = ("activity", "weights", "states")
 _LAST_TIME = (1 << 64) - 1
@@ -99,7 +101,7 @@ class _McapRows:
         self._channels = [(_ARRAYS.index(name), n, array_prefix(label, sizes[name])) for n, name in enumerate(held, 2)]
         about = {"network": frame.network, "hash": frame.hash, "dt": repr(frame.dt), "version": __version__}
         start = records.head("ros2", f"neurovis {__version__}") + records.metadata(_ABOUT, about)
-        start += records.attachment(_FRAME, frame_bytes(frame))
+        start += records.attachment(FRAME, frame_bytes(frame))
         start += records.schemas_and_channels([Schema(*ARRAY), Schema(*STRING)], channels)
         if frame.spec:
             start += records.chunk([Message(1, 0, 0, 0, text_message(frame.spec))])
@@ -226,7 +228,7 @@ class _Reading:
             reader.take(16)
             name = reader.text()
             reader.text()
-            if name == _FRAME:
+            if name == FRAME:
                 self._frame = frame_of(reader.take(reader.number(8)))
         elif found.opcode == records.METADATA:
             reader = records.content_of(self._file, found)

@@ -19,7 +19,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.interrupts import Asked, Ended, deferred
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.checkpoint import save_state
-from neurovis_spec.runtime.columns import columns_of
+from neurovis_spec.runtime.columns import Columns, columns_of
 from neurovis_spec.runtime.formats import StreamingFormat, for_path, settle
 from neurovis_spec.runtime.inputs import STRETCH
 from neurovis_spec.runtime.memory import check_disk
@@ -43,6 +43,12 @@ class StoppedError(Ended):
         self.rows = rows
 
 
+def frame_of(network: Network, columns: Columns, state: State) -> Recording:
+    """A recording of a network without a step, which begins in this state."""
+    none = InMemory(columns.widths(network), 0).numbers(Steps(0))
+    return recording_of(network, columns, none, state.weights, after(network, state))
+
+
 def record_to(
     network: Network,
     path: Path,
@@ -61,8 +67,7 @@ def record_to(
     state = first_state(network, start, checkpoint)
     steps = Steps(checked_steps(network, course.steps, course.every), course.every, state.k)
     columns = columns_of(network, course.keep)
-    none = InMemory(columns.widths(network), 0).numbers(Steps(0))
-    frame = recording_of(network, columns, none, state.weights, after(network, state))
+    frame = frame_of(network, columns, state)
     settle(path, format_)
     check_disk(path, steps.total, steps.every, format_.size(frame, steps))
     written = False
