@@ -213,6 +213,12 @@ def test_definitions_are_those_of_both_ros() -> None:
             assert ros == 2 or md5sum(type_, text) == sum_
 
 
+def test_types_of_ros_that_are_not_in_the_table_are_known_with_the_extra() -> None:
+    assert "float32 variance" in (definition("sensor_msgs/Range", 2) or "")
+    assert "float32 variance" not in (definition("sensor_msgs/msg/Range", 1) or "variance")
+    assert definition("my_msgs/Mine", 1) is definition("std_msgs/None", 2) is None
+
+
 VALUES = st.lists(st.floats(width=64, allow_nan=True, allow_infinity=True), max_size=7)
 LABELS = st.sampled_from([None, "", LABEL, "neurovis/1:other", "ü" * 40]) | st.text(max_size=9)
 

@@ -45,16 +45,29 @@ def written(type_: str, ros: Ros) -> str:
 
 
 def definition(type_: str, ros: Ros) -> str | None:
-    """The text of a type with all that is in it; None where it is not in the table.
+    """The text of a type with all that is in it; None where it is neither in the table nor known to ``rosbags`` (the
+    extra ``ros``), which knows those of ROS itself.
 
     >>> definition("std_msgs/Float64", 2)
     'float64 data\\n'
     """
     texts: dict[str, str] = {}
     if not _gather(plain(type_), ros, texts):
-        return None
+        return _of_rosbags(type_, ros)
     first, *others = texts.items()
     return "".join([first[1], *(f"{SEPARATOR}\nMSG: {name}\n{text}" for name, text in others)])
+
+
+def _of_rosbags(type_: str, ros: Ros) -> str | None:
+    try:
+        from rosbags.typesys import Stores, TypesysError, get_typestore
+    except ImportError:
+        return None
+    try:
+        store = get_typestore(Stores.ROS1_NOETIC if ros == 1 else Stores.LATEST)
+        return store.generate_msgdef(written(type_, 2), ros_version=ros)[0]
+    except TypesysError:
+        return None
 
 
 def _gather(type_: str, ros: Ros, texts: dict[str, str]) -> bool:
