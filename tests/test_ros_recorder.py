@@ -183,6 +183,12 @@ def test_an_existing_file_is_an_error_unless_forced(name: str, ros: Ros, tmp_pat
     assert len(left) == 1
 
 
+@KINDS
+def test_a_folder_that_is_not_there_is_an_error_at_once(name: str, ros: Ros, tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        files(tmp_path / "missing" / name, ros)
+
+
 def test_what_cannot_be_recorded_is_refused_before() -> None:
     assert refusal(Path("x.mcap"), 1) is refusal(Path("x.mcap"), 2) is refusal(Path("x"), 2) is None
     assert "ROS 2" in str(refusal(Path("x.bag"), 2))

@@ -6,6 +6,8 @@ file begins with the messages that are needed to read it.
 
 from __future__ import annotations
 
+import errno
+import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -94,7 +96,12 @@ class Files:
         self._clear()
 
     def _clear(self) -> None:
-        """See that nothing is in the way. Raises OSError."""
+        """See that it can be written, and that nothing is in the way. Raises OSError."""
+        folder = self.path.parent
+        if not folder.is_dir():
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(folder))
+        if not os.access(folder, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
         old = [place(self.path, 0)] if self.path.suffix else [self.path / METADATA]
         number = 0
         while place(self.path, number).exists():
@@ -104,11 +111,11 @@ class Files:
             old.append(place(self.path, 1))
         there = [path for path in dict.fromkeys(old) if path.exists()]
         if there and not self.force:
-            raise FileExistsError(17, "it exists", str(there[0]))
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(there[0]))
         if not self.path.suffix:
             if self.path.exists() and not self.path.is_dir():
-                raise FileExistsError(17, "it exists", str(self.path))
-            self.path.mkdir(parents=True, exist_ok=True)
+                raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(self.path))
+            self.path.mkdir(exist_ok=True)
         for path in there:
             path.unlink()
 
