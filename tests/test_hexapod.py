@@ -11,6 +11,7 @@ import numpy.typing as npt
 import pytest
 
 import neurovis_spec as nv
+from neurovis_spec.analysis import gait
 from neurovis_spec.runtime.recording import Recording
 
 FOLDER = Path(__file__).parent.parent / "specs" / "hexapod"
@@ -130,6 +131,24 @@ def test_the_frequency_may_be_set_while_it_runs(count: int) -> None:
     names = nv.compile(SPEC).network.neurons.names
     columns = [names.index(f"DL{number}") for number in range(6, 12)]
     assert set(ripples(np.stack(active)[200:, columns]).tolist()) == {count}
+
+
+@pytest.mark.parametrize(("count", "phases"), [(1, [0, 1, 2, 3, 4, 5]), (2, [0, 2, 4, 0, 2, 4])])
+def test_the_phases_of_the_gaits(walk: Recording, count: int, phases: list[int]) -> None:
+    """Wave and caterpillar, of six; the duty of a lifted leg is one swing of a period."""
+    window = SETTLED[count]
+    found = gait(walk, [f"{leg}.CF" for leg in LEGS], window.start, window.stop, threshold=0.5)
+    assert (6 * found.column("phase")).tolist() == pytest.approx(phases, abs=1e-9)
+    assert found.column("period").tolist() == [6 * SWING / count] * 6
+    assert found.column("duty").tolist() == pytest.approx([count / 6] * 6)
+
+
+def test_the_phases_of_the_tripod(walk: Recording) -> None:
+    """Three legs and three legs, half a period apart; at the beams single steps differ."""
+    window = SETTLED[3]
+    phase = gait(walk, [f"{leg}.CF" for leg in LEGS], window.start, window.stop, threshold=0.5).column("phase")
+    away = np.angle(np.exp(2j * np.pi * (phase - [0, 0.5, 0, 0.5, 0, 0.5]))) / (2 * np.pi)
+    assert np.abs(away).max() < 0.02
 
 
 def test_in_the_wave_gait_one_leg_lifts_after_the_other(walk: Recording) -> None:

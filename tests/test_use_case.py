@@ -10,14 +10,14 @@ import numpy.typing as npt
 import pytest
 
 import neurovis_spec as nv
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.analysis import awake_at_once, printed_correlation, weight_changes
 from neurovis_spec.runtime.recording import Recording
 
 SPECS = Path(__file__).parent.parent / "specs"
 PERIOD = 128.62  # steps
-SECOND = 20  # steps
 #: the last twenty periods of a recording
-SETTLED = slice(-round(20 * PERIOD), None)
+FROM = 12_000 - round(20 * PERIOD)
+SETTLED = slice(FROM, None)
 
 
 @pytest.fixture(scope="module")
@@ -63,36 +63,32 @@ def awake(recording: Recording, neuron: str) -> npt.NDArray[np.bool_]:
     return np.asarray(np.abs(recording[neuron][SETTLED]) > 0.05, dtype=np.bool_)
 
 
-def mutual_information(x: FloatArray, y: FloatArray, bins: int = 20) -> float:
-    """Eq. 13 in bits, with the joint distribution of Eq. 14 over equal bins."""
-    joint = np.histogram2d(x, y, bins=bins)[0] / len(x)
-    apart = joint.sum(axis=1, keepdims=True) * joint.sum(axis=0, keepdims=True)
-    occurs = joint > 0
-    return float((joint[occurs] * np.log2(joint[occurs] / apart[occurs])).sum())
-
-
 def test_three_to_five_kernels_are_awake(learned: Recording) -> None:
-    assert set(awake(learned, "K").sum(axis=1).tolist()) == {3, 4, 5}
+    assert awake_at_once(learned, "K", start=FROM).rows.labels == ("3", "4", "5")
 
 
 @pytest.mark.parametrize(("pair", "seconds"), [(("K2", "K3"), 2.3), (("K2", "K4"), 1.4)])
 def test_kernels_are_awake_together_as_in_figure_6a(learned: Recording, pair: tuple[str, str], seconds: float) -> None:
-    together = np.logical_and(*(awake(learned, name) for name in pair)).sum() / SECOND / 20
-    assert round(float(together), 1) == seconds
+    assert round(learned.coactivation("K", start=FROM)[pair], 1) == seconds
+    assert learned.coactivation("K", start=FROM, per="total")[pair] == pytest.approx(20 * seconds, abs=1)
 
 
 @pytest.mark.parametrize(("pair", "product"), [(("K2", "K3"), 0.10), (("K2", "K4"), 0.02)])
 def test_kernels_correlate_as_in_figure_6b(learned: Recording, pair: tuple[str, str], product: float) -> None:
     """Eq. 12 with the joint distribution: the mean of the product."""
-    x, y = (learned[name][SETTLED] for name in pair)
-    assert round(float((x * y).mean()), 2) == product
+    assert round(learned.cross_correlation("K", start=FROM)[pair], 2) == product
+
+
+def test_equation_12_as_printed_has_one_value_for_all_pairs(learned: Recording) -> None:
+    """With p(x)·p(y) the two pairs that Figure 6B tells apart are alike."""
+    printed = printed_correlation(learned, "K", start=FROM)
+    assert [round(printed[pair], 2) for pair in (("K2", "K3"), ("K2", "K4"))] == [0.06, 0.06]
 
 
 @pytest.mark.parametrize(("pair", "bits"), [(("K2", "K3"), 1.34), (("K2", "K4"), 0.76)])
 def test_kernels_tell_of_each_other_as_in_figure_6c(learned: Recording, pair: tuple[str, str], bits: float) -> None:
     """The paper has 1.39 and 0.78."""
-    x, y = (learned[name][SETTLED] for name in pair)
-    assert round(mutual_information(x, y), 2) == bits
+    assert round(learned.mutual_information("K", start=FROM)[pair], 2) == bits
 
 
 def test_five_kernels_are_awake_while_c2_is_strong_and_c1_weakly_negative(learned: Recording) -> None:
@@ -110,6 +106,9 @@ def test_k2_comes_to_hold_o_down_most_of_all(learned: Recording) -> None:
     at_first, in_the_end = ([float(learned.weight(f"K{i} -> O")[step]) for i in range(1, 9)] for step in (100, -1))
     assert (round(at_first[1], 2), round(in_the_end[1], 2)) == (-0.11, -0.52)
     assert max(in_the_end, key=abs) == in_the_end[1]
+    changes = weight_changes(learned)
+    assert changes["K2 -> O", "last"] == in_the_end[1]
+    assert changes.rows.labels[int(np.argmax(np.abs(changes.column("change"))))] == "K2 -> O"
 
 
 def test_the_settings_are_those_of_the_paper() -> None:

@@ -7,10 +7,10 @@ their Network by its hash and hold as much of its structure as is needed to read
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+    from neurovis_spec.analysis.named import NamedArray
     from neurovis_spec.runtime.columns import Columns
 
 
@@ -154,6 +155,14 @@ class Recording:
             return isinstance(name, str) and self._found(name) is not None
         except UnknownNameError:
             return False
+
+    def names_of(self, reference: str) -> tuple[str, ...]:
+        """The names of the neurons that a reference names (``K``, ``K3..K5``, ``left.K + O``). Raises KeyError with the
+        nearest names."""
+        found = self._names.find(arguments.text("reference", reference))
+        if isinstance(found, str):
+            raise UnknownNameError(found)
+        return tuple(self.neurons[index] for index in found.neurons)
 
     def _found(self, name: str) -> tuple[FloatArray, Found]:
         """Where the numbers of a reference are: an array, and its columns."""
@@ -290,6 +299,40 @@ class Recording:
         from neurovis_spec.runtime.frames import to_pandas
 
         return to_pandas(self)
+
+    def cross_correlation(
+        self, of: str | Sequence[str] | None = None, start: int | None = None, stop: int | None = None
+    ) -> NamedArray:
+        """Eq. 12: the mean of x·y of each pair of neurons (see ``neurovis_spec.analysis``)."""
+        from neurovis_spec.analysis.correlation import cross_correlation
+
+        return cross_correlation(self, of, start, stop)
+
+    def mutual_information(
+        self,
+        of: str | Sequence[str] | None = None,
+        start: int | None = None,
+        stop: int | None = None,
+        bins: int = 20,
+    ) -> NamedArray:
+        """Eqs. 13 and 14: what each pair of neurons tells of each other, in bits."""
+        from neurovis_spec.analysis.information import mutual_information
+
+        return mutual_information(self, of, start, stop, bins)
+
+    def coactivation(
+        self,
+        of: str | Sequence[str] | None = None,
+        start: int | None = None,
+        stop: int | None = None,
+        threshold: float = 0.05,
+        per: Literal["period", "total"] = "period",
+        period: float | None = None,
+    ) -> NamedArray:
+        """Fig. 6A: the seconds for which each pair of neurons is active together."""
+        from neurovis_spec.analysis.coactivity import coactivation
+
+        return coactivation(self, of, start, stop, threshold, per, period)
 
     def _repr_svg_(self) -> str:
         """Its traces, for a notebook."""

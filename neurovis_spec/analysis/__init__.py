@@ -1,0 +1,36 @@
+"""Analysis: what a run or a recording tells, in numbers: the measures of the NeuroVis paper, and their pictures.
+
+In: a Recording, or a compiled network. Out: named arrays; with ``report``, a folder of tables, pictures and a page.
+docs/measures.md lists all measures, with equations and sources.
+"""
+
+from __future__ import annotations
+
+from neurovis_spec.analysis.activities import topography, traces
+from neurovis_spec.analysis.coactivity import awake_at_once, coactivation
+from neurovis_spec.analysis.correlation import cross_correlation, printed_correlation
+from neurovis_spec.analysis.excerpt import cut
+from neurovis_spec.analysis.gait import gait, stretches
+from neurovis_spec.analysis.information import mutual_information
+from neurovis_spec.analysis.named import Axis, NamedArray
+from neurovis_spec.analysis.structure import connection_matrix
+from neurovis_spec.analysis.weights import updates, weight_changes, weights
+
+__all__ = [
+    "Axis",
+    "NamedArray",
+    "awake_at_once",
+    "coactivation",
+    "connection_matrix",
+    "cross_correlation",
+    "cut",
+    "gait",
+    "mutual_information",
+    "printed_correlation",
+    "stretches",
+    "topography",
+    "traces",
+    "updates",
+    "weight_changes",
+    "weights",
+]

@@ -1,0 +1,82 @@
+"""The gait diagram: when each of some neurons is active in a rhythm.
+
+In: activities of a set of neurons (those that lift the legs, for example) and a threshold. Out: for each of them its
+onset, duty factor, phase and period; the stretches for which it is active. The first neuron of the set is the one by
+which phases go.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.analysis.coactivity import THRESHOLD, awake
+from neurovis_spec.analysis.excerpt import excerpt
+from neurovis_spec.analysis.named import Axis, NamedArray
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.runtime.recording import Recording
+
+QUANTITIES = ("onset", "duty", "phase", "period", "times")
+
+
+def gait(
+    recording: Recording,
+    of: str | Sequence[str] | None = None,
+    start: int | None = None,
+    stop: int | None = None,
+    threshold: float = THRESHOLD,
+) -> NamedArray:
+    """A row for each neuron: the step of its first ``onset`` (NaN where it has none), its ``duty``, the share of time
+    for which it is active, its ``phase``, how far behind the first neuron's onset its own comes (0…1 of that one's
+    period; the mean around the circle), its ``period`` in steps, and how many ``times`` it becomes active."""
+    part = excerpt(recording, of, start, stop)
+    active = awake(part, threshold)
+    begins = [part.step[_onsets(active[:, column])] for column in range(len(part.names))]
+    values = np.full((len(part.names), len(QUANTITIES)), np.nan)
+    for row, own in enumerate(begins):
+        values[row, 1], values[row, 4] = active[:, row].mean(), len(own)
+        if len(own):
+            values[row, 0] = own[0]
+            values[row, 2] = _phase(own, begins[0])
+        if len(own) > 1:
+            values[row, 3] = (own[-1] - own[0]) / (len(own) - 1)
+    return NamedArray("gait", values, Axis("neuron", part.names), Axis("quantity", QUANTITIES))
+
+
+def stretches(
+    recording: Recording,
+    of: str | Sequence[str] | None = None,
+    start: int | None = None,
+    stop: int | None = None,
+    threshold: float = THRESHOLD,
+) -> dict[str, list[tuple[int, int]]]:
+    """For each neuron the stretches for which it is active: the first step, and the one after the last."""
+    part = excerpt(recording, of, start, stop)
+    active = awake(part, threshold)
+    stride = round(part.stride)
+    result = {}
+    for column, name in enumerate(part.names):
+        edges = np.diff(np.pad(active[:, column].astype(np.int8), 1))
+        first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+        result[name] = list(zip(part.step[first].tolist(), (part.step[last] + stride).tolist(), strict=True))
+    return result
+
+
+def _onsets(active: npt.NDArray[np.bool_]) -> IntArray:
+    """The rows in which a neuron becomes active."""
+    found: IntArray = np.flatnonzero(active[1:] & ~active[:-1]) + 1
+    return found
+
+
+def _phase(own: IntArray, reference: IntArray) -> float:
+    """The mean phase of onsets in the cycles that begin with those of a reference."""
+    if len(reference) < 2:
+        return float("nan")
+    cycle = np.clip(np.searchsorted(reference, own, "right") - 1, 0, len(reference) - 2)
+    length = (reference[cycle + 1] - reference[cycle]).astype(np.float64)
+    shares: FloatArray = (own - reference[cycle]) / length
+    turn = np.exp(2j * np.pi * shares).mean()
+    phase = float(np.angle(turn) / (2 * np.pi)) % 1.0
+    return 0.0 if phase > 1 - 1e-9 else phase
