@@ -195,10 +195,12 @@ def test_a_run_records_what_it_publishes_and_its_inputs(ros: World, tmp_path: Pa
         "\nconnections: {B -> A: 0.5, A -> B: {weight: -0.5, plasticity: {oja: {rate: 0.01}}}}\n"
         "ros: {subscribe: {target: {topic: /target}}}\n"
     )
-    run = ros.neurovis("ros", "run", spec, "--record", out, "--seconds", "6", "--format", "json")
+    run = ros.neurovis("ros", "run", spec, "--record", out, "--format", "json")
     run.wait_for("ready")
-    ros.peer(send=[{"topic": "/target", "type": "std_msgs/Float64", "values": {"data": 2.5}, "count": 20, "rate": 20}])
-    assert run.end() == 0
+    send = [{"topic": "/target", "type": "std_msgs/Float64", "values": {"data": 2.5}, "count": 20, "rate": 20}]
+    ros.peer(send=send, seconds=8).end()
+    time.sleep(1)
+    assert run.stop() == 0
     counts = run.json()["topics"]
     steps = counts["activity"]["recorded"]
     assert steps == counts["weights"]["recorded"] == run.json()["steps"] > 100

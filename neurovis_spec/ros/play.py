@@ -89,7 +89,7 @@ class Player:
                 tell(f"{topic.name} is left out: {error}")
                 return
         latched = is_spec(topic, self._bag)
-        quality = Quality("reliable", "transient_local", 1) if latched else Quality("reliable", "volatile", 1000)
+        quality = Quality("reliable", "transient_local", 1) if latched else Quality("reliable", "volatile", 4000)
         publisher = self._node.publisher(topic.name, topic.type, quality)
         self._ways[topic.name, topic.type] = _Way(publisher, converter, latched)
 
