@@ -22,7 +22,6 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 NPM := npm --no-audit --no-fund --no-package-lock --loglevel=error
 ELSEWHERE := browser or dot or compiler or cluster or node
-ROS_EXTRAS := bags,live,ros
 
 .PHONY: help install demo gallery test test-all test-elsewhere test-ros needs needs-ros fuzz layouts docs page page-check format clean
 .DELETE_ON_ERROR:
@@ -74,18 +73,10 @@ test-elsewhere: needs $(VENV)/tested page-check
 test-ros: needs-ros $(VENV)/tested .ros/one/made .ros/kilted/made .ros/jazzy/made
 	$(BIN)/python tests/isolated.py $(BIN)/python -m pytest -m ros $(wildcard tests/test_ros*.py) $(PYTEST_ARGS)
 
-.ros/one/made: pyproject.toml
-	@echo "installing into .ros/one, beside ROS 1"
-	@/usr/bin/python3 -m venv --system-site-packages .ros/one
-	@.ros/one/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[$(ROS_EXTRAS)]'
-	@touch $@
-
-.ros/kilted/made: WHEELS := ros-rclpy[fastrtps]==9.1.2 ros-std-msgs==5.5.1 ros-sensor-msgs==5.5.1 ros-diagnostic-msgs==5.5.1
-.ros/jazzy/made: WHEELS := ros-rclpy[fastrtps]==7.1.6 ros-std-msgs==5.3.6 ros-sensor-msgs==5.3.6
-.ros/kilted/made .ros/jazzy/made: .ros/%/made: $(VENV)/made pyproject.toml
-	@echo "installing ROS 2 into .ros/$*"
-	@$(BIN)/python -m venv .ros/$*
-	@.ros/$*/bin/python -m pip install --quiet --disable-pip-version-check $(WHEELS:%='%') --editable '.[$(ROS_EXTRAS)]'
+# The commands are those of docs/ros.md, whose python3 is the one of .venv.
+.ros/%/made: $(VENV)/made docs/ros.md pyproject.toml
+	@echo "installing into .ros/$*, as docs/ros.md does"
+	@PATH="$(CURDIR)/$(BIN):$$PATH" PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 $(BIN)/python tests/ros_page.py $* --install
 	@touch $@
 
 # Skipping would hide that nothing was tested: what is missing is an error.
@@ -108,10 +99,12 @@ page-check: $(VENV)/tested node_modules/made
 	$(NPM) run --silent check
 	$(BIN)/python neurovis_spec/live/page/build.py --check
 
-ROS_1 := python3-rosmaster python3-rospy python3-std-msgs python3-sensor-msgs
+ROS_1 := python3-roslaunch python3-rosmaster python3-rospy python3-rostopic python3-rosbag python3-rosparam \
+  python3-std-msgs python3-sensor-msgs ros-std-msgs ros-sensor-msgs rosout
 
 needs-ros:
-	@/usr/bin/python3 -c 'import rosmaster, rospy, std_msgs.msg, sensor_msgs.msg' 2>/dev/null && command -v rosmaster >/dev/null \
+	@/usr/bin/python3 -c 'import rosmaster, rospy, std_msgs.msg, sensor_msgs.msg' 2>/dev/null \
+	  && (for command in roscore rosmaster rostopic rosbag rosparam; do command -v $$command >/dev/null || exit 1; done) \
 	  || { echo "make test-ros needs what is not here: ROS 1 (apt-get install $(ROS_1))" >&2; exit 1; }
 	@test "$$(uname -sm)" = "Linux x86_64" || { echo "make test-ros needs Linux on x86_64: there are no wheels of ROS 2 for others" >&2; exit 1; }
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -57,20 +58,25 @@ class Process:
         for line in pipe:
             lines.append(line.rstrip("\n"))
 
-    def wait_for(self, text: str, seconds: float = PATIENCE) -> str:
+    def wait_for(self, text: str | re.Pattern[str], seconds: float = PATIENCE) -> str:
         """The first line, of either stream, that holds a text."""
+        pattern = re.compile(re.escape(text)) if isinstance(text, str) else text
         deadline = time.monotonic() + seconds
         while time.monotonic() < deadline:
             for line in [*self.err, *self.out]:
-                if text in line:
+                if pattern.search(line):
                     return line
             if self._process.poll() is not None and not any(thread.is_alive() for thread in self._threads):
                 break
             time.sleep(0.01)
-        raise AssertionError(f"no '{text}' in {self.out} {self.err}")
+        raise AssertionError(f"no '{pattern.pattern}' in {self.out} {self.err}")
 
     def signal(self, number: int) -> None:
         self._process.send_signal(number)
+
+    def interrupt(self) -> None:
+        """Press Ctrl-C: all that it has started in its group gets it."""
+        os.killpg(self._process.pid, signal.SIGINT)
 
     @property
     def running(self) -> bool:

@@ -39,12 +39,12 @@ def command(output: str | None, namespace: str, network: str, desk: Desk, meetin
 
     if not desk and output is None:
         desk = desk.in_the_browser()
-    begun = time.monotonic()
     sys.setswitchinterval(0.0005)
     with meeting.node("neurovis_legacy", anonymous=True) as node, ExitStack() as stack, heeded() as asked:
         listener, listening = LegacyListener(node, namespace, network, tell), None
         listener.look()
         tell(f"ready: {namespace}, ROS {node.ros}")
+        begun = time.monotonic()
         while not (
             asked or node.ended or (meeting.seconds is not None and time.monotonic() - begun >= meeting.seconds)
         ):

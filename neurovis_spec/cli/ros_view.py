@@ -63,6 +63,7 @@ def command(spec: str | None, network: str | None, settings: dict[str, float], d
                 for topic, stream in listening.streams.items()
             ]
             tell(f"ready: {compiled.name}, ROS {node.ros}, {subscriptions[0].topic.removesuffix(ACTIVITY)}")
+            begun = time.monotonic()
             while not stopped():
                 if node.reconnects != reconnects:
                     reconnects = node.reconnects
@@ -72,6 +73,9 @@ def command(spec: str | None, network: str | None, settings: dict[str, float], d
                 subscription.close()
             listening.end()
             shown, skipped = listening.shown
+            silent = [one.topic for one in subscriptions if not listening.streams[one.topic].counts.received]
+            if silent:
+                tell(f"nothing came on {', '.join(silent)}")
             summary = Summary(
                 network=compiled.name, hash=compiled.hash, ros=node.ros, seconds=time.monotonic() - begun,
                 reconnects=node.reconnects, shown=shown, skipped=skipped, files=listening.paths,

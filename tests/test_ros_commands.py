@@ -1,0 +1,57 @@
+"""The commands of ``neurovis ros`` beside a node that is none: when they end, and what they say."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from click.testing import CliRunner
+
+from neurovis_spec.cli.commands import neurovis
+from neurovis_spec.ros import middleware
+from neurovis_spec.ros.definitions import definition
+
+OPENING = 0.5
+
+
+class Quiet:
+    """A node to which nothing comes, and which takes a while to be made. Notes when it listened, and for how long."""
+
+    ros, encoding, name, reconnects, ended = 2, "cdr", "/neurovis_view", 0, False
+
+    def __init__(self) -> None:
+        self.listened: list[float] = []
+
+    def opened(self, *_: object) -> Quiet:
+        time.sleep(OPENING)
+        return self
+
+    def subscription(self, topic: str, *_: object) -> SimpleNamespace:
+        begun = time.monotonic()
+        return SimpleNamespace(topic=topic, close=lambda: self.listened.append(time.monotonic() - begun))
+
+    def definition(self, type_: str) -> str:
+        return str(definition(type_, 2))
+
+    def close(self) -> None: ...
+
+
+@pytest.fixture
+def quiet(monkeypatch: pytest.MonkeyPatch) -> Quiet:
+    node = Quiet()
+    opened: Callable[..., Quiet] = node.opened
+    monkeypatch.setattr(middleware, "open_node", opened)
+    return node
+
+
+def test_the_seconds_of_a_view_are_those_in_which_it_listens(quiet: Quiet, tmp_path: Path) -> None:
+    spec = tmp_path / "a.yaml"
+    spec.write_text("neurovis: 1\nname: a\nneurons: {A: {}}\n")
+    out = tmp_path / "a.mcap"
+    found = CliRunner().invoke(neurovis, ["ros", "view", str(spec), "--record", str(out), "--seconds", "0.3"])
+    assert found.exit_code == 0, found.output
+    assert min(quiet.listened) >= 0.3
+    assert "nothing came on /neurovis/a/activity" in found.output
