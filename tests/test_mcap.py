@@ -22,7 +22,8 @@ import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.runtime import mcap_records as records
 from neurovis_spec.runtime.recording import Recording, RecordingError
-from neurovis_spec.runtime.ros_messages import array_of, label_of, text_of
+from neurovis_spec.runtime.ros_messages import label_of, step_of
+from neurovis_spec.runtime.wire import text_of
 
 SPECS = Path(__file__).parents[1] / "specs"
 SPEC = """\
@@ -77,7 +78,7 @@ def test_other_programs_read_it(network: nv.CompiledNetwork, path: Path) -> None
     assert (about["network"], about["dt"]) == ("bag", "0.025")
     schema, channel, first = messages[0]
     assert (schema and schema.name, channel.topic) == ("std_msgs/msg/String", "/robot/bag/spec")
-    assert nv.compile_text(text_of(first.data)).hash == network.hash
+    assert nv.compile_text(text_of(first.data, "cdr")).hash == network.hash
     topics = {c.topic for _, c, _ in messages}
     assert topics == {f"/robot/bag/{name}" for name in ("spec", "activity", "weights", "states")}
     for schema, channel, message in messages[1:]:
@@ -88,7 +89,7 @@ def test_other_programs_read_it(network: nv.CompiledNetwork, path: Path) -> None
         t = message.sequence
         assert message.log_time == message.publish_time == round(t * 0.025 * 1e9)
         if channel.topic.endswith("activity"):
-            assert np.array_equal(array_of(message.data, label_of(network.hash), 4)[1], made.activity[t])
+            assert np.array_equal(step_of(message.data, "cdr", label_of(network.hash), 4)[1], made.activity[t])
             assert struct.unpack_from("<dd", message.data, len(message.data) - 48) == (t, t * 0.025)
     with path.open("rb") as file:
         kinds = [type(record).__name__ for record in StreamReader(file, validate_crcs=True, emit_chunks=True).records]

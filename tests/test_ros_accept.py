@@ -16,7 +16,7 @@ from neurovis_spec.ros.accept import ARRAY, STRING, Accepted, Stream, anything, 
 from neurovis_spec.ros.counts import Teller
 from neurovis_spec.ros.definitions import definition, md5sum, written
 from neurovis_spec.ros.middleware import Arrival, Ros
-from neurovis_spec.ros.wire import ENCODINGS, ArrayForm, Encoding, WireError, array_of, text_message, text_of
+from neurovis_spec.runtime.wire import ENCODINGS, ArrayForm, Encoding, WireError, array_of, text_message, text_of
 
 HASH = "0123456789abcdef"
 LABEL = f"neurovis/1:{HASH}"

@@ -15,8 +15,8 @@ from rosbags.rosbag2 import Writer as TwoWriter
 from rosbags.typesys import Stores, get_typestore
 
 from neurovis_spec.ros.bags import read_bag
-from neurovis_spec.ros.wire import ArrayForm, text_message
 from neurovis_spec.runtime.recording import RecordingError
+from neurovis_spec.runtime.wire import ArrayForm, text_message
 
 ARRAY, STRING = "std_msgs/msg/Float64MultiArray", "std_msgs/msg/String"
 ONE, TWO = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_KILTED)

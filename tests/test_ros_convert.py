@@ -15,7 +15,7 @@ from rosbags.typesys import Stores, get_typestore
 from neurovis_spec.language.ros_types import all_types
 from neurovis_spec.ros.convert import ConversionError, Converter, shape_of
 from neurovis_spec.ros.definitions import written
-from neurovis_spec.ros.wire import WireError
+from neurovis_spec.runtime.wire import WireError
 
 STORES = {1: get_typestore(Stores.ROS1_NOETIC), 2: get_typestore(Stores.ROS2_KILTED)}
 SIZES = {"float32": "f4", "float64": "f8", "bool": "?", "byte": "u1", "char": "u1", "octet": "u1"}

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from neurovis_spec.ros import definitions
 from neurovis_spec.ros.fields import Definition, Form, Value, encode, numbers_at, texts_at
-from neurovis_spec.ros.wire import ENCODINGS, Encoding, WireError
+from neurovis_spec.runtime.wire import ENCODINGS, Encoding, WireError
 
 ROS: tuple[Literal[1, 2], ...] = (1, 2)
 ENCODED = tuple(ENCODINGS.values())

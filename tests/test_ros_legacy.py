@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import neurovis_spec as nv
 from neurovis_spec.ros.legacy import FLOATS, KINDS, TEXT, Kind, Legacy, layer_pairs, numbers_of, positions, types_of
-from neurovis_spec.ros.wire import Encoding, WireError, text_message
+from neurovis_spec.runtime.wire import Encoding, WireError, text_message
 
 
 def floats(values: list[float], encoding: Encoding) -> bytes:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import struct
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -20,8 +22,8 @@ from neurovis_spec.ros.bags import read_bag
 from neurovis_spec.ros.listening import Listening, Wanted
 from neurovis_spec.ros.middleware import Arrival
 from neurovis_spec.ros.received import ReceivedSource
-from neurovis_spec.ros.wire import ArrayForm, text_message
 from neurovis_spec.runtime.ros_messages import label_of
+from neurovis_spec.runtime.wire import ENCODINGS, ArrayForm, text_message
 
 SPEC = """
 neurovis: 1
@@ -188,6 +190,42 @@ def test_what_was_recorded_is_a_recording_of_the_network(compiled: nv.CompiledNe
     assert np.array_equal(read.weights, made.weights)
     assert (read.spec, read.hash) == (compiled.text(), made.hash)
     assert compiled.run(5, start=read).reached > 200
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+def test_a_recording_of_either_ros_is_read_without_the_steps_that_were_lost(
+    compiled: nv.CompiledNetwork, tmp_path: Path, ros: Literal[1, 2]
+) -> None:
+    made, path, encoding = compiled.run(50), tmp_path / "x.mcap", ENCODINGS[ros]
+    listening = Listening(compiled, ros, Wanted(path), print)
+    listening.start()
+    for row in range(50):
+        for name, values, lost in (("activity", made.activity[row], 7), ("weights", made.weights[row], 9)):
+            data = ArrayForm.of(label_of(made.hash), len(values), encoding).message(row, 1e9 + row, values)
+            if row != lost:
+                listening.put(f"/neurovis/x/{name}", Arrival(data, row * 10**6, None, ARRAY))
+    until(lambda: listening.counts["weights"].recorded == 49)
+    listening.end()
+    read, kept = nv.load(path), [row for row in range(50) if row not in (7, 9)]
+    assert read.step.tolist() == kept
+    assert np.array_equal(read.activity, made.activity[kept])
+    assert np.array_equal(read.weights, made.weights[kept])
+    assert (read.spec, read.hash) == (compiled.text(), made.hash)
+
+
+def test_a_recording_of_arrays_without_labels_is_read(tmp_path: Path) -> None:
+    """A controller that sends its activities alone."""
+    bare, path = nv.compile_text("neurovis: 1\nname: x\nneurons: {A: {count: 3, bias: 1}}\n"), tmp_path / "x.mcap"
+    listening = Listening(bare, 2, Wanted(path), print)
+    listening.start()
+    for row in range(4):
+        data = b"\0\1\0\0" + struct.pack("<IIIIddd", 0, 0, 3, 0, row, 1.0, 2.0)
+        listening.put("/neurovis/x/activity", Arrival(data, row * 10**6, None, ARRAY))
+    until(lambda: listening.counts["activity"].recorded == 4)
+    listening.end()
+    read = nv.load(path)
+    assert read.step.tolist() == [0, 1, 2, 3]
+    assert read.activity.tolist() == [[row, 1.0, 2.0] for row in range(4)]
 
 
 def test_a_live_run_follows_pauses_and_goes_back(compiled: nv.CompiledNetwork, source: ReceivedSource) -> None:

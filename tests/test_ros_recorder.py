@@ -25,9 +25,9 @@ from neurovis_spec.ros.files import Files, Rotation, refusal
 from neurovis_spec.ros.logs import Stored, Topic, topic_of
 from neurovis_spec.ros.middleware import Arrival, Ros
 from neurovis_spec.ros.recorder import Recorder
-from neurovis_spec.ros.wire import ENCODINGS, ArrayForm, text_message
 from neurovis_spec.runtime import mcap_records as records
 from neurovis_spec.runtime.recording import RecordingError
+from neurovis_spec.runtime.wire import ENCODINGS, ArrayForm, text_message
 
 HASH, N = "0123456789abcdef", 12
 LABEL, TOPIC = f"neurovis/1:{HASH}", "/neurovis/x/activity"

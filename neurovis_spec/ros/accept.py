@@ -17,8 +17,8 @@ from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.language.ros_types import plain
 from neurovis_spec.ros.counts import REASONS, Counts, Reason, Teller
 from neurovis_spec.ros.middleware import Arrival
-from neurovis_spec.ros.wire import Encoding, WireError, array_of, stamp_of, text_of
 from neurovis_spec.runtime.ros_messages import label_of
+from neurovis_spec.runtime.wire import Encoding, WireError, array_of, stamp_of, text_of
 
 ARRAY: Final = "std_msgs/Float64MultiArray"
 STRING: Final = "std_msgs/String"

@@ -14,7 +14,7 @@ from neurovis_spec import api
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.ros.accept import ARRAY, STRING
 from neurovis_spec.ros.middleware import LATCHED, Arrival, MiddlewareError, Node
-from neurovis_spec.ros.wire import WireError, text_of
+from neurovis_spec.runtime.wire import WireError, text_of
 
 #: seconds in which others may announce themselves, too
 _OTHERS = 0.5

@@ -25,9 +25,9 @@ from neurovis_spec.ros.definitions import definition
 from neurovis_spec.ros.files import METADATA, place
 from neurovis_spec.ros.logs import ABOUT, BAG_MAGIC, Stored, Topic
 from neurovis_spec.ros.middleware import Ros
-from neurovis_spec.ros.wire import Encoding
 from neurovis_spec.runtime import mcap_records as records
 from neurovis_spec.runtime.recording import RecordingError
+from neurovis_spec.runtime.wire import Encoding
 
 _SQLITE: Final = b"SQLite format 3\0"
 #: a chunk of more bytes is none

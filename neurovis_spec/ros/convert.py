@@ -13,7 +13,7 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from neurovis_spec.ros.definitions import PRIMITIVES, fields_of_text, inner_name, sections
-from neurovis_spec.ros.wire import Cursor, Encoding, WireError
+from neurovis_spec.runtime.wire import Cursor, Encoding, WireError
 
 _SIZES: Final = {
     **{f"{kind}{bits}": bits // 8 for kind in ("int", "uint", "float") for bits in (8, 16, 32, 64)},

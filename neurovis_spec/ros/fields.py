@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from neurovis_spec.language.ros_types import plain
 from neurovis_spec.ros.definitions import fields_of_text, inner_name, sections
-from neurovis_spec.ros.wire import Cursor, Encoding, WireError
+from neurovis_spec.runtime.wire import Cursor, Encoding, WireError
 
 #: what a message is made of: numbers, texts, lists of values, fields by name; what is left out is 0 or empty
 Value: TypeAlias = "float | int | str | Sequence[Value] | Mapping[str, Value]"

@@ -16,7 +16,7 @@ from neurovis_spec.compiler.ros_settings import Subscription as Settings
 from neurovis_spec.ros.counts import REASONS, Counts, Reason, Teller
 from neurovis_spec.ros.fields import Definition, numbers_at, texts_at
 from neurovis_spec.ros.middleware import Arrival, Arrived
-from neurovis_spec.ros.wire import Encoding, WireError
+from neurovis_spec.runtime.wire import Encoding, WireError
 
 
 class _Reading:

@@ -18,7 +18,7 @@ import yaml
 
 from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.pins import DIAMETER
-from neurovis_spec.ros.wire import Encoding, WireError, array_of, text_of
+from neurovis_spec.runtime.wire import Encoding, WireError, array_of, text_of
 
 Kind: TypeAlias = Literal["neuronName", "neuronPos", "connections", "connectionsLayers", "activity", "weightsAll"]
 KINDS: Final[tuple[Kind, ...]] = get_args(Kind)

@@ -21,8 +21,8 @@ from neurovis_spec.ros.counts import REASONS, Counts, Reason, Teller
 from neurovis_spec.ros.legacy import KINDS, Kind, Legacy, types_of
 from neurovis_spec.ros.listening import ACTIVITY, WEIGHTS, Listening
 from neurovis_spec.ros.middleware import Arrival, Node, Quality, Tell
-from neurovis_spec.ros.wire import ArrayForm, WireError
 from neurovis_spec.runtime.ros_messages import label_of
+from neurovis_spec.runtime.wire import ArrayForm, WireError
 
 _QUALITY: Final = Quality("offered", "volatile", 4000)
 #: messages that wait to be read

@@ -20,10 +20,10 @@ from neurovis_spec.ros.logs import topic_of
 from neurovis_spec.ros.middleware import Arrival, Ros
 from neurovis_spec.ros.received import ReceivedSource
 from neurovis_spec.ros.recorder import Recorder
-from neurovis_spec.ros.wire import ENCODINGS, text_message
 from neurovis_spec.runtime.columns import Probe, columns_of
 from neurovis_spec.runtime.npz_file import frame_bytes
 from neurovis_spec.runtime.stream import frame_of
+from neurovis_spec.runtime.wire import ENCODINGS, text_message
 from neurovis_spec.version import __version__
 
 ACTIVITY: Final = "activity"
@@ -85,8 +85,7 @@ class Listening:
         about = {"network": network.name, "hash": network.hash, "dt": repr(network.dt), "version": __version__}
         topic = topic_of(f"{self._base}/{SPEC}", STRING, self._definition(STRING), self.ros)
         first = [(topic, text_message(self.compiled.text(), ENCODINGS[self.ros]))]
-        frame = _frame(self.compiled) if self.ros == 2 else b""
-        return Files(path, self.ros, about, first, wanted.rotation, wanted.force, frame)
+        return Files(path, self.ros, about, first, wanted.rotation, wanted.force, _frame(self.compiled))
 
     def _definition(self, type_: str) -> str:
         return definition(type_, self.ros) or self._definitions_of(type_)

@@ -15,9 +15,9 @@ from typing import Final, NamedTuple, Protocol
 
 from neurovis_spec.ros.definitions import md5sum, written
 from neurovis_spec.ros.middleware import Ros
-from neurovis_spec.ros.wire import ENCODINGS, Encoding
 from neurovis_spec.runtime import mcap_records as records
 from neurovis_spec.runtime.mcap_file import FRAME
+from neurovis_spec.runtime.wire import ENCODINGS, Encoding
 from neurovis_spec.version import __version__
 
 #: the metadata record of an MCAP file, and the field of a bag's header

@@ -14,7 +14,7 @@ from importlib.util import find_spec
 from typing import Final, Literal, NamedTuple, Protocol, TypeAlias
 from urllib.parse import urlsplit
 
-from neurovis_spec.ros.wire import Encoding
+from neurovis_spec.runtime.wire import Encoding
 
 Ros: TypeAlias = Literal[1, 2]
 #: the module that each ROS is imported as

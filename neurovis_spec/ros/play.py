@@ -17,7 +17,7 @@ from neurovis_spec.ros.counts import Counts, Teller
 from neurovis_spec.ros.logs import Stored, Topic
 from neurovis_spec.ros.middleware import Arrival, Node, Publisher, Quality, Tell
 from neurovis_spec.ros.pace import Clock, SimulatedClock, SteadyClock
-from neurovis_spec.ros.wire import WireError, text_of
+from neurovis_spec.runtime.wire import WireError, text_of
 
 #: Called with what is sent; must not wait.
 Sent = Callable[[str, Arrival], None]

@@ -34,7 +34,7 @@ from neurovis_spec.ros.middleware import (
     Tell,
     Wish,
 )
-from neurovis_spec.ros.wire import Encoding
+from neurovis_spec.runtime.wire import Encoding
 
 #: seconds between two questions to the master, to the cache of parameters, and until the master counts as away
 _WATCH, _LOOK, _AWAY = 1.0, 0.05, 2.0

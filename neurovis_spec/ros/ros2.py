@@ -35,7 +35,7 @@ from neurovis_spec.ros.middleware import (
     Tell,
     Wish,
 )
-from neurovis_spec.ros.wire import Encoding
+from neurovis_spec.runtime.wire import Encoding
 
 _HUGE: Final = 1.7976931348623157e308
 #: names of primitives in interfaces, where they are others than in messages

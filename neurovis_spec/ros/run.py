@@ -28,10 +28,10 @@ from neurovis_spec.ros.middleware import LATCHED, Arrival, MiddlewareError, Node
 from neurovis_spec.ros.pace import Clock, Pace, SimulatedClock, SteadyClock
 from neurovis_spec.ros.steering import RunSteering
 from neurovis_spec.ros.summary import Summary
-from neurovis_spec.ros.wire import ArrayForm, WireError, text_message
 from neurovis_spec.runtime.backend import BackendError, choose_backend
 from neurovis_spec.runtime.ros_messages import label_of
 from neurovis_spec.runtime.simulation import ParameterError, Simulation
+from neurovis_spec.runtime.wire import ArrayForm, WireError, text_message
 
 #: a run has no end: what compiling costs is soon paid for
 _ENDLESS: Final = 1 << 40

@@ -14,6 +14,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial, reduce
 from io import FileIO
 from pathlib import Path
 from time import monotonic
@@ -27,18 +28,10 @@ from neurovis_spec.runtime.files import regular_size
 from neurovis_spec.runtime.mcap_records import Channel, DamagedError, Found, Message, Schema, Topic
 from neurovis_spec.runtime.npz_file import frame_bytes, frame_of, suspicion
 from neurovis_spec.runtime.recording import After, Recording, RecordingError, after_rows, ended
-from neurovis_spec.runtime.ros_messages import (
-    ARRAY,
-    STRING,
-    array_message,
-    array_of,
-    array_prefix,
-    label_of,
-    text_message,
-    text_of,
-)
+from neurovis_spec.runtime.ros_messages import ARRAY, STRING, label_of, step_of
 from neurovis_spec.runtime.rows import RowWriter, Steps
 from neurovis_spec.runtime.unfinished import Part, move, part_of
+from neurovis_spec.runtime.wire import ENCODINGS, ArrayForm, Encoding, text_message, text_of
 from neurovis_spec.version import __version__
 
 #: the attachment that holds what does not grow with the steps
@@ -98,13 +91,15 @@ class _McapRows:
         channels = [Channel(2, f"{base}/spec"), *(Channel(1, f"{base}/{name}") for name in held)]
         sizes = dict(zip(_ARRAYS, frame.widths, strict=True))
         label = label_of(frame.hash)
-        self._channels = [(_ARRAYS.index(name), n, array_prefix(label, sizes[name])) for n, name in enumerate(held, 2)]
+        self._channels = [
+            (_ARRAYS.index(name), n, ArrayForm.of(label, sizes[name], "cdr")) for n, name in enumerate(held, 2)
+        ]
         about = {"network": frame.network, "hash": frame.hash, "dt": repr(frame.dt), "version": __version__}
         start = records.head("ros2", f"neurovis {__version__}") + records.metadata(_ABOUT, about)
         start += records.attachment(FRAME, frame_bytes(frame))
         start += records.schemas_and_channels([Schema(*ARRAY), Schema(*STRING)], channels)
         if frame.spec:
-            start += records.chunk([Message(1, 0, 0, 0, text_message(frame.spec))])
+            start += records.chunk([Message(1, 0, 0, 0, text_message(frame.spec, "cdr"))])
         records.put(file, start)
 
     def write(self, activity: FloatArray, weights: FloatArray, states: FloatArray, after: After) -> None:
@@ -134,8 +129,8 @@ class _McapRows:
         for row, step in enumerate(steps):
             seconds = step * self._dt
             time = min(round(seconds * 1e9), _LAST_TIME)
-            for kind, channel, prefix in self._channels:
-                data = array_message(prefix, step, seconds, rows[kind][row])
+            for kind, channel, form in self._channels:
+                data = form.message(step, seconds, rows[kind][row])
                 yield Message(channel, step % (1 << 32), time, time, data)
 
     def close(self) -> None:
@@ -198,9 +193,10 @@ class _Reading:
         self._file = file
         self._frame: Recording | None = None
         self._after: dict[str, str] = {}
-        self._channels: dict[int, int] = {}
+        #: of each channel of ours what it holds and how
+        self._channels: dict[int, tuple[int, Encoding]] = {}
         self._known: set[int] = set()
-        self._specs: set[int] = set()
+        self._specs: dict[int, Encoding] = {}
         self._spec = ""
         self._named = 0
         self._room = max(_ROOM, _RATIO * file.seek(0, io.SEEK_END))
@@ -253,24 +249,28 @@ class _Reading:
     def _channel(self, topic: Topic) -> None:
         self._known.add(topic.channel)
         kind = topic.topic.rpartition("/")[2]
+        encoding = next((one for one in ENCODINGS.values() if one == topic.encoding), None)
+        if encoding is None:
+            return
         if kind == "spec":
-            self._specs.add(topic.channel)
+            self._specs[topic.channel] = encoding
         elif kind in _ARRAYS:
-            self._channels[topic.channel] = _ARRAYS.index(kind)
+            self._channels[topic.channel] = _ARRAYS.index(kind), encoding
 
     def _message(self, message: Message) -> None:
-        kind = self._channels.get(message.channel)
         if message.channel in self._specs:
-            self._spec = text_of(message.data)
+            self._spec = text_of(message.data, self._specs[message.channel])
             return
-        if kind is None:
+        if message.channel not in self._channels:
             if message.channel not in self._known:
                 raise RecordingError("a message is of a channel that there is not")
             return
+        kind, encoding = self._channels[message.channel]
         if self._frame is None:
             raise RecordingError("not a recording: messages come before the network that they are of")
-        step, numbers = array_of(message.data, label_of(self._frame.hash), self._frame.widths[kind])
+        said, numbers = step_of(message.data, encoding, label_of(self._frame.hash), self._frame.widths[kind])
         steps = self._steps[kind]
+        step = said if said is not None else steps[-1] + 1 if steps else 0
         if steps and step <= steps[-1]:
             raise RecordingError("the steps of its messages do not ascend")
         steps.append(step)
@@ -278,14 +278,13 @@ class _Reading:
 
     def _made(self, frame: Recording) -> Recording:
         used = [kind for kind, width in enumerate(frame.widths) if width or kind == 0]
-        count = min(len(self._steps[kind]) for kind in used)
-        steps = self._steps[0][:count]
-        if any(self._steps[kind][:count] != steps for kind in used):
-            raise RecordingError("its topics do not hold the same steps")
-        step = np.array(steps, dtype=np.int64)
+        held = {kind: np.array(self._steps[kind], dtype=np.int64) for kind in used}
+        step = reduce(partial(np.intersect1d, assume_unique=True), held.values())  # lost of one, left out of all
         activity, weights, states = (
-            np.array(self._rows[kind][:count]).reshape(count, width) for kind, width in enumerate(frame.widths)
-        )
+            np.array([self._rows[kind][row] for row in np.searchsorted(held[kind], step)] if kind in held else [])
+            .reshape(len(step), width)
+            for kind, width in enumerate(frame.widths)
+        )  # fmt: skip
         recording = replace(frame, step=step, activity=activity, weights=weights, states=states, spec=self._spec)
         return ended(recording, self._ended(recording))
 
