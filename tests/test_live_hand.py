@@ -98,6 +98,18 @@ def above(shot: bytes, x: float, y: float) -> Image.Image:
     return image.crop((round(x) - 80, round(y) - 80, round(x) + 80, round(y) - 40))
 
 
+def beside(shot: bytes, x: float, y: float) -> Image.Image:
+    """A part of a screenshot left of a neuron's middle: half of its disc, and heads of lines that come to it."""
+    image = Image.open(io.BytesIO(shot)).convert("RGB")
+    return image.crop((round(x) - 90, round(y) - 90, round(x), round(y) + 30))
+
+
+def dark(shot: bytes, x: float, y: float) -> int:
+    """How many pixels left of a neuron's middle and above it are of the darkest ink."""
+    corner = Image.open(io.BytesIO(shot)).convert("L").crop((round(x) - 15, round(y) - 15, round(x), round(y)))
+    return sum(corner.histogram()[:60])
+
+
 PUT = "document.querySelector('#placed').textContent"
 
 
@@ -141,6 +153,56 @@ def test_a_neuron_is_dragged_and_put_back(tmp_path: Path) -> None:
             await opened.key("z")
             await opened.until(f"{PUT} == ''")
             await holds(opened, (x, y), "O")
+
+    asyncio.run(main())
+
+
+def test_near_by_a_neuron_and_its_lines_follow_the_pointer_as_they_are_drawn_there(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with at_hand(tmp_path) as (opened, desk, _):
+            await pause(opened)
+            (x, y), zoom = places(desk.placed.compiled)["O"], 1.25**3
+            middle = await opened.ask("[picture.clientWidth / 2, picture.clientHeight / 2]")
+            assert isinstance(middle, list)
+            at = (middle[0] + zoom * (x - middle[0]), middle[1] + zoom * (y - middle[1]))
+            end = (at[0] - 24.75 * zoom, at[1] - 24.75 * zoom)
+            for _ in range(3):
+                await opened.key("+")
+            await holds(opened, at, "O")
+            before = await opened.shot()
+            await drag(opened, at, end, release_it=False)
+            await asyncio.sleep(0.2)
+            dragging = await opened.shot()
+            await release(opened, end)
+            await opened.until(f"{PUT} == 'O'")
+            await holds(opened, end, "O")
+            dragged = await opened.shot()
+            (tmp_path / "dragging.png").write_bytes(dragging)
+            (tmp_path / "dragged.png").write_bytes(dragged)
+            assert similarity(beside(before, *end), beside(dragged, *end)) < 0.9
+            assert similarity(beside(dragging, *end), beside(dragged, *end)) > 0.95
+
+    asyncio.run(main())
+
+
+def test_what_is_lesioned_takes_its_cross_along(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with at_hand(tmp_path) as (opened, desk, _):
+            await pause(opened)
+            x, y = places(desk.placed.compiled)["O"]
+            await opened.click(x, y)
+            await opened.ask("document.querySelector('#lesion').click()")
+            await opened.until("document.querySelector('#tip').textContent.includes('lesioned')")
+            end = (x - 99, y - 24.75)
+            before = await opened.shot()
+            await drag(opened, (x, y), end, release_it=False)
+            await asyncio.sleep(0.2)
+            dragging = await opened.shot()
+            (tmp_path / "dragging.png").write_bytes(dragging)
+            crossed, along, left = dark(before, x, y), dark(dragging, *end), dark(dragging, x, y)
+            assert crossed > 10
+            assert along == pytest.approx(crossed, rel=0.3)
+            assert left == 0
 
     asyncio.run(main())
 

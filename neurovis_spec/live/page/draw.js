@@ -123,8 +123,12 @@ export class Drawing {
 
   /** Take over that the shapes of a group have other places. @param {Group} group */
   reshape({ id, shapes }) {
-    const line = this.lines.find((one) => one.id === id);
-    if (line) [line.points, line.head] = [shapes[0].points, { ...shapes[1] }];
+    const group = this.scene.groups.find((one) => one.id === id),
+      line = this.lines.find((one) => one.id === id),
+      disc = this.discs.find((one) => one.id === id);
+    if (group) group.shapes = shapes;
+    if (disc) [disc.shape, ...disc.rest] = shapes;
+    if (line) [{ points: line.points }, line.head, ...line.rest] = [shapes[0], { ...shapes[1] }, ...shapes.slice(2)];
   }
 
   /** Draw a look; true where there is more to be drawn in the next frame.

@@ -213,7 +213,15 @@ function go(id) {
 
 new ResizeObserver(resize).observe(canvas);
 followFingers(canvas, camera, redraw);
-const placing = new Placing(link, () => (matrix ? null : drawing), redraw, part);
+const placing = new Placing(
+  link,
+  () => !matrix && drawing !== null,
+  (group) => {
+    if (group) drawing?.reshape(zoom.inked(group));
+    redraw();
+  },
+  part,
+);
 new Pointer(canvas, camera, attention, placing, {
   pointed(x, y) {
     const { look } = link;

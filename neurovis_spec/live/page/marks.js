@@ -5,14 +5,15 @@
 /** @typedef {import('./camera.js').Camera} Camera */
 /** @typedef {import('./protocol.js').Look} Look */
 /** @typedef {import('./protocol.js').Scene} Scene */
-/** @typedef {{id: string, item: number, ends: number[], at: number[], reach: number}} Mark */
+/** @typedef {import('./protocol.js').Group} Group */
+/** @typedef {{group: Group, item: number, ends: number[]}} Mark */
 
 /** How far the arms of a cross reach: in a disc, as a share of its radius; on a line, in pixels of a page. */
 const IN_DISC = 0.6,
   ON_LINE = 5;
 
 /** The middle of a cubic spline. @param {number[]} points @returns {number[]} */
-function middle(points) {
+function halfway(points) {
   const pieces = (points.length - 2) / 6,
     first = 6 * Math.floor(pieces / 2);
   return [0, 1].map((axis) => {
@@ -31,15 +32,12 @@ export class Marks {
     for (const { id, data } of scene.groups)
       if (data.neuron !== undefined) items.set(data.neuron, scene.lines + Number(id.slice(1)));
     /** @type {Mark[]} */
-    this.marks = scene.groups.flatMap(({ id, data, shapes }) => {
-      if (data.neuron !== undefined) {
-        return [
-          { id, item: items.get(data.neuron) ?? 0, ends: [], at: shapes[0].at, reach: IN_DISC * shapes[0].radius },
-        ];
-      }
+    this.marks = scene.groups.flatMap((group) => {
+      const { id, data } = group;
+      if (data.neuron !== undefined) return [{ group, item: items.get(data.neuron) ?? 0, ends: [] }];
       if (data.connection === undefined) return [];
       const ends = [data.from, data.to].flatMap((name) => items.get(name) ?? []);
-      return [{ id, item: Number(id.slice(1)), ends, at: middle(shapes[0].points), reach: 0 }];
+      return [{ group, item: Number(id.slice(1)), ends }];
     });
   }
 
@@ -50,8 +48,12 @@ export class Marks {
       [left, top] = camera.origin;
     const gone = (/** @type {number} */ item) => (look.kinds[item] & constants.isFaint) !== 0;
     context.setTransform(1, 0, 0, 1, 0, 0);
-    for (const { id, item, ends, at, reach } of this.marks) {
+    for (const { group, item, ends } of this.marks) {
       if (!gone(item) || ends.some(gone)) continue;
+      const { id, shapes } = group,
+        [{ at: middle, points, radius }] = shapes;
+      const at = points ? halfway(points) : middle,
+        reach = points ? 0 : IN_DISC * radius;
       const x = left + at[0] * camera.scale,
         y = top + at[1] * camera.scale;
       const arm = reach * camera.scale || ON_LINE * devicePixelRatio;

@@ -182,9 +182,9 @@ export class Matrix {
     if (row >= count || column >= count || (row < 0 && column < 0)) return '';
     if (row >= 0 && column >= 0) {
       const cell = this.cells.get(row * count + column);
-      // of what the picture leaves out nothing is told
-      const line = cell?.lines.find((one) => this.groups.has(`c${one}`));
-      return line === undefined ? '' : `c${line}`;
+      // of what the picture leaves out nothing is told; of several the one after what is held
+      const lines = (cell?.lines ?? []).map((line) => `c${line}`).filter((line) => this.groups.has(line));
+      return lines[(lines.indexOf(this.held) + 1) % lines.length] ?? '';
     }
     return this.rows[Math.max(row, column)].id;
   }

@@ -2,7 +2,6 @@
  * Placing: a neuron is dragged, its mirror image and the routes follow, and what was put by hand is saved or undone.
  */
 
-/** @typedef {import('./draw.js').Drawing} Drawing */
 /** @typedef {import('./protocol.js').Status} Status */
 /** @typedef {import('./protocol.js').Group} Group */
 /** @typedef {import('./protocol.js').Link} Link */
@@ -15,13 +14,29 @@
 /** How far a key moves a neuron, in units of the layout. */
 const KEYSTEP = 0.125;
 
+/** The neurons from and to which a line or a dotted line runs. @param {Group} group @returns {string[]} */
+const endsOf = ({ data: { signal, from, to } }) => (signal === undefined ? [from, to] : signal.split(' -> '));
+
+/** A line whose ends are elsewhere. @param {Stand} stand @param {number[] | null} start by how much @param {number[] | null} end
+ * @returns {Stand} */
+function bent({ at, points, along }, start, end) {
+  const last = points.length / 2 - 1;
+  const shift = (/** @type {number} */ value, /** @type {number} */ axis, /** @type {number} */ share) =>
+    value + (1 - share) * (start ? start[axis] : 0) + share * (end ? end[axis] : 0);
+  return {
+    along,
+    at: at.map((point, place) => point?.map((value, axis) => shift(value, axis, place === 1 ? 1 : 0.5))),
+    points: points.map((value, place) => shift(value, place & 1, (place >> 1) / last)),
+  };
+}
+
 /** Neurons put by hand. */
 export class Placing {
-  /** @param {Link} link @param {() => (Drawing | null)} drawing @param {() => void} redraw
-   * @param {(id: string) => HTMLElement} find */
-  constructor(link, drawing, redraw, find) {
+  /** @param {Link} link @param {() => boolean} drawn whether there is a picture, in which something can stand elsewhere
+   * @param {(group?: Group) => void} redraw @param {(id: string) => HTMLElement} find */
+  constructor(link, drawn, redraw, find) {
     this.link = link;
-    this.drawing = drawing;
+    this.drawn = drawn;
     this.redraw = redraw;
     this.find = find;
     this.owner = false;
@@ -62,7 +77,7 @@ export class Placing {
 
   /** Whether this can be dragged. @param {string} id @returns {boolean} */
   can(id) {
-    return this.owner && /^n\d/.test(id) && this.constants.scale > 0 && this.drawing() !== null;
+    return this.owner && /^n\d/.test(id) && this.constants.scale > 0 && this.drawn();
   }
 
   /** Where layout units lie. @returns {{scale: number, left: number, top: number}} */
@@ -73,21 +88,20 @@ export class Placing {
   /** How a group stands now. @param {string} id @returns {Stand} */
   stand(id) {
     const { shapes } = /** @type {Group} */ (this.groups.get(id));
-    const along = id[0] === 'c' ? shapes[1].along : [];
+    const along = shapes[0].points && shapes[1].along;
     return { at: shapes.map(({ at }) => at), points: shapes[0].points, along };
   }
 
   /** Have a group stand so. @param {string} id @param {Stand} stand */
   set(id, stand) {
-    const drawing = this.drawing(),
-      group = /** @type {Group} */ (this.groups.get(id)),
+    const group = /** @type {Group} */ (this.groups.get(id)),
       { shapes } = group;
     if (!this.first.has(id)) this.first.set(id, this.stand(id));
     shapes.forEach((shape, place) => {
       shape.at = stand.at[place];
     });
-    if (id[0] === 'c') [shapes[0].points, shapes[1].along] = [stand.points, stand.along];
-    if (drawing) drawing.reshape(group);
+    if (stand.points) [shapes[0].points, shapes[1].along] = [stand.points, stand.along];
+    this.redraw(group);
   }
 
   /** How a group stands by the last answer, else in the scene. @param {string} id @returns {Stand} */
@@ -108,20 +122,10 @@ export class Placing {
       { neuron } = /** @type {Group} */ (this.groups.get(id)).data,
       from = this.known(id);
     const by = [0, 1].map((axis) => this.at[axis] - from.at[0][axis]);
-    const shift = (/** @type {number[]} */ point, share = 1) =>
-      point && [point[0] + share * by[0], point[1] + share * by[1]];
-    this.set(id, { ...from, at: from.at.map((point) => shift(point)) });
-    for (const [line, { data }] of this.groups) {
-      const [start, end] = [data.from === neuron ? 1 : 0, data.to === neuron ? 1 : 0];
-      if (data.connection === undefined || !(start || end)) continue;
-      const { at, points, along } = this.known(line),
-        count = points.length / 2 - 1;
-      const part = (/** @type {number} */ place) => start + (end - start) * (place / count);
-      this.set(line, {
-        along,
-        at: at.map((point, place) => shift(point, place === 1 ? end : 0.5 * (start + end))),
-        points: points.map((value, place) => value + part(place >> 1) * by[place & 1]),
-      });
+    this.set(id, { ...from, at: from.at.map((point) => point?.map((value, axis) => value + by[axis])) });
+    for (const [line, group] of this.groups) {
+      const [start, end] = endsOf(group).map((name) => (name === neuron ? by : null));
+      if (start || end) this.set(line, bent(this.known(line), start, end));
     }
     this.redraw();
   }
@@ -174,10 +178,19 @@ export class Placing {
       if (stand && !(id in moved.discs || id in moved.lines)) this.set(id, stand);
     }
     this.last.clear();
+    /** @type {Map<string, number[]>} */
+    const by = new Map();
     for (const [id, [x, y]] of Object.entries(moved.discs)) {
       const from = this.first.get(id) || this.stand(id),
         [a, b] = from.at[0];
+      by.set(/** @type {Group} */ (this.groups.get(id)).data.neuron, [x - a, y - b]);
       this.last.set(id, { ...from, at: from.at.map((point) => point && [point[0] + x - a, point[1] + y - b]) });
+    }
+    // of the dotted lines nothing is told
+    for (const [id, group] of this.groups) {
+      if (group.data.signal === undefined) continue;
+      const [start, end] = endsOf(group).map((name) => by.get(name) ?? null);
+      if (start || end) this.last.set(id, bent(this.first.get(id) || this.stand(id), start, end));
     }
     for (const [id, [points, tip, along]] of Object.entries(moved.lines)) {
       const { at } = this.first.get(id) || this.stand(id);
