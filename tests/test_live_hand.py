@@ -15,6 +15,7 @@ from chromium import Page, chromium
 from PIL import Image
 from renderer_conformance import similarity
 from test_live_browser import SPECS, STEP, fit, pause
+from test_live_everyone import tap
 from test_live_looking import places
 
 import neurovis_spec as nv
@@ -203,6 +204,37 @@ def test_what_is_lesioned_takes_its_cross_along(tmp_path: Path) -> None:
             assert crossed > 10
             assert along == pytest.approx(crossed, rel=0.3)
             assert left == 0
+
+    asyncio.run(main())
+
+
+def test_a_drag_is_given_up_by_escape_by_a_second_finger_and_by_another_network(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with at_hand(tmp_path) as (opened, desk, _):
+            await pause(opened)
+            x, y = places(desk.placed.compiled)["O"]
+            await drag(opened, (x, y), (x + 60, y), release_it=False)
+            await opened.key("Escape")
+            await release(opened, (x + 60, y))
+            await holds(opened, (x, y), "O")
+            await drag(opened, (x, y), (x + 60, y), release_it=False)
+            await opened.ask(
+                "document.querySelector('#theme').value = 'dark'; theme.dispatchEvent(new Event('change'))"
+            )
+            await opened.until("getComputedStyle(document.body).backgroundColor == 'rgb(13, 17, 23)'")
+            await release(opened, (x + 60, y))
+            await holds(opened, (x, y), "O")
+            await opened.click(x, y)
+            await opened.call("Emulation.setTouchEmulationEnabled", enabled=True, maxTouchPoints=5)
+            await tap(opened, (x, y))
+            for by in (10, 20, 30):
+                fingers = [{"x": x + by, "y": y, "id": 0}]
+                await opened.call("Input.dispatchTouchEvent", type="touchMove", touchPoints=fingers)
+            await tap(opened, (x + 30, y), (x + 230, y))
+            await still(opened)
+            await opened.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+            await holds(opened, (x, y), "O")
+            assert desk.placed.moved == ()
 
     asyncio.run(main())
 

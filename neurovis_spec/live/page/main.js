@@ -107,6 +107,7 @@ function resize() {
 const link = new Link({
   scene(scene) {
     const first = !zoom.scene;
+    pointer.cancel();
     zoom.use(scene);
     drawing = null;
     document.title = `${scene.title} – NeuroVis`;
@@ -212,7 +213,6 @@ function go(id) {
 }
 
 new ResizeObserver(resize).observe(canvas);
-followFingers(canvas, camera, redraw);
 const placing = new Placing(
   link,
   () => !matrix && drawing !== null,
@@ -222,7 +222,7 @@ const placing = new Placing(
   },
   part,
 );
-new Pointer(canvas, camera, attention, placing, {
+const pointer = new Pointer(canvas, camera, attention, placing, {
   pointed(x, y) {
     const { look } = link;
     if (matrix) return matrix.under(camera, x, y);
@@ -230,6 +230,7 @@ new Pointer(canvas, camera, attention, placing, {
   },
   redraw,
 });
+followFingers(canvas, camera, redraw, () => pointer.cancel());
 /** Come closer to the middle, or go away. @param {number} factor */
 function nearer(factor) {
   camera.closer(factor, camera.window[0] / 2, camera.window[1] / 2);
@@ -286,7 +287,13 @@ Object.assign(controls.keys, {
   p: ['pin the strip of what is held, or unpin it', () => strips.toggle(attention.held)],
   '<': ['show more of the past', () => scrubber.more(1)],
   '>': ['show less of the past', () => scrubber.more(-1)],
-  Escape: ['let go of what is held', () => attention.hold('')],
+  Escape: [
+    'let go of what is held; give up a drag',
+    () => {
+      pointer.cancel();
+      attention.hold('');
+    },
+  ],
   ']': ['hold the next neuron', () => attention.next(1)],
   '[': ['hold the neuron before', () => attention.next(-1)],
   'shift+←': ['put what is held further left', () => placing.step(attention.held, -1, 0)],

@@ -9,8 +9,9 @@ function spread([[x0, y0], [x1, y1]]) {
   return [(x0 + x1) / 2, (y0 + y1) / 2, Math.max(1, Math.hypot(x1 - x0, y1 - y0))];
 }
 
-/** Follow fingers. @param {HTMLCanvasElement} canvas @param {Camera} camera @param {() => void} redraw */
-export function followFingers(canvas, camera, redraw) {
+/** Follow fingers. @param {HTMLCanvasElement} canvas @param {Camera} camera @param {() => void} redraw
+ * @param {() => void} begun called when the second finger comes: what the first was about is given up */
+export function followFingers(canvas, camera, redraw, begun) {
   /** @type {Map<number, number[]>} */
   const fingers = new Map();
   // two there have been, and one is still down: it neither drags nor taps
@@ -23,6 +24,7 @@ export function followFingers(canvas, camera, redraw) {
     const before = fingers.size === 2 ? spread([...fingers.values()]) : null;
     if (type === 'pointerdown' ? fingers.size < 2 : fingers.has(id)) fingers.set(id, at);
     if (type === 'pointerup' || type === 'pointercancel') fingers.delete(id);
+    if (fingers.size === 2 && !pinched) begun();
     pinched ||= fingers.size === 2;
     if (pinched) event.stopImmediatePropagation();
     if (pinched && before && type === 'pointermove') {

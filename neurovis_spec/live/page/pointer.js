@@ -37,7 +37,7 @@ export class Pointer {
     canvas.addEventListener('wheel', (event) => this.wheel(event), { passive: false });
     canvas.addEventListener('pointerdown', (event) => this.down(event));
     canvas.addEventListener('pointerup', (event) => this.up(event));
-    canvas.addEventListener('pointercancel', () => placing.cancel());
+    canvas.addEventListener('pointercancel', () => this.cancel());
     canvas.addEventListener('pointermove', (event) => this.move(event));
     canvas.addEventListener('pointerleave', () => attention.point('', [0, 0]));
   }
@@ -57,7 +57,7 @@ export class Pointer {
     const [x, y] = pixel(event),
       id = this.ground.pointed(x, y),
       { placing } = this;
-    if (placing.dragged) placing.cancel();
+    this.cancel();
     this.dragged = 0;
     this.on =
       event.button === 0 && placing.can(id) && (event.pointerType === 'mouse' || id === this.attention.held) ? id : '';
@@ -67,6 +67,13 @@ export class Pointer {
     const [across, down] = this.camera.unit(x, y),
       [left, top] = placing.stand(id).at[0];
     this.off = [left - across, top - down];
+  }
+
+  /** Give up a drag: the neuron stands where it stood. */
+  cancel() {
+    if (this.placing.dragged) this.placing.cancel();
+    this.on = '';
+    this.clamp = null;
   }
 
   /** A click holds; a neuron stays where it was dragged to. @param {PointerEvent} event */
