@@ -225,6 +225,33 @@ def test_with_reduced_motion_pictures_come_seldom_and_nothing_glides(tmp_path: P
     asyncio.run(main())
 
 
+def test_no_panel_lies_on_the_picture_nor_the_tooltip_elsewhere(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):
+            await pause(opened)
+            await opened.size(1300, 800)
+            edges = "(name => { const {left, right} = document.getElementById(name).getBoundingClientRect(); "
+            for key in ("t", "o"):
+                await opened.key(key)
+            await opened.until(f"{ROWS}.length > 10 && !document.querySelector('#turning').hidden")
+            ends = await opened.ask(f"['outline', 'picture', 'turning'].flatMap({edges} return [left, right]; }}))")
+            assert ends == [0, 300, 300, 1000, 1000, 1300]
+            await opened.ask("document.querySelector('#picture').focus()")
+            await opened.key("]")
+            await opened.until(f"!{TIP}.hidden")
+            await opened.ask("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+            left = await opened.ask(f"{TIP}.getBoundingClientRect().left")
+            assert isinstance(left, (int, float))
+            found = await opened.ask(
+                "(async () => { for (let y = 0; y < 400; y += 4) for (let x = LEFT - 60; x < LEFT + 8; x += 4) {"
+                "picture.dispatchEvent(new PointerEvent('pointermove', {clientX: x, clientY: y}));"
+                "if (picture.style.cursor) return true; } })()".replace("LEFT", str(left))
+            )
+            assert found
+
+    asyncio.run(main())
+
+
 @pytest.mark.parametrize(("theme", "scheme"), [("default", "light"), ("dark", "dark")])
 def test_what_the_browser_draws_itself_is_as_dark_as_the_theme(theme: str, scheme: str, tmp_path: Path) -> None:
     async def main() -> None:
