@@ -117,6 +117,7 @@ def test_length_depth_and_cost_are_bounded() -> None:
     assert constant(ones + " " * (999 - len(ones))) == 100
     assert constant(" " * 999 + "7") == 7
     assert codes(f"neurons: {{A: {{bias: '{' ' * 1000}7'}}}}") == ["expression-too-long"]
+    assert constant("+".join("1" * 240)) == 240
     assert codes(f"neurons: {{A: {{bias: '{'+'.join('1' * 500)}'}}}}") == ["expression-too-costly"]
     deep = "(" * 300 + "1" + ")" * 300
     assert codes(f"neurons: {{A: {{bias: '{deep}'}}}}") == ["expression-too-deep"]

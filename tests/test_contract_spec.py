@@ -179,3 +179,17 @@ def test_groups_inputs_and_instances_share_one_namespace() -> None:
         "instances: {B: {module: A}}\noutputs: {A: A}\nlayout: {boxes: {B: A}}"
     )
     assert network_of(text).neurons.names == ("A", "B.L", "B.A")
+
+
+def test_hashes_outlive_a_version() -> None:
+    """What was recorded with an earlier one belongs to the same network."""
+    network = nv.compile_text(
+        """neurovis: 1
+name: pinned
+activations:
+  wave: {parameters: {b: 2}, value: x*b/3 - sin(x) + 1 if x > 0 and b > 0 else -x^2}
+neurons: {A: {count: 2, activation: wave, noise: "normal(0, 1) + k % 3 - 1"}}
+connections: {A -> A: {pattern: ring}}
+"""
+    )
+    assert network.describe()["hash"] == "398d1075b5f645ddf9131ae6846853e790f98f7df32fe701a2c40591358cb848"

@@ -18,6 +18,8 @@ from neurovis_spec.language.expressions.tree import (
     Binary,
     BinaryOperator,
     Call,
+    Chain,
+    ChainOperator,
     Conditional,
     Name,
     Number,
@@ -28,7 +30,13 @@ from neurovis_spec.language.expressions.tree import (
 
 NAMES = ("a", "b", "c")
 CODES = {name: f"v_{name}" for name in NAMES}
-COMPARISONS: tuple[BinaryOperator, ...] = ("<", "<=", ">", ">=", "==", "!=", "and", "or")
+COMPARISONS: tuple[BinaryOperator, ...] = ("<", "<=", ">", ">=", "==", "!=")
+TRUTHS: tuple[ChainOperator, ...] = ("and", "or")
+#: Every operator between a and b.
+OPERATIONS: Mapping[str, Tree] = {
+    **{sign: Chain((sign,), (Name("a"), Name("b"))) for sign in ("+", "-", "*", "/", "%", *TRUTHS)},
+    **{sign: Binary(sign, Name("a"), Name("b")) for sign in ("^", *COMPARISONS)},
+}
 SIGNS: tuple[UnaryOperator, ...] = ("-", "+", "not")
 #: Functions that IEEE 754 rounds exactly.
 EXACT = ("abs", "sign", "min", "max", "clip", "floor", "ceil", "round", "sqrt", "step")
@@ -44,15 +52,26 @@ def calls(functions: tuple[str, ...], parts: st.SearchStrategy[Tree]) -> st.Sear
     return st.sampled_from(functions).flatmap(of)
 
 
+def chains(operators: tuple[ChainOperator, ...], parts: st.SearchStrategy[Tree]) -> st.SearchStrategy[Tree]:
+    """Of two to five operands."""
+
+    def joined(first: Tree, rest: list[tuple[ChainOperator, Tree]]) -> Tree:
+        return Chain(tuple(sign for sign, _ in rest), (first, *(operand for _, operand in rest)))
+
+    rest = st.lists(st.tuples(st.sampled_from(operators), parts), min_size=1, max_size=4)
+    return st.builds(joined, parts, rest)
+
+
 def trees(
-    numbers: tuple[float, ...], operators: tuple[BinaryOperator, ...], functions: tuple[str, ...]
+    numbers: tuple[float, ...], levels: tuple[tuple[ChainOperator, ...], ...], functions: tuple[str, ...]
 ) -> st.SearchStrategy[Tree]:
     leaves: st.SearchStrategy[Tree] = st.sampled_from(numbers).map(Number) | st.sampled_from(NAMES).map(Name)
     return st.recursive(
         leaves,
         lambda parts: (
             st.builds(Unary, st.sampled_from(SIGNS), parts)
-            | st.builds(Binary, st.sampled_from(operators + COMPARISONS), parts, parts)
+            | st.builds(Binary, st.sampled_from(COMPARISONS), parts, parts)
+            | st.sampled_from((*levels, ("and",), ("or",))).flatmap(lambda level: chains(level, parts))
             | st.builds(Conditional, parts, parts, parts)
             | st.builds(Binary, st.just("^"), parts, st.just(Number(2.0)))
             | calls(functions, parts)
@@ -61,10 +80,15 @@ def trees(
     )
 
 
-EXACT_TREES = trees((0.0, 1.0, 2.0, 0.5, 3.0, 1e300, -1.0), ("+", "-", "*"), EXACT)
+EXACT_TREES = trees((0.0, 1.0, 2.0, 0.5, 3.0, 1e300, -1.0), (("+", "-"), ("*",)), EXACT)
 # denominators that are leaves: the sign of a zero that min or max picks is the platform's choice
-DIVIDED = st.builds(Binary, st.sampled_from(["/", "%"]), EXACT_TREES, st.sampled_from(NAMES).map(Name))
-SMOOTH_TREES = trees((0.0, 1.0, 0.25, 0.7, -0.3), ("+", "-"), SMOOTH)
+DIVIDED = st.builds(
+    lambda first, signs, names: Chain(tuple(signs), (first, *map(Name, names[: len(signs)]))),
+    EXACT_TREES,
+    st.lists(st.sampled_from(["/", "%", "*"]), min_size=1, max_size=3),
+    st.permutations(NAMES),
+)
+SMOOTH_TREES = trees((0.0, 1.0, 0.25, 0.7, -0.3), (("+", "-"),), SMOOTH)
 VALUES = st.lists(
     st.sampled_from([0.0, -0.0, 1.0, -1.0, 0.5, -2.5, 3.0, 1e200, math.inf, -math.inf, math.nan]) | st.floats(-9, 9),
     min_size=3,
@@ -126,15 +150,17 @@ def without_jumps(tree: Tree) -> Tree:
             return Unary(sign, without_jumps(operand))
         case Binary(operator="^", left=left):
             return Binary("^", Call("sin", (without_jumps(left),)), Number(2.0))
-        case Binary(operator="+" | "-" as operator, left=left, right=right):
-            return Binary(operator, without_jumps(left), without_jumps(right))
+        case Chain(operators=("+" | "-", *_) as operators, operands=operands):
+            return Chain(operators, tuple(map(without_jumps, operands)))
+        case Chain(operands=operands):
+            times: ChainOperator = "*"
+            return Chain((times,) * (len(operands) - 1), tuple(Call("cos", (without_jumps(one),)) for one in operands))
         case Binary(left=left, right=right):
-            return Binary("*", Call("cos", (without_jumps(left),)), Call("tanh", (without_jumps(right),)))
+            return Chain(("*",), (Call("cos", (without_jumps(left),)), Call("tanh", (without_jumps(right),))))
         case Conditional(then=then, condition=condition, otherwise=otherwise):
             chosen = Binary("<", Name("a"), Name("b"))
-            return Binary(
-                "+", Conditional(chosen, without_jumps(then), without_jumps(otherwise)), without_jumps(condition)
-            )
+            choice = Conditional(chosen, without_jumps(then), without_jumps(otherwise))
+            return Chain(("+",), (choice, without_jumps(condition)))
         case Call(function=function, arguments=arguments):
             return Call(function, tuple(map(without_jumps, arguments)))
         case _:
@@ -151,15 +177,37 @@ def test_every_function_has_its_code(name: str) -> None:
         np.testing.assert_allclose(other, reference, rtol=1e-12, atol=0)
 
 
-@pytest.mark.parametrize("operator", ["+", "-", "*", "/", "%", "^", *COMPARISONS])
-def test_every_operator_at_the_edges(operator: BinaryOperator) -> None:
+@pytest.mark.parametrize("operator", OPERATIONS)
+def test_every_operator_at_the_edges(operator: str) -> None:
     edges = [0.0, -0.0, 0.5, -0.5, 1.0, -1.0, 2.0, -3.0, 1e308, -1e308, math.inf, -math.inf, math.nan]
     values = [[a, b, 0.0] for a in edges for b in edges]
-    operation = Binary(operator, Name("a"), Name("b"))
-    for tree in (operation, Binary("/", Number(1.0), operation)):  # the second tells a zero from its negative
+    operation = OPERATIONS[operator]
+    for tree in (operation, Chain(("/",), (Number(1.0), operation))):  # the second tells a zero from its negative
         reference, *others = four_ways(tree, values)
         for other in others:
             np.testing.assert_allclose(other, reference, rtol=1e-12, atol=0)
+
+
+#: 240 operands, none inside another.
+LONG = {
+    "sum": "a" + "+b-c" * 119 + "+b",
+    "product": "a" + "*b/c" * 119 + "*b",
+    "quotient": "a" + "/b" * 239,
+    "remainder": "a" + "%b" * 239,
+    "truth": "a" + " or b" * 190,
+}
+
+
+@pytest.mark.parametrize("text", LONG.values(), ids=LONG)
+def test_a_long_sum_is_one_operation_and_not_deep(text: str) -> None:
+    tree = parse(text)
+    assert isinstance(tree, Chain)
+    assert all(isinstance(operand, Name) for operand in tree.operands)
+    reference, *others = four_ways(tree, [[0.1, 0.7, 1.3], [3.7e5, -0.3, 0.9], [0.0, -0.0, math.inf]])
+    for other in others:
+        np.testing.assert_array_equal(other, reference)
+    by_python = eval(text, {"a": 0.1, "b": 0.7, "c": 1.3})
+    assert reference[0] == (1.0 if "or" in text else by_python)
 
 
 @pytest.mark.parametrize(
@@ -178,6 +226,7 @@ def test_every_operator_at_the_edges(operator: BinaryOperator) -> None:
         ("a / b", "np.divide(v_a, v_b)"),
         ("1 / 0", "np.divide(1.0, 0.0)"),
         ("a % b", "np.remainder(v_a, v_b)"),
+        ("2*a / b / c * a % b", "np.divide(2.0*v_a, v_b)/v_c*v_a%v_b"),
         ("a < b", "(v_a < v_b)*1.0"),
         ("a < b and c", "((v_a < v_b) & (v_c != 0.0))*1.0"),
         ("a and (b or c)", "((v_a != 0.0) & ((v_b != 0.0) | (v_c != 0.0)))*1.0"),
@@ -222,7 +271,7 @@ def test_functions_and_draws_of_the_place() -> None:
 
 
 def test_numbers_that_are_not_finite() -> None:
-    tree = Binary("-", Number(-math.inf), Binary("*", Number(math.nan), Number(-0.0)))
+    tree = Chain(("-",), (Number(-math.inf), Chain(("*",), (Number(math.nan), Number(-0.0)))))
     assert emit(tree, {}) == "-np.inf - np.nan*-0.0"
 
 

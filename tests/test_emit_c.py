@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
-from test_emit import COMPARISONS, DIVIDED, EXACT_TREES, NAMES, SMOOTH_TREES, VALUES
+from test_emit import DIVIDED, EXACT_TREES, LONG, NAMES, OPERATIONS, SMOOTH_TREES, VALUES
 
 from neurovis_spec.language.expressions.emit_c import Emitter, known_in
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.language.expressions.parser import parse
-from neurovis_spec.language.expressions.tree import Binary, Call, Name, Number, Tree
+from neurovis_spec.language.expressions.tree import Call, Name, Number, Tree
 from neurovis_spec.runtime.c_code import words_of
 from neurovis_spec.runtime.c_library import load
 
@@ -61,8 +61,11 @@ def test_random_trees_give_the_same_bits(trees: list[Tree], points: list[list[fl
 def test_every_function_and_operator_at_the_edges() -> None:
     calls = [Call(name, tuple(Name(n) for n in NAMES[: function.least])) for name, function in FUNCTIONS.items()]
     several: list[Tree] = [Call(name, (Name("a"), Name("b"), Name("c"), Name("a"))) for name in ("min", "max")]
-    operators: list[Tree] = [Binary(o, Name("a"), Name("b")) for o in ("+", "-", "*", "/", "%", "^", *COMPARISONS)]
-    agree([*calls, *several, *operators], [[a, b, 0.5] for a in EDGES for b in EDGES])
+    agree([*calls, *several, *OPERATIONS.values()], [[a, b, 0.5] for a in EDGES for b in EDGES])
+
+
+def test_a_long_sum_gives_the_same_bits() -> None:
+    agree([parse(text) for text in LONG.values()], [[a, b, 1.3] for a in EDGES for b in EDGES])
 
 
 def test_zero_minus_a_choice_of_zero_is_zero() -> None:

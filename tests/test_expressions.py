@@ -18,6 +18,7 @@ from neurovis_spec.language.expressions.parser import ExpressionError, parse, un
 from neurovis_spec.language.expressions.tree import (
     Binary,
     Call,
+    Chain,
     Conditional,
     Draw,
     Name,
@@ -49,6 +50,11 @@ def shown(node: Tree) -> str:
             return f"({operator} {shown(operand)})"
         case Binary(operator=binary, left=left, right=right):
             return f"({shown(left)} {binary} {shown(right)})"
+        case Chain(operands=operands):
+            result = shown(operands[0])
+            for joined, operand in node.steps:
+                result = f"({result} {joined} {shown(operand)})"
+            return result
         case Conditional(condition=condition, then=then, otherwise=otherwise):
             return f"({shown(then)} if {shown(condition)} else {shown(otherwise)})"
         case Call(function=function, arguments=arguments):
@@ -436,7 +442,7 @@ def test_substitution_does_not_explode() -> None:
         substitute(parse("u + u"), {"u": doubled})
     for _ in range(199):
         deep = substitute(parse("-u"), {"u": deep})
-    with pytest.raises(ExpressionError, match="more than 200 operations one upon the other"):
+    with pytest.raises(ExpressionError, match="more than 200 operations inside each other"):
         substitute(parse("-u"), {"u": deep})
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from neurovis_spec.language.expressions.tree import Chain
 from neurovis_spec.language.located import Located
 
 if TYPE_CHECKING:
@@ -85,6 +86,8 @@ class _Writer:
             for key, item in sorted(value.items()):  # no mapping of a network has an order that matters
                 self.value(str(key))
                 self.value(item)
+        elif isinstance(value, Chain):
+            self._chain(value)
         elif isinstance(value, Located):  # where it stands is no content
             written = value.value
             self.value(float(written) if isinstance(written, int) else written)
@@ -99,6 +102,18 @@ class _Writer:
         self.put("list", str(len(items)).encode())
         for item in items:
             self.value(item)
+
+    def _chain(self, chain: Chain) -> None:
+        """One operation upon the other, in the form in which two operands are written: hashes outlive a version."""
+        for operator in reversed(chain.operators):
+            self.put("record", b"Binary")
+            self.value("operator")
+            self.value(operator)
+            self.value("left")
+        self.value(chain.operands[0])
+        for operand in chain.operands[1:]:
+            self.value("right")
+            self.value(operand)
 
     def _record(self, value: DataclassInstance) -> None:
         kind = type(value)

@@ -17,7 +17,7 @@ from neurovis_spec.compiler.settable import ParameterFormula, places_of
 from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
-from neurovis_spec.language.expressions.tree import Binary, Conditional, Draw, Tree, children, draws, names
+from neurovis_spec.language.expressions.tree import Chain, Conditional, Draw, Tree, children, draws, names
 from neurovis_spec.language.located import Formula
 
 
@@ -67,7 +67,7 @@ def _check_deviations(tree: Tree, formula: Formula, count: int, constants: Const
             width = width_of(draw, *(evaluate_array(part, known) for part in (parts[0], draw.second)))
             if np.less(width, 0).any():
                 constants.refuse_draw(formula, draw, float(np.min(width)))
-            tree = draw.second if draw.kind == "normal" else Binary("-", draw.second, draw.first)
+            tree = draw.second if draw.kind == "normal" else Chain(("-",), (draw.second, draw.first))
             bound = constants.bound(tree, {name: known[name] for name in ("i", "n")})
             if bound.slots:
                 following.append(bound)

@@ -22,7 +22,7 @@ from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.measures import PLACE, Formula, parse_measure
 from neurovis_spec.language.expressions.parser import ExpressionError
-from neurovis_spec.language.expressions.tree import Binary, Call, Name, Tree, is_square, names, walk
+from neurovis_spec.language.expressions.tree import Binary, Call, Chain, Name, Tree, is_square, names, walk
 from neurovis_spec.runtime.columns import Probe, find_states, probe_of
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.recording import UnknownNameError
@@ -78,8 +78,10 @@ class Measure:
 def _by_numpy(node: Tree) -> bool:
     """Whether NumPy works out a part of a formula in its own way: of 0 and −0, which are equal, its ``min`` takes
     either. A square is a product to both."""
+    if isinstance(node, Chain):
+        return "%" in node.operators
     if isinstance(node, Binary):
-        return node.operator == "%" or (node.operator == "^" and is_square(node) is None)
+        return node.operator == "^" and is_square(node) is None
     return isinstance(node, Call) and node.function not in ("abs", "sign", "step", "sqrt")
 
 

@@ -17,6 +17,7 @@ from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.language.expressions.tree import (
     Binary,
     Call,
+    Chain,
     Conditional,
     Draw,
     Name,
@@ -97,6 +98,11 @@ class _Evaluation:
                 return np.negative(result) if sign == "-" else result
             case Binary(operator=symbol, left=left, right=right):
                 return np.asarray(_OPERATIONS[symbol](self.value(left), self.value(right)), dtype=np.float64)
+            case Chain(operands=operands):
+                result = self.value(operands[0])
+                for joined, operand in tree.steps:
+                    result = np.asarray(_OPERATIONS[joined](result, self.value(operand)), dtype=np.float64)
+                return result
             case Conditional(condition=condition, then=then, otherwise=otherwise):
                 return np.where(np.not_equal(self.value(condition), 0), self.value(then), self.value(otherwise))
             case Call(function=function, arguments=arguments):

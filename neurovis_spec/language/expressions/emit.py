@@ -19,6 +19,7 @@ from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.language.expressions.tree import (
     Binary,
     Call,
+    Chain,
     Conditional,
     Draw,
     Name,
@@ -68,12 +69,14 @@ def simplify(tree: Tree) -> Tree:
     What is not finite stays as written, and so does an exponent that comes to 2 (written, it would be a square).
 
     >>> from neurovis_spec.language.expressions.parser import parse
-    >>> simplify(parse("2 * 3 + 1/0")).left
+    >>> simplify(parse("2 * 3 + 1/0")).operands[0]
     Number(value=6.0, start=0, end=5)
     """
     parts = tuple(simplify(part) for part in children(tree))
     if parts:
         tree = _with_parts(tree, parts)
+    if isinstance(tree, Chain):
+        return _folded_chain(tree)
     constant = isinstance(tree, Unary | Binary | Conditional) or (isinstance(tree, Call) and tree.function in FUNCTIONS)
     if not constant or not all(isinstance(part, Number) for part in parts):
         return tree
@@ -91,6 +94,19 @@ def _with_parts(tree: Tree, parts: tuple[Tree, ...]) -> Tree:
     if exponent is not None and not isinstance(exponent, Number) and parts[1] == _two(parts[1]):
         parts = (parts[0], exponent)
     return rebuild(tree, parts)
+
+
+def _folded_chain(tree: Chain) -> Tree:
+    """A sum or a product with the numbers that it begins with made one."""
+    first, *rest = tree.operands
+    operators = [*tree.operators]
+    while rest and isinstance(first, Number) and isinstance(rest[0], Number):
+        value = evaluate(Chain((operators[0],), (first, rest[0])), {})
+        if not math.isfinite(value):
+            break
+        first = Number(value, tree.start, rest.pop(0).end)
+        del operators[0]
+    return Chain(tuple(operators), (first, *rest), tree.start, tree.end) if rest else first
 
 
 def _two(tree: Tree) -> Number:
@@ -120,8 +136,11 @@ class _Emitter:
                 return f"-{self.tight(operand, _SIGN)}", _SIGN
             case Unary(operator="+", operand=operand):
                 return self.value(operand)
-            case Binary(operator=operator, left=left, right=right) if operator in ("+", "-", "*", "/", "%", "^"):
-                return self.arithmetic(operator, left, right)
+            case Binary(operator="^", left=left, right=right):
+                # the operator of Python raises where both operands are Python floats; the function of NumPy never does
+                return f"np.float_power({self.loose(left)}, {self.loose(right)})", _ATOM
+            case Chain() if tree.operators[0] not in ("and", "or"):
+                return self.arithmetic(tree)
             case Conditional(condition=condition, then=then, otherwise=otherwise):
                 choice = f"{self.truth(condition)[0]}, {self.loose(then)}, {self.loose(otherwise)}"
                 return f"np.where({choice})", _ATOM
@@ -138,25 +157,31 @@ class _Emitter:
         match tree:
             case Binary(operator=operator, left=left, right=right) if operator in _COMPARISONS:
                 return f"{self.tight(left, _OR)} {operator} {self.tight(right, _OR)}", _COMPARE
-            case Binary(operator="and", left=left, right=right):
-                return f"{_wrapped(self.truth(left), _AND)} & {_wrapped(self.truth(right), _AND + 1)}", _AND
-            case Binary(operator="or", left=left, right=right):
-                return f"{_wrapped(self.truth(left), _OR)} | {_wrapped(self.truth(right), _OR + 1)}", _OR
+            case Chain(operators=("and", *_), operands=operands):
+                return " & ".join(_wrapped(self.truth(operand), _AND + 1) for operand in operands), _AND
+            case Chain(operators=("or", *_), operands=operands):
+                return " | ".join(_wrapped(self.truth(operand), _OR + 1) for operand in operands), _OR
             case Unary(operator="not", operand=operand):
                 return f"np.logical_not({self.truth(operand)[0]})", _ATOM
             case _:
                 return f"{self.tight(tree, _OR)} != 0.0", _COMPARE
 
-    def arithmetic(self, operator: str, left: Tree, right: Tree) -> _Code:
-        if operator in _ARITHMETIC:
-            level = _ARITHMETIC[operator]
-            joined = f" {operator} " if level == _ADD else operator
-            return f"{self.tight(left, level)}{joined}{self.tight(right, level + 1)}", level
-        if operator == "/" and isinstance(right, Number) and right.value != 0 and math.isfinite(right.value):
-            return f"{self.tight(left, _MULTIPLY)}/{self.tight(right, _SIGN)}", _MULTIPLY
-        # the operators of Python raise where both operands are Python floats; the functions of NumPy never do
-        name = {"/": "divide", "%": "remainder", "^": "float_power"}[operator]
-        return f"np.{name}({self.loose(left)}, {self.loose(right)})", _ATOM
+    def arithmetic(self, chain: Chain) -> _Code:
+        """Sums and products: one operator after the other."""
+        code, by_numpy = self.value(chain.operands[0]), False
+        for operator, operand in chain.steps:
+            if operator in _ARITHMETIC:
+                level = _ARITHMETIC[operator]
+                joined = f" {operator} " if level == _ADD else operator
+                code = f"{_wrapped(code, level)}{joined}{self.tight(operand, level + 1)}", level
+            elif by_numpy or (operator == "/" and _divides(operand)):
+                code = f"{_wrapped(code, _MULTIPLY)}{operator}{self.tight(operand, _SIGN)}", _MULTIPLY
+            else:
+                # the operators of Python raise where both operands are Python floats; the functions of NumPy never do,
+                # and what comes of them is no such float
+                name = {"/": "divide", "%": "remainder"}[operator]
+                code, by_numpy = (f"np.{name}({code[0]}, {self.loose(operand)})", _ATOM), True
+        return code
 
     def square(self, base: Tree) -> _Code:
         code, level = self.value(base)
@@ -178,6 +203,11 @@ class _Emitter:
 
     def tight(self, tree: Tree, level: int) -> str:
         return _wrapped(self.value(tree), level)
+
+
+def _divides(tree: Tree) -> bool:
+    """Whether anything can be divided by it: a number, but not 0."""
+    return isinstance(tree, Number) and tree.value != 0 and math.isfinite(tree.value)
 
 
 def _wrapped(code: _Code, level: int) -> str:

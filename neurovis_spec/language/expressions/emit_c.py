@@ -17,6 +17,7 @@ from neurovis_spec.language.expressions.emit import simplify
 from neurovis_spec.language.expressions.tree import (
     Binary,
     Call,
+    Chain,
     Conditional,
     Draw,
     Name,
@@ -113,7 +114,7 @@ def known_in(tree: Tree, names: Mapping[str, Value]) -> Tree:
     """The tree with the numbers that are known put in and all constant parts computed.
 
     >>> from neurovis_spec.language.expressions.parser import parse
-    >>> known_in(parse("a * b + x"), {"a": 2.0, "b": 3.0, "x": "x1"}).left.value
+    >>> known_in(parse("a * b + x"), {"a": 2.0, "b": 3.0, "x": "x1"}).operands[0].value
     6.0
     """
     return simplify(_put(tree, names))
@@ -232,14 +233,8 @@ class _Writer:
                 return f"-{self.tight(operand, _ATOM)}", _SIGN
             case Unary(operator="+", operand=operand):
                 return self.value(operand)
-            case Binary(operator="-", left=Number(value=0.0 as zero), right=right) if math.copysign(1.0, zero) > 0:
-                return f"nv_from_zero({self.loose(right)})", _ATOM
-            case Binary(operator=operator, left=left, right=right) if operator in _ARITHMETIC:
-                level = _ARITHMETIC[operator]
-                joined = f" {operator} " if level == _ADD else operator
-                return f"{self.tight(left, level)}{joined}{self.tight(right, level + 1)}", level
-            case Binary(operator="%", left=left, right=right):
-                return f"nv_mod({self.loose(left)}, {self.loose(right)})", _ATOM
+            case Chain() if tree.operators[0] not in ("and", "or"):
+                return self.arithmetic(tree)
             case Binary(operator="^", left=left, right=right):
                 return self.power(left, right)
             case Conditional(condition=condition, then=then, otherwise=otherwise):
@@ -255,15 +250,29 @@ class _Writer:
             case Binary(operator=operator, left=left, right=right) if operator in _COMPARISONS:
                 level = _COMPARISONS[operator]
                 return f"{self.tight(left, _ADD)} {operator} {self.tight(right, _ADD)}", level
-            case Binary(operator="and", left=left, right=right):
-                return f"{_wrapped(self.truth(left), _AND)} && {_wrapped(self.truth(right), _EQUAL)}", _AND
-            case Binary(operator="or", left=left, right=right):
+            case Chain(operators=("and", *_), operands=operands):
+                return " && ".join(_wrapped(self.truth(operand), _EQUAL) for operand in operands), _AND
+            case Chain(operators=("or", *_), operands=operands):
                 # compilers warn of && within ||
-                return f"{_wrapped(self.truth(left), _EQUAL)} || {_wrapped(self.truth(right), _EQUAL)}", _OR
+                return " || ".join(_wrapped(self.truth(operand), _EQUAL) for operand in operands), _OR
             case Unary(operator="not", operand=operand):
                 return f"!{_wrapped(self.truth(operand), _ATOM)}", _SIGN
             case _:
                 return f"{self.tight(tree, _ADD)} != {self.number(0.0)}", _EQUAL
+
+    def arithmetic(self, chain: Chain) -> _Code:
+        """Sums and products: one operator after the other."""
+        code = self.value(chain.operands[0])
+        for number, (operator, operand) in enumerate(chain.steps):
+            if number == 0 and operator == "-" and _is_zero(chain.operands[0]):
+                code = f"nv_from_zero({self.loose(operand)})", _ATOM
+            elif operator == "%":
+                code = f"nv_mod({code[0]}, {self.loose(operand)})", _ATOM
+            else:
+                level = _ARITHMETIC[operator]
+                joined = f" {operator} " if level == _ADD else operator
+                code = f"{_wrapped(code, level)}{joined}{self.tight(operand, level + 1)}", level
+        return code
 
     def power(self, base: Tree, exponent: Tree) -> _Code:
         known = known_in(exponent, self.names)
@@ -301,6 +310,11 @@ class _Writer:
 
     def tight(self, tree: Tree, level: int) -> str:
         return _wrapped(self.value(tree), level)
+
+
+def _is_zero(tree: Tree) -> bool:
+    """Whether a tree is the number 0, not −0."""
+    return isinstance(tree, Number) and tree.value == 0.0 and math.copysign(1.0, tree.value) > 0
 
 
 def _wrapped(code: _Code, level: int) -> str:

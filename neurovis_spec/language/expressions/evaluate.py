@@ -18,6 +18,7 @@ from neurovis_spec.language.expressions.functions import FUNCTIONS, divide, modu
 from neurovis_spec.language.expressions.tree import (
     Binary,
     Call,
+    Chain,
     Conditional,
     Draw,
     Name,
@@ -78,6 +79,11 @@ def evaluate(
         case Binary(operator=symbol, left=left, right=right):
             first = evaluate(left, names, functions, draw)
             return float(_OPERATIONS[symbol](first, evaluate(right, names, functions, draw)))
+        case Chain(operands=operands):
+            value = evaluate(operands[0], names, functions, draw)
+            for joined, operand in tree.steps:
+                value = float(_OPERATIONS[joined](value, evaluate(operand, names, functions, draw)))
+            return value
         case Conditional(condition=condition, then=then, otherwise=otherwise):
             taken = then if evaluate(condition, names, functions, draw) != 0 else otherwise
             return evaluate(taken, names, functions, draw)

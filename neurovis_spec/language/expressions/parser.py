@@ -21,6 +21,8 @@ from neurovis_spec.language.expressions.tree import (
     Binary,
     BinaryOperator,
     Call,
+    Chain,
+    ChainOperator,
     Conditional,
     Draw,
     Name,
@@ -162,18 +164,35 @@ class Parser:
         """Operands joined by operators that bind at least as tight as ``level``."""
         start = self.token.start
         left = self.prefix(level)
-        while self.token.kind == "operator" and LEVELS.get(self.token.text, -1) >= level:
+        while self.level() >= level:
+            own = self.level()
+            if own not in (_POWER, _COMPARISON):
+                left = self.chain(left, own, start)
+                continue
             token = self.advance()
-            own = LEVELS[token.text]
             with self.deeper(token):
                 right = self.binary(own if own == _POWER else own + 1)
             operator = cast(BinaryOperator, "^" if token.text == "**" else token.text)
             left = Binary(operator, left, right, start, self.end)
-            if own == _COMPARISON and LEVELS.get(self.token.text) == _COMPARISON:
+            if own == self.level() == _COMPARISON:
                 message = "comparisons do not chain"
                 hint = "join two comparisons with 'and', as in 'a < b and b < c'"
                 raise ExpressionError("chained-comparison", message, self.token.start, self.token.end, hint)
         return left
+
+    def level(self) -> int:
+        """How tight the operator binds that stands here; -1 where there is none."""
+        return LEVELS.get(self.token.text, -1) if self.token.kind == "operator" else -1
+
+    def chain(self, first: Tree, own: int, start: int) -> Tree:
+        """What is joined to ``first`` by operators that bind as tight as ``own``."""
+        operators, operands = [], [first]
+        while self.level() == own:
+            token = self.advance()
+            operators.append(cast(ChainOperator, token.text))
+            with self.deeper(token):
+                operands.append(self.binary(own + 1))
+        return Chain(tuple(operators), tuple(operands), start, self.end)
 
     def prefix(self, level: int) -> Tree:
         """A sign or ``not`` with its operand, else an operand."""

@@ -15,7 +15,8 @@ from typing import Literal, TypeAlias
 from neurovis_spec.language.expressions.errors import ExpressionError
 
 UnaryOperator = Literal["-", "+", "not"]
-BinaryOperator = Literal["+", "-", "*", "/", "%", "^", "<", "<=", ">", ">=", "==", "!=", "and", "or"]
+BinaryOperator = Literal["^", "<", "<=", ">", ">=", "==", "!="]
+ChainOperator = Literal["+", "-", "*", "/", "%", "and", "or"]
 
 #: How tight the operators bind; ``not`` is between ``and`` and the comparisons, signs between ``%`` and ``^``.
 LEVELS: Mapping[str, int] = {
@@ -26,9 +27,9 @@ LEVELS: Mapping[str, int] = {
     **dict.fromkeys(("*", "/", "%"), 6),
     **dict.fromkeys(("^", "**"), 8),
 }
-#: The cost of an expression: its nodes.
-MAX_NODES = 600
-#: How far down a tree goes; long sums go down to the left. Every walk may recurse.
+#: The cost of an expression: its operations and values.
+MAX_COST = 600
+#: How far down a tree goes, which every walk may do by recursion. A long sum is one node.
 MAX_DEPTH = 200
 
 
@@ -62,13 +63,29 @@ class Unary:
 
 @dataclass(frozen=True, slots=True)
 class Binary:
-    """Two operands. Comparisons, ``and`` and ``or`` give 1 or 0."""
+    """A power, or a comparison, which gives 1 or 0."""
 
     operator: BinaryOperator
     left: Tree
     right: Tree
     start: int = 0
     end: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """``a + b - c``: operands joined from left to right by operators that bind equally tight, one fewer than there are
+    operands. ``and`` and ``or`` give 1 or 0."""
+
+    operators: tuple[ChainOperator, ...]
+    operands: tuple[Tree, ...]
+    start: int = 0
+    end: int = 0
+
+    @property
+    def steps(self) -> Iterator[tuple[ChainOperator, Tree]]:
+        """Each operator with the operand behind it."""
+        return zip(self.operators, self.operands[1:], strict=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +121,7 @@ class Draw:
     end: int = 0
 
 
-Tree: TypeAlias = Number | Name | Unary | Binary | Conditional | Call | Draw
+Tree: TypeAlias = Number | Name | Unary | Binary | Chain | Conditional | Call | Draw
 
 
 def children(tree: Tree) -> tuple[Tree, ...]:
@@ -114,6 +131,8 @@ def children(tree: Tree) -> tuple[Tree, ...]:
             return (operand,)
         case Binary(left=left, right=right):
             return (left, right)
+        case Chain(operands=operands):
+            return operands
         case Conditional(condition=condition, then=then, otherwise=otherwise):
             return (then, condition, otherwise)
         case Call(arguments=arguments):
@@ -172,6 +191,8 @@ def rebuild(tree: Tree, parts: tuple[Tree, ...]) -> Tree:
             return replace(tree, operand=parts[0])
         case Binary():
             return replace(tree, left=parts[0], right=parts[1])
+        case Chain():
+            return replace(tree, operands=parts)
         case Conditional():
             return replace(tree, then=parts[0], condition=parts[1], otherwise=parts[2])
         case Call():
@@ -186,14 +207,14 @@ def substitute(tree: Tree, mapping: Mapping[str, Tree]) -> Tree:
     """The tree with the names in ``mapping`` replaced (at once, not again in what was put in).
 
     What is put in keeps its own places, which belong to another text. Raises ExpressionError at the whole of
-    ``tree`` where the result is deeper or has more nodes than an expression may.
+    ``tree`` where the result is deeper or costs more than an expression may.
 
-    >>> substitute(Binary("*", Name("u"), Name("x")), {"u": Number(2.0), "x": Name("u")})
-    Binary(operator='*', left=Number(value=2.0, start=0, end=0), right=Name(name='u', start=0, end=0), start=0, end=0)
+    >>> substitute(Binary("^", Name("u"), Name("x")), {"u": Number(2.0), "x": Name("u")})
+    Binary(operator='^', left=Number(value=2.0, start=0, end=0), right=Name(name='u', start=0, end=0), start=0, end=0)
     """
-    sizes = {name: sum(1 for _ in walk(put)) for name, put in mapping.items()}
-    nodes = sum(sizes.get(node.name, 1) if isinstance(node, Name) else 1 for node in walk(tree))
-    _check_nodes(nodes, tree)
+    costs = {name: sum(map(_cost, walk(put))) for name, put in mapping.items()}
+    cost = sum(costs.get(node.name, 1) if isinstance(node, Name) else _cost(node) for node in walk(tree))
+    _check_cost(cost, tree)
     result = _substituted(tree, mapping)
     check_extent(result, tree)
     return result
@@ -206,23 +227,28 @@ def _substituted(tree: Tree, mapping: Mapping[str, Tree]) -> Tree:
 
 
 def check_extent(tree: Tree, place: Tree | None = None) -> None:
-    """Raise ExpressionError, at ``place``, where a tree has too many nodes or goes too deep."""
+    """Raise ExpressionError, at ``place``, where a tree has too many operations and values or goes too deep."""
     place = place or tree
     waiting = [(tree, 1)]
-    nodes = deepest = 0
+    cost = deepest = 0
     while waiting:
         node, depth = waiting.pop()
-        nodes += 1
+        cost += _cost(node)
         deepest = max(deepest, depth)
         waiting.extend((child, depth + 1) for child in children(node))
-    _check_nodes(nodes, place)
+    _check_cost(cost, place)
     if deepest > MAX_DEPTH:
-        message = f"this expression has more than {MAX_DEPTH} operations one upon the other"
+        message = f"this expression has more than {MAX_DEPTH} operations inside each other"
         raise ExpressionError("expression-too-deep", message, place.start, place.end, "divide it into parts with names")
 
 
-def _check_nodes(nodes: int, place: Tree) -> None:
-    if nodes > MAX_NODES:
-        message = f"this expression takes {nodes} operations and values; {MAX_NODES} are the most"
+def _cost(node: Tree) -> int:
+    """The operations and values of a node alone."""
+    return len(node.operators) if isinstance(node, Chain) else 1
+
+
+def _check_cost(cost: int, place: Tree) -> None:
+    if cost > MAX_COST:
+        message = f"this expression takes {cost} operations and values; {MAX_COST} are the most"
         hint = "divide it into parts with names"
         raise ExpressionError("expression-too-costly", message, place.start, place.end, hint)
