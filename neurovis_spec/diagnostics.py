@@ -13,9 +13,13 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypeAlias
 
 Severity = Literal["error", "warning"]
+#: A help line; where it takes a while to find, what finds it.
+Hint: TypeAlias = "str | Callable[[], str | None] | None"
+#: Errors after which no help line is looked for, and no misspelt name understood: nobody reads them.
+MOST_HINTS = 200
 #: A number in a message, with what belongs to it; that of a name (K3) is none.
 _NUMBER = re.compile(r"(?<![\w.])-?\d[\d.,]*(e[+-]?\d+)?")
 
@@ -73,9 +77,11 @@ class Findings:
     _several: dict[Diagnostic, int] = field(default_factory=dict)
     _unread: dict[Span, frozenset[Diagnostic]] = field(default_factory=dict)
 
-    def error(self, code: str, span: Span, message: str, hint: str | None = None, *, several: bool = False) -> None:
+    def error(self, code: str, span: Span, message: str, hint: Hint = None, *, several: bool = False) -> None:
         """Note a mistake. ``several``: it is one of a data file that the stretch names, which may have several; they
         are told in the order in which they are noted."""
+        if callable(hint):
+            hint = None if self.many else hint()
         found = Diagnostic(code, message, span, "error", hint)
         self._items.append(found)
         if several:
@@ -114,6 +120,11 @@ class Findings:
     def errors(self) -> int:
         """How many errors there are so far: a stage compares it before and after."""
         return self._errors
+
+    @property
+    def many(self) -> bool:
+        """Whether there are so many errors that unknown names are no longer compared with known ones."""
+        return self._errors >= MOST_HINTS
 
     def at_fault(self, span: Span) -> bool:
         """Whether there is an error about exactly this stretch of a text."""

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 from neurovis_spec.compiler.gaps import Gaps
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Input
-from neurovis_spec.compiler.references import Section
-from neurovis_spec.diagnostics import Findings, Span, shown, suggest
+from neurovis_spec.compiler.references import Section, known_inputs
+from neurovis_spec.diagnostics import Findings, Hint, Span, shown
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.model import lost_names
 from neurovis_spec.language.modules import InstanceModel
@@ -51,13 +52,11 @@ def bindings_of(
 
 
 def _unknown(outer: Located[str], section: Section, findings: Findings) -> None:
-    if outer.value.partition(".")[0] in section.neurons:
-        message = f"'{shown(outer.value)}' is a group of neurons, not an input"
-        hint = "connect it to the neurons of the instance"
-    else:
+    hint: Hint = "connect it to the neurons of the instance"
+    message = f"'{shown(outer.value)}' is a group of neurons, not an input"
+    if outer.value.partition(".")[0] not in section.neurons:
         message = f"there is no input '{shown(outer.value)}'"
-        known = suggest(outer.value, tuple(section.inputs), "inputs")
-        hint = known or "no inputs are declared; add it under 'inputs'"
+        hint = partial(known_inputs, outer.value, section.inputs)
     findings.error("unknown-input", outer.span, message, hint)
 
 

@@ -18,7 +18,6 @@ import numpy as np
 
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.draws import Stream
-from neurovis_spec.compiler.limits import MOST_HINTS
 from neurovis_spec.compiler.settable import Dependent, ParameterFormula, Part, Slot, places_of
 from neurovis_spec.diagnostics import Findings, shown, suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
@@ -103,7 +102,7 @@ def parse_formula(
         unknown = unknown_names(tree, names(tree).difference(unused))
         used = [(node.name, node.start, node.end) for node in unknown]
     for name, start, end in () if incomplete else used:
-        few = known if findings.errors < MOST_HINTS else ()
+        few = () if findings.many else known
         message, hint = _unknown(name, few, functions or {}, what)
         if name in later:
             message, hint = f"'{name}' comes later", "a parameter sees those that are declared before it"

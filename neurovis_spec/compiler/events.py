@@ -124,7 +124,7 @@ class EventReader:
         if name not in constants.parameters and name not in constants.broken and not constants.incomplete:
             message = f"there is no parameter '{shown(name)}' to be set"
             known = (*constants.parameters, *constants.broken)
-            self.findings.error("unknown-parameter", span, message, other_parameter(name, known))
+            self.findings.error("unknown-parameter", span, message, lambda: other_parameter(name, known))
         elif name in self.constants.structural:
             message = f"'{name}' cannot be set in a run: the structure of the network depends on it"
             self.findings.error("structural-parameter", span, message)

@@ -17,15 +17,15 @@ from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.definitions import Defaults, Definitions
 from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.labels import labels_of
-from neurovis_spec.compiler.limits import MOST_HINTS, PATIENCE, Limits, amount, plural
+from neurovis_spec.compiler.limits import PATIENCE, Limits, amount, plural
 from neurovis_spec.compiler.network import Group, Role
 from neurovis_spec.compiler.positions import positions_of
 from neurovis_spec.compiler.program import Activation, Combine, Model
-from neurovis_spec.compiler.references import key_span
+from neurovis_spec.compiler.references import key_span, known_inputs
 from neurovis_spec.compiler.settable import Part
 from neurovis_spec.compiler.settings import check_initials, choose, look_at_settings, parameters, spread
 from neurovis_spec.compiler.unit import Unit
-from neurovis_spec.diagnostics import meant, shown, suggest
+from neurovis_spec.diagnostics import meant, shown
 from neurovis_spec.language.expressions.tree import Call, walk
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, too_long
 from neurovis_spec.language.sections import GroupModel
@@ -283,12 +283,9 @@ class Builder:
         if found is None:
             known = tuple(self.unit.section.inputs)
             if name not in known and not self.definitions.gaps.cover("inputs", name):
-                many = findings.errors >= MOST_HINTS
-                hint = (
-                    None if many else suggest(name, known, "inputs") or "no inputs are declared; add it under 'inputs'"
-                )
-                findings.error("unknown-input", model.input.span, f"there is no input '{shown(name)}'", hint)
-                found = None if many else self.unit.inputs.get(meant(name, known) or "")
+                found = None if findings.many else self.unit.inputs.get(meant(name, known) or "")
+                message = f"there is no input '{shown(name)}'"
+                findings.error("unknown-input", model.input.span, message, lambda: known_inputs(name, known))
         if found is None or n is None:
             return None
         if found.size == 1:

@@ -145,8 +145,10 @@ def _place(signal: str, node: Node, unit: Unit, directory: Directory, neurons: i
         return None
     if directory.find(name) is None and not any(mark in name for mark in (".", "+")):
         names = (*unit.section.inputs, *directory.known)
-        hint = suggest(name, few(name, names), "inputs and neurons")
-        findings.error("unknown-signal", node.span, f"there is no neuron, group or input '{shown(name)}'", hint)
+        message = f"there is no neuron, group or input '{shown(name)}'"
+        findings.error(
+            "unknown-signal", node.span, message, lambda: suggest(name, few(name, names), "inputs and neurons")
+        )
         return None
     found = resolve_end(Located(node.value, node), directory, findings)
     return None if found is None else np.array(found, dtype=np.int64)

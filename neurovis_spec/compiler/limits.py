@@ -9,8 +9,6 @@ from typing import NamedTuple
 
 #: Findings in one list of values, after which the rest of the list is not looked at.
 PATIENCE = 20
-#: Errors after which unknown names are no longer compared with the known ones.
-MOST_HINTS = 200
 #: The most instances of modules, and how deep they may be nested.
 MOST_INSTANCES, DEEPEST = 100_000, 64
 #: The longest delay in steps, and the most signals under way (delays of all connections together).

@@ -13,7 +13,7 @@ from itertools import islice
 from typing import TypeAlias
 
 from neurovis_spec.compiler.gaps import Gaps
-from neurovis_spec.compiler.limits import MOST_HINTS, PATIENCE
+from neurovis_spec.compiler.limits import PATIENCE
 from neurovis_spec.compiler.network import Group
 from neurovis_spec.compiler.states import split_sum
 from neurovis_spec.diagnostics import Findings, Span, did_you_mean, listed, meant, nearest, shown, suggest
@@ -26,7 +26,7 @@ from neurovis_spec.language.spec import Spec
 #: What declares neurons, inputs and connections: a spec, or a module.
 Section: TypeAlias = Spec | ModuleModel
 #: How many names are looked through for one that is like another: it takes a while.
-_MANY = 1000
+_MANY = 10_000
 #: A neuron's number as its name has it: without leading zeros.
 _NUMBER = re.compile(r"0|[1-9][0-9]{0,63}")
 _QUOTED = re.compile(r"'([^']*)'")
@@ -162,6 +162,11 @@ def few(name: str, known: Collection[str]) -> Collection[str]:
     return tuple(islice((other for other in known if other.startswith(begin)), _MANY))
 
 
+def known_inputs(name: str, known: Collection[str]) -> str:
+    """A help line for an input that is not declared; ``known`` are those that are."""
+    return suggest(name, few(name, known), "inputs") or "no inputs are declared; add it under 'inputs'"
+
+
 def other_parameter(name: str, known: Collection[str]) -> str:
     """A help line for a parameter that cannot be set as there is none of that name; ``known`` are the spec's own."""
     there = "the spec has no parameters" if not known else f"parameters of the spec: {listed(known)}"
@@ -228,8 +233,8 @@ def resolve_part(name: str, span: Span, directory: Directory, findings: Findings
         if not name:
             findings.error("empty-reference", span, "a reference is missing here", "name a group, a neuron or a range")
         elif not directory.covers(name):
+            right = None if findings.many else directory.meant(name)
             _unknown(name, span, directory, findings)
-            right = directory.meant(name) if findings.errors < MOST_HINTS else None
             return None if right is None else directory.find(right)
     return result
 
@@ -247,8 +252,7 @@ def _unknown(name: str, span: Span, directory: Directory, findings: Findings) ->
         findings.error("unknown-neuron", span, f"'{shown(name)}' is an input, not a neuron", hint)
         return
     message = f"there is no neuron or group '{shown(name)}'"
-    hint = directory.hint(name) if findings.errors < MOST_HINTS else None
-    findings.error("unknown-neuron", span, message, hint)
+    findings.error("unknown-neuron", span, message, lambda: directory.hint(name))
 
 
 def resolve(

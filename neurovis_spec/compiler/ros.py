@@ -14,7 +14,7 @@ from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.gaps import Gaps
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.network import Input, Output
-from neurovis_spec.compiler.references import key_of
+from neurovis_spec.compiler.references import key_of, known_inputs
 from neurovis_spec.compiler.ros_settings import NAMESPACE, Publication, RosSettings, Subscription
 from neurovis_spec.diagnostics import Findings, shown, suggest
 from neurovis_spec.language.located import Located
@@ -136,18 +136,20 @@ def _type(entry: SubscribeModel | PublishModel, size: int) -> str:
 def _report_input(name: str, model: RosModel, known: tuple[str, ...], gaps: Gaps, findings: Findings) -> None:
     if gaps.cover("inputs", name) or ("." in name and findings.failed):  # that of an instance may be missing therefore
         return
-    hint = suggest(name, known, "inputs") or "no inputs are declared; add it under 'inputs'"
     span = key_of(model.source, "subscribe", name).span
-    findings.error("unknown-input", span, f"there is no input '{shown(name)}'", hint)
+    findings.error("unknown-input", span, f"there is no input '{shown(name)}'", lambda: known_inputs(name, known))
 
 
 def _report_output(name: str, model: RosModel, spec: Spec, findings: Findings) -> None:
     declared = {**spec.outputs, **dict.fromkeys(lost_names(spec.source, "outputs", spec.outputs))}
     if name in declared or "outputs" in spec.lost_keys:
         return
-    hint = suggest(name, tuple(declared), "outputs") or "no outputs are declared; add it under 'outputs'"
-    span = key_of(model.source, "publish", name).span
-    findings.error("unknown-output", span, f"there is no output '{shown(name)}'", hint)
+    findings.error(
+        "unknown-output",
+        key_of(model.source, "publish", name).span,
+        f"there is no output '{shown(name)}'",
+        lambda: suggest(name, declared, "outputs") or "no outputs are declared; add it under 'outputs'",
+    )
 
 
 def _check_numbers(entry: SubscribeModel | PublishModel, size: int | None, who: str, findings: Findings) -> None:

@@ -15,7 +15,7 @@ from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.constants import Constants, Randomness, Value, check_finite
 from neurovis_spec.compiler.definitions import Default, Defaults, Definitions, check_bounds
 from neurovis_spec.compiler.draws import Stream
-from neurovis_spec.compiler.limits import MOST_HINTS, PATIENCE, plural
+from neurovis_spec.compiler.limits import PATIENCE, plural
 from neurovis_spec.compiler.program import Quantity
 from neurovis_spec.compiler.settable import Assembled, Dependent, ParameterFormula, Part, Subset
 from neurovis_spec.diagnostics import Findings, meant, nearest, shown, suggest
@@ -72,10 +72,9 @@ def choose(
     name = choice.name
     found = known.get(name.value)
     if found is None and not definitions.gaps.cover(f"{what}s", name.value):
-        many = findings.errors >= MOST_HINTS
-        hint = None if many else suggest(name.value, known, "known")
-        findings.error(f"unknown-{what}", name.span, f"there is no {what} '{shown(name.value)}'", hint)
-        right = None if many else meant(name.value, known)
+        right = None if findings.many else meant(name.value, known)
+        message = f"there is no {what} '{shown(name.value)}'"
+        findings.error(f"unknown-{what}", name.span, message, lambda: suggest(name.value, known, "known"))
         found = None if right is None else known[right]
     return found
 

@@ -17,7 +17,7 @@ from neurovis_spec.compiler.bindings import Binding, bindings_of, check_sizes, s
 from neurovis_spec.compiler.census import Census, Excess
 from neurovis_spec.compiler.constants import Constants
 from neurovis_spec.compiler.gaps import Gaps
-from neurovis_spec.compiler.limits import DEEPEST, MOST_HINTS, MOST_INSTANCES, Limits
+from neurovis_spec.compiler.limits import DEEPEST, MOST_INSTANCES, Limits
 from neurovis_spec.compiler.modules import Library, Module
 from neurovis_spec.compiler.network import Input
 from neurovis_spec.compiler.parameters import make_parameters
@@ -260,10 +260,13 @@ class Expander:
         name = model.module.value
         found = self.library.modules.get(name)
         if found is None and not self.library.definitions.gaps.cover("modules", name):
-            hint = None
-            if self.findings.errors < MOST_HINTS:
-                hint = suggest(name, self.library.modules, "modules") or "there are no modules; add it under 'modules'"
-            self.findings.error("unknown-module", model.module.span, f"there is no module '{shown(name)}'", hint)
+            known = self.library.modules
+            self.findings.error(
+                "unknown-module",
+                model.module.span,
+                f"there is no module '{shown(name)}'",
+                lambda: suggest(name, known, "modules") or "there are no modules; add it under 'modules'",
+            )
         return found
 
     def _look(self, model: InstanceModel, unit: Unit) -> None:

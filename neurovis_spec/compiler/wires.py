@@ -74,7 +74,7 @@ class Finder:
             found = self.wires.between(*ends)
             if not len(found):
                 message = f"there is no connection '{shown(text.value)}'"
-                self.findings.error("no-connection", text.span, message, self._other(text, ends))
+                self.findings.error("no-connection", text.span, message, lambda: self._other(text, ends))
                 return None
             self._know(text, found)
         return self.known[text.value]
