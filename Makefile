@@ -118,6 +118,7 @@ layouts: $(VENV)/tested
 docs: $(VENV)/installed
 	$(BIN)/python docs/make_language.py
 	$(BIN)/python -m neurovis_spec.codes > docs/errors.md
+	$(BIN)/python -m neurovis_spec.analysis > docs/measures.md
 
 page: $(VENV)/tested node_modules/made
 	$(BIN)/python neurovis_spec/live/page/build.py

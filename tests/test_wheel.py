@@ -58,6 +58,8 @@ def test_the_wheel_holds_the_packages_the_library_and_the_examples(wheel: Path) 
     names = set(zipfile.ZipFile(wheel).namelist())
     expected = {
         "neurovis_spec/pipeline.py",
+        "neurovis_spec/analysis/catalogue.yaml",
+        "neurovis_spec/analysis/page.html",
         "neurovis_spec/live/page.html",
         "neurovis_layouts/layered/engine.py",
         "neurovis_renderers/svg.py",

@@ -11,8 +11,10 @@ from neurovis_spec.analysis.coactivity import awake_at_once, coactivation
 from neurovis_spec.analysis.correlation import cross_correlation, printed_correlation
 from neurovis_spec.analysis.excerpt import cut
 from neurovis_spec.analysis.gait import gait, stretches
+from neurovis_spec.analysis.importance import importance
 from neurovis_spec.analysis.information import mutual_information
 from neurovis_spec.analysis.named import Axis, NamedArray
+from neurovis_spec.analysis.sensitivity import sensitivity
 from neurovis_spec.analysis.structure import connection_matrix
 from neurovis_spec.analysis.weights import updates, weight_changes, weights
 
@@ -25,8 +27,10 @@ __all__ = [
     "cross_correlation",
     "cut",
     "gait",
+    "importance",
     "mutual_information",
     "printed_correlation",
+    "sensitivity",
     "stretches",
     "topography",
     "traces",

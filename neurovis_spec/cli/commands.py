@@ -32,6 +32,7 @@ COMMANDS: Final[Mapping[str, str]] = {
     "layout": "Compute and write the layout.",
     "run": "Run a network and write a recording.",
     "sweep": "Run a spec over a grid of parameters and seeds, into a table.",
+    "analyze": "Measure a run, into tables, pictures and a page.",
     "render": "Draw one step as a picture.",
     "animate": "Draw a run as a moving picture.",
     "live": "Show a network in the browser while it runs.",
@@ -39,7 +40,7 @@ COMMANDS: Final[Mapping[str, str]] = {
     "export": "Write a network as source code for a robot.",
 }
 #: What the language names and this version does not have yet.
-LATER: Final = ("analyze", "import")
+LATER: Final = ("import",)
 NO_READER: Final = 141  # as a process that SIGPIPE has ended
 
 EPILOG = """\b

@@ -33,6 +33,16 @@ def check_target(path: Path | None, inputs: Iterable[tuple[str, str | None]] = (
         raise fault(f"{path}: there is no folder '{path.parent}'", f"make it: mkdir -p {path.parent}")
 
 
+def check_folder(path: Path, option: str = "-o") -> None:
+    """Refuse a folder that is something else, or that could not be made."""
+    if str(path) == "-":
+        raise click.UsageError(f"{option} takes a folder: what is written does not go to standard output ('-')")
+    if path.exists() and not path.is_dir():
+        raise fault(f"{path} is a file, not a folder", "name a folder; it is made if it is not there")
+    if not path.parent.is_dir():
+        raise fault(f"{path}: there is no folder '{path.parent}'", f"make it: mkdir -p {path.parent}")
+
+
 def files_of(inputs: Mapping[str, str]) -> list[tuple[str, str | None]]:
     """What the files of inputs are, in words, and their paths."""
     return [(f"the file of the input '{name}'", path) for name, path in inputs.items()]

@@ -1,0 +1,325 @@
+"""The report: all measures of a run, as tables, pictures and a page, in a folder.
+
+In: a compiled network, a Recording of it or none (then it is run), what is to be measured. Out: files. What cannot be
+measured is left out, and the page says why.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec import pipeline
+from neurovis_spec.analysis import pictures, tables
+from neurovis_spec.analysis.activities import topography, traces
+from neurovis_spec.analysis.catalogue import catalogue
+from neurovis_spec.analysis.coactivity import THRESHOLD, awake_at_once, coactivation
+from neurovis_spec.analysis.correlation import cross_correlation
+from neurovis_spec.analysis.excerpt import cut, excerpt
+from neurovis_spec.analysis.gait import gait, stretches
+from neurovis_spec.analysis.importance import importance_by
+from neurovis_spec.analysis.information import mutual_information
+from neurovis_spec.analysis.named import Axis, NamedArray
+from neurovis_spec.analysis.page import PAGE, Shown, page_of
+from neurovis_spec.analysis.sensitivity import sensitivity_by
+from neurovis_spec.analysis.structure import connection_matrix
+from neurovis_spec.analysis.trials import STEPS, Trials
+from neurovis_spec.analysis.weights import updates, weight_changes, weights
+from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.layout.model import LayoutRefusalError
+from neurovis_spec.progress import Progress
+from neurovis_spec.runtime.files import replacing
+from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.scene.model import Scene, Theme
+from neurovis_spec.scene.themes import theme_of
+
+#: The most curves of a picture, bars of a ranking, rows of a table over time, and neurons of a gait diagram.
+_CURVES, _BARS, _ROWS, _LEGS = 24, 30, 2_000, 40
+#: Pictures of activities over time show so many of the last rows, so that their shape is seen.
+_SEEN = 600
+#: Trials that take longer than so many updates of a neuron or a connection are left out.
+_LONGEST = 5_000_000_000
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What is to be measured: which neurons (``of``, None for all), which steps, above which threshold a neuron is
+    active, how many bins; whether further runs are made (``trials``); the theme of the pictures."""
+
+    of: str | Sequence[str] | None = None
+    start: int | None = None
+    stop: int | None = None
+    threshold: float = THRESHOLD
+    bins: int = 20
+    trials: bool = True
+    theme: str | None = None
+    inputs: Mapping[str, npt.ArrayLike] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a measure found: tables and pictures by the names of their files, and what has to be said of them."""
+
+    key: str
+    tables: Mapping[str, NamedArray] = field(default_factory=dict)
+    pictures: Mapping[str, bytes] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+def file_names() -> tuple[str, ...]:
+    """All files that a report may write."""
+    stems = [*catalogue(), "coactivation_total", "active_at_once", "weight_changes", "raster"]
+    return (PAGE, *(f"{stem}{suffix}" for stem in stems for suffix in (".csv", ".json", ".svg")))
+
+
+def analyze(
+    network: CompiledNetwork,
+    folder: str | Path,
+    recording: Recording | None = None,
+    wish: Wish | None = None,
+    progress: Progress | None = None,
+) -> list[Path]:
+    """Write the report of a recording, or of a run as long as ``time.steps``, into a folder, which is made if it is not
+    there; gives the files. Raises what the measures raise, ImportError without the extra ``analyze``, OSError."""
+    asked = Wish() if wish is None else wish
+    place = Path(folder)
+    run = network.run(inputs=asked.inputs, progress=progress) if recording is None else recording
+    report = _Report(network, cut(run, asked.start, asked.stop), asked, progress)
+    readings = list(report.readings())
+    files: dict[str, bytes] = {}
+    for reading in readings:
+        for name, table in reading.tables.items():
+            files[f"{name}.csv"], files[f"{name}.json"] = tables.csv_of(table).encode(), tables.json_of(table).encode()
+        files |= {f"{name}.svg": content for name, content in reading.pictures.items()}
+    files[PAGE] = page_of(_shown(readings), network, report.recording, report.theme, report.settings())
+    place.mkdir(exist_ok=True)
+    for name, content in files.items():
+        with replacing(place / name) as file:
+            file.write(content)
+    return [place / name for name in files]
+
+
+def _shown(readings: Sequence[Reading]) -> list[Shown]:
+    entries = catalogue()
+    return [Shown(entries[one.key], one.tables, one.pictures, one.notes) for one in readings]
+
+
+class _Report:
+    """The readings of one recording, each made when it is asked for."""
+
+    def __init__(self, network: CompiledNetwork, recording: Recording, wish: Wish, progress: Progress | None) -> None:
+        self.network, self.recording, self.wish, self._progress = network, recording, wish, progress
+        self.theme: Theme = theme_of(network.settings_for(wish.theme))
+        self._part = excerpt(recording, wish.of)
+        self._late = cut(recording, int(recording.step[-_SEEN])) if len(recording) > _SEEN else recording
+        self._dt = network.network.dt if network.network.dt_given else None
+
+    def settings(self) -> dict[str, str]:
+        """What was measured, in words."""
+        step, names = self.recording.step, self._part.names
+        return {
+            "steps": f"{step[0]} to {step[-1]} ({len(step):,} rows)",
+            "neurons": f"{len(names):,} of {len(self.recording.neurons):,}" if self.wish.of else f"all {len(names):,}",
+            "active": f"above an absolute activity of {self.wish.threshold:g}",
+            "bins": str(self.wish.bins),
+        }
+
+    def readings(self) -> Iterator[Reading]:
+        """All measures, in the order of the catalogue."""
+        makers: dict[str, Callable[[], Reading]] = {
+            "connections": self._connections,
+            "traces": self._traces,
+            "topography": self._topography,
+            "correlation": self._correlation,
+            "information": self._information,
+            "coactivation": self._coactivation,
+            "weights": self._weights,
+            "updates": self._updates,
+            "gait": self._gait,
+        }
+        for key, make in makers.items():
+            yield _left_out(key, make)
+        yield from self._trials()
+
+    def _draw(self, scene: Scene) -> bytes:
+        return pipeline.draw(scene, ".svg")
+
+    def _view(self, view: str) -> bytes:
+        """A view that the pictures of a network have as well."""
+        with TemporaryDirectory() as folder:
+            target = Path(folder) / "picture.svg"
+            self.network.render(target, recording=self._late, view=view, theme=self.wish.theme)
+            return target.read_bytes()
+
+    def _pairs(self, table: NamedArray, caption: str) -> bytes:
+        return self._draw(pictures.cells(table, catalogue_title(table.name), caption, self.theme))
+
+    def _connections(self) -> Reading:
+        made = connection_matrix(self.recording, self.wish.of)
+        drawn = {"connections": self._pairs(made, "rows send, columns take in")} if len(made.rows.labels) else {}
+        return Reading("connections", {"connections": made}, drawn)
+
+    def _traces(self) -> Reading:
+        made, part = traces(self.recording, self.wish.of), excerpt(self._late, self.wish.of)
+        drawn, notes = {}, self._late_only()
+        if len(part.names) <= _CURVES:
+            scene = pictures.curves(part.names, part.activity, part.step, self._dt, "Traces", "activity", self.theme)
+            drawn["traces"] = self._draw(scene)
+        else:
+            notes.append(f"{len(part.names):,} curves are too many for a picture: choose up to {_CURVES} with --of.")
+        if self.recording.missing is None and self.wish.of is None:
+            drawn["raster"] = self._view("raster")
+        thin, said = _thinned(made)
+        return Reading("traces", {"traces": thin}, drawn, (*notes, *said))
+
+    def _late_only(self) -> list[str]:
+        if self._late is self.recording:
+            return []
+        rows, most = f"{len(self.recording):,}", f"{len(self._late):,}"
+        return [f"Pictures have the last {most} of {rows} rows; --from and --to choose others."]
+
+    def _topography(self) -> Reading:
+        self.recording.check_whole("a map is not drawn of")
+        made = topography(self.recording, self.network.drawn().value.positions, self.wish.of)
+        return Reading("topography", {"topography": made}, {"topography": self._view("network")})
+
+    def _correlation(self) -> Reading:
+        made = cross_correlation(self.recording, self.wish.of)
+        return Reading("correlation", {"correlation": made}, {"correlation": self._pairs(made, "E[x·y] of each pair")})
+
+    def _information(self) -> Reading:
+        made = mutual_information(self.recording, self.wish.of, bins=self.wish.bins)
+        caption = f"bits, {self.wish.bins} bins; the diagonal is the entropy"
+        return Reading("information", {"information": made}, {"information": self._pairs(made, caption)})
+
+    def _coactivation(self) -> Reading:
+        threshold, of = self.wish.threshold, self.wish.of
+        total = coactivation(self.recording, of, threshold=threshold, per="total")
+        found = {"coactivation_total": total}
+        drawn = {"coactivation_total": self._pairs(total, f"seconds in total, |a| > {threshold:g}")}
+        notes: tuple[str, ...] = ()
+        try:
+            each = coactivation(self.recording, of, threshold=threshold)
+            found = {"coactivation": each, **found}
+            drawn = {"coactivation": self._pairs(each, f"seconds a period, |a| > {threshold:g}"), **drawn}
+        except RecordingError:
+            notes = ("The activities have no period, so there is only the total.",)
+        found["active_at_once"] = awake_at_once(self.recording, of, threshold=threshold)
+        return Reading("coactivation", found, drawn, notes)
+
+    def _weights(self) -> Reading:
+        made, changes = weights(self.recording), weight_changes(self.recording)
+        if not changes.rows.labels:
+            raise RecordingError("no weight can change")
+        thin, said = _thinned(made)
+        names, values, more = self._strongest(made, changes)
+        scene = pictures.curves(names, values, self.recording.step, self._dt, "Weights", "weight", self.theme)
+        return Reading("weights", {"weight_changes": changes, "weights": thin}, {"weights": self._draw(scene)},
+                       (*more, *said))  # fmt: skip
+
+    def _updates(self) -> Reading:
+        made, changes = updates(self.recording), weight_changes(self.recording)
+        if not changes.rows.labels:
+            raise RecordingError("no weight can change")
+        if len(self.recording) < 2:
+            raise RecordingError("one step alone has no updates")
+        thin, said = _thinned(made)
+        names, values, more = self._strongest(made, changes)
+        scene = pictures.curves(names, values, self.recording.step[:-1], self._dt, "Updates", "update", self.theme)
+        return Reading("updates", {"updates": thin}, {"updates": self._draw(scene)}, (*more, *said))
+
+    def _strongest(self, made: NamedArray, changes: NamedArray) -> tuple[tuple[str, ...], FloatArray, tuple[str, ...]]:
+        """Of many connections those whose weights have gone the longest way."""
+        names = made.columns.labels
+        if len(names) <= _CURVES:
+            return names, made.values, ()
+        way = np.nan_to_num(changes.column("travelled"), nan=-1.0)
+        order = np.sort(np.argsort(-way, kind="stable")[:_CURVES])
+        chosen = tuple(names[place] for place in order.tolist())
+        return (
+            chosen,
+            made.values[:, order],
+            (f"The picture has the {_CURVES} of {len(names):,} that travel furthest.",),
+        )
+
+    def _gait(self) -> Reading:
+        threshold, of = self.wish.threshold, self.wish.of
+        made = gait(self.recording, of, threshold=threshold)
+        if len(made.rows.labels) > _LEGS:
+            note = f"{len(made.rows.labels):,} rows are too many for a picture: choose up to {_LEGS} with --of."
+            return Reading("gait", {"gait": made}, {}, (note,))
+        found = stretches(self._late, of, threshold=threshold)
+        scene = pictures.diagram(found, made, self._late.step, self._dt, "Gait diagram", self.theme)
+        return Reading("gait", {"gait": made}, {"gait": self._draw(scene)}, tuple(self._late_only()))
+
+    def _trials(self) -> Iterator[Reading]:
+        keys = ("importance", "sensitivity")
+        if not self.wish.trials:
+            yield from (Reading(key, notes=("Left out: no further runs were asked for.",)) for key in keys)
+            return
+        network = self.network.network
+        first = self.wish.start
+        last = network.steps if self.wish.stop is None else self.wish.stop
+        count = min(STEPS, network.steps) if first is None else max(min(STEPS, last - first), 1)
+        if self.wish.stop is not None and first is None:
+            first = max(last - count, 0)
+        size = len(network.neurons) + len(network.connections)
+        runs = 2 * (size + len(network.neurons) + 2 * len(network.inputs) + len(network.parameters))
+        if runs * count * size > _LONGEST:
+            note = f"Left out: {runs:,} runs of this network take too long."
+            yield from (Reading(key, notes=(note,)) for key in keys)
+            return
+        try:
+            trials = Trials(self.network, first, count, self.wish.inputs or None)
+        except ValueError as error:
+            yield from (Reading(key, notes=(f"Left out: {error}.",)) for key in keys)
+            return
+        names = [network.neurons.names[index] for index in trials.outputs.tolist()]
+        what = f"runs of {count:,} steps from step {trials.start:,} on, by {_few(names)}"
+        lost = importance_by(trials, self._progress)
+        shares = lost.column("lesion share")
+        by = "lesion share" if np.isfinite(shares).any() else "lesion"
+        yield self._ranked("importance", lost, by, f"{by}, {what}")
+        yield self._ranked("sensitivity", sensitivity_by(trials, self._progress), "elasticity", f"elasticity, {what}")
+
+    def _ranked(self, key: str, table: NamedArray, by: str, caption: str) -> Reading:
+        values, names = table.column(by), table.rows.labels
+        order = np.argsort(-np.nan_to_num(values, nan=-1.0), kind="stable")[:_BARS]
+        title = catalogue()[key].title
+        scene = pictures.bars([names[p] for p in order.tolist()], values[order], title, caption, self.theme)
+        notes = (f"The picture has the first {_BARS} of {len(names):,}.",) if len(names) > _BARS else ()
+        return Reading(key, {key: table}, {key: self._draw(scene)}, notes)
+
+
+def catalogue_title(name: str) -> str:
+    """A name as a title."""
+    return name[:1].upper() + name[1:]
+
+
+def _left_out(key: str, make: Callable[[], Reading]) -> Reading:
+    """A reading, or why there is none."""
+    try:
+        return make()
+    except (RecordingError, LayoutRefusalError) as error:
+        return Reading(key, notes=(f"Left out: {error}.",))
+
+
+def _thinned(table: NamedArray) -> tuple[NamedArray, tuple[str, ...]]:
+    """One in so many rows that the table is no longer than tables are; the recording has them all."""
+    rows = len(table.rows.labels)
+    if rows <= _ROWS:
+        return table, ()
+    every = -(-rows // _ROWS)
+    kept = Axis(table.rows.name, table.rows.labels[::every])
+    said = f"The table has one in {every} of {rows:,} rows; neurovis run -o x.csv writes all."
+    return replace(table, values=table.values[::every], rows=kept), (said,)
+
+
+def _few(names: Sequence[str]) -> str:
+    return ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")

@@ -1,0 +1,157 @@
+"""Trials: runs of a network from one and the same state, each with something changed.
+
+In: a compiled network, the step at which the trials begin, how many steps they have. Out: the outputs of a trial, step
+by step. The run up to the first step is made once, and so is the code that makes steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec import arguments
+from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.network import Input, Network
+from neurovis_spec.runtime.backend import Availability, Capabilities, Stepper, prepare
+from neurovis_spec.runtime.columns import ALL, columns_of
+from neurovis_spec.runtime.record import Course, InMemory, Last, go
+from neurovis_spec.runtime.recording import RecordingError
+from neurovis_spec.runtime.rows import Steps
+from neurovis_spec.runtime.simulation import Simulation
+from neurovis_spec.runtime.state import State, initial_state
+
+#: Steps of a trial where nothing else is asked for.
+STEPS = 500
+
+
+class Prepared:
+    """A backend that has made the network ready already; ``seen`` is given the inputs of each step, and says which it
+    is to take instead."""
+
+    name = "prepared"
+    capabilities = Capabilities(noise=True)
+
+    def __init__(self, stepper: Stepper, seen: Callable[[FloatArray], FloatArray] | None = None) -> None:
+        self._stepper = stepper if seen is None else _Turned(stepper, seen)
+
+    def availability(self) -> Availability:
+        """It is there."""
+        return Availability(True)
+
+    def prepare(self, network: Network) -> Stepper:
+        """The stepper that there is."""
+        return self._stepper
+
+
+@dataclass(frozen=True)
+class _Turned:
+    """A stepper that is given other inputs."""
+
+    stepper: Stepper
+    seen: Callable[[FloatArray], FloatArray]
+
+    def step(self, state: State, inputs: FloatArray, /) -> None:
+        self.stepper.step(state, self.seen(inputs))
+
+
+class Trials:
+    """Trials of ``steps`` steps from step ``start`` on, by default the last ones of ``time.steps``; ``inputs`` replace
+    sources of inputs as in ``run``, ``of`` are the neurons that count as outputs (default: the spec's outputs, else
+    those that send to nobody). Raises KeyError, ValueError where there are no outputs."""
+
+    def __init__(
+        self,
+        compiled: CompiledNetwork,
+        start: int | None = None,
+        steps: int | None = None,
+        inputs: Mapping[str, npt.ArrayLike] | None = None,
+        of: str | Sequence[str] | None = None,
+    ) -> None:
+        network = compiled.network
+        count = min(STEPS, network.steps) if steps is None else arguments.integer("steps", steps, 1, 1 << 40)
+        first = max(network.steps - count, 0) if start is None else arguments.integer("start", start, 0, 1 << 40)
+        self.network, self.start, self.steps, self._inputs = network, first, count, inputs
+        self.outputs = output_neurons(network) if of is None else _neurons(network, of)
+        if not len(self.outputs):
+            raise ValueError("the network has no outputs: name the neurons that count as outputs")
+        self._stepper = prepare(network, None, (first + count) * 100)
+        self._simulation = Simulation(network, Prepared(self._stepper), inputs=inputs)
+        self._state = initial_state(network)
+        widths = columns_of(network, ALL).widths(network)
+        go(network, self._state, Course(first, 1, inputs, Prepared(self._stepper)), Last(widths))
+        vectors: list[FloatArray] = []
+
+        def noted(vector: FloatArray) -> FloatArray:
+            vectors.append(vector.copy())
+            return vector
+
+        #: what the network does with nothing changed: all activities (steps, neurons), and the inputs that it is given
+        self.activity = self._run(self._state.copy(), noted)
+        self.given = np.array(vectors).reshape(count, -1)
+        self.intact = self.activity[:, self.outputs]
+
+    @property
+    def weights(self) -> FloatArray:
+        """w[start] of all connections (m,)."""
+        return self._state.weights
+
+    def parameter(self, name: str) -> float:
+        """The value of a parameter at the first step."""
+        return float(self._state.conditions.parameters[self.network.settable.index[name]])
+
+    def changed(self, change: Callable[[Simulation], None]) -> FloatArray:
+        """The outputs (steps, outputs) where something was done to the simulation before the first step."""
+        self._simulation.restore(self._state)
+        change(self._simulation)
+        return self._run(self._simulation.state())[:, self.outputs]
+
+    def weighed(self, connection: int, more: float) -> FloatArray:
+        """The same where a connection's weight is by so much more."""
+        state = self._state.copy()
+        state.weights[connection] += more
+        return self._run(state)[:, self.outputs]
+
+    def told(self, entry: Input, turn: Callable[[FloatArray], FloatArray]) -> FloatArray:
+        """The same where an input is another, made of what it is at each step."""
+        own = slice(entry.start, entry.start + entry.size)
+
+        def seen(vector: FloatArray) -> FloatArray:
+            other = vector.copy()
+            other[own] = turn(vector[own])
+            return other
+
+        return self._run(self._state.copy(), seen)[:, self.outputs]
+
+    def _run(self, state: State, seen: Callable[[FloatArray], FloatArray] | None = None) -> FloatArray:
+        rows = InMemory(columns_of(self.network, ALL).widths(self.network), self.steps)
+        go(self.network, state, Course(self.steps, 1, self._inputs, Prepared(self._stepper, seen)), rows)
+        return rows.numbers(Steps(self.steps, 1, self.start)).activity
+
+
+def output_neurons(network: Network) -> IntArray:
+    """The neurons of the spec's outputs, else those of the role output, else those that send to no other."""
+    found = {index for output in network.outputs if not output.states for index in output.neurons.tolist()}
+    if not found:
+        found = {index for group in network.neurons.groups if group.role == "output" for index in group.indices}
+    if not found:
+        ends = network.connections
+        sending = set(ends.sources[ends.sources != ends.targets].tolist())
+        found = set(ends.targets.tolist()) - sending
+    return np.array(sorted(found), dtype=np.int64)
+
+
+def _neurons(network: Network, of: str | Sequence[str]) -> IntArray:
+    from neurovis_spec.runtime.names import names_of
+
+    result: dict[int, None] = {}
+    names = names_of(network)
+    for reference in arguments.texts("of", of):
+        found = names.find(reference)
+        if isinstance(found, str):
+            raise RecordingError(found)
+        result.update(dict.fromkeys(found.neurons))
+    return np.array(list(result), dtype=np.int64)

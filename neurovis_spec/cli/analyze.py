@@ -1,0 +1,97 @@
+"""``neurovis analyze``: what a run tells, as tables, pictures and a page."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+
+import click
+
+from neurovis_spec.cli.completion import paths
+from neurovis_spec.cli.failure import fault
+from neurovis_spec.cli.files import count, network_of, recording_of, tables, writing
+from neurovis_spec.cli.options import examples, finite, input_option, need_run, set_option, spec_argument, theme_option
+from neurovis_spec.cli.progress import progress
+from neurovis_spec.cli.targets import check_files, check_folder, check_target, files_of
+
+
+@click.command(
+    epilog=examples(
+        "neurovis analyze first.yaml -o readings",
+        "neurovis analyze first.yaml --of K --from 9428 -o readings",
+        "neurovis analyze first.yaml --recording first.npz --no-trials -o readings",
+        "neurovis analyze hexapod.yaml --of left.CF+right.CF --threshold 0.5 --from 120 --to 360 -o gait",
+    )
+)
+@spec_argument
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="FOLDER",
+    required=True,
+    help="The folder for the tables, the pictures and the page (index.html); it is made if it is not there.",
+)
+@click.option("--recording", metavar="FILE", shell_complete=paths, help="Measure this; without it the network is run.")
+@click.option("--of", metavar="REFS", multiple=True, help="The neurons to measure, such as K or 'C + K'; default: all.")
+@click.option("--from", "start", type=click.IntRange(0, 2**53), metavar="STEP", help="The first step to measure.")
+@click.option("--to", "stop", type=click.IntRange(1, 2**53), metavar="STEP", help="The step to end before.")
+@click.option(
+    "--threshold",
+    type=click.FloatRange(min=0),
+    callback=finite,
+    default=0.05,
+    metavar="X",
+    help="A neuron is active while its absolute activity is above X; default: 0.05.",
+)
+@click.option(
+    "--bins", type=click.IntRange(2, 1000), default=20, metavar="N", help="Bins of mutual information; default: 20."
+)
+@click.option(
+    "--trials/--no-trials",
+    default=True,
+    help="Make the further runs that importance and sensitivity need (default), or leave these out.",
+)
+@theme_option
+@set_option
+@input_option
+def command(
+    spec: str,
+    output: Path,
+    recording: str | None,
+    of: tuple[str, ...],
+    start: int | None,
+    stop: int | None,
+    threshold: float,
+    bins: int,
+    trials: bool,
+    theme: str | None,
+    settings: dict[str, float],
+    inputs: dict[str, str],
+) -> None:
+    """Measure a run: tables, pictures, and a page that says what they mean.
+
+    The measures are those of the NeuroVis paper: connection matrix, traces, topography, cross-correlation, mutual
+    information, co-activation, weights and their updates, the gait diagram, and what the outputs lose and gain with
+    each part. What cannot be measured is left out, and the page says why.
+    """
+    need_run(inputs, recording)
+    if start is not None and stop is not None and stop <= start:
+        raise click.UsageError(f"--to {stop} is not behind --from {start}: there is no step to measure")
+    if find_spec("jinja2") is None:
+        raise fault("the page needs jinja2, which is not installed", "pip install 'neurovis-spec[analyze]'")
+    from neurovis_spec.analysis.report import Wish, analyze, file_names
+
+    check_folder(output)
+    read = [("the spec itself", spec), ("the recording that is measured", recording), *files_of(inputs)]
+    if output.is_dir():
+        for name in file_names():
+            check_target(output / name, read)
+    network = network_of(spec, settings)
+    for name in file_names():
+        check_files(output / name, network)
+    record, arrays = recording_of(recording), tables(inputs, network.network)
+    wish = Wish(of or None, start, stop, threshold, bins, trials, theme, arrays)
+    with progress("measuring") as bar, writing(output):
+        files = analyze(network, output, record, wish, bar)
+    click.echo(f"{output}: {count(len(files), 'file')}; open {output / 'index.html'}")
