@@ -129,7 +129,8 @@ class World:
         else:
             self.environment |= {"ROS_DOMAIN_ID": str(next(_domains) % 200)}
 
-    def _started(self, command: Sequence[str | Path], **more: str) -> Process:
+    def started(self, command: Sequence[str | Path], **more: str) -> Process:
+        """A process in the environment of this world, with more variables."""
         process = Process(command, {**self.environment, **more})
         self.processes.append(process)
         return process
@@ -154,17 +155,17 @@ class World:
 
     def neurovis(self, *arguments: str | Path, **environment: str) -> Process:
         """A command of NeuroVis."""
-        return self._started([self.bin / "neurovis", *arguments], **environment)
+        return self.started([self.bin / "neurovis", *arguments], **environment)
 
     def peer(self, **plan: object) -> Process:
         """Another node; see ``ros_peer``. It meets this machine alone."""
         alone = {"ROS_IP": "127.0.0.1"} if self.ros == 1 else {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-        return self._started([self.bin / "python", PEER, json.dumps({"seconds": PATIENCE, **plan})], **alone)
+        return self.started([self.bin / "python", PEER, json.dumps({"seconds": PATIENCE, **plan})], **alone)
 
     def python(self, code: str, *arguments: str) -> Process:
         """A program in this environment."""
         alone = {"ROS_IP": "127.0.0.1"} if self.ros == 1 else {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-        return self._started([self.bin / "python", "-c", code, *arguments], **alone)
+        return self.started([self.bin / "python", "-c", code, *arguments], **alone)
 
     def close(self) -> None:
         """Kill what still runs."""

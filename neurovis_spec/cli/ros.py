@@ -16,6 +16,7 @@ COMMANDS: Final[Mapping[str, str]] = {
     "view": "Show and record a network that runs elsewhere.",
     "legacy": "Show, record or write as a spec what speaks to the first NeuroVis.",
     "play": "Publish a recording as it came.",
+    "export": "Write a network as a package, a node in C++, or a publisher.",
 }
 
 

@@ -5,10 +5,11 @@ In: texts of the command line. Out: a Meeting, which opens the node and ends wit
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import re
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, TypeVar
+from typing import TYPE_CHECKING, Final, Literal, TypeVar
 
 import click
 
@@ -19,6 +20,34 @@ if TYPE_CHECKING:
     from neurovis_spec.ros.summary import Summary
 
 F = TypeVar("F", bound=Callable[..., object])
+#: where a command's context has the arguments for ROS itself
+_ARGUMENTS: Final = "neurovis.ros"
+_REMAPPING: Final = re.compile(r"[A-Za-z_~/][A-Za-z0-9_~/.]*:=.*", re.DOTALL)
+
+
+def arguments_of_ros(arguments: Sequence[str]) -> tuple[list[str], tuple[str, ...]]:
+    """The arguments of a command, and those of ROS itself among them.
+
+    >>> arguments_of_ros(["x.yaml", "--ros-args", "-r", "a:=b", "--", "--steps", "5"])
+    (['x.yaml', '--steps', '5'], ('--ros-args', '-r', 'a:=b', '--'))
+    >>> arguments_of_ros(["x.yaml", "__name:=y", "--steps", "5", "_gain:=2"])
+    (['x.yaml', '--steps', '5'], ('__name:=y', '_gain:=2'))
+    """
+    rest, found, within = list[str](), list[str](), False
+    for word in arguments:
+        within = within or word == "--ros-args"
+        (found if within or _REMAPPING.fullmatch(word) else rest).append(word)
+        within = within and word != "--"
+    return rest, tuple(found)
+
+
+class NodeCommand(click.Command):
+    """A command that takes the arguments of ROS, too, as launch files give them."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Set the arguments of ROS aside."""
+        rest, ctx.meta[_ARGUMENTS] = arguments_of_ros(args)
+        return super().parse_args(ctx, rest)
 
 
 @dataclass(frozen=True)
@@ -37,7 +66,9 @@ class Meeting:
         """A node that is there for a block. Raises MiddlewareError."""
         from neurovis_spec.ros.middleware import Wish, open_node
 
-        opened = open_node(Wish(name, namespace, self.ros, self.remote, self.sim_time, anonymous), tell)
+        context = click.get_current_context(silent=True)
+        given: tuple[str, ...] = () if context is None else context.meta.get(_ARGUMENTS, ())
+        opened = open_node(Wish(name, namespace, self.ros, self.remote, self.sim_time, anonymous, given), tell)
         try:
             yield opened
         finally:

@@ -10,18 +10,19 @@ import click
 from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.files import network_of
 from neurovis_spec.cli.options import backend_option, examples, finite, set_option, spec_argument
-from neurovis_spec.cli.ros_options import Meeting, meeting_options, tell
+from neurovis_spec.cli.ros_options import Meeting, NodeCommand, meeting_options, tell
 from neurovis_spec.cli.ros_shown import Desk, shown_options
 from neurovis_spec.interrupts import heeded
 
 
 @click.command(
+    cls=NodeCommand,
     epilog=examples(
         "neurovis ros run first.yaml",
         "neurovis ros run first.yaml --rate 100 --seconds 60",
         "neurovis ros run first.yaml --live 8080 --record run.mcap",
         "neurovis ros run first.yaml --ros 1 --steps 1000 --wait 5 --format json",
-    )
+    ),
 )
 @spec_argument
 @click.option("--steps", type=click.IntRange(min=1), metavar="N", help="End after N steps.")

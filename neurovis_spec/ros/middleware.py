@@ -157,7 +157,8 @@ class Node(Protocol):
         ...
 
     def declare(self, parameters: Sequence[Parameter], set_: SetParameters) -> None:
-        """Offer parameters that others can set: ROS 2's own; in ROS 1 ``NAME/parameters/…`` of the master's server."""
+        """Offer parameters that others can set: ROS 2's own; in ROS 1 ``NAME/parameters/…`` of the master's server.
+        Those that the node was started with are set at once: ROS 2's overrides; in ROS 1 ``~NAME``."""
         ...
 
     def follow(self, values: Mapping[str, float]) -> None:
@@ -172,7 +173,8 @@ class Node(Protocol):
 @dataclass(frozen=True, slots=True)
 class Wish:
     """How a node is to be opened: its name and namespace, ``ros`` (None: what is there), whether it meets other
-    machines, whether its time is that of ``/clock``, whether another of its name may be there (``anonymous``)."""
+    machines, whether its time is that of ``/clock``, whether another of its name may be there (``anonymous``), and
+    ``arguments`` for ROS itself: ``--ros-args -r a:=b -p name:=1``, in ROS 1 ``a:=b _name:=1``."""
 
     name: str
     namespace: str = "/"
@@ -180,6 +182,7 @@ class Wish:
     remote: bool = False
     sim_time: bool = False
     anonymous: bool = False
+    arguments: tuple[str, ...] = ()
     environment: Mapping[str, str] = field(default_factory=lambda: os.environ)
 
 

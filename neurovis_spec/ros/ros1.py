@@ -88,11 +88,12 @@ class Ros1Publisher:
     """Sends bytes to a topic."""
 
     def __init__(self, node: Ros1Node, topic: str, type_: str, quality: Quality) -> None:
-        self.topic, self.type, self._node = topic, type_, node
+        self.type, self._node = type_, node
         self._class = _raw(type_)
         latched = quality.durability == "transient_local"
         queue = quality.depth if quality.reliability == "best_effort" else max(_QUEUE, quality.depth)
         self.handle = rospy.Publisher(topic, self._class, queue_size=queue, latch=latched, tcp_nodelay=True)
+        self.topic = str(self.handle.resolved_name)
 
     @property
     def subscribers(self) -> int:
@@ -119,8 +120,9 @@ class Ros1Subscription:
     """Hands on the bytes of a topic, whatever their type."""
 
     def __init__(self, node: Ros1Node, topic: str, quality: Quality, arrived: Arrived) -> None:
-        self.topic, self.type, self._node, self._arrived, self._closed = topic, "*", node, arrived, False
+        self.type, self._node, self._arrived, self._closed = "*", node, arrived, False
         self.handle = rospy.Subscriber(topic, rospy.AnyMsg, self._take, buff_size=_BUFFER, tcp_nodelay=True)
+        self.topic = str(self.handle.resolved_name)
 
     def _take(self, message: rospy.AnyMsg) -> None:
         if self._closed:
@@ -158,13 +160,15 @@ class Ros1Node:
         self._prefix, self._set = "", cast("SetParameters | None", None)
         self._seen: dict[str, object] = {}
         self._end, self._gone, self._away, self._ending = Event(), Event(), False, False
+        if wish.arguments[:1] == ("--ros-args",):
+            raise MiddlewareError("ROS 1 does not take '--ros-args'", "write /from:=/to, _NAME:=VALUE")
         uri = os.environ.setdefault("ROS_MASTER_URI", "http://localhost:11311")
         os.environ["ROS_NAMESPACE"] = wish.namespace
         rospy.names._set_caller_id(rosgraph.names.make_global_ns(wish.namespace) + wish.name)
         self._uri = uri
         self._wait_for_master()
         try:
-            remaps = ["neurovis", f"__ns:={wish.namespace}"]
+            remaps = ["neurovis", f"__ns:={wish.namespace}", *wish.arguments]
             rospy.init_node(wish.name, remaps, anonymous=wish.anonymous, disable_signals=True, disable_rostime=True)
         except Exception as error:
             raise MiddlewareError(f"a node of ROS 1 cannot be made: {error}") from None
@@ -254,8 +258,21 @@ class Ros1Node:
         if parameters:
             self._prefix = f"{self.name}/parameters"
             self._values = {one.name: float(one.value) for one in parameters}
+            self._start(set_)
             self._announce()
             self._set = set_
+
+    def _start(self, set_: SetParameters) -> None:
+        """Set what the node was started with."""
+        try:
+            given = self._ask(lambda master: master.getParam(self.name, self.name))
+        except OSError:  # nothing
+            return
+        for name, value in given.items() if isinstance(given, dict) else ():
+            if name in self._values:
+                why = self._refusal({name: value}, set_)
+                if why is not None:
+                    self.tell(f"the parameter '{name}' stays {self._values[name]:g}: {why}")
 
     def _announce(self) -> None:
         """Put the parameters on the server, and have it tell of changes."""
@@ -278,12 +295,12 @@ class Ros1Node:
         changed = {name: value for name, value in changed.items() if value != self._values.get(name)}
         if not changed:
             return
-        why = self._refusal(changed)
+        why = self._refusal(changed, self._set)
         if why is not None:
             self.tell(f"{self._prefix}: {why}")
             self._put({name: self._values[name] for name in changed if name in self._values})
 
-    def _refusal(self, changed: Mapping[str, object]) -> str | None:
+    def _refusal(self, changed: Mapping[str, object], set_: SetParameters) -> str | None:
         given: dict[str, float] = {}
         for name, value in changed.items():
             if name not in self._values:
@@ -291,8 +308,7 @@ class Ros1Node:
             if isinstance(value, bool) or not isinstance(value, int | float):
                 return f"'{name}' takes a number"
             given[name] = float(value)
-        assert self._set is not None
-        why = self._set(given)
+        why = set_(given)
         if why is None:
             self._values |= given
         return why

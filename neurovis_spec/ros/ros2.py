@@ -78,7 +78,7 @@ class Ros2Publisher:
     """Sends bytes to a topic."""
 
     def __init__(self, node: Ros2Node, topic: str, type_: str, quality: Quality) -> None:
-        self.topic, self.type, self._node = topic, type_, node
+        self.topic, self.type, self._node = node.rcl.resolve_topic_name(topic), type_, node
 
         def incompatible(event: object) -> None:
             node.tell(f"{topic}: a subscriber asks for another quality of service ({_policy(event)}) and gets nothing")
@@ -110,7 +110,8 @@ class Ros2Subscription:
     """Hands on the bytes of a topic."""
 
     def __init__(self, node: Ros2Node, topic: str, type_: str, quality: Quality, arrived: Arrived) -> None:
-        self.topic, self._type, self._node, self._quality, self._arrived = topic, type_, node, quality, arrived
+        self.topic = node.rcl.resolve_topic_name(topic)
+        self._type, self._node, self._quality, self._arrived = type_, node, quality, arrived
         self._class, self._closed, self._told = _message(type_), False, set[str]()
         self._make(self._reliable())
 
@@ -198,13 +199,16 @@ class Ros2Node:
         self._later: list[Callable[[], None]] = []
         self._declared: set[str] = set()
         self._context = Context()
+        if wish.arguments and wish.arguments[0] != "--ros-args":
+            raise MiddlewareError(f"ROS 2 does not take '{wish.arguments[0]}'", "write --ros-args -r /from:=/to")
+        no_signals = rclpy.SignalHandlerOptions.NO
         try:
-            rclpy.init(args=[], context=self._context, signal_handler_options=rclpy.SignalHandlerOptions.NO)
+            rclpy.init(args=list(wish.arguments), context=self._context, signal_handler_options=no_signals)
             self.rcl = rclpy.create_node(
                 wish.name,
                 namespace=wish.namespace,
                 context=self._context,
-                use_global_arguments=False,
+                use_global_arguments=bool(wish.arguments),
                 parameter_overrides=[Given("use_sim_time", Given.Type.BOOL, True)] if wish.sim_time else [],
             )
         except Exception as error:
@@ -304,6 +308,7 @@ class Ros2Node:
                 self.tell(f"the parameter '{one.name}' is not offered: {error}")
                 continue
             self._declared.add(one.name)
+            self._start(one, float(self.rcl.get_parameter(one.name).value), set_)
 
         def asked(given: Sequence[Given]) -> SetParametersResult:
             values = {one.name: float(one.value) for one in given if one.name in self._declared}
@@ -311,6 +316,13 @@ class Ros2Node:
             return SetParametersResult(successful=why is None, reason=why or "")
 
         self.rcl.add_on_set_parameters_callback(asked)
+
+    def _start(self, one: Parameter, value: float, set_: SetParameters) -> None:
+        """Set a parameter that the node was started with."""
+        why = set_({one.name: value}) if value != one.value else None
+        if why is not None:
+            self.tell(f"the parameter '{one.name}' stays {one.value:g}: {why}")
+            self.later(lambda: self._show({one.name: one.value}))
 
     def follow(self, values: Mapping[str, float]) -> None:
         """Have parameters show what they are by now."""

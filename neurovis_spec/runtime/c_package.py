@@ -6,7 +6,7 @@ there is left alone: an example and a CMakeLists.txt that are there stay, and of
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from pathlib import Path
 
 from neurovis_spec.compiler.network import Network
@@ -19,7 +19,7 @@ from neurovis_spec.runtime.files import replacing
 from neurovis_spec.runtime.state import State
 
 #: what says that a file is ours
-_MARK = "neurovis export"
+_MARK = "by neurovis export"
 
 
 def files(network: Network, start: State | None = None, real: str = "double") -> dict[str, str]:
@@ -34,29 +34,35 @@ def files(network: Network, start: State | None = None, real: str = "double") ->
     }
 
 
-def write(folder: Path, texts: dict[str, str]) -> tuple[list[Path], list[Path]]:
-    """Write the files; what was written, and what was there and stays. Raises ExportError for a file of somebody else's
-    in the way, OSError."""
-    folder.mkdir(parents=True, exist_ok=True)
-    written, kept = [], []
-    for name in texts:
+def write(
+    folder: Path, texts: dict[str, str], yours: Collection[str] = ("main.c", "CMakeLists.txt"), mark: str = _MARK
+) -> tuple[list[Path], list[Path]]:
+    """Write the files, by their paths in the folder; those that begin with ``#!`` can be executed. Of what is there,
+    ``yours`` stays, and what has our ``mark`` is replaced. Gives what was written, and what was there and stays. Raises
+    ExportError for a file of somebody else's in the way, OSError."""
+    written, kept = dict[Path, str](), []
+    for name, text in texts.items():
         path = folder / name
-        if not path.exists() or _holds(path, texts[name]):
-            written.append(path)
-        elif name in ("main.c", "CMakeLists.txt"):
+        if not path.exists() or _holds(path, text):
+            written[path] = text
+        elif name in yours:
             kept.append(path)
-        elif path.is_file() and _MARK in path.read_text(encoding="utf-8", errors="replace")[:2000]:
-            written.append(path)
+        elif path.is_file() and mark in path.read_text(encoding="utf-8", errors="replace"):
+            written[path] = text
         else:
-            raise ExportError(f"{path} was not made by neurovis export and would be lost: name another folder")
-    for path in written:
+            raise ExportError(f"{path} was not made {mark} and would be lost: name another folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    for path, text in written.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as file:
-            file.write(texts[path.name].encode("ascii"))
-    return written, kept
+            file.write(text.encode())
+        if text.startswith("#!"):
+            path.chmod(path.stat().st_mode | 0o111)
+    return list(written), kept
 
 
 def _holds(path: Path, text: str) -> bool:
-    return path.is_file() and path.read_bytes() == text.encode("ascii")
+    return path.is_file() and path.read_bytes() == text.encode()
 
 
 def size_of_state(made: Exported) -> int:

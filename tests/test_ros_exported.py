@@ -1,0 +1,370 @@
+"""What ``neurovis ros export`` writes, with real ROS: packages are launched, nodes and publishers built and run."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from ros_worlds import NAMES, Process, World, world
+
+import neurovis_spec as nv
+from neurovis_spec.ros.export import Form, save, texts
+from neurovis_spec.ros.middleware import Ros
+
+pytestmark = pytest.mark.ros
+
+ARRAY = "std_msgs/Float64MultiArray"
+STEPS = 120
+ARM = """
+neurovis: 1
+name: arm
+seed: 3
+time: {dt: 0.01, steps: 100}
+parameters: {gain: {value: 0.5, min: 0, max: 2}, turn: 0.3}
+inputs: {target: {expression: sin(3*t)}, torque: {size: 2}, own: {expression: 0.1*cos(t)}}
+neurons:
+  C: {count: 2, activation: tanh, bias: 0.01, noise: "normal(0, 0.01)"}
+  A: {input: [target, own], activation: identity}
+  M: {count: 2, input: torque, activation: identity}
+  B: {activation: tanh}
+connections:
+  C -> C: {matrix: [[1.4, turn], ["-turn", 1.4]]}
+  C1 -> B: {weight: 0.3, plasticity: {oja: {rate: 0.05}}}
+  A -> B: gain
+outputs: {signal: B, motors: M, on: A}
+events: [{at: 0.5, set: {turn: 0.2}}]
+ros:
+  rate: 100
+  qos: {depth: 2000}
+  subscribe:
+    target: {topic: /target, type: std_msgs/Float64, timeout: 0.4, on_timeout: ON_TIMEOUT}
+    torque: {topic: joints, type: sensor_msgs/JointState, field: effort, names: [hip, knee], timeout: 0.4}
+  publish:
+    signal: {topic: /cmd_vel, type: geometry_msgs/TwistStamped, field: twist.linear.x, safe: -1}
+    motors: {topic: ~/motors, type: std_msgs/Float64MultiArray, safe: 0}
+    on: {topic: on, type: std_msgs/Bool, safe: 0}
+"""
+BASE = "/neurovis/arm"
+ACTIVITY = {"topic": f"{BASE}/activity", "type": ARRAY, "fields": ["data", "layout.dim.0.label"]}
+WEIGHTS = {"topic": f"{BASE}/weights", "type": ARRAY, "fields": ["data", "layout.dim.0.size"]}
+SPEC = {"topic": f"{BASE}/spec", "type": "std_msgs/String", "fields": ["data"], "latched": True}
+COMMANDS = {"topic": "/cmd_vel", "type": "geometry_msgs/TwistStamped", "fields": ["twist.linear.x", "twist.angular.z"]}
+MOTORS = {"topic": f"{BASE}/motors", "type": ARRAY, "fields": ["data"]}
+ON = {"topic": "/neurovis/on", "type": "std_msgs/Bool", "fields": ["data"]}
+
+
+def compiled(on_timeout: str = "zero", published: bool = True) -> nv.CompiledNetwork:
+    text = ARM.replace("ON_TIMEOUT", on_timeout)
+    return nv.compile_text(text if published else re.sub(r"(?s)  subscribe:.*", "", text))
+
+
+def exported(folder: Path, network: nv.CompiledNetwork, form: Form, ros: Ros = 1) -> Path:
+    save(folder, texts(network, form, ros))
+    return folder
+
+
+def expected(network: nv.CompiledNetwork, steps: int = STEPS, **inputs: float) -> nv.Recording:
+    """The run offline; inputs that no message came for are 0."""
+    size = {entry.name: entry.size for entry in network.network.inputs}
+    heard = {one.input: np.zeros((1, size[one.input])) for one in network.network.ros.subscribe}
+    return network.run(steps, heard, backend="reference")
+
+
+def check_bits(came: dict[str, list[list[list[float]]]], network: nv.CompiledNetwork) -> None:
+    recording = expected(network)
+    for topic, rows in (("activity", recording.activity), ("weights", recording.weights)):
+        data = [one[0] for one in came[f"{BASE}/{topic}"]][:STEPS]
+        assert [one[0] for one in data] == list(range(STEPS))
+        np.testing.assert_array_equal([one[2:] for one in data], rows)
+        assert abs(data[0][1] - time.time()) < 600
+    assert {str(one[1]) for one in came[f"{BASE}/activity"]} == {f"neurovis/1:{network.network.hash}"}
+
+
+def listening(ros: World) -> Process:
+    until = {f"{BASE}/activity": STEPS, f"{BASE}/weights": STEPS}
+    return ros.peer(listen=[ACTIVITY, WEIGHTS], until=until)
+
+
+# ---- packages ------------------------------------------------------------------------------------------------------
+
+
+def test_a_package_of_ros_1_is_launched(tmp_path: Path) -> None:
+    network = compiled(published=False)
+    folder = exported(tmp_path / "neurovis_arm", network, "package", 1)
+    settings = folder / "config" / "parameters.yaml"
+    settings.write_text(settings.read_text().replace('"gain": 0.5', '"gain": 0.25'))
+    with world("one") as ros:
+        peer = listening(ros)
+        environment = {"ROS_PACKAGE_PATH": str(tmp_path), "PATH": f"{ros.bin}:{os.environ['PATH']}"}
+        options = f"arguments:=--steps {STEPS + 50} --wait 60 --backend reference"
+        # as somebody calls it who has sourced /opt/ros: with the interpreter of the system
+        launch = ros.started(
+            ["/usr/bin/python3", "/usr/bin/roslaunch", "neurovis_arm", "network.launch", options], ROS_IP="127.0.0.1",
+            **environment,
+        )  # fmt: skip
+        assert launch.wait_for("ready: /neurovis/arm, ROS 1")
+        assert peer.end() == 0
+        launch.stop()
+        quarter = nv.compile_text(network.text(), gain=0.25)
+        came = peer.json()
+        label = came[f"{BASE}/activity"][0][1]
+        assert label == f"neurovis/1:{network.network.hash}"
+        rows = [one[0][2:] for one in came[f"{BASE}/activity"]][:STEPS]
+        np.testing.assert_array_equal(rows, expected(quarter).activity)
+
+
+@pytest.mark.parametrize("name", ["kilted", "jazzy"])
+def test_a_package_of_ros_2_is_installed_and_run_as_its_launch_file_says(name: str, tmp_path: Path) -> None:
+    network = compiled(published=False)
+    folder = exported(tmp_path / "src", network, "package", 2)
+    settings = folder / "config" / "parameters.yaml"
+    settings.write_text(settings.read_text().replace('"gain": 0.5', '"gain": 0.25'))
+    prefix = tmp_path / "install"
+    with world(name) as ros:
+        # as colcon installs a package of ament_python
+        words = ["install", "--prefix", prefix, "--single-version-externally-managed", "--record", tmp_path / "record"]
+        subprocess.run(
+            [ros.bin / "python", "setup.py", "-q", *words], cwd=folder, check=True, capture_output=True, timeout=60
+        )
+        assert (prefix / "share" / "ament_index" / "resource_index" / "packages" / "neurovis_arm").is_file()
+        share = prefix / "share" / "neurovis_arm"
+        (node,) = ElementTree.parse(share / "launch" / "network.launch.xml").getroot().iter("node")
+        (given,) = node.iter("param")
+        parameters = str(given.get("from")).replace("$(find-pkg-share neurovis_arm)", str(share))
+        program = prefix / "lib" / str(node.get("pkg")) / str(node.get("exec"))
+        (library,) = prefix.glob("lib/python*/site-packages")
+        peer = listening(ros)
+        run = ros.started(
+            [program, "--steps", str(STEPS), "--wait", "60", "--backend", "reference",
+             "--ros-args", "--params-file", parameters, "-r", "/neurovis/arm/unused:=/elsewhere"],
+            PATH=f"{ros.bin}:{os.environ['PATH']}", PYTHONPATH=str(library),
+        )  # fmt: skip
+        assert run.end() == 0, run.err
+        assert peer.end() == 0
+        rows = [one[0][2:] for one in peer.json()[f"{BASE}/activity"]][:STEPS]
+        np.testing.assert_array_equal(rows, expected(nv.compile_text(network.text(), gain=0.25)).activity)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_node_takes_the_arguments_of_ros(name: str, tmp_path: Path) -> None:
+    spec = tmp_path / "arm.yaml"
+    spec.write_text(compiled(published=False).text())
+    with world(name) as ros:
+        given = ["_gain:=9.0", "_turn:=0.1", "/neurovis/arm/activity:=/seen", "__name:=other"]
+        if ros.ros == 2:
+            given = ["--ros-args", "-p", "turn:=0.1", "-r", "/neurovis/arm/activity:=/seen", "-r", "__node:=other"]
+        peer = ros.peer(listen=[{**ACTIVITY, "topic": "/seen"}], until={"/seen": 20})
+        words = ["--steps", "20", "--wait", "3", "--backend", "reference"]
+        run = ros.neurovis("ros", "run", spec, *words, *given)
+        assert "/neurovis/other" in run.wait_for("ready")
+        assert run.end() == 0
+        assert peer.end() == 0
+        rows = [one[0][2:] for one in peer.json()["/seen"]]
+        np.testing.assert_array_equal(rows, expected(nv.compile(spec, turn=0.1), 20).activity)
+        if ros.ros == 1:
+            assert any("the parameter 'gain' stays 0.5" in line for line in run.err)
+        wrong = ros.neurovis("ros", "run", spec, *(["--ros-args"] if ros.ros == 1 else ["a:=b"]))
+        assert wrong.end() == 1
+        assert any("does not take" in line for line in wrong.err)
+
+
+# ---- a node in C++ -------------------------------------------------------------------------------------------------
+
+
+def built(folder: Path) -> Path:
+    """Build a node as its README says for Debian."""
+    if shutil.which("g++") is None or not Path("/usr/include/ros/ros.h").exists():
+        pytest.fail("this test needs g++ and roscpp: apt-get install g++ pkg-config libroscpp-dev libsensor-msgs-dev")
+    page = (folder / "README.md").read_text()
+    commands = re.findall(r"^    ((?:gcc|g\+\+) .*)$", page, re.MULTILINE)
+    assert len(commands) == 2
+    for command in commands:
+        strict = command.replace(" -O2 ", " -O1 -Wall -Wextra ")
+        done = subprocess.run(strict, shell=True, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+        assert done.returncode == 0, done.stderr
+        assert f"{folder.name}_node.cpp" not in done.stderr, done.stderr
+    return folder / "arm_node"
+
+
+@pytest.fixture(scope="module")
+def node(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return built(exported(tmp_path_factory.mktemp("made") / "arm", compiled(), "cpp"))
+
+
+@pytest.fixture
+def one() -> Iterator[World]:
+    with world("one") as made:
+        yield made
+
+
+def start(ros: World, node: Path, *words: str) -> Process:
+    run = ros.started([node, *words], ROS_IP="127.0.0.1")
+    run.wait_for("ready: /neurovis/arm, ROS 1")
+    return run
+
+
+def test_a_node_in_cpp_publishes_the_offline_run_bit_for_bit(one: World, node: Path) -> None:
+    network = compiled()
+    wanted = {f"{BASE}/activity": STEPS, f"{BASE}/weights": STEPS, f"{BASE}/spec": 1}
+    peer = one.peer(listen=[ACTIVITY, WEIGHTS, SPEC, COMMANDS, MOTORS, ON], until=wanted)
+    run = start(one, node, "--steps", str(STEPS), "--wait", "60")
+    assert run.end() == 0
+    assert re.fullmatch(rf"arm: {STEPS} steps, \d+ late", run.out[0])
+    assert peer.end() == 0
+    came = peer.json()
+    check_bits(came, network)
+    assert nv.compile_text(came[f"{BASE}/spec"][0][0]).network.hash == network.network.hash
+
+
+def test_inputs_become_outputs_of_a_node_in_cpp_and_its_end_is_safe(one: World, node: Path) -> None:
+    run = start(one, node)
+    name = {"name": ["knee", "elbow", "hip"]}
+    nan = float("nan")
+    joints = [{**name, "effort": [4.0, 9.0, 3.0]}] * 40
+    joints += [{**name, "effort": [nan, 1.0, 2.0]}, {**name, "effort": [1.0]}, {"effort": [1.0, 2.0, 3.0]}] * 3
+    sent = {"topic": "/neurovis/joints", "type": "sensor_msgs/JointState", "values": joints}
+    target = {"topic": "/target", "type": "std_msgs/Float64", "values": {"data": 1.5}, "count": 50}
+    peer = one.peer(listen=[COMMANDS, MOTORS, ON], send=[sent, target], seconds=3.0)
+    peer.wait_for("ready")
+    time.sleep(2.2)
+    assert run.stop() == 0
+    assert peer.end() == 0
+    came = peer.json()
+    motors = [tuple(one[0]) for one in came[f"{BASE}/motors"]]
+    assert set(motors) == {(0.0, 0.0), (3.0, 4.0)}
+    assert motors[-1] == (0.0, 0.0)
+    assert came["/cmd_vel"][-1] == [-1.0, 0.0]
+    assert 0.5 < max(one[0] for one in came["/cmd_vel"]) <= 1.0
+    assert [one[0] for one in came["/neurovis/on"]][-1] is False
+    assert True in [one[0] for one in came["/neurovis/on"]]
+    assert "/neurovis/joints: 49 received, 6 of another length, 3 not finite" in run.out
+    assert "/target: 50 received, 0 of another length, 0 not finite" in run.out
+
+
+def test_parameters_of_a_node_in_cpp_are_set_within_their_bounds(one: World, node: Path) -> None:
+    code = """
+import sys, time, xmlrpc.client, os
+master = xmlrpc.client.ServerProxy(os.environ["ROS_MASTER_URI"])
+key = "/neurovis/arm/parameters"
+def until(name, value):
+    end = time.monotonic() + 20
+    while master.getParam("/x", f"{key}/{name}")[2] != value:
+        assert time.monotonic() < end, master.getParam("/x", key)
+        time.sleep(0.02)
+until("gain", 1.5); until("turn", 0.2)
+master.setParam("/x", f"{key}/gain", 9.0); until("gain", 1.5)
+master.setParam("/x", f"{key}/gain", 2); until("gain", 2)
+print("done")
+"""
+    run = start(one, node, "_gain:=1.5", "--rate", "200")
+    asked = one.python(code)
+    assert asked.end() == 0, asked.err
+    assert run.running
+    assert run.stop() == 0
+    assert any("the parameter 'gain' cannot be 9" in line for line in [*run.err, *run.out])
+
+
+def test_rosnode_kill_ends_a_node_in_cpp_safely(one: World, node: Path) -> None:
+    run = start(one, node)
+    peer = one.peer(listen=[COMMANDS], seconds=2.5)
+    peer.wait_for("ready")
+    time.sleep(0.8)
+    alone = {**one.environment, "ROS_IP": "127.0.0.1"}
+    killed = ["/usr/bin/python3", "/usr/bin/rosnode", "kill", "/neurovis/arm"]
+    subprocess.run(killed, env=alone, check=True, capture_output=True, timeout=30)
+    assert run.end() == 0
+    assert peer.end() == 0
+    assert peer.json()["/cmd_vel"][-1] == [-1.0, 0.0]
+
+
+# ---- publishers ----------------------------------------------------------------------------------------------------
+
+CONTROLLER = """
+import sys, time
+sys.path.insert(0, sys.argv[1])
+from arm_publisher import NETWORK, Publisher
+shown = Publisher(NETWORK)
+while not shown.subscribers:
+    time.sleep(0.01)
+for step in range(200):
+    time.sleep(0.002)
+    shown.publish([step + number for number in range(6)], [step / 10])
+try:
+    shown.publish([1.0])
+except ValueError as error:
+    print(error, flush=True)
+time.sleep(1)
+"""
+CONTROLLER_CPP = """
+#include "arm_publisher.hpp"
+#include <iostream>
+int main(int argc, char **argv) {
+  ros::init(argc, argv, "controller");
+  ros::NodeHandle node;
+  neurovis::Publisher shown(node, neurovis::arm_network());
+  while (shown.subscribers() == 0) ros::Duration(0.01).sleep();
+  std::vector<double> activity(6), weights(1);
+  for (int step = 0; step < 200; ++step) {
+    ros::Duration(0.002).sleep();
+    for (int number = 0; number < 6; ++number) activity[number] = step + number;
+    weights[0] = step / 10.0;
+    shown.publish(activity, weights);
+  }
+  try {
+    shown.publish(std::vector<double>(1));
+  } catch (const std::invalid_argument &error) {
+    std::cout << error.what() << std::endl;
+  }
+  ros::Duration(1).sleep();
+}
+"""
+
+
+def check_shown(ros: World, view: Process, controller: Process, recording: Path) -> None:
+    """What ``neurovis ros view`` has seen and recorded of a controller."""
+    assert controller.end() == 0, controller.err
+    assert controller.out[-1] == "arm has 6 activities, not 1"
+    assert view.stop() == 0
+    counts = view.json()["topics"]
+    for topic in ("activity", "weights"):
+        assert counts[topic]["recorded"] == counts[topic]["received"] == 200, view.err
+        assert counts[topic]["lost"] == counts[topic]["unlabelled"] == 0
+    assert view.json()["hash"] == compiled().network.hash
+    found = nv.load(recording)
+    np.testing.assert_array_equal(found.activity, np.arange(200.0)[:, None] + np.arange(6.0))
+    np.testing.assert_array_equal(found.weights[:, 0], np.arange(200) / 10)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_controller_in_python_shows_itself(name: str, tmp_path: Path) -> None:
+    exported(tmp_path / "given", compiled(), "publisher")
+    recording = tmp_path / "seen.mcap"
+    with world(name) as ros:
+        controller = ros.python(CONTROLLER, str(tmp_path / "given"))
+        view = ros.neurovis("ros", "view", "--record", recording, "--format", "json")
+        view.wait_for("ready")
+        check_shown(ros, view, controller, recording)
+
+
+def test_a_controller_in_cpp_shows_itself(one: World, tmp_path: Path) -> None:
+    folder = exported(tmp_path / "given", compiled(), "publisher")
+    (folder / "controller.cpp").write_text(CONTROLLER_CPP)
+    build = "g++ -std=c++17 -Wall -Wextra controller.cpp -o controller $(pkg-config --cflags --libs roscpp)"
+    subprocess.run(build, shell=True, cwd=folder, check=True, timeout=300)
+    recording = tmp_path / "seen.mcap"
+    controller = one.started([folder / "controller"], ROS_IP="127.0.0.1")
+    view = one.neurovis("ros", "view", "--record", recording, "--format", "json")
+    view.wait_for("ready")
+    check_shown(one, view, controller, recording)
+
+
+assert sys.platform == "linux"
