@@ -107,13 +107,15 @@ def test_a_package_of_ros_1_is_launched(tmp_path: Path) -> None:
     with world("one") as ros:
         peer = listening(ros)
         environment = {"ROS_PACKAGE_PATH": str(tmp_path), "PATH": f"{ros.bin}:{os.environ['PATH']}"}
-        options = f"arguments:=--steps {STEPS + 50} --wait 60 --backend reference"
+        file = folder / "launch" / "network.launch"
+        more = f"--steps {STEPS + 50} --wait 60 --backend reference --rate"
+        file.write_text(file.read_text().replace("--rate", more))
         # as somebody calls it who has sourced /opt/ros: with the interpreter of the system
         launch = ros.started(
-            ["/usr/bin/python3", "/usr/bin/roslaunch", "neurovis_arm", "network.launch", options], ROS_IP="127.0.0.1",
+            ["/usr/bin/python3", "/usr/bin/roslaunch", "neurovis_arm", "network.launch", "rate:=200"], ROS_IP="127.0.0.1",
             **environment,
         )  # fmt: skip
-        assert launch.wait_for("ready: /neurovis/arm, ROS 1")
+        assert launch.wait_for("ready: /neurovis/arm, ROS 1, 200 steps a second")
         assert peer.end() == 0
         launch.stop()
         quarter = nv.compile_text(network.text(), gain=0.25)
@@ -153,7 +155,7 @@ def test_a_package_of_ros_2_is_installed_and_run_as_its_launch_file_says(name: s
         (library,) = prefix.glob("lib/python*/site-packages")
         peer = listening(ros)
         run = ros.started(
-            [program, "--steps", str(STEPS), "--wait", "60", "--backend", "reference",
+            [program, *str(node.get("args")).replace("$(var rate)", "200").split(), "--steps", str(STEPS), "--wait", "60", "--backend", "reference",
              "--ros-args", "--params-file", parameters, "-r", "/neurovis/arm/unused:=/elsewhere"],
             PATH=f"{ros.bin}:{os.environ['PATH']}", PYTHONPATH=str(library),
         )  # fmt: skip
@@ -217,7 +219,7 @@ def one() -> Iterator[World]:
 
 def start(ros: World, node: Path, *words: str) -> Process:
     run = ros.started([node, *words], ROS_IP="127.0.0.1")
-    run.wait_for("ready: /neurovis/arm, ROS 1")
+    run.wait_for("ready: /neurovis/arm, ROS 1, 200 steps a second")
     return run
 
 
