@@ -80,7 +80,7 @@ MORE = [
     (f"{GROUPS}  engine: organic\n  mirror: [[A1, A2]]\n", "layout-mirror-unsupported", "[A1, A2]"),
     (f"{GROUPS}  direction: right\n  arrange: {{A: row}}\n  align: [[B, A3], [A1, A2]]\n", "align-conflict",
      "[A1, A2]"),
-    (f"{GROUPS}  positions: {{B: [9, 9], {', '.join(f'A{i}: [{i}, 0]' for i in range(1, 5))}}}\n"
+    (f"{GROUPS}  engine: manual\n  positions: {{B: [9, 9], {', '.join(f'A{i}: [{i}, 0]' for i in range(1, 5))}}}\n"
      "  arrange: {A: row}\n", "layout-arrange-unsupported", "A"),
 ]  # fmt: skip
 
