@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 import neurovis_spec as nv
-from neurovis_spec.compiler.limits import MOST_HINTS
-from neurovis_spec.diagnostics import nearest
+from neurovis_spec.diagnostics import MOST_HINTS, nearest
 from neurovis_spec.language.allow import allows
 
 HEAD = "neurovis: 1\nname: x\n"
