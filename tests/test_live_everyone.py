@@ -326,6 +326,7 @@ def test_where_nobody_asks_for_a_theme_it_is_dark_where_the_system_is(
                 step = await opened.ask(STEP)
                 await opened.until(f"{STEP} > {step} + 20")
                 assert await opened.ask(back) == "rgb(255, 255, 255)"
+            await opened.call("Page.navigate", url="about:blank")  # the owner's page would ask for dark
             await opened.call(
                 "Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark"}]
             )

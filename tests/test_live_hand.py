@@ -307,7 +307,7 @@ def test_a_viewer_moves_the_picture_instead(tmp_path: Path) -> None:
             await drag(opened, (x, y), (x + 60, y))
             await holds(opened, (x + 60, y), "O")
             assert desk.placed.moved == ()
-            for button in ("unplace", "tospec", "tofile"):
+            for button in ("unplace", "tospec", "tofile", "svg", "npz", "film"):
                 assert await opened.ask(f"document.querySelector('#{button}').disabled")
 
     asyncio.run(main())

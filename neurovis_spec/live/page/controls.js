@@ -63,7 +63,7 @@ export class Controls {
     this.play.setAttribute('aria-label', status.playing ? 'pause' : 'play');
     this.speed.value = status.speed;
     this.turns = status.owner && status.can.turns;
-    for (const id of ['restart', 'back', 'play', 'step', 'speed', 'before', 'next']) {
+    for (const id of ['restart', 'back', 'play', 'step', 'speed', 'before', 'next', 'svg', 'npz', 'film']) {
       const isEvent = id === 'before' || id === 'next';
       /** @type {HTMLButtonElement} */ (part(id)).disabled = !status.owner || (isEvent && !status.events.length);
     }
