@@ -9,6 +9,7 @@ import pytest
 from small_specs import answer, codes, compiled, network_of, pairs
 
 import neurovis_spec as nv
+from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.runtime.simulation import ParameterError
 
 
@@ -332,3 +333,41 @@ def test_a_label_changes_nothing_but_the_picture() -> None:
     one, other = network_of(text), network_of(text.replace("x{a}", "y{2*a}"))
     assert one.hash == other.hash
     assert (one.neurons.labels, other.neurons.labels) == (("x1",), ("y2",))
+
+
+STARTS = """parameters: {low: -65}
+neurons:
+  A: {count: 3, model: izhikevich, activation: step, bias: 5, initial: {v: low + 5*i, u: "normal(0, 1)"}}
+  B: {model: leaky_integrator, initial: {activity: 0.5, v: 2}}
+  C: {model: leaky_integrator, initial: {v: 3}}
+  D: {model: leaky_integrator, bias: 1}
+connections: {A -> B: 1}
+outputs: {s: A.v, b: B.v, c: C.v, d: D.v}
+"""
+
+
+@pytest.mark.parametrize("backend", ["reference", "numpy", pytest.param("c", marks=pytest.mark.compiler)])
+def test_states_begin_where_the_group_says(backend: str) -> None:
+    """With 'activity' they are first updated at step 1, without it at step 0."""
+    run = compiled(STARTS).run(steps=3, backend=backend)
+    assert run["b"].tolist() == pytest.approx([2, 1.8, 1.62])
+    assert run["c"].tolist() == pytest.approx([2.7, 2.43, 2.187])
+    assert run["d"][0] == pytest.approx(0.1)
+    assert run["B"][0] == 0.5
+    assert run["C"][0] == run["c"][0]
+    reference = compiled(STARTS).run(steps=3, backend="reference")
+    assert np.array_equal(run.activity, reference.activity)
+    assert np.array_equal(run["s"], reference["s"])
+    v = np.array([-65.0, -60.0, -55.0])
+    u = Stream(0, "initial", "A.u").normal(np.arange(3), 0, 0, 0)
+    assert run["s"][0] == pytest.approx(v + 0.04 * v**2 + 5 * v + 140 - u + 5)
+
+
+def test_what_states_begin_with_is_content() -> None:
+    hashes = {compiled(STARTS.replace("v: 3", f"v: {value}")).hash for value in (3, 4)}
+    assert len(hashes) == 2
+    one, other = (
+        compiled(f"neurons: {{A: {{bias: 1, initial: {text}}}}}").hash
+        for text in ("{activity: 'uniform(0, 1)'}", "'uniform(0, 1)'")
+    )
+    assert one == other

@@ -132,6 +132,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         *ordered[1:],
         noises,
         *((output.name, *singles(output.states)) for output in outputs if output.states),
+        *([("starts", population.neurons.starts)] if population.neurons.starts else []),
     )
     slots = tuple(constants.slots)
     network = Network(

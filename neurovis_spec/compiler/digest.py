@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 #: Where a node of an expression stood, and what is only shown, is no content.
 _SHOWN = frozenset(
-    # ``slots``, ``parts`` and ``widths`` are how something follows parameters
+    # ``slots``, ``parts`` and ``widths`` are how something follows parameters; ``starts``, where there are some, are
+    # put behind the rest
     (
         "start",
         "end",
@@ -36,6 +37,7 @@ _SHOWN = frozenset(
         "learns",
         "slots",
         "parts",
+        "starts",
         "states",
         "spikes",
         "widths",

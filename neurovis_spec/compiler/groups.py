@@ -24,13 +24,14 @@ from neurovis_spec.compiler.program import Activation, Combine, Model
 from neurovis_spec.compiler.references import key_span, known_inputs
 from neurovis_spec.compiler.settable import Part
 from neurovis_spec.compiler.settings import check_initials, choose, look_at_settings, parameters, spread
+from neurovis_spec.compiler.states import no_state
 from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.diagnostics import meant, shown
 from neurovis_spec.language.expressions.tree import Call, walk
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, too_long
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.source import Scalar
-from neurovis_spec.language.values import Choice, FormulaList
+from neurovis_spec.language.values import Choice, FormulaList, Initial
 
 
 class Kind(NamedTuple):
@@ -59,6 +60,8 @@ class Built(NamedTuple):
     input: IntArray
     position: FloatArray | None
     first: int | None
+    #: what states of its model begin with
+    starts: Mapping[str, FloatArray]
     #: what of it follows parameters: ``bias``, ``position`` (x, then y), and those of its kind
     parts: tuple[Part, ...] = ()
 
@@ -117,7 +120,8 @@ class Builder:
         kind = self._kind(model, n)
         with self.constants.following() as biased:
             bias = None if model.bias is None else self._drawn(model.bias, n, "bias", name)
-        initial = None if model.initial is None else self._drawn(model.initial, n, "initial", name)
+        given = model.initial or Initial(None)
+        initial = None if given.activity is None else self._drawn(given.activity, n, "initial", name)
         input_index = self._input(model, n)
         with self.constants.following() as placed:
             position = positions_of(model.position, n, self.constants, self.unit.files)
@@ -150,6 +154,7 @@ class Builder:
             input=_unsaid(n).input if input_index is None else input_index,
             position=position,
             first=first_number,
+            starts=self._starts(given, n, name, kind, model),
             parts=(
                 *kind.parts,
                 *(part._replace(field="bias") for part in biased),
@@ -159,12 +164,28 @@ class Builder:
 
     def _look(self, name: str, model: GroupModel) -> None:
         """What can be said of a group of which it is not known which neurons it has."""
-        self._kind(model, None)
-        for formulas, purpose in ((model.bias, "bias"), (model.initial, "initial")):
+        kind = self._kind(model, None)
+        given = model.initial or Initial(None)
+        for formulas, purpose in ((model.bias, "bias"), (given.activity, "initial")):
             if formulas is not None:
                 self._drawn(formulas, None, purpose, name)
+        self._starts(given, None, name, kind, model)
         self._input(model, None)
         positions_of(model.position, None, self.constants, self.unit.files)
+
+    def _starts(self, given: Initial, n: int | None, name: str, kind: Kind, model: GroupModel) -> dict[str, FloatArray]:
+        """What states of the model begin with."""
+        result: dict[str, FloatArray] = {}
+        sure = model.model is None or kind.model.name == model.model.name.value  # else it is at fault, and said so
+        states = tuple(state.name for state in kind.model.state)
+        for state, formulas in given.states:
+            if sure and state.value not in states:
+                found = no_state(f"the model '{kind.model.name}' of '{name}'", state.value, states)
+                self.constants.findings.error("unknown-state", state.span, *found)
+            values = self._drawn(formulas, n, "initial", name, state.value)
+            if values is not None:
+                result[state.value] = values
+        return result
 
     def _fed(self, model: GroupModel) -> str | None:
         """The network's name of the input of a group."""
@@ -271,8 +292,14 @@ class Builder:
             neuron, settings = self.definitions.models["static"], {}
         return Kind(activation[0], activity, neuron[0], settings, tuple(parts))
 
-    def _drawn(self, formulas: Formula | FormulaList, n: int | None, purpose: str, name: str) -> FloatArray | None:
-        return spread(formulas, n, self.constants, f"'{purpose}'", Stream(self.seed, purpose, self.unit.called(name)))
+    def _drawn(
+        self, formulas: Formula | FormulaList, n: int | None, purpose: str, name: str, state: str | None = None
+    ) -> FloatArray | None:
+        """The values of a key, or those of a state in it, of the group's neurons."""
+        called, what = self.unit.called(name), purpose
+        if state is not None:
+            called, what = f"{called}.{state}", state
+        return spread(formulas, n, self.constants, f"'{what}'", Stream(self.seed, purpose, called))
 
     def _input(self, model: GroupModel, n: int | None) -> IntArray | None:
         if model.input is None:

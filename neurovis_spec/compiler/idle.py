@@ -18,6 +18,7 @@ import numpy.typing as npt
 from neurovis_spec.compiler.arrays import IntArray
 from neurovis_spec.compiler.network import Group, Network
 from neurovis_spec.compiler.program import Block
+from neurovis_spec.compiler.starts import starts_of
 from neurovis_spec.language.expressions.arrays import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.tree import names
@@ -49,7 +50,7 @@ def idle_neurons(network: Network) -> Iterator[Idle]:
     if not quiet.any():
         return
     for block in network.blocks:
-        quiet[block.members] &= _stays_at_zero(block, network.dt)
+        quiet[block.members] &= _stays_at_zero(block, network)
     for binding in network.set_by_events:  # what an event makes of a neuron is not looked at
         kind, _, number = binding.array.partition("/")
         if kind == "bias":
@@ -118,15 +119,15 @@ def _first(idle: Mask, sources: IntArray, targets: IntArray) -> Mask:
     return result
 
 
-def _stays_at_zero(block: Block, dt: float) -> Mask:
+def _stays_at_zero(block: Block, network: Network) -> Mask:
     """Whether the neurons of a block, never driven, surely keep their states and an activity of 0: then all that their
     formulas read stays what it is at the first step."""
     count = len(block.members)
     if block.combine == "product" or not _TIME.isdisjoint(_read(block)):
         return np.zeros(count, dtype=np.bool_)
     result = np.ones(count, dtype=np.bool_)
-    values: dict[str, Value] = {**CONSTANTS, "dt": dt, **block.model_parameters, "drive": 0.0}
-    states = {state.name: evaluate_array(state.initial, values) for state in block.model.state}
+    values: dict[str, Value] = {**CONSTANTS, "dt": network.dt, **block.model_parameters, "drive": 0.0}
+    states = starts_of(block, network.neurons, network.dt)
     values |= states
     for name, tree in block.model.let:
         values[name] = evaluate_array(tree, values)

@@ -16,7 +16,7 @@ from neurovis_spec.language.expressions.parser import parse, unknown_names
 from neurovis_spec.language.expressions.tree import Name, names
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.sections import ConnectionModel, GroupModel
-from neurovis_spec.language.source import Node, Packed, Scalar, Sequence
+from neurovis_spec.language.source import Mapping, Node, Packed, Scalar, Sequence
 from neurovis_spec.language.values import EdgeRows
 
 #: the keys of a group whose expressions know ``i`` and ``n``
@@ -49,6 +49,8 @@ def _instances(section: Section, findings: Findings) -> None:
 
 def _group(name: str, group: GroupModel, findings: Findings) -> None:
     nodes = [group.source.get(key) for key in _OF_A_GROUP]
+    states = group.source.get("initial")
+    nodes += [entry.value for entry in states.entries] if isinstance(states, Mapping) else []
     for choice in (group.activation, group.model):
         nodes += [] if choice is None else [entry.value for entry in choice.settings]
     for place, index in _found_in(nodes, COUNTED):

@@ -90,6 +90,8 @@ class Neurons:
     input: IntArray
     #: (n, 2), NaN without a position
     position: FloatArray
+    #: by states of models, what each begins with; NaN where the model says it
+    starts: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.names)

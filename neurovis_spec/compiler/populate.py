@@ -208,8 +208,9 @@ def _join(settled: list[_Settled]) -> Population:
         initial=np.concatenate([item.initial for item in built] or [empty]),
         input=np.concatenate([item.input for item in built] or [empty.astype(np.int64)]),
         position=np.concatenate([_placed(item) for item in built] or [np.zeros((0, 2))]),
+        starts=_starts(built, len(names)),
     )
-    for array in (neurons.bias, neurons.initial, neurons.input, neurons.position):
+    for array in (neurons.bias, neurons.initial, neurons.input, neurons.position, *neurons.starts.values()):
         frozen(array)
     directories = _directories(settled, len(names))
     kinds, models = tuple(item.kind for item in built), tuple(item.model for item in built)
@@ -221,6 +222,16 @@ def _join(settled: list[_Settled]) -> Population:
     constants = tuple(one.unit.constants for one in settled)
     parts = tuple(item.parts for item in built)
     return Population(neurons, directories, kinds, models, owners, misplaced, constants, lost, parts)
+
+
+def _starts(built: list[Built], total: int) -> dict[str, FloatArray]:
+    """By states of models, what they begin with in all neurons, NaN where no group says it."""
+    result: dict[str, FloatArray] = {}
+    for item in built:
+        for state, values in item.starts.items():
+            array = result.setdefault(state, np.full(total, np.nan))
+            array[item.group.start : item.group.start + item.group.count] = values
+    return result
 
 
 def _placed(item: Built) -> FloatArray:

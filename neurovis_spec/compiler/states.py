@@ -106,7 +106,7 @@ def model_state(name: StateName, neurons: Sequence[int], models: Iterable[Holder
     wanted = np.array(neurons, dtype=np.int64)
     for holder in models:
         if name.state not in holder.states and np.isin(wanted, holder.members).any():
-            return _refused(f"the model '{holder.kind}' of '{shown(name.owner)}'", name.state, holder.states)
+            return no_state(f"the model '{holder.kind}' of '{shown(name.owner)}'", name.state, holder.states)
     return StateOf(name.state, wanted, _NONE)
 
 
@@ -130,10 +130,11 @@ def connections_state(name: StateName, connections: IntArray, wiring: Wiring) ->
         return Refusal(f"there is no connection '{shown(name.owner)}'")
     if not holders:
         return Refusal(f"no rule changes '{shown(name.owner)}', so it has no states")
-    return _refused(f"the rule '{holders[0].kind}' of '{shown(name.owner)}'", name.state, holders[0].states)
+    return no_state(f"the rule '{holders[0].kind}' of '{shown(name.owner)}'", name.state, holders[0].states)
 
 
-def _refused(owner: str, state: str, states: tuple[str, ...]) -> Refusal:
+def no_state(owner: str, state: str, states: tuple[str, ...]) -> Refusal:
+    """That a model or a rule, which is called ``owner``, has not this state, but ``states``."""
     if not states:
         return Refusal(f"{owner} has no states")
     return Refusal(f"{owner} has no state '{shown(state)}'", suggest(state, states, "its states are"))

@@ -40,6 +40,7 @@ from neurovis_spec.language.values import (
     EdgesField,
     FileReference,
     FormulasField,
+    InitialField,
     MatrixField,
     as_file,
 )
@@ -117,7 +118,10 @@ class GroupModel(Model):
         description="What arrives is combined by sum or product of w·a, or by distance √Σ(w·a − c)² (default sum).",
     )
     bias: FormulasField | None = Field(None, description="Added to the combined input (default 0).")
-    initial: FormulasField | None = Field(None, description="The activity at step 0; without it step 0 is computed.")
+    initial: InitialField | None = Field(
+        None,
+        description="The activity at step 0, else computed; or states of the model, too: {v: -65, activity: 0.5}.",
+    )
     input: TextField | None = Field(None, description="An entry of inputs, added to the combined input.")
     noise: FormulaField | None = Field(
         None, description="An expression with normal(m, s) or uniform(a, b), drawn anew and added each step."

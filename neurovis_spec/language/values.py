@@ -207,6 +207,35 @@ def as_formulas(node: Node, info: ValidationInfo) -> Formula | FormulaList:
 FormulasField = Annotated[Formula | FormulaList, Leaf(as_formulas, FORMULAS)]
 
 
+class Initial(NamedTuple):
+    """What a group begins with: its activity at step 0 (None: it is computed), and states of its model."""
+
+    activity: Formula | FormulaList | None
+    states: tuple[tuple[Located[str], Formula | FormulaList], ...] = ()
+
+
+def as_initial(node: Node, info: ValidationInfo) -> Initial:
+    """The activity, or a mapping of states and ``activity``."""
+    if not isinstance(node, Mapping):
+        return Initial(as_formulas(node, info))
+    if not node.entries:
+        refuse(info, node, "a value, or states with their values", "write {activity: 0.5}")
+    found = {entry.name: (Located(entry.name, entry.key), as_formulas(entry.value, info)) for entry in node.entries}
+    _, activity = found.pop(ACTIVITY, (None, None))
+    return Initial(activity, tuple(found.values()))
+
+
+#: What stands beside the states of a model in ``initial``.
+ACTIVITY = "activity"
+_STATES = {
+    "type": "object",
+    "properties": {ACTIVITY: FORMULAS},
+    "additionalProperties": FORMULAS,
+    "minProperties": 1,
+}
+InitialField = Annotated[Initial, Leaf(as_initial, {"anyOf": [*FORMULAS["anyOf"], _STATES]})]
+
+
 class Parameter(NamedTuple):
     """A named constant: its value, and the bounds within which it may be set. ``failed``: something of it is at fault;
     a value of 0 stands in then."""

@@ -131,6 +131,8 @@ def _of_role(role: Role | None, scope: Scope, path: Path, front: str, index: Ind
             yield from _definitions(known(role.kind, index.all_items).values())
         case "setting" | "setting value":
             yield from _settings(role, scope, path, front, index, place)
+        case "state":
+            yield from _states_of(index, path[:-2])
         case "pattern":
             yield from (_Offer(name, "definition", meaning) for name, meaning in PATTERNS.items())
         case "engine":
@@ -255,14 +257,18 @@ def _states(scope: Scope, front: str, index: Index) -> Iterator[_Offer]:
     module = index.module_at(instances, scope.module)
     if index.module_of(owner, module) is not None or (instances and module is None):
         return
-    models = known("model", index.all_items)
     for group in index.declared("neuron", module):
         if group.text == owner or owner in _numbered(group, index):
-            path = (*group.item.path, "model")
-            told = index.attribute(group, "model")
-            inner = (key[-1] for key in index.home(group).keys if key[:-1] == path)
-            model = models.get(told.text if told is not None else str(next(inner, "")))
-            yield from (_Offer(name, "parameter", "state") for name in (() if model is None else model.states))
+            yield from _states_of(index.home(group), group.item.path)
+
+
+def _states_of(index: Index, group: Path) -> Iterator[_Offer]:
+    """The states of the model of the group at a path."""
+    path = (*group, "model")
+    told = index.values.get(path)
+    inner = (key[-1] for key in index.keys if key[:-1] == path)
+    model = known("model", index.all_items).get(told.text if told is not None else str(next(inner, "")))
+    yield from (_Offer(name, "parameter", "state") for name in (() if model is None else model.states))
 
 
 def _instances(module: str | None, index: Index) -> Iterator[_Offer]:

@@ -27,6 +27,7 @@ Use: TypeAlias = Literal[
     "choice",
     "setting",
     "setting value",
+    "state",
     "pattern",
     "engine",
     "message",
@@ -104,6 +105,7 @@ _KEYS: Final[Mapping[str, Role]] = {
     "connections # * pattern *": Role("pattern"),
     "neurons * activation * *": Role("setting", "activation"),
     "neurons * model * *": Role("setting", "model"),
+    "neurons * initial *": Role("state", "model"),
     "connections # * plasticity * *": Role("setting", "rule"),
 }
 _VALUES: Final[Mapping[str, Role]] = {
@@ -122,6 +124,7 @@ _VALUES: Final[Mapping[str, Role]] = {
     "neurons * names #": Role("declares", "neuron"),
     "neurons * bias #": _GROUP_DRAWN,
     "neurons * initial #": _GROUP_DRAWN,
+    "neurons * initial * #": _GROUP_DRAWN,
     "neurons * noise": _NOISE,
     "neurons * label #": Role("template", given=("i", "n", "number")),
     "neurons * input": Role("names", "input"),

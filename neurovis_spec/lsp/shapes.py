@@ -30,6 +30,7 @@ LIBRARY_ALONE: Final = frozenset({"modules", "activations", "models", "rules"})
 
 #: Keys of leaves, the patterns among them, whose schemas carry no words of their own.
 _LEAF_KEYS = {
+    "activity": "The activity at step 0; without it step 0 is computed.",
     "value": "The value, a number or an expression.",
     "min": "The least value that may be set.",
     "max": "The largest value that may be set.",

@@ -15,6 +15,7 @@ import numpy as np
 from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Plasticity, Quantity, Rule
+from neurovis_spec.compiler.starts import starts_of
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.runtime.conditions import Conditions, first_conditions
@@ -75,10 +76,7 @@ def initial_state(network: Network) -> State:
         weights=np.array(network.connections.weights, dtype=np.float64),
         signals=np.zeros(signal_layout(network).size),
         history=np.zeros((history_depth(network), n)),
-        cells=tuple(
-            _initials(block.model.state, block.model_parameters, len(block.members), network.dt)
-            for block in network.blocks
-        ),
+        cells=tuple(tuple(starts_of(block, network.neurons, network.dt).values()) for block in network.blocks),
         traces=tuple(
             _initials(entry.rule.state, entry.parameters, len(entry.members), network.dt)
             for entry in network.plasticity
