@@ -54,7 +54,8 @@ OPTIONS = {
     "animate": "--output --steps --from --fps --recording --input --theme --engine",
     "export": "--to --output --float --from --set",
     "live": "--recording --from --watch --host --port --viewers --open --theme --engine --backend --set",
-    "ros": "run view play legacy export", "analyze": "--recording --of --from --threshold --bins --output", "explain": "", "docs": "", "lsp": "", "schema": "",
+    "analyze": "--recording --of --from --threshold --bins --output",
+    "ros": "run view play legacy export", "explain": "", "docs": "", "lsp": "", "schema": "",
 }  # fmt: skip
 
 
