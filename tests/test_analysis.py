@@ -165,7 +165,7 @@ def test_what_cannot_be_measured_is_refused(run: Recording) -> None:
         analysis.weight_changes(network.run(weights="none"))
     with pytest.raises(KeyError, match="not recorded"):
         network.run(neurons="O").cross_correlation("K")
-    with pytest.raises(ValueError, match="too many"):
+    with pytest.raises(ValueError, match="too many for a measure of pairs"):
         made(np.zeros((2, 401))).cross_correlation()
     with pytest.raises(ValueError, match="'per'"):
         run.coactivation(per="hour")  # type: ignore[arg-type]

@@ -44,7 +44,7 @@ def good(words: str, stdin: str | None = None) -> str:
 
 READS = {
     "validate": "", "inspect": "", "layout": "", "run": "--steps 3", "fmt": "", "render": "--step 2 -o x.svg",
-    "animate": "--steps 3 -o y.svg", "export": "--to c -o made",
+    "animate": "--steps 3 -o y.svg", "analyze": "-o readings", "export": "--to c -o made",
 }  # fmt: skip
 OPTIONS = {
     "new": "--from", "validate": "--format --strict --limit --root", "fmt": "--check --diff", "inspect": "--format",
@@ -54,7 +54,7 @@ OPTIONS = {
     "animate": "--output --steps --from --fps --recording --input --theme --engine",
     "export": "--to --output --float --from --set",
     "live": "--recording --from --watch --host --port --viewers --open --theme --engine --backend --set",
-    "analyze": "--recording --of --from --threshold --bins --output",
+    "analyze": "--output --recording --of --from --to --threshold --bins --trials --theme --set --input",
     "ros": "run view play legacy export", "explain": "", "docs": "", "lsp": "", "schema": "",
 }  # fmt: skip
 

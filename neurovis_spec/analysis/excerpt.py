@@ -88,10 +88,9 @@ def chosen(recording: Recording, of: str | Sequence[str]) -> tuple[str, ...]:
 def paired(
     recording: Recording, of: str | Sequence[str] | None = None, start: int | None = None, stop: int | None = None
 ) -> Excerpt:
-    """The same for a measure of pairs. Raises ValueError where there are too many neurons."""
+    """The same for a measure of pairs. Raises RecordingError where there are too many neurons."""
     part = excerpt(recording, of, start, stop)
     if len(part.names) > MOST_NEURONS:
-        raise ValueError(
-            f"{len(part.names):,} neurons are too many for a measure of pairs, which takes {MOST_NEURONS}: choose some"
-        )
+        many = f"{len(part.names):,} neurons are too many for a measure of pairs, which takes {MOST_NEURONS}"
+        raise RecordingError(f"{many}: choose some (of='K', --of K)")
     return part

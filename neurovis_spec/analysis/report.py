@@ -38,6 +38,7 @@ from neurovis_spec.runtime.files import replacing
 from neurovis_spec.runtime.recording import Recording, RecordingError
 from neurovis_spec.scene.model import Scene, Theme
 from neurovis_spec.scene.themes import theme_of
+from neurovis_spec.snapshots import fitted
 
 #: The most curves of a picture, bars of a ranking, rows of a table over time, and neurons of a gait diagram.
 _CURVES, _BARS, _ROWS, _LEGS = 24, 30, 2_000, 40
@@ -89,7 +90,10 @@ def analyze(
     there; gives the files. Raises what the measures raise, ImportError without the extra ``analyze``, OSError."""
     asked = Wish() if wish is None else wish
     place = Path(folder)
-    run = network.run(inputs=asked.inputs, progress=progress) if recording is None else recording
+    if recording is None:
+        run = network.run(inputs=asked.inputs, progress=progress)
+    else:
+        run = fitted(recording, network.network)
     report = _Report(network, cut(run, asked.start, asked.stop), asked, progress)
     readings = list(report.readings())
     files: dict[str, bytes] = {}

@@ -69,11 +69,11 @@ def command(
     settings: dict[str, float],
     inputs: dict[str, str],
 ) -> None:
-    """Measure a run: tables, pictures, and a page that says what they mean.
+    """Measure a run, into tables, pictures and a page.
 
-    The measures are those of the NeuroVis paper: connection matrix, traces, topography, cross-correlation, mutual
-    information, co-activation, weights and their updates, the gait diagram, and what the outputs lose and gain with
-    each part. What cannot be measured is left out, and the page says why.
+    The page says what each measure means. The measures are those of the NeuroVis paper: connection matrix, traces,
+    topography, cross-correlation, mutual information, co-activation, weights and their updates, the gait diagram, and
+    what the outputs lose and gain with each part. What cannot be measured is left out, and the page says why.
     """
     need_run(inputs, recording)
     if start is not None and stop is not None and stop <= start:
