@@ -1,6 +1,6 @@
-"""What the commands of ``neurovis ros`` that listen share: the page, the recording.
+"""What the commands of ``neurovis ros`` that listen share: the page, the recording, the film.
 
-In: texts of the command line. Out: a Desk, which opens both for a block.
+In: texts of the command line. Out: a Desk, which opens them for a block.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ import functools
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from datetime import datetime
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -17,7 +18,7 @@ import click
 
 from neurovis_spec.cli.completion import paths
 from neurovis_spec.cli.failure import fault
-from neurovis_spec.cli.options import engine_option, theme_option
+from neurovis_spec.cli.options import engine_option, finite, theme_option
 from neurovis_spec.cli.ros_options import tell
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ F = TypeVar("F", bound=Callable[..., object])
 
 @dataclass(frozen=True)
 class Desk:
-    """Where what arrives is shown (a port; None: nowhere) and recorded."""
+    """Where what arrives is shown (a port; None: nowhere), recorded and filmed ("": where nobody has said)."""
 
     live: int | None
     record: str | None
@@ -39,9 +40,11 @@ class Desk:
     force: bool
     theme: str | None
     engine: str | None
+    video: str | None
+    fps: float
 
     def __bool__(self) -> bool:
-        return self.live is not None or self.record is not None
+        return any(one is not None for one in (self.live, self.record, self.video))
 
     def in_the_browser(self) -> Desk:
         """The same, shown at a port that is free."""
@@ -56,17 +59,47 @@ class Desk:
         path = None if self.record is None else Path(self.record)
         if path is not None and (why := refusal(path, node.ros)) is not None:
             raise fault(f"{path}: {why}")
-        wanted = Wanted(path, self.rotation, self.force, self.live is not None)
+        film = self._film(compiled)
+        wanted = Wanted(path, self.rotation, self.force, self.live is not None or film is not None)
         try:
             listening = Listening(compiled, node.ros, wanted, tell, node.definition)
         except FileExistsError as error:
             raise fault(f"{error.filename} exists", "--force overwrites it") from None
-        with self._page(listening):
+        with self._page(listening), self._filmed(listening, film):
             listening.start()
             try:
                 yield listening
             finally:
                 listening.end()
+
+    def _film(self, compiled: CompiledNetwork) -> Path | None:
+        """Where the film goes; raises what says that there can be none."""
+        if self.video is None:
+            return None
+        from neurovis_spec.cli.targets import check_target
+        from neurovis_spec.scene.renderers import renderer_for
+
+        path = Path(self.video or f"{compiled.name}-{datetime.now():%Y%m%d-%H%M%S}.mp4")
+        renderer_for(path.suffix, moving=True)
+        check_target(path, option="--video")
+        if path.exists() and not self.force:
+            raise fault(f"{path} exists", "--force overwrites it")
+        return path
+
+    @contextmanager
+    def _filmed(self, listening: Listening, path: Path | None) -> Iterator[None]:
+        if path is None or listening.source is None:
+            yield
+            return
+        from neurovis_spec.ros.video import Video, shooting
+
+        taken = shooting(listening.compiled, path, self.fps, self.theme, self.engine)
+        listening.video = video = Video(taken, listening.source, tell)
+        video.start()
+        try:
+            yield
+        finally:
+            video.end()
 
     @contextmanager
     def _page(self, listening: Listening) -> Iterator[None]:
@@ -99,6 +132,8 @@ def shown_options(always: bool) -> Callable[[F], F]:
             force: bool,
             theme: str | None,
             engine: str | None,
+            video: str | None,
+            fps: float,
             **rest: object,
         ) -> object:
             from neurovis_spec.ros.files import Rotation, rotation
@@ -106,11 +141,12 @@ def shown_options(always: bool) -> Callable[[F], F]:
             turns = Rotation() if rotate is None else rotation(rotate)
             if turns is None:
                 raise click.UsageError(f"--rotate takes a size or seconds (1GiB, 500MB, 60s, 10min), not '{rotate}'")
-            if always and record is None and live is None:
-                live = 0
-            return command(*args, desk=Desk(live, record, turns, force, theme, engine), **rest)
+            if video and Path(video).suffix.lower() != ".mp4":
+                raise click.UsageError(f"--video takes a file that ends in .mp4, not '{video}'")
+            desk = Desk(live, record, turns, force, theme, engine, video, fps)
+            return command(*args, desk=desk if desk or not always else desk.in_the_browser(), **rest)
 
-        default = "; default without --record: one that is free" if always else ""
+        default = "; default without --record and --video: one that is free" if always else ""
         options = (
             click.option(
                 "--live", type=click.IntRange(0, 65535), metavar="PORT",
@@ -123,9 +159,17 @@ def shown_options(always: bool) -> Callable[[F], F]:
             click.option(
                 "--rotate", metavar="SIZE|SECONDS", help="Begin a new file at this size or time; default: 1GiB."
             ),
-            click.option("--force", is_flag=True, help="Overwrite a recording that is there."),
+            click.option("--force", is_flag=True, help="Overwrite a recording or a film that is there."),
             theme_option,
             engine_option,
+            click.option(
+                "--video", metavar="[FILE]", is_flag=False, flag_value="", shell_complete=paths,
+                help="Film it, as .mp4; default: the network's name and the time.",
+            ),
+            click.option(
+                "--fps", type=click.FloatRange(1, 120), callback=finite, default=25.0, show_default=True, metavar="F",
+                help="Frames a second of the film.",
+            ),
         )  # fmt: skip
         result: Callable[..., object] = with_desk
         for option in reversed(options):

@@ -20,6 +20,7 @@ from neurovis_spec.ros.logs import topic_of
 from neurovis_spec.ros.middleware import Arrival, Ros
 from neurovis_spec.ros.received import ReceivedSource
 from neurovis_spec.ros.recorder import Recorder
+from neurovis_spec.ros.video import Video
 from neurovis_spec.runtime.columns import Probe, columns_of
 from neurovis_spec.runtime.npz_file import frame_bytes
 from neurovis_spec.runtime.stream import frame_of
@@ -72,6 +73,8 @@ class Listening:
         self._definitions: dict[str, str] = {}
         self.source = ReceivedSource(network) if wanted.shown else None
         self._files = None if wanted.record is None else self._recording(wanted.record, wanted)
+        #: the film that is made of it, where there is one
+        self.video: Video | None = None
         self.recorder = Recorder(self._files, self._definitions, tell, self._heard)
         self.activity = self._add(
             ACTIVITY, f"{self._base}/{ACTIVITY}", ARRAY, arrays(network.hash, len(network.neurons))
@@ -146,5 +149,7 @@ class Listening:
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """The files of the recording."""
-        return () if self._files is None else tuple(map(str, self._files.paths))
+        """The files of the recording, and the film."""
+        recorded = () if self._files is None else self._files.paths
+        filmed = () if self.video is None or not self.video.begun else (self.video.path,)
+        return tuple(map(str, (*recorded, *filmed)))

@@ -69,7 +69,7 @@ class Steering(Protocol):
 @dataclass(slots=True, eq=False)
 class _Row:
     """A step as it came: ``seq`` its publisher's number, ``time`` when it came in nanoseconds, ``weights`` those of the
-    plastic connections, ``seen`` what a picture shows in place of the activity."""
+    plastic connections, ``seen`` what a picture shows in place of the activity, ``shown`` whether one has."""
 
     step: int
     seq: int | None
@@ -77,6 +77,7 @@ class _Row:
     activity: FloatArray
     weights: FloatArray
     seen: FloatArray | None
+    shown: bool = False
 
 
 class ReceivedSource:
@@ -90,15 +91,14 @@ class ReceivedSource:
         self._changing = network.changing
         self._weights = network.connections.weights[self._changing].copy()
         self._lock = Lock()
-        self._rows = [_Row(0, None, 0, np.zeros(len(network.neurons)), self._weights, None)]
+        self._rows = [_Row(0, None, 0, np.zeros(len(network.neurons)), self._weights, None, True)]
         self._each = _EACH + 8 * len(network.neurons) + 8 * len(self._changing)
         self._fading = Fading(network)
         self._unknown = np.full(len(network.neurons), np.nan), np.full(len(network.connections), np.nan)
         self.history = Ring(len(network.neurons), len(network.connections))
         self._at, self._time = self._rows[0], 0
         self._offset, self._begun, self._following = 0, False, True
-        self._shown: _Row | None = None
-        #: messages that were seen, and all that there were
+        #: messages that were shown, and all that there were
         self.shown = self.came = 0
 
     def steer(self, steering: Steering) -> None:
@@ -152,6 +152,19 @@ class ReceivedSource:
             self._offset = 0 if seq is None else step - seq
         return step
 
+    # ---- the newest, in any thread -----------------------------------------------------------------------------
+
+    @property
+    def begun(self) -> bool:
+        """Whether a step has come."""
+        return self._begun
+
+    def newest(self) -> Snapshot:
+        """The newest step, wherever the source stands."""
+        with self._lock:
+            row = self._rows[-1]
+        return self._show(row)
+
     # ---- the source, in the thread of the run ------------------------------------------------------------------
 
     @property
@@ -187,21 +200,24 @@ class ReceivedSource:
 
     def seen(self) -> Seen:
         """What is seen of the step that it stands at."""
-        at, network = self._at, self.network
-        with self._lock:
-            place = bisect_left(self._rows, at.step, key=attrgetter("step"))
-            before = self._rows[place - 1] if place else None
-        if at is not self._shown and self._begun:
-            self.shown += 1
-        self._shown = at
-        previous = None
-        if before is not None and before.step == at.step - 1:
-            previous = self._all_weights(before)
-        snapshot = Snapshot(at.step, at.activity, self._all_weights(at), previous, at.seen)
+        network, snapshot = self.network, self._show(self._at)
         if self._steering is not None and self._following:
             return Seen(snapshot, *self._steering.touched)
         neurons, connections = np.zeros(len(network.neurons), bool), np.zeros(len(network.connections), bool)
         return Seen(snapshot, neurons, connections, neurons)
+
+    def _show(self, row: _Row) -> Snapshot:
+        """What is shown of a step."""
+        with self._lock:
+            place = bisect_left(self._rows, row.step, key=attrgetter("step"))
+            before = self._rows[place - 1] if place else None
+            if not row.shown:
+                row.shown = True
+                self.shown += 1
+        previous = None
+        if before is not None and before.step == row.step - 1:
+            previous = self._all_weights(before)
+        return Snapshot(row.step, row.activity, self._all_weights(row), previous, row.seen)
 
     def _all_weights(self, row: _Row) -> FloatArray:
         weights: FloatArray = self.network.connections.weights.copy()

@@ -6,6 +6,7 @@ parameters are set by the middleware's thread between two of them; once a second
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -142,7 +143,7 @@ class NodeRun:
         self._simulation = simulation(self.network, course.backend)
         self._clock: Clock = SimulatedClock(node.now) if course.sim_time else SteadyClock()
         self._pace = Pace(self._clock, course.rate)
-        self._begun = time.monotonic()
+        self._begun, self._over = time.monotonic(), math.inf
         self.why: str | None = None
         try:
             self._inputs = self._subscribe()
@@ -243,6 +244,7 @@ class NodeRun:
                 step += 1
         finally:
             self._make_safe()
+            self._over = time.monotonic()
             self._end.set()
             watch.join(2.0)
             self._teller.rest()
@@ -305,7 +307,7 @@ class NodeRun:
             network=self.network.name,
             hash=self.network.hash,
             ros=self.node.ros,
-            seconds=time.monotonic() - self._begun,
+            seconds=min(time.monotonic(), self._over) - self._begun,
             steps=self._simulation.k,
             late=self._pace.late,
             reconnects=self.node.reconnects,

@@ -24,6 +24,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from neurovis_spec.language.expressions.emit_c import INEXACT
+from neurovis_spec.runtime.environment import for_others
 
 #: No option changes what IEEE 754 says of an operation, but for flags and traps that nobody reads.
 FLAGS = (
@@ -161,15 +162,6 @@ def _made(text: str, path: Path) -> ctypes.CDLL:
         raise CompilerError(f"what is compiled cannot be written or loaded: {error}") from None
 
 
-def _inherited() -> dict[str, str]:
-    """The environment of other programs. The wheels of ROS 2 have their own process look for libraries among theirs:
-    no other program is to load these."""
-    environment = dict(os.environ)
-    if environment.pop("_ROS_WHEELS_BOOTSTRAP_COMPLETE", None) is not None:
-        environment.pop("LD_LIBRARY_PATH", None)
-    return environment
-
-
 def _compiled(text: str, into: Path, zig: Path) -> Path:
     """Compile in a folder; ``zig`` is where ziglang may keep what it makes for itself (it waits for ever where it
     cannot write). Raises OSError where the folder cannot be written to, CompilerError where the compiler fails."""
@@ -187,7 +179,7 @@ def _compiled(text: str, into: Path, zig: Path) -> Path:
         done = subprocess.run(
             command,
             cwd=into,
-            env={**own, **_inherited()},
+            env={**own, **for_others()},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,

@@ -1,6 +1,6 @@
 """Videos: a Film as MP4 (H.264) or WebM (VP9), written while it is made.
 
-In: a Film, in parts of some frames each. Out: a file in fragments of two seconds, so that what is there can be played
+In: a Film, in parts of some frames each. Out: a file in fragments of a second, so that what is there can be played
 at any time, also when whoever wrote it has been killed. ffmpeg encodes, in a process of its own that writes the file:
 that of the package ``imageio-ffmpeg`` (extra ``video``), else the system's. Colours are stated as those of BT.709, four
 brightnesses to a colour (4:2:0), which is what everything plays.
@@ -28,7 +28,7 @@ from neurovis_spec.scene import Film, Progress, RendererCapabilities, Scene
 from neurovis_spec.scene.renderers import RendererError
 
 #: Seconds of a fragment.
-_FRAGMENT = 2.0
+_FRAGMENT = 1.0
 #: Colours, which are halved across and down, are kept finer than brightness would need; without frames that look ahead
 #: (B) an MP4 in fragments begins at 0, and without a WebM's lag (25 by default) as little as can be is on the way.
 _ENCODERS = {
