@@ -112,7 +112,8 @@ def test_a_package_of_ros_1_is_launched(tmp_path: Path) -> None:
         file.write_text(file.read_text().replace("--rate", more))
         # as somebody calls it who has sourced /opt/ros: with the interpreter of the system
         launch = ros.started(
-            ["/usr/bin/python3", "/usr/bin/roslaunch", "neurovis_arm", "network.launch", "rate:=200"], ROS_IP="127.0.0.1",
+            ["/usr/bin/python3", "/usr/bin/roslaunch", "neurovis_arm", "network.launch", "rate:=200"],
+            ROS_IP="127.0.0.1",
             **environment,
         )  # fmt: skip
         assert launch.wait_for("ready: /neurovis/arm, ROS 1, 200 steps a second")
@@ -155,8 +156,9 @@ def test_a_package_of_ros_2_is_installed_and_run_as_its_launch_file_says(name: s
         (library,) = prefix.glob("lib/python*/site-packages")
         peer = listening(ros)
         run = ros.started(
-            [program, *str(node.get("args")).replace("$(var rate)", "200").split(), "--steps", str(STEPS), "--wait", "60", "--backend", "reference",
-             "--ros-args", "--params-file", parameters, "-r", "/neurovis/arm/unused:=/elsewhere"],
+            [program, *str(node.get("args")).replace("$(var rate)", "200").split(),
+             "--steps", str(STEPS), "--wait", "60", "--backend", "reference", "--ros-args",
+             "--params-file", parameters, "-r", "/neurovis/arm/unused:=/elsewhere"],
             PATH=f"{ros.bin}:{os.environ['PATH']}", PYTHONPATH=str(library),
         )  # fmt: skip
         assert run.end() == 0, run.err
