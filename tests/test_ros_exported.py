@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -137,7 +138,7 @@ def test_a_package_of_ros_2_is_installed_and_run_as_its_launch_file_says(name: s
     with world(name) as ros:
         # as colcon installs a package of ament_python
         record = ("--single-version-externally-managed", "--record", tmp_path / "record")
-        install = [ros.bin / "python", "setup.py", "-q", "install", "--prefix", prefix, *record]
+        install: list[str | Path] = [sys.executable, "setup.py", "-q", "install", "--prefix", prefix, *record]
         subprocess.run(install, cwd=folder, check=True, capture_output=True, timeout=60)
         assert (prefix / "share" / "ament_index" / "resource_index" / "packages" / "neurovis_arm").is_file()
         share = prefix / "share" / "neurovis_arm"
