@@ -6,12 +6,14 @@
 A block of the page that begins with ```sh is for bash; words after it say for which ROS it is (``kilted``, ``jazzy``,
 ``one``, ``ros2``; all of them where none does), and more: ``install`` makes the environment, ``packages`` needs root,
 ``stays`` goes on until its section (##) ends, and is then ended as by Ctrl-C. Each is a terminal of its own, in which
-the environment is activated. A block ```text after it is what is printed (among other lines); … is anything.
+the environment is activated. A block ```text after it is what is printed (among other lines); … is anything. A page
+whose address is printed by what stays is opened, and must show further and further steps.
 """
 
 from __future__ import annotations
 
 import argparse
+import asyncio
 import os
 import re
 import shutil
@@ -21,7 +23,9 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+import aiohttp
 from ros_worlds import _OURS, FOLDER, ROOT, Process
+from test_live_server import Eyes
 
 PAGE = ROOT / "docs" / "ros.md"
 _VERSIONS = {"kilted": "ros2", "jazzy": "ros2", "one": "ros1"}
@@ -115,7 +119,23 @@ class Terminals:
             process.kill()
             raise
         print(*process.err[:20], *process.out[:20], sep="\n", flush=True)
+        if "stays" in block.words:
+            for line in process.err:
+                if line.startswith("live: "):
+                    print(f"shown: {asyncio.run(shown(line.removeprefix('live: ')))} steps", flush=True)
         return process
+
+
+async def shown(url: str) -> int:
+    """Open a page as a browser does, and look on until it has shown what takes a second or so; how many steps."""
+    async with aiohttp.ClientSession() as session:
+        async with session.get(url) as answer:
+            assert answer.status == 200
+        eyes = Eyes(await session.ws_connect(url.replace("/?", "/live?"), max_msg_size=1 << 24))
+        await eyes.until(lambda: eyes.step > 0)
+        first = eyes.step
+        await eyes.until(lambda: eyes.step > first + 30)
+        return eyes.step - first
 
 
 def run(name: str, folder: Path) -> None:
