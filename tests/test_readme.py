@@ -24,6 +24,7 @@ PAGES = [
         "docs/editors.md",
         "docs/language.md",
         "docs/measures.md",
+        "docs/ros.md",
     )
 ]
 
