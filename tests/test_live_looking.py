@@ -46,6 +46,46 @@ async def told(opened: Page, name: str) -> list[str]:
     return found.split("\n")
 
 
+def bends(compiled: nv.CompiledNetwork) -> dict[str, tuple[tuple[str, str], list[tuple[float, float]]]]:
+    """The ends of each connection, and the points halfway along the pieces of its line in the window of ``shown``."""
+    scene = json.loads(gzip.decompress(view_of(compiled, compiled.gains).content))
+    result = {}
+    for group in scene["groups"]:
+        if "connection" in group["data"]:
+            points = np.reshape(group["shapes"][0]["points"], (-1, 2)) * scene["density"]
+            pieces = [points[first : first + 4] for first in range(0, len(points) - 3, 3)]
+            middles = [(a + 3 * b + 3 * c + d) / 8 for a, b, c, d in pieces]
+            found = [(float(x), float(y)) for x, y in [*middles, *points[::3]]]
+            result[group["data"]["connection"]] = ((group["data"]["from"], group["data"]["to"]), found)
+    return result
+
+
+def test_the_tooltip_does_not_lie_on_what_it_tells_of(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, compiled, _):
+            await pause(opened)
+            lines, at = bends(compiled), places(compiled)
+
+            async def covered(points: list[tuple[float, float]]) -> int:
+                await opened.ask("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+                ask = f"(({{left, top, right, bottom}}) => [left, top, right, bottom])({TIP}.getBoundingClientRect())"
+                box = await opened.ask(ask)
+                assert isinstance(box, list)
+                return sum(box[0] < x < box[2] and box[1] < y < box[3] for x, y in points)
+
+            for name in ("C1 -> K8", "C2 -> K8", "K1 -> O", "K8 -> O"):
+                await opened.point(*lines[name][1][0])
+                await told(opened, name.replace("->", "→"))
+                assert await covered(lines[name][1]) == 0, name
+            for name in ("K1", "K8", "O"):
+                await opened.point(*at[name])
+                await told(opened, name)
+                own = [point for ends, points in lines.values() if name in ends for point in points]
+                assert await covered(own) == 0, name
+
+    asyncio.run(main())
+
+
 def test_a_pointer_is_told_name_value_delay_and_rule(tmp_path: Path) -> None:
     async def main() -> None:
         async with shown("cpg_rbf.yaml", tmp_path) as (opened, compiled, _):

@@ -17,6 +17,29 @@ export function signed(value) {
   return (value > 0 ? '+' : '') + String(Number(value.toPrecision(6))).replace('-', '−');
 }
 
+/** The sides of a place on which a tooltip can be, the best first, how far it is from there, and the steps in which room is
+ * kept for it, in pixels of a page. */
+const SIDES = [
+    [1, 1],
+    [-1, 1],
+    [1, -1],
+    [-1, -1],
+  ],
+  GAP = 14,
+  COARSE = 32;
+
+/** Points along a cubic spline. @param {number[]} points @returns {number[][]} */
+function along(points) {
+  const found = [];
+  for (let first = 0; first + 7 < points.length; first += 6) {
+    for (let t = 0; t < 1; t += 1 / 16) {
+      const shares = [(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t * t * (1 - t), t ** 3];
+      found.push([0, 1].map((axis) => shares.reduce((sum, by, at) => sum + by * points[first + 2 * at + axis], 0)));
+    }
+  }
+  return found;
+}
+
 /** What is pointed at and what is held, by the ids of their groups, '' for nothing. */
 export class Attention {
   /** @param {Link} link @param {Zoom} zoom @param {() => void} changed called when something else is to be seen
@@ -48,6 +71,9 @@ export class Attention {
     this.values = {};
     /** where the pointer is, in units @type {number[]} */
     this.place = [0, 0];
+    /** on which side of its place the tooltip is, and for what that was found */
+    this.side = SIDES[0];
+    this.beside = '';
     this.tip = /** @type {HTMLElement} */ (document.getElementById('tip'));
   }
 
@@ -165,7 +191,19 @@ export class Attention {
     return shapes[id[0] === 'n' ? 0 : 1].at;
   }
 
-  /** Show the tooltip beside what is pointed at, or else held. @param {Camera} camera @param {Look} look */
+  /** Points of the lines that are told of: a connection's, or those of a neuron's inputs and outputs, and their discs.
+   * @param {string} id @returns {number[][]} */
+  told(id) {
+    const group = this.groups.get(id);
+    if (!group) return [];
+    const shown = group.data.neuron === undefined ? [id] : this.around(id);
+    return shown.flatMap((one) => {
+      const [{ at, points }] = this.groups.get(one)?.shapes ?? [{}];
+      return points ? along(points) : at ? [at] : [];
+    });
+  }
+
+  /** Show the tooltip, where it covers least of what it tells of, beside what is pointed at, or else held. @param {Camera} camera @param {Look} look */
   show(camera, look) {
     const id = this.pointed || this.held,
       words = this.words(id, look),
@@ -175,13 +213,30 @@ export class Attention {
     if (tip.textContent !== words) tip.textContent = words;
     const [x, y] = this.pointed ? this.place : this.middle(id);
     const at = camera.pixel(x, y).map((pixel) => pixel / devicePixelRatio);
-    const room = [tip.offsetWidth, tip.offsetHeight];
-    const edge = camera.window.map((size) => size / devicePixelRatio);
-    // where there is no room to the right or below, it is to the left or above
-    const [across, down] = [0, 1].map((axis) => {
-      const beside = at[axis] + 14 + room[axis] > edge[axis] ? at[axis] - 14 - room[axis] : at[axis] + 14;
-      return Math.max(0, Math.min(beside, edge[axis] - room[axis]));
-    });
+    // as large as it may become while numbers change, so that it stays on its side
+    const [room, size] = [COARSE, 1].map((grain) =>
+      [tip.offsetWidth, tip.offsetHeight].map((length) => Math.ceil(length / grain) * grain),
+    );
+    const edge = camera.window.map((length) => length / devicePixelRatio);
+    const key = [id, at, room, edge, camera.scale].join();
+    if (key !== this.beside) {
+      this.beside = key;
+      const points = this.spot ? [] : this.told(id).map((point) => camera.pixel(point[0], point[1]));
+      let least = Infinity;
+      for (const side of SIDES) {
+        const [left, top] = side.map((way, axis) => at[axis] + (way < 0 ? -GAP - room[axis] : GAP));
+        const [right, bottom] = [left + room[0], top + room[1]];
+        let covered = left < 0 || top < 0 || right > edge[0] || bottom > edge[1] ? points.length + 1 : 0;
+        for (const point of points) {
+          const [x, y] = point.map((pixel) => pixel / devicePixelRatio);
+          if (x > left && x < right && y > top && y < bottom) covered++;
+        }
+        if (covered < least) [least, this.side] = [covered, side];
+      }
+    }
+    const [across, down] = this.side.map((way, axis) =>
+      Math.max(0, Math.min(at[axis] + (way < 0 ? -GAP - size[axis] : GAP), edge[axis] - size[axis])),
+    );
     tip.style.transform = `translate(${Math.round(across)}px, ${Math.round(down)}px)`;
   }
 }
