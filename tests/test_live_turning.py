@@ -55,6 +55,28 @@ async def turned(opened: Page, *wanted: str) -> None:
     await opened.until(f"JSON.stringify({rows}) == JSON.stringify({list(wanted)})")
 
 
+def test_a_field_without_a_number_within_its_bounds_turns_nothing_and_says_so(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):
+            await pause(opened)
+            await opened.key("]")
+            await opened.key("t")
+            field = "document.querySelector('#slider-eta + input')"
+            for bad in ("7", ""):
+                await opened.ask(f"document.activeElement.blur(), {field}.value = '{bad}'")
+                await opened.ask(f"{field}.dispatchEvent(new Event('change'))")
+                assert await opened.ask(f"document.activeElement == {field} && {field}.matches(':invalid')")
+            for name, bad, button in (("clampto", "", "clamp"), ("seconds", "999", "film"), ("seconds", "", "film")):
+                await opened.ask(f"document.querySelector('#{name}').value = '{bad}'")
+                await opened.ask(f"document.querySelector('#{button}').click()")
+                assert await opened.ask("document.activeElement.id") == name
+            await opened.ask("document.querySelector('#clampto').value = '0.5'")
+            await opened.ask("document.querySelector('#clamp').click()")
+            await turned(opened, "clamp C1 = 0.5")
+
+    asyncio.run(main())
+
+
 def test_a_slider_sets_a_parameter_within_its_bounds_and_a_double_click_resets_it(tmp_path: Path) -> None:
     async def main() -> None:
         async with shown("cpg_rbf.yaml", tmp_path) as (opened, _, _):

@@ -20,6 +20,7 @@ import { Refusal } from './refusal.js';
 import { download, savePng } from './save.js';
 import { say } from './say.js';
 import { Scrubber } from './scrubber.js';
+import { withNumber } from './sliders.js';
 import { Strips } from './strips.js';
 import { Turning } from './turning.js';
 import { Zoom } from './zoom.js';
@@ -258,10 +259,8 @@ function help() {
 part('png').onclick = () => {
   if (link.scene && link.look) savePng(link.scene, link.look);
 };
-for (const what of ['svg', 'film', 'npz']) {
-  part(what).onclick = () =>
-    link.ask('fetch', { what, seconds: Number(/** @type {HTMLInputElement} */ (part('seconds')).value) });
-}
+for (const what of ['svg', 'npz']) part(what).onclick = () => link.ask('fetch', { what, seconds: 1 });
+part('film').onclick = () => withNumber(part('seconds'), (seconds) => link.ask('fetch', { what: 'film', seconds }));
 part('help').onclick = help;
 part('matrix').onclick = () => choose(!matrix);
 part('shut').onclick = help;

@@ -19,6 +19,12 @@ function range({ value, low, high }) {
   return [least, high === null ? Math.max(value + reach, least + reach) : high];
 }
 
+/** Do something with the number in a field; where it is none, or out of bounds, the browser says so in place of that.
+ * @param {HTMLInputElement} field @param {(value: number) => void} then */
+export function withNumber(field, then) {
+  if (field.reportValidity()) then(field.valueAsNumber);
+}
+
 /** Rows of sliders; a double click on one, or Delete, resets. */
 export class Sliders {
   /** @param {HTMLElement} place */
@@ -71,9 +77,8 @@ export class Sliders {
     slider.onkeyup = () => {
       this.pressed = false;
     };
-    field.onchange = () => {
-      if (field.value && field.checkValidity()) given(Number(field.value), false);
-    };
+    field.required = true;
+    field.onchange = () => withNumber(field, (number) => given(number, false));
     slider.ondblclick = () => given(null, false);
     slider.onkeydown = (event) => {
       this.pressed = true;

@@ -6,7 +6,7 @@ import { Appearance, drawnOtherwise } from './appearance.js';
 import { eventsOf, takenBack } from './events.js';
 import { Feeds } from './feeds.js';
 import { Rules } from './rules.js';
-import { Sliders } from './sliders.js';
+import { Sliders, withNumber } from './sliders.js';
 
 /** @typedef {import('./protocol.js').Gains} Gains */
 /** @typedef {import('./protocol.js').Status} Status */
@@ -53,7 +53,7 @@ export class Turning {
     this.declared = [];
     this.ref = '';
     const clampTo = /** @type {HTMLInputElement} */ (find('clampto'));
-    find('clamp').onclick = () => link.ask('hold', { neurons: this.ref, value: Number(clampTo.value) });
+    find('clamp').onclick = () => withNumber(clampTo, (value) => link.ask('hold', { neurons: this.ref, value }));
     find('release').onclick = () => link.ask('release', { neurons: this.ref });
     find('lesion').onclick = () => link.ask('lesion', { part: this.ref });
     find('mend').onclick = () => link.ask('mend', { part: this.ref });
