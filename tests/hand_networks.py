@@ -89,6 +89,7 @@ def network(
             next((f"{rules[c.rule][0]}(rate=0.01)" for c in connections if c.entry == entry and c.rule >= 0), None)
             for entry in range(len(entries))
         ),
+        labels=(None,) * len(entries),
     )
     plasticity = []
     for number, (rule, signals) in enumerate(rules):

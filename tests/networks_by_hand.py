@@ -191,6 +191,7 @@ def connections(links: Sequence[Link]) -> Connections:
         entries=("all",),
         descriptions=(None,),
         learns=("rule" if any(link.learns >= 0 for link in links) else None,),
+        labels=(None,),
     )
 
 

@@ -88,3 +88,55 @@ def test_a_label_beside_a_disc_keeps_off_the_line_of_a_box_where_it_can() -> Non
     assert found["shoulder"].text == "shoulder"
     assert not found["shoulder"].on_disc
     assert not found["shoulder"].halo
+
+
+NAMED = """neurovis: 1
+name: named
+neurons: {C: {count: 2, bias: 1}, K: {count: 6}, O: {label: "the output"}}
+connections:
+  C -> C: {pattern: all_to_all, label: rotation, weight: 0.3}
+  C -> K: {label: "sensory: tuning", weight: i - j, pattern: all_to_all}
+  K -> O: {label: readout, description: learned later}
+"""
+
+
+def named(spec: str) -> tuple[dict[str, Text], list[str]]:
+    """The labels of connections by entry, and all tooltips."""
+    network = nv.compile_text(spec)
+    snapshot, layout = network.run(3).snapshot(2), network.layout().value
+    scene = pipeline.picture(network.network, layout, snapshot, network.gains, network.network.render)
+    found = {g.id: s for g in scene.groups for s in g.shapes if isinstance(s, Text) and g.id.startswith("label:")}
+    return found, [group.title for group in scene.groups]
+
+
+def test_an_entry_has_its_label_once_on_one_of_its_lines() -> None:
+    found, titles = named(NAMED)
+    assert {name: text.text for name, text in found.items()} == {
+        "label:C -> C": "rotation",
+        "label:C -> K": "sensory: tuning",
+        "label:K -> O": "readout",
+    }
+    assert len({text.point for text in found.values()}) == 3
+    assert all(text.halo for text in found.values())
+    readout = [title.splitlines() for title in titles if "readout" in title]
+    assert [lines[0] for lines in readout] == [f"K{number} → O: readout" for number in range(1, 7)]
+    assert all("learned later" in lines for lines in readout)
+
+
+def test_labels_of_connections_are_no_content_and_can_be_left_out() -> None:
+    without = NAMED.replace("label: readout, ", "")
+    assert nv.compile_text(without).hash == nv.compile_text(NAMED).hash
+    assert not named(NAMED + "render: {labels: false}\n")[0]
+    gathered, titles = named(NAMED + "render: {collapse: [K]}\n")
+    assert set(gathered) == {"label:C -> C"}
+    assert not any("readout" in title for title in titles)
+
+
+def test_a_label_of_a_connection_stands_on_no_disc_and_on_no_other() -> None:
+    chain = "".join(f"  N{i} -> N{i + 1}: {{label: from the one to the next}}\n" for i in range(1, 9))
+    found, _ = named(f"neurovis: 1\nname: n\nneurons: {{N: {{count: 9, bias: 1}}}}\nconnections:\n{chain}")
+    boxes = [
+        (text.point[0] - width(text.text, text.size) / 2, text.point[1] - text.size, text.point[0], text.point[1])
+        for text in found.values()
+    ]
+    assert all(a[3] <= b[1] or b[3] <= a[1] or a[0] >= b[2] or b[0] >= a[2] for a in boxes for b in boxes if a != b)

@@ -147,6 +147,7 @@ def join(bundles: tuple[Bundle, ...], rules: IntArray) -> Connections:
         entries=tuple(bundle.name for bundle in bundles),
         descriptions=tuple(bundle.description for bundle in bundles),
         learns=tuple(None if bundle.learning is None else title_of(bundle.learning) for bundle in bundles),
+        labels=tuple(bundle.label for bundle in bundles),
     )
     for array in (
         result.sources,

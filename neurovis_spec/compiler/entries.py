@@ -58,6 +58,7 @@ class Bundle(NamedTuple):
     #: what of it follows parameters: ``weights``, ``first`` of an entry that learns (its first weights, which nothing
     #: that is set in a run changes), ``centres``, ``low``, ``high``, ``rule``
     parts: tuple[Part, ...] = ()
+    label: str | None = None
 
 
 class _Shape(NamedTuple):
@@ -172,6 +173,7 @@ class EntryBuilder:
                 *bounding,
                 *(part._replace(field="rule") for part in ruled if learning is not None),
             ),
+            None if body.label is None else body.label.value,
         )
 
     def _fits(self, count: int) -> bool:

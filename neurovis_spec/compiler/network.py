@@ -122,6 +122,8 @@ class Connections:
     descriptions: tuple[str | None, ...]
     #: the rule of each entry as the author wrote it, for display (``delta(rate=0.01)``); None without one
     learns: tuple[str | None, ...]
+    #: what each entry is called in pictures
+    labels: tuple[str | None, ...]
 
     def __len__(self) -> int:
         return len(self.sources)

@@ -189,6 +189,7 @@ class ConnectionModel(Model):
         BeforeValidator(lambda node, info: _pair(node, info)),
         WithJsonSchema({"type": "array", "items": FORMULA, "minItems": 2, "maxItems": 2}),
     ] = Field(None, description="[low, high] for plastic weights.")
+    label: TextField | None = Field(None, description="What it is called in pictures and tooltips.")
     description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
 
 

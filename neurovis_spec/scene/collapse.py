@@ -323,6 +323,7 @@ class _Gatherer:
             tuple(entries),
             tuple(descriptions),
             tuple(learns),
+            (*old.labels, *(None for _ in entries[len(old.labels) :])),
         )
 
     def _plasticity(self) -> tuple[Plasticity, ...]:

@@ -203,7 +203,8 @@ def tooltips(network: Network, gains: Gains, activity: FloatArray, weights: Floa
     rows = zip(connections.delays.tolist(), connections.entry.tolist(), strict=True)
     for index, (delay, entry) in enumerate(rows):
         parts = [
-            network.connection_names[index].replace("->", "→"),
+            network.connection_names[index].replace("->", "→")
+            + (f": {label}" if (label := connections.labels[entry]) else ""),
             f"weight {_range(lows[index], highs[index])}",
             connections.learns[entry] or "",
             f"delay {delay}" if delay != 1 else "",

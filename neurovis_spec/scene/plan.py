@@ -31,6 +31,7 @@ from neurovis_spec.scene.heading import CAPTION, CAPTION_Y, HEADER, TITLE, capti
 from neurovis_spec.scene.labels import Ground, Label, labels_of, margin_beside, room_beside
 from neurovis_spec.scene.legend_entry import Entry
 from neurovis_spec.scene.lesions import Lesions, lesions_of
+from neurovis_spec.scene.line_labels import line_labels
 from neurovis_spec.scene.lines import Line, routes_of, trimmed
 from neurovis_spec.scene.model import Arrowhead, Group, Rectangle, Spline, Text, Theme, head_half_width
 from neurovis_spec.scene.obstacles import Obstacles
@@ -148,8 +149,14 @@ def plan(
         reach = margin_beside(network, RADIUS * frame.scale) if margin > MARGIN else 0.0
         ground = Ground(positions, factors, frame.scale, (frame.left, frame.top), inner, extent, reach)
         labels = labels_of(network, ground, obstacles, (~seen.focus).tolist(), sizes)
+    named = line_labels(network, lines, obstacles, theme) if settings.labels else {}
     titles = _box_titles(boxes, frame, obstacles, theme, picture)
-    front = [*titles, *([header] if header else []), *([notes] if notes else [])]
+    front = [
+        *(Group((text,), id=f"label:{entry}") for entry, text in named.items()),
+        *titles,
+        *([header] if header else []),
+        *([notes] if notes else []),
+    ]
     if items:
         front.append(legend.flow(items, frame.width - 2 * MARGIN, MARGIN, bottom))
     rings = np.minimum(2.5, 0.12 * radii)
