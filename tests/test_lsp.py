@@ -255,6 +255,51 @@ def test_a_refused_rename_says_why(tmp_path: Path) -> None:
     edit(tmp_path, scenario)
 
 
+def test_a_refused_rename_writes_nothing() -> None:
+    uri = "untitled:one"
+    opened = {"uri": uri, "languageId": "yaml", "version": 1, "text": "neurovis: 1\nname: x\nneurons: {A: {}, B: {}}\n"}
+    asked = {"textDocument": {"uri": uri}, "position": {"line": 2, "character": 10}, "newName": "B"}
+    spoken = (
+        message(id=1, method="initialize", params={"capabilities": {}, "processId": None, "rootUri": None})
+        + message(method="initialized", params={})
+        + message(method="textDocument/didOpen", params={"textDocument": opened})
+        + message(id=2, method="textDocument/rename", params=asked)
+        + message(id=3, method="shutdown")
+        + message(method="exit")
+    )
+    command = [sys.executable, "-m", "neurovis_spec", "lsp"]
+    done = subprocess.run(command, input=spoken, capture_output=True, timeout=60, check=False)
+    assert b"'B' is declared already" in done.stdout
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+def test_references_and_quick_fixes(tmp_path: Path) -> None:
+    async def scenario(editor: Editor) -> None:
+        client, document = editor.client, editor.document
+        text = SPEC.replace("{gaussian: {sigma: 4}}", "tahn")
+        found = await editor.open(text)
+        uses = await client.text_document_references_async(
+            types.ReferenceParams(types.ReferenceContext(False), document, editor.at("K: {count"))
+        )
+        assert uses is not None
+        lines = [one.range.start.line for one in uses]
+        assert {one.uri for one in uses} == {editor.uri}
+        assert len(lines) == len([line for line in text.splitlines() for _ in line.split("K")[1:]]) - 1
+        action = types.CodeActionParams(document, found[0].range, types.CodeActionContext(found))
+        actions = await client.text_document_code_action_async(action) or []
+        (fix,) = [one for one in actions if one.title == "Write 'tanh'"]
+        assert isinstance(fix, types.CodeAction)
+        assert fix.is_preferred
+        assert fix.edit is not None
+        assert fix.edit.changes is not None
+        (change,) = fix.edit.changes[editor.uri]
+        start = editor.at("tahn")
+        end = types.Position(start.line, start.character + 4)
+        assert change == types.TextEdit(types.Range(start, end), "tanh")
+
+    edit(tmp_path, scenario)
+
+
 def message(**content: object) -> bytes:
     body = json.dumps({"jsonrpc": "2.0", **content}).encode()
     return b"Content-Length: %d\r\n\r\n%s" % (len(body), body)

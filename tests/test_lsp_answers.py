@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from lsp_marks import marked
 
 from neurovis_spec.language.patterns import SETTINGS
+from neurovis_spec.lsp import wire
 from neurovis_spec.lsp.check import check
 from neurovis_spec.lsp.completion import Completion, complete
 from neurovis_spec.lsp.definition import definition
@@ -72,8 +73,8 @@ def offered(text: str) -> dict[str, Completion]:
         (BASE + "connections:\n  K -> O: {plasticity: {¦", ["delta", "oja"], ["tanh"]),
         (BASE + "connections:\n  K -> O: {plasticity: {delta: {¦", ["rate", "target"], ["alpha"]),
         (BASE + "connections:\n  K -> O: {plasticity: {delta: {rate: ¦", ["alpha", "beta", "i", "n_to"], ["K", "n"]),
-        (BASE + "connections:\n  K -> O: {plasticity: {delta: {target: ¦", ["T", "go"], ["alpha"]),
-        (BASE + "connections:\n  K -> O: {plasticity: {delta: {target: [K1, ¦", ["T", "go"], ["alpha"]),
+        (BASE + "connections:\n  K -> O: {plasticity: {delta: {target: ¦", ["T", "go", "K1", "K5"], ["alpha"]),
+        (BASE + "connections:\n  K -> O: {plasticity: {delta: {target: [K1, ¦", ["T", "go", "K2"], ["alpha"]),
         (BASE + "connections:\n  K -> O: {pattern: ¦", ["all_to_all", "random"], ["alpha"]),
         (BASE + "connections:\n  K -> O: {pattern: {¦", ["ring", "random", "band"], ["probability"]),
         (BASE + "connections:\n  K -> O: {pattern: {random: {¦", ["probability"], ["random", "count"]),
@@ -440,3 +441,29 @@ def test_the_colours_of_a_theme_are_offered_and_explained() -> None:
     shown = hover(*marked(BASE + 'render: {theme: {ne¦gative: "#d55e00"}}'))
     assert shown is not None
     assert "colour of −1" in shown.markdown
+
+
+@pytest.mark.parametrize(
+    ("text", "wrong", "right"),
+    [
+        ("neurons: {A: {activation: 'tahn'}}", "tahn", "tanh"),
+        ("neurons: {A: {activaton: tanh}}", "activaton", "activation"),
+        ("parameters: {alpha: 1}\nneurons: {A: {bias: 2*alhpa}}", "alhpa", "alpha"),
+        ("neurons: {A: {model: leaky_integrator, bias: 1}}\noutputs: {o: A.vv}", "vv", "v"),
+        ("neurons: {Left: {bias: 1}, O: {}}\nconnections: {Lfet -> O: 1}", "Lfet", "Left"),
+    ],
+)
+def test_a_quick_fix_writes_the_right_name(text: str, wrong: str, right: str) -> None:
+    spec = f"neurovis: 1\nname: x\n{text}\n"
+    document, _ = marked(spec + "¦")
+    fixes = wire.fixes("file:///x.yaml", document.text, wire.diagnostics(document.text, check(document).findings))
+    fix = next(one for one in fixes if one.title == f"Write '{right}'")
+    assert fix.edit is not None
+    assert fix.edit.changes is not None
+    (change,) = fix.edit.changes["file:///x.yaml"]
+    lines = spec.splitlines()
+    line = lines[change.range.start.line]
+    assert line[change.range.start.character : change.range.end.character] == wrong
+    lines[change.range.start.line] = line[: change.range.start.character] + right + line[change.range.end.character :]
+    mended, _ = marked("\n".join(lines) + "\n¦")
+    assert not [one for one in check(mended).findings if one.severity == "error"]

@@ -243,7 +243,6 @@ def _neurons(scope: Scope, front: str, index: Index, single: bool = False, signa
     yield from _instances(module, index)
     if signals:
         yield from (_Offer(name.text, "input", "input") for name in index.declared("input", module))
-        return
     for group in groups:
         yield from (_Offer(name, "neuron", f"of {group.text}") for name in _numbered(group, index))
 

@@ -57,11 +57,10 @@ def rename(document: Document, place: Place, new: str) -> tuple[Edit, ...]:
     _check_name(document, declaration, new)
     families = _families(document, declaration)
     edits: dict[Edit, None] = {}
-    for family in families:
-        for index in _indices(family):
-            for name, span in index.uses(declaration):
-                _check_use(document, declaration, name, new)
-                edits[Edit(span, new)] = None
+    for index in _indices(families):
+        for name, span in index.uses(declaration):
+            _check_use(document, declaration, name, new)
+            edits[Edit(span, new)] = None
     result = tuple(edits)
     _check_files(document, result)
     _check_result(document, families, result, new)
@@ -102,10 +101,20 @@ def _families(document: Document, declaration: Name) -> list[tuple[Page, ...]]:
     return list(families.values())
 
 
-def _indices(family: tuple[Page, ...]) -> Iterator[Index]:
-    """All names of each file of a family, as they lead to what the others declare."""
-    for page in family:
-        yield page.index((other.alone for other in family if other is not page), whole=True)
+def _indices(families: Iterable[tuple[Page, ...]]) -> Iterator[Index]:
+    """All names of each file of each family, as they lead to what the others declare."""
+    for family in families:
+        for page in family:
+            yield page.index((other.alone for other in family if other is not page), whole=True)
+
+
+def sharing(document: Document, declaration: Name) -> Iterator[Index]:
+    """All names of each file that shares a declaration; of the document alone where these cannot be found."""
+    try:
+        families = _families(document, declaration)
+    except RenameError:
+        families = [(document.page, *document.included)]
+    return _indices(families)
 
 
 def _check_use(document: Document, declaration: Name, name: Name, new: str) -> None:

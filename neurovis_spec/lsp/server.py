@@ -27,6 +27,7 @@ from neurovis_spec.lsp.desk import Desk
 from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.formatting import formatting
 from neurovis_spec.lsp.hover import hover
+from neurovis_spec.lsp.references import references
 from neurovis_spec.lsp.rename import RenameError, prepare, rename
 from neurovis_spec.lsp.symbols import symbols
 from neurovis_spec.lsp.text import Text
@@ -35,6 +36,14 @@ from neurovis_spec.version import __version__
 #: Seconds without a change until findings are looked for.
 PAUSE: Final = 0.3
 _log = logging.getLogger(__name__)
+
+
+class Refusal(JsonRpcInvalidParams):
+    """A sentence for the one who asks, and no mistake: nothing is written of it."""
+
+
+def _is_worth_a_line(record: logging.LogRecord) -> bool:
+    return not (record.exc_info and isinstance(record.exc_info[1], Refusal))
 
 
 class SpecServer(LanguageServer):
@@ -108,6 +117,13 @@ class SpecServer(LanguageServer):
         """The text of a file near a document; empty where it cannot be read (then only lines are right)."""
         page = document.files.page(path)
         return Text("", document.encoding) if page is None else page.text
+
+    def placed(self, file: str, uri: str, document: Document) -> list[tuple[str, Text]]:
+        """The URI and the text of a file that a span names, perhaps that of the document; none where it has no URI."""
+        if file == document.file:
+            return [(uri, document.text)]
+        other = self.uri_of(Path(file))
+        return [] if other is None else [(other, self.text_of(Path(file), document))]
 
     def _check_soon(self, uri: str, pause: float | None) -> None:
         self._forget_check(uri)
@@ -199,7 +215,7 @@ def _follow(server: SpecServer) -> None:
 
 
 def _answer(server: SpecServer) -> None:
-    """Completion, hover, definition, symbols."""
+    """Completion, hover, definition, references, symbols."""
 
     @server.feature(types.TEXT_DOCUMENT_COMPLETION, types.CompletionOptions(trigger_characters=list(" {[,.>+(:")))
     def completion(params: types.CompletionParams) -> types.CompletionList:
@@ -225,6 +241,17 @@ def _answer(server: SpecServer) -> None:
             return None
         return types.Location(uri, wire.range_of(server.text_of(found.path, document), found.span))
 
+    @server.feature(types.TEXT_DOCUMENT_REFERENCES)
+    def on_references(params: types.ReferenceParams) -> list[types.Location]:
+        document = server.document(params.text_document.uri)
+        place = wire.place_of(document, params.position)
+        found = references(document, place, declaration=params.context.include_declaration)
+        return [
+            types.Location(uri, wire.range_of(text, span))
+            for span in found
+            for uri, text in server.placed(span.file, params.text_document.uri, document)
+        ]
+
     @server.feature(types.TEXT_DOCUMENT_DOCUMENT_SYMBOL)
     def document_symbol(params: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
         document = server.document(params.text_document.uri)
@@ -232,7 +259,7 @@ def _answer(server: SpecServer) -> None:
 
 
 def _edit(server: SpecServer) -> None:
-    """Rename and format. A refusal is an error with a sentence, which editors show."""
+    """Rename, mend and format. A refusal is an error with a sentence, which editors show."""
 
     @server.feature(types.TEXT_DOCUMENT_PREPARE_RENAME)
     def prepare_rename(params: types.PrepareRenameParams) -> types.PrepareRenamePlaceholder:
@@ -240,7 +267,7 @@ def _edit(server: SpecServer) -> None:
         try:
             span, name = prepare(document, wire.place_of(document, params.position))
         except RenameError as error:
-            raise JsonRpcInvalidParams(str(error)) from None
+            raise Refusal(str(error)) from None
         return types.PrepareRenamePlaceholder(wire.range_of(document.text, span), name)
 
     @server.feature(types.TEXT_DOCUMENT_RENAME)
@@ -249,15 +276,20 @@ def _edit(server: SpecServer) -> None:
         try:
             edits = rename(document, wire.place_of(document, params.position), params.new_name)
         except RenameError as error:
-            raise JsonRpcInvalidParams(str(error)) from None
+            raise Refusal(str(error)) from None
         changes = []
         for file in dict.fromkeys(edit.span.file for edit in edits):
             own = [edit for edit in edits if edit.span.file == file]
-            uri = params.text_document.uri if file == document.file else server.uri_of(Path(file))
-            text = document.text if file == document.file else server.text_of(Path(file), document)
-            if uri is not None:
-                changes.append((uri, text, own))
+            changes += [(uri, text, own) for uri, text in server.placed(file, params.text_document.uri, document)]
         return wire.workspace_edit(changes)
+
+    @server.feature(
+        types.TEXT_DOCUMENT_CODE_ACTION, types.CodeActionOptions(code_action_kinds=[types.CodeActionKind.QuickFix])
+    )
+    def on_code_action(params: types.CodeActionParams) -> list[types.CodeAction]:
+        document = server.document(params.text_document.uri)
+        own = [one for one in params.context.diagnostics if one.source == "neurovis"]
+        return wire.fixes(params.text_document.uri, document.text, own)
 
     @server.feature(types.TEXT_DOCUMENT_FORMATTING)
     def on_formatting(params: types.DocumentFormattingParams) -> list[types.TextEdit]:
@@ -272,4 +304,5 @@ def serve() -> None:
     """
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    logging.getLogger("pygls.protocol.json_rpc").addFilter(_is_worth_a_line)
     make_server().start_io(stdout=answers)

@@ -6,6 +6,7 @@ that knows the protocol is ``server``.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
@@ -130,6 +131,44 @@ def symbol_of(document: Document, symbol: Symbol) -> types.DocumentSymbol:
 def workspace_edit(edits: Iterable[tuple[str, Text, Sequence[Edit]]]) -> types.WorkspaceEdit:
     """Edits of several texts, each with its URI."""
     return types.WorkspaceEdit(changes={uri: text_edits(text, own) for uri, text, own in edits})
+
+
+_QUOTED: Final = re.compile(r"'([^']*)'")
+
+
+def fixes(uri: str, text: Text, found: Iterable[types.Diagnostic]) -> list[types.CodeAction]:
+    """For each finding that offers names an action for each of them, which puts it in the place of what is written; one
+    that is offered alone is preferred."""
+    result = []
+    for finding in found:
+        said, _, offered = finding.message.partition("\nhelp: did you mean ")
+        place = _misspelt(text, finding.range, _QUOTED.findall(said))
+        if place is None:
+            continue
+        names = _QUOTED.findall(offered.partition("?")[0])
+        for name in names:
+            result.append(
+                types.CodeAction(
+                    f"Write '{name}'",
+                    types.CodeActionKind.QuickFix,
+                    [finding],
+                    is_preferred=len(names) == 1,
+                    edit=types.WorkspaceEdit(changes={uri: text_edits(text, [Edit(place, name)])}),
+                )
+            )
+    return result
+
+
+def _misspelt(text: Text, where: types.Range, quoted: Sequence[str]) -> Span | None:
+    """Where the name stands that a message says is unknown: of those that it quotes the last one that is written
+    there."""
+    start, end = text.place(where.start.line, where.start.character), text.place(where.end.line, where.end.character)
+    whole = Span("", start.line, start.column, end.line, end.column)
+    if start.line != end.line:
+        return None
+    written = text.part(whole)
+    found = [(written.rfind(name), name) for name in quoted if name and name in written]
+    return whole.within(found[-1][0], found[-1][0] + len(found[-1][1])) if found else None
 
 
 def text_edits(text: Text, edits: Iterable[Edit]) -> list[types.TextEdit]:
