@@ -143,6 +143,8 @@ def test_weights_and_what_became_of_them(run: Recording) -> None:
     assert row["travelled"] == pytest.approx(float(np.abs(steps).sum()))
     assert row["largest update"] == steps[int(np.abs(steps).argmax())]
     assert row["at step"] == int(np.abs(steps).argmax())
+    still = analysis.weight_changes(nv.compile_text(NETWORK.replace("rate: 0.02", "rate: 0")).run()).row("K2 -> O")
+    assert (still["largest update"], math.isnan(still["at step"])) == (0, True)
     one = analysis.weight_changes(run, start=10, stop=11).row("K2 -> O")
     assert (one["change"], math.isnan(one["at step"])) == (0, True)
 

@@ -138,7 +138,7 @@ def test_what_does_not_apply_is_left_out(folder: Path) -> None:
 
 
 def test_many_neurons_are_measured_without_pairs(folder: Path) -> None:
-    many = "neurovis: 1\nname: x\nneurons: {N: {count: 450, bias: sin(i)}}\ntime: {steps: 5}\n"
+    many = "neurovis: 1\nname: x\nneurons: {N: {count: 450, bias: sin(i)}}\ntime: {steps: 5}\nlayout: {engine: grid}\n"
     (folder / "many.yaml").write_text(many, "utf-8")
     assert call("analyze many.yaml --no-trials -o out").exit_code == 0
     names = {path.name for path in (folder / "out").iterdir()}

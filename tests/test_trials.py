@@ -57,6 +57,21 @@ def test_the_sensitivity_of_a_sum(linear: nv.CompiledNetwork) -> None:
     assert "parameter size" not in slopes.rows.labels  # the structure depends on it
 
 
+def test_where_the_output_jumps_there_is_no_derivative() -> None:
+    """S crosses its threshold at step 20 with any more of the bias, and with any less of the slope."""
+    network = nv.compile_text(
+        "neurovis: 1\nname: x\ntime: {steps: 40}\nparameters: {height: 3, level: 0, more: 1}\n"
+        "inputs: {ramp: {expression: k - 20 + level}}\n"
+        "neurons: {A: {input: ramp}, S: {activation: step}, O: {}}\n"
+        "connections: {A -> S: {weight: 1, delay: 0}, S -> O: {weight: height, delay: 0}}\n"
+    )
+    slopes = analysis.sensitivity(network, of="O", steps=40)
+    assert np.isnan(slopes["parameter level", "rms"])
+    assert slopes["A -> S", "rms"] == 0
+    assert slopes["S -> O", "mean"] == pytest.approx(20 / 40, abs=0.03)
+    assert slopes["S -> O", "mean"] == slopes["parameter height", "mean"]
+
+
 def test_a_trial_is_the_run_itself_where_nothing_changes(linear: nv.CompiledNetwork) -> None:
     """Also with noise and events, and whichever way its steps are made."""
     network = nv.compile_text(

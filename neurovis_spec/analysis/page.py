@@ -64,7 +64,7 @@ class Shown:
 def largest(table: NamedArray) -> str:
     """The pairs of different neurons with the largest numbers, in words."""
     values, names = table.values, table.rows.labels
-    places = [(i, j) for i in range(len(names)) for j in range(i) if math.isfinite(values[i, j])]
+    places = [(i, j) for i in range(len(names)) for j in range(i) if math.isfinite(values[i, j]) and values[i, j]]
     if not places:
         return ""
     places.sort(key=lambda at: -abs(float(values[at])))

@@ -158,7 +158,7 @@ class _Report:
         """A view that the pictures of a network have as well."""
         with TemporaryDirectory() as folder:
             target = Path(folder) / "picture.svg"
-            self.network.render(target, recording=self._late, view=view, theme=self.wish.theme)
+            self.network.render(target, recording=self.recording, view=view, theme=self.wish.theme, window=_SEEN)
             return target.read_bytes()
 
     def _pairs(self, table: NamedArray, caption: str) -> bytes:
@@ -274,7 +274,11 @@ class _Report:
         if self.wish.stop is not None and first is None:
             first = max(last - count, 0)
         size = len(network.neurons) + len(network.connections)
-        runs = 2 * (size + len(network.neurons) + 2 * len(network.inputs) + len(network.parameters))
+        runs = (
+            2 * len(network.neurons)
+            + 6 * len(network.inputs)
+            + 4 * (len(network.parameters) + len(network.connections))
+        )
         if runs * count * size > _LONGEST:
             note = f"Left out: {runs:,} runs of this network take too long."
             yield from (Reading(key, notes=(note,)) for key in keys)
@@ -290,15 +294,20 @@ class _Report:
         shares = lost.column("lesion share")
         by = "lesion share" if np.isfinite(shares).any() else "lesion"
         yield self._ranked("importance", lost, by, f"{by}, {what}")
-        yield self._ranked("sensitivity", sensitivity_by(trials, self._progress), "elasticity", f"elasticity, {what}")
+        slopes = sensitivity_by(trials, self._progress)
+        jumps = int(np.isnan(slopes.column("rms")).sum())
+        note = (
+            f"{jumps:,} of {len(slopes.rows.labels):,} have no derivative there: a little more makes the outputs jump."
+        )
+        yield self._ranked("sensitivity", slopes, "elasticity", f"elasticity, {what}", (note,) if jumps else ())
 
-    def _ranked(self, key: str, table: NamedArray, by: str, caption: str) -> Reading:
+    def _ranked(self, key: str, table: NamedArray, by: str, caption: str, said: tuple[str, ...] = ()) -> Reading:
         values, names = table.column(by), table.rows.labels
         order = np.argsort(-np.nan_to_num(values, nan=-1.0), kind="stable")[:_BARS]
         title = catalogue()[key].title
         scene = pictures.bars([names[p] for p in order.tolist()], values[order], title, caption, self.theme)
         notes = (f"The picture has the first {_BARS} of {len(names):,}.",) if len(names) > _BARS else ()
-        return Reading(key, {key: table}, {key: self._draw(scene)}, notes)
+        return Reading(key, {key: table}, {key: self._draw(scene)}, (*said, *notes))
 
 
 def catalogue_title(name: str) -> str:

@@ -1,7 +1,8 @@
 """Sensitivity (saliency): how much the outputs change with a weight, a parameter or an input.
 
-In: a compiled network. Out: for each of them the derivative of the outputs by central differences: two runs from the
-same state, with a little more and a little less of it.
+In: a compiled network. Out: for each of them the derivative of the outputs by central differences: runs from the same
+state, with a little more and a little less of it. Where a smaller difference gives another derivative there is none: a
+threshold is crossed, and the outputs jump.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from neurovis_spec.runtime.simulation import ParameterError
 QUANTITIES = ("mean", "rms", "elasticity")
 #: How far to either side, of the size of what is changed; where that is 0, of 1.
 STEP = 1e-4
+#: The second difference, of the first; how far both derivatives may be apart, of the larger one and of the rounding.
+_FINER, _APART, _ROUNDING = 0.25, 0.1, 1e3
 
 #: What moves something by so much, and gives the outputs; ParameterError where it cannot be there.
 Move = Callable[[float], FloatArray]
@@ -37,7 +40,7 @@ def sensitivity(
     """A row for each input, each parameter that can be set in a run and each connection: the ``mean`` over steps and
     outputs of ∂output/∂it, its root mean square (``rms``), and the ``elasticity``, the rms times the size of it: how
     much the outputs change where it changes by its own size. A weight that learns goes on learning; an input is changed
-    by the same at all steps. See ``Trials`` for the arguments."""
+    by the same at all steps. NaN where there is no derivative. See ``Trials`` for the arguments."""
     return sensitivity_by(Trials(network, start, steps, inputs, of), progress)
 
 
@@ -47,10 +50,8 @@ def sensitivity_by(trials: Trials, progress: Progress | None = None) -> NamedArr
     total = len(network.inputs) + len(network.parameters) - len(network.structural) + len(network.connections)
     labels, found = [], []
     for label, size, move in _moves(trials):
-        slope = _slope(move, trials.intact, STEP * (size or 1.0))
-        with np.errstate(all="ignore"):
-            rms = float(np.sqrt(np.mean(slope**2)))
-            found.append((float(np.mean(slope)), rms, rms * size))
+        mean, rms = _derivative(move, trials.intact, STEP * (size or 1.0))
+        found.append((mean, rms, rms * size))
         labels.append(label)
         if progress is not None:
             progress(min(len(found), total), total)
@@ -76,6 +77,18 @@ def _moves(trials: Trials) -> Iterator[tuple[str, float, Move]]:
     weights = trials.weights
     for index, name in enumerate(network.connection_names):
         yield name, abs(float(weights[index])), lambda h, index=index: trials.weighed(index, h)  # type: ignore[misc]
+
+
+def _derivative(move: Move, intact: FloatArray, h: float) -> tuple[float, float]:
+    """The mean and the root mean square of the derivative; NaN where there is none."""
+    finer = h * _FINER
+    with np.errstate(all="ignore"):
+        slope = _slope(move, intact, h)
+        one, other = (float(np.sqrt(np.mean(values**2))) for values in (slope, _slope(move, intact, finer)))
+        rounding = _ROUNDING * float(np.finfo(np.float64).eps * np.abs(intact).max()) / finer
+    if not abs(one - other) <= _APART * max(one, other) + rounding:
+        return float("nan"), float("nan")
+    return float(np.mean(slope)), one
 
 
 def _slope(move: Move, intact: FloatArray, h: float) -> FloatArray:

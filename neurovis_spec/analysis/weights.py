@@ -31,7 +31,8 @@ def updates(recording: Recording, start: int | None = None, stop: int | None = N
 
 def weight_changes(recording: Recording, start: int | None = None, stop: int | None = None) -> NamedArray:
     """A row for each connection that can change: its ``first`` and ``last`` weight, the ``change`` between them, the
-    way that it has ``travelled`` (the sum of all |Δw|), its ``largest update`` and the step of that."""
+    way that it has ``travelled`` (the sum of all |Δw|), its ``largest update`` and the step of that, NaN where it never
+    changes."""
     part = _with_weights(recording, start, stop)
     with np.errstate(all="ignore"):
         each = _differences(part)
@@ -39,7 +40,8 @@ def weight_changes(recording: Recording, start: int | None = None, stop: int | N
         count = part.weights.shape[1]
         if len(each):
             best = size.argmax(axis=0)
-            largest, at = each[best, np.arange(count)], part.step[best].astype(np.float64)
+            largest = each[best, np.arange(count)]
+            at = np.where(largest == 0, np.nan, part.step[best].astype(np.float64))
         else:
             largest, at = np.zeros(count), np.full(count, np.nan)
         first, last = part.weights[0], part.weights[-1]
