@@ -125,6 +125,12 @@ def test_the_gait_of_made_up_legs() -> None:
     assert analysis.stretches(recording, "N1", 0, 50)["N1"] == [(0, 6), (20, 26), (40, 46)]
 
 
+def test_a_wave_around_zero_swings_once_a_period(run: Recording) -> None:
+    found = analysis.gait(run, "A", 80)
+    assert found["A", "period"] == 40
+    assert found["A", "duty"] == pytest.approx(0.5, abs=0.03)
+
+
 def test_a_phase_near_the_turn_is_not_averaged_to_the_opposite() -> None:
     t = np.arange(400)
     late = np.isin(t % 40, [39, 1]) & (t % 40 == np.where((t // 40) % 2, 39, 1))

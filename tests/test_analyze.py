@@ -220,3 +220,14 @@ def test_in_python_it_is_one_call(folder: Path) -> None:
     assert files == sorted(files, key=files.index)
     assert (folder / "out" / "index.html") in files
     assert {path.name for path in files} == {path.name for path in (folder / "out").iterdir()}
+
+
+def test_trials_that_would_take_too_long_are_left_out(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 5 neurons, 6 connections and an input, 500 steps: 12 runs for importance, 28 for sensitivity."""
+    for longest, expected in ((28 * 500 * 11, 2), (28 * 500 * 11 - 1, 1), (12 * 500 * 11 - 1, 0)):
+        monkeypatch.setattr(report, "_LONGEST", longest)
+        out = folder / f"out{expected}"
+        assert call(f"analyze small.yaml -o {out.name}").exit_code == 0
+        assert len([path for path in out.glob("*.csv") if path.stem in ("importance", "sensitivity")]) == expected
+        text = (out / "index.html").read_text(encoding="utf-8")
+        assert text.count("take too long") == 2 - expected

@@ -12,13 +12,22 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.analysis.coactivity import THRESHOLD, awake
-from neurovis_spec.analysis.excerpt import excerpt
+from neurovis_spec import arguments
+from neurovis_spec.analysis.coactivity import THRESHOLD
+from neurovis_spec.analysis.excerpt import Excerpt, excerpt
 from neurovis_spec.analysis.named import Axis, NamedArray
 from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.runtime.recording import Recording
 
 QUANTITIES = ("onset", "duty", "phase", "period", "times")
+
+
+def above(part: Excerpt, threshold: float) -> npt.NDArray[np.bool_]:
+    """Which neurons are above the threshold in which rows: (rows, neurons)."""
+    level = arguments.number("threshold", threshold)
+    with np.errstate(invalid="ignore"):
+        result: npt.NDArray[np.bool_] = part.activity > level
+    return result
 
 
 def gait(
@@ -32,7 +41,7 @@ def gait(
     for which it is active, its ``phase``, how far behind the first neuron's onset its own comes (0…1 of that one's
     period; the mean around the circle), its ``period`` in steps, and how many ``times`` it becomes active."""
     part = excerpt(recording, of, start, stop)
-    active = awake(part, threshold)
+    active = above(part, threshold)
     begins = [part.step[_onsets(active[:, column])] for column in range(len(part.names))]
     values = np.full((len(part.names), len(QUANTITIES)), np.nan)
     for row, own in enumerate(begins):
@@ -54,7 +63,7 @@ def stretches(
 ) -> dict[str, list[tuple[int, int]]]:
     """For each neuron the stretches for which it is active: the first step, and the one after the last."""
     part = excerpt(recording, of, start, stop)
-    active = awake(part, threshold)
+    active = above(part, threshold)
     stride = round(part.stride)
     result = {}
     for column, name in enumerate(part.names):

@@ -273,33 +273,37 @@ class _Report:
         count = min(STEPS, network.steps) if first is None else max(min(STEPS, last - first), 1)
         if self.wish.stop is not None and first is None:
             first = max(last - count, 0)
+        runs = {
+            "importance": 2 * (len(network.neurons) + len(network.inputs)),
+            "sensitivity": 4 * (len(network.inputs) + len(network.parameters) + len(network.connections)),
+        }
         size = len(network.neurons) + len(network.connections)
-        runs = (
-            2 * len(network.neurons)
-            + 6 * len(network.inputs)
-            + 4 * (len(network.parameters) + len(network.connections))
-        )
-        if runs * count * size > _LONGEST:
-            note = f"Left out: {runs:,} runs of this network take too long."
-            yield from (Reading(key, notes=(note,)) for key in keys)
-            return
+        long = {key for key, number in runs.items() if number * count * size > _LONGEST}
         try:
-            trials = Trials(self.network, first, count, self.wish.inputs or None)
+            trials = Trials(self.network, first, count, self.wish.inputs or None) if len(long) < len(runs) else None
         except ValueError as error:
             yield from (Reading(key, notes=(f"Left out: {error}.",)) for key in keys)
             return
-        names = [network.neurons.names[index] for index in trials.outputs.tolist()]
-        what = f"runs of {count:,} steps from step {trials.start:,} on, by {_few(names)}"
-        lost = importance_by(trials, self._progress)
-        shares = lost.column("lesion share")
-        by = "lesion share" if np.isfinite(shares).any() else "lesion"
-        yield self._ranked("importance", lost, by, f"{by}, {what}")
+        for key in keys:
+            if key in long or trials is None:
+                yield Reading(key, notes=(f"Left out: {runs[key]:,} runs of this network take too long.",))
+            else:
+                yield self._effects(key, trials)
+
+    def _effects(self, key: str, trials: Trials) -> Reading:
+        """What trials tell: what is lost without each part, or how the outputs follow it."""
+        names = [self.recording.neurons[index] for index in trials.outputs.tolist()]
+        what = f"runs of {trials.steps:,} steps from step {trials.start:,} on, by {_few(names)}"
+        if key == "importance":
+            lost = importance_by(trials, self._progress)
+            by = "lesion share" if np.isfinite(lost.column("lesion share")).any() else "lesion"
+            return self._ranked(key, lost, by, f"{by}, {what}")
         slopes = sensitivity_by(trials, self._progress)
         jumps = int(np.isnan(slopes.column("rms")).sum())
         note = (
             f"{jumps:,} of {len(slopes.rows.labels):,} have no derivative there: a little more makes the outputs jump."
         )
-        yield self._ranked("sensitivity", slopes, "elasticity", f"elasticity, {what}", (note,) if jumps else ())
+        return self._ranked(key, slopes, "elasticity", f"elasticity, {what}", (note,) if jumps else ())
 
     def _ranked(self, key: str, table: NamedArray, by: str, caption: str, said: tuple[str, ...] = ()) -> Reading:
         values, names = table.column(by), table.rows.labels
