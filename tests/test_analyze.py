@@ -137,6 +137,28 @@ def test_what_does_not_apply_is_left_out(folder: Path) -> None:
         assert said in text
 
 
+def test_a_run_that_grows_without_bound_is_warned_of_once(folder: Path) -> None:
+    wild = (
+        "neurovis: 1\nname: wild\ntime: {steps: 2000}\nneurons: {A: {initial: 1}, O: {}}\n"
+        "connections: {A -> A: 3, A -> O: {weight: 1, plasticity: {hebbian: {rate: 1}}}}\n"
+    )
+    (folder / "wild.yaml").write_text(wild, "utf-8")
+    result = call("analyze wild.yaml -o out")
+    assert (result.exit_code, "encountered" in result.stderr) == (0, False), result.stderr
+    assert len(result.stderr.splitlines()) == 1
+    assert "have no derivative" in (folder / "out" / "index.html").read_text(encoding="utf-8")
+    assert ",inf" in (folder / "out" / "traces.csv").read_text(encoding="utf-8")
+
+
+def test_without_dt_the_unit_is_a_step(folder: Path) -> None:
+    (folder / "plain.yaml").write_text(SPEC.replace(", dt: 0.1", ""), "utf-8")
+    units = []
+    for name in ("small", "plain"):
+        assert call(f"analyze {name}.yaml --no-trials -o {name}").exit_code == 0
+        units.append(json.loads((folder / name / "coactivation.json").read_text(encoding="utf-8"))["unit"])
+    assert units == ["s", "steps"]
+
+
 def test_many_neurons_are_measured_without_pairs(folder: Path) -> None:
     many = "neurovis: 1\nname: x\nneurons: {N: {count: 450, bias: sin(i)}}\ntime: {steps: 5}\nlayout: {engine: grid}\n"
     (folder / "many.yaml").write_text(many, "utf-8")

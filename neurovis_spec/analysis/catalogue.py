@@ -18,7 +18,8 @@ What the NeuroVis paper measures, and each technique of its Table 1 that measure
 `neurovis analyze SPEC -o FOLDER` makes them all into tables (CSV and JSON), pictures (SVG) and a page that says what
 they mean (it needs the extra `analyze`). In Python each takes a recording, or a compiled network where it has to run
 it, and returns a named array: `table["K2", "K3"]`, `table.row("K2")`, `table.column("last")`, `numpy.asarray(table)`.
-`of` chooses neurons (`"K"`, `"C + K"`, `["K1", "O"]`), `start` and `stop` choose steps.
+`of` chooses neurons (`"K"`, `"C + K"`, `["K1", "O"]`), `start` and `stop` choose steps. The folder of
+`neurovis analyze` is `neurovis_spec.analysis.report.analyze(network, folder, recording)`.
 
 The examples are of use case 1, the last twenty periods, and they are tested:
 

@@ -45,13 +45,15 @@ def importance_by(trials: Trials, progress: Progress | None = None) -> NamedArra
               for place, label in enumerate(labels)]  # fmt: skip
     found: list[tuple[float, float]] = []
     for entry in network.inputs:
-        mean = trials.given[:, entry.start : entry.start + entry.size].mean(axis=0)
+        with np.errstate(all="ignore"):
+            mean = trials.given[:, entry.start : entry.start + entry.size].mean(axis=0)
         silent = trials.told(entry, np.zeros_like)
         held = trials.told(entry, lambda _, mean=mean: mean)  # type: ignore[misc]
         found.append((_apart(trials, silent), _apart(trials, held)))
         _tell(progress, len(found), len(labels))
     for index in own:
-        level = float(trials.activity[:, index].mean())
+        with np.errstate(all="ignore"):
+            level = float(trials.activity[:, index].mean())
         removed = trials.changed(lambda simulation, name=names[index]: simulation.lesion(name))  # type: ignore[misc]
         occluded = float("nan")
         if np.isfinite(level):
@@ -60,8 +62,8 @@ def importance_by(trials: Trials, progress: Progress | None = None) -> NamedArra
         found.append((_apart(trials, removed), occluded))
         _tell(progress, len(found), len(labels))
     lost = np.array(found, dtype=np.float64).reshape(-1, 2)
-    varies = float(np.sqrt(np.mean((trials.intact - trials.intact.mean(axis=0)) ** 2)))
     with np.errstate(all="ignore"):
+        varies = float(np.sqrt(np.mean((trials.intact - trials.intact.mean(axis=0)) ** 2)))
         share = lost / varies if varies > 0 else np.full_like(lost, np.nan)
     values = np.concatenate([lost, share], axis=1)
     return NamedArray("importance", values, Axis("without", tuple(labels)), Axis("quantity", QUANTITIES))

@@ -26,8 +26,11 @@ def period_of(activity: FloatArray) -> float | None:
     True
     """
     rows = len(activity)
-    centred = activity - activity.mean(axis=0) if rows else activity
-    if rows < 8 or not np.isfinite(centred).all():
+    if rows < 8:
+        return None
+    with np.errstate(all="ignore"):
+        centred = activity - activity.mean(axis=0)
+    if not np.isfinite(centred).all():
         return None
     scale = np.abs(centred).max(axis=0)
     alive = scale > 1e-12

@@ -204,18 +204,23 @@ class _Report:
 
     def _coactivation(self) -> Reading:
         threshold, of = self.wish.threshold, self.wish.of
-        total = coactivation(self.recording, of, threshold=threshold, per="total")
+        total = self._timed(coactivation(self.recording, of, threshold=threshold, per="total"))
         found = {"coactivation_total": total}
-        drawn = {"coactivation_total": self._pairs(total, f"seconds in total, |a| > {threshold:g}")}
+        unit = "steps" if self._dt is None else "seconds"
+        drawn = {"coactivation_total": self._pairs(total, f"{unit} in total, |a| > {threshold:g}")}
         notes: tuple[str, ...] = ()
         try:
-            each = coactivation(self.recording, of, threshold=threshold)
+            each = self._timed(coactivation(self.recording, of, threshold=threshold))
             found = {"coactivation": each, **found}
-            drawn = {"coactivation": self._pairs(each, f"seconds a period, |a| > {threshold:g}"), **drawn}
+            drawn = {"coactivation": self._pairs(each, f"{unit} a period, |a| > {threshold:g}"), **drawn}
         except RecordingError:
             notes = ("The activities have no period, so there is only the total.",)
         found["active_at_once"] = awake_at_once(self.recording, of, threshold=threshold)
         return Reading("coactivation", found, drawn, notes)
+
+    def _timed(self, table: NamedArray) -> NamedArray:
+        """A table of seconds, which are steps where the spec says nothing of the time."""
+        return replace(table, unit="steps") if self._dt is None else table
 
     def _weights(self) -> Reading:
         made, changes = weights(self.recording), weight_changes(self.recording)

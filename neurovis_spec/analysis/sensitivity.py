@@ -64,7 +64,8 @@ def _moves(trials: Trials) -> Iterator[tuple[str, float, Move]]:
     network = trials.network
     for entry in network.inputs:
         given = trials.given[:, entry.start : entry.start + entry.size]
-        size = float(np.sqrt(np.mean(given**2)))
+        with np.errstate(all="ignore"):
+            size = float(np.sqrt(np.mean(given**2)))
         yield f"input {entry.name}", size, lambda h, entry=entry: trials.told(entry, lambda x: x + h)  # type: ignore[misc]
     for name in network.parameters:
         if name not in network.structural:

@@ -6,6 +6,7 @@ by step. The run up to the first step is made once, and so is the code that make
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -18,7 +19,7 @@ from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Input, Network
 from neurovis_spec.runtime.backend import Availability, Capabilities, Stepper, prepare
 from neurovis_spec.runtime.columns import ALL, columns_of
-from neurovis_spec.runtime.record import Course, InMemory, Last, go
+from neurovis_spec.runtime.record import Course, InMemory, Last, Rows, go
 from neurovis_spec.runtime.recording import RecordingError
 from neurovis_spec.runtime.rows import Steps
 from neurovis_spec.runtime.simulation import Simulation
@@ -82,7 +83,7 @@ class Trials:
         self._simulation = Simulation(network, Prepared(self._stepper), inputs=inputs)
         self._state = initial_state(network)
         widths = columns_of(network, ALL).widths(network)
-        go(network, self._state, Course(first, 1, inputs, Prepared(self._stepper)), Last(widths))
+        _go(network, self._state, Course(first, 1, inputs, Prepared(self._stepper)), Last(widths))
         vectors: list[FloatArray] = []
 
         def noted(vector: FloatArray) -> FloatArray:
@@ -128,8 +129,15 @@ class Trials:
 
     def _run(self, state: State, seen: Callable[[FloatArray], FloatArray] | None = None) -> FloatArray:
         rows = InMemory(columns_of(self.network, ALL).widths(self.network), self.steps)
-        go(self.network, state, Course(self.steps, 1, self._inputs, Prepared(self._stepper, seen)), rows)
+        _go(self.network, state, Course(self.steps, 1, self._inputs, Prepared(self._stepper, seen)), rows)
         return rows.numbers(Steps(self.steps, 1, self.start)).activity
+
+
+def _go(network: Network, state: State, course: Course, rows: Rows) -> None:
+    """Make the steps. What is no longer finite is seen in the numbers: hundreds of trials need not warn of it each."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        go(network, state, course, rows)
 
 
 def output_neurons(network: Network) -> IntArray:
