@@ -167,6 +167,10 @@ class World:
         alone = {"ROS_IP": "127.0.0.1"} if self.ros == 1 else {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
         return self.started([self.bin / "python", "-c", code, *arguments], **alone)
 
+    def program(self, *command: str | Path) -> Process:
+        """A program of the system, which meets this machine alone."""
+        return self._started(command, ROS_IP="127.0.0.1")
+
     def close(self) -> None:
         """Kill what still runs."""
         for process in self.processes:
