@@ -105,7 +105,8 @@ CPP_1 := libroscpp-dev libsensor-msgs-dev libgeometry-msgs-dev libstd-msgs-dev g
 
 needs-ros:
 	@/usr/bin/python3 -c 'import rosmaster, rospy, std_msgs.msg, sensor_msgs.msg' 2>/dev/null \
-	  && (for command in roscore rosmaster rostopic rosbag rosparam; do command -v $$command >/dev/null || exit 1; done) \
+	  && (for command in roscore rosmaster rostopic rosbag rosparam g++ pkg-config; do command -v $$command >/dev/null || exit 1; done) \
+	  && pkg-config --exists roscpp sensor_msgs \
 	  || { echo "make test-ros needs what is not here: ROS 1 (apt-get install $(ROS_1))" >&2; exit 1; }
 	@command -v g++ >/dev/null && command -v rosnode >/dev/null && pkg-config --exists roscpp 2>/dev/null \
 	  && test -e /usr/include/sensor_msgs/JointState.h -a -e /usr/include/geometry_msgs/TwistStamped.h \

@@ -169,7 +169,7 @@ class World:
 
     def program(self, *command: str | Path) -> Process:
         """A program of the system, which meets this machine alone."""
-        return self._started(command, ROS_IP="127.0.0.1")
+        return self.started(command, ROS_IP="127.0.0.1")
 
     def close(self) -> None:
         """Kill what still runs."""
