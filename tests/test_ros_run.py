@@ -6,8 +6,9 @@ import asyncio
 import json
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
 import aiohttp
@@ -431,10 +432,9 @@ def test_a_run_is_recorded_and_shown(ros: World, arm: Path, tmp_path: Path) -> N
     assert "--force" in again.err[-1]
 
 
-def test_the_live_page_turns_the_run(ros: World, tmp_path: Path) -> None:
-    run = ros.neurovis("ros", "run", written(tmp_path, "hold"), "--live", "0")
-    url = urlsplit(run.wait_for("live: ").removeprefix("live: "))
-    run.wait_for("ready")
+def ask(page: str, asked: Mapping[str, object], until: Callable[[Mapping[str, Any]], bool]) -> None:
+    """Ask a live page for something, until what it tells is what is wanted."""
+    url = urlsplit(page.removeprefix("live: "))
     token = (url.query or url.fragment).partition("=")[2]
 
     async def turn() -> None:
@@ -442,15 +442,45 @@ def test_the_live_page_turns_the_run(ros: World, tmp_path: Path) -> None:
             aiohttp.ClientSession() as session,
             session.ws_connect(f"http://{url.netloc}/live?token={token}", max_msg_size=1 << 24) as stream,
         ):
-            await stream.send_str(json.dumps({"type": "set", "values": {"gain": 1.5}}))
+            await stream.send_str(json.dumps(asked))
             async with asyncio.timeout(PATIENCE):
                 async for message in stream:
-                    told = json.loads(message.data) if message.type is aiohttp.WSMsgType.TEXT else {}
-                    if told.get("parameters", {}).get("gain") == 1.5:
+                    if message.type is aiohttp.WSMsgType.TEXT and until(json.loads(message.data)):
                         return
 
     asyncio.run(turn())
+
+
+def gain_is(value: float) -> Callable[[Mapping[str, Any]], bool]:
+    return lambda told: bool(told.get("parameters", {}).get("gain") == value)
+
+
+def test_the_live_page_turns_the_run(ros: World, tmp_path: Path) -> None:
+    run = ros.neurovis("ros", "run", written(tmp_path, "hold"), "--live", "0")
+    page = run.wait_for("live: ")
+    run.wait_for("ready")
+    ask(page, {"type": "set", "values": {"gain": 1.5}}, gain_is(1.5))
     peer = ros.peer(listen=[COMMANDS], send=[targets(2.0, 20)], until={"/cmd_vel": 60})
     assert peer.end() == 0
     assert 3.0 in [one[0] for one in peer.json()["/cmd_vel"]]
     assert run.stop() == 0
+
+
+def test_the_live_page_of_who_views_sets_the_parameters_of_the_run(ros: World, tmp_path: Path) -> None:
+    run = ros.neurovis("ros", "run", written(tmp_path, "hold"))
+    run.wait_for("ready")
+    view = ros.neurovis("ros", "view", "--live", "0")
+    page = view.wait_for("live: ")
+    view.wait_for("ready")
+    ask(page, {"type": "play"}, lambda told: gain_is(0.5)(told) and told["can"]["turns"])
+    ask(page, {"type": "set", "values": {"gain": 1.5}}, gain_is(1.5))
+    for asked, why in (
+        ({"type": "set", "values": {"gain": 3.0}}, "gain"),
+        ({"type": "lesion", "part": "A"}, "its parameters can be set, and nothing else"),
+    ):
+        ask(page, asked, lambda told, why=why: why in told.get("reason", ""))  # type: ignore[misc]
+    peer = ros.peer(listen=[COMMANDS], send=[targets(2.0, 20)], until={"/cmd_vel": 60})
+    assert peer.end() == 0
+    assert 3.0 in [one[0] for one in peer.json()["/cmd_vel"]]
+    assert run.stop() == 0
+    assert view.stop() == 0

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from threading import Lock
+from typing import cast
 
 import numpy as np
 import pytest
@@ -10,8 +12,10 @@ import pytest
 import neurovis_spec
 from neurovis_spec.live.source import SourceError, Turned
 from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Set
+from neurovis_spec.ros.middleware import Node
 from neurovis_spec.ros.received import ReceivedSource
 from neurovis_spec.ros.steering import RunSteering
+from neurovis_spec.ros.view_steering import ViewSteering
 
 SPEC = """
 neurovis: 1
@@ -85,3 +89,59 @@ def test_rules_are_stopped_and_inputs_fed() -> None:
     assert source.fed == {"pair": (0.5, 0.5)}
     with pytest.raises(SourceError, match="takes 2 numbers, not 3"):
         source.turn(Feed("pair", (1.0, 2.0, 3.0)))
+
+
+class Elsewhere:
+    """A node that meets another one, which has parameters, and refuses some values."""
+
+    def __init__(self, values: Mapping[str, float] | None) -> None:
+        self.values = None if values is None else dict(values)
+
+    def parameters_of(self, node: str, names: Sequence[str]) -> Mapping[str, float] | None:
+        assert node == "/neurovis/turned"
+        return None if self.values is None else {name: self.values[name] for name in names if name in self.values}
+
+    def set_parameters_of(self, node: str, values: Mapping[str, float]) -> str | None:
+        if self.values is None or any(value == 0.125 for value in values.values()):
+            return f"{node} says no"
+        self.values |= values
+        return None
+
+
+def elsewhere(values: Mapping[str, float] | None) -> tuple[Elsewhere, ViewSteering]:
+    node = Elsewhere(values)
+    return node, ViewSteering(NETWORK, cast(Node, node), "/neurovis/turned")
+
+
+def test_the_parameters_of_a_network_elsewhere_are_set() -> None:
+    node, made = elsewhere({"gain": 0.5, "count": 2.0})
+    assert made.look()
+    assert made.parameters == {"gain": 0.5}
+    made.turn(Set({"gain": 1.5}))
+    assert made.parameters == {"gain": 1.5} == {"gain": node.values and node.values["gain"]}
+    node.values = {"gain": 0.25}
+    assert made.look()
+    assert made.parameters == {"gain": 0.25}
+
+
+def test_what_a_network_elsewhere_does_not_take_is_refused() -> None:
+    node, made = elsewhere({"gain": 0.5})
+    assert made.look()
+    for turn, said in (
+        (Set({"gain": 3.0}), "gain"),
+        (Set({"gain": 0.125}), "says no"),
+        (Set({"count": 3.0}), "structure"),
+        (Set({"gane": 1.0}), "gane"),
+        (Lesion("A"), "nothing else"),
+        (Feed("target", (1.0,)), "nothing else"),
+    ):
+        with pytest.raises(SourceError, match=said):
+            made.turn(turn)
+    assert (node.values, made.parameters) == ({"gain": 0.5}, {"gain": 0.5})
+    assert (made.fed, made.learning) == ({}, {"M -> B": True})
+    nothings: tuple[dict[str, float] | None, ...] = (None, {})
+    for nothing in nothings:
+        _, made = elsewhere(nothing)
+        assert not made.look()
+        with pytest.raises(SourceError, match="does not offer 'gain'"):
+            made.turn(Set({"gain": 1.0}))

@@ -16,6 +16,9 @@ from neurovis_spec.cli.ros_options import Meeting, meeting_options, tell
 from neurovis_spec.cli.ros_shown import Desk, shown_options
 from neurovis_spec.interrupts import heeded
 
+#: seconds between two looks at the parameters of the other node
+_LOOK = 1.0
+
 
 @click.command(
     epilog=examples(
@@ -33,12 +36,14 @@ def command(spec: str | None, network: str | None, settings: dict[str, float], d
     """Show and record a network that runs elsewhere, on a robot.
 
     Without SPEC it is the one that announces itself. The page shows the newest step, and goes back over those that
-    came; the recording has every message. Ctrl-C ends it.
+    came; the recording has every message. Where the network's node takes parameters, the page sets them. Ctrl-C ends
+    it.
     """
     from neurovis_spec.ros.announced import find
-    from neurovis_spec.ros.listening import ACTIVITY
+    from neurovis_spec.ros.listening import ACTIVITY, base_of
     from neurovis_spec.ros.middleware import DISPLAY, RECORDER
     from neurovis_spec.ros.summary import Summary
+    from neurovis_spec.ros.view_steering import ViewSteering
 
     begun = time.monotonic()
     compiled = None if spec is None else network_of(spec, settings)
@@ -64,10 +69,17 @@ def command(spec: str | None, network: str | None, settings: dict[str, float], d
             ]
             tell(f"ready: {compiled.name}, ROS {node.ros}, {subscriptions[0].topic.removesuffix(ACTIVITY)}")
             begun = time.monotonic()
+            steering = ViewSteering(compiled.network, node, base_of(compiled))
+            due = begun
             while not stopped():
                 if node.reconnects != reconnects:
                     reconnects = node.reconnects
                     listening.anew()
+                source = listening.source
+                if source is not None and source.begun and time.monotonic() >= due:
+                    due = time.monotonic() + _LOOK
+                    if steering.look() and not source.capabilities.turns:
+                        source.steer(steering)
                 time.sleep(0.02)
             for subscription in subscriptions:
                 subscription.close()

@@ -165,6 +165,16 @@ class Node(Protocol):
         """Have parameters show what they are by now, whoever set them."""
         ...
 
+    def parameters_of(self, node: str, names: Sequence[str]) -> Mapping[str, float] | None:
+        """The parameters of another node that have these names, as they are; None where it offers none. Waits for a
+        second at most."""
+        ...
+
+    def set_parameters_of(self, node: str, values: Mapping[str, float]) -> str | None:
+        """Set parameters of another node; gives why not. ROS 1 does not know whether they are taken: the other node
+        puts back what it does not take. Waits for a second at most."""
+        ...
+
     def close(self) -> None:
         """Send what is still to be sent, and go. A second call does nothing."""
         ...

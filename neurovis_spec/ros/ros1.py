@@ -328,6 +328,26 @@ class Ros1Node:
             self._values |= changed
             self._put(changed)
 
+    def parameters_of(self, node: str, names: Sequence[str]) -> Mapping[str, float] | None:
+        """Parameters of another node, as the master's server has them."""
+        try:
+            found = self._ask(lambda master: master.getParam(self.name, f"{node}/parameters"))
+        except OSError:
+            return None
+        if not isinstance(found, dict):
+            return None
+        return {name: float(found[name]) for name in names if isinstance(found.get(name), int | float)}
+
+    def set_parameters_of(self, node: str, values: Mapping[str, float]) -> str | None:
+        """Put parameters of another node on the master's server, from where it takes them."""
+        try:
+            for name, value in values.items():
+                key = f"{node}/parameters/{name}"
+                self._ask(lambda master, key=key, value=float(value): master.setParam(self.name, key, value))  # type: ignore[misc]
+        except OSError as error:
+            return f"the master of ROS 1 does not answer ({error})"
+        return None
+
     # ---- the master --------------------------------------------------------------------------------------------
 
     def _watch(self) -> None:

@@ -10,10 +10,11 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
-from threading import Lock, Thread
-from typing import Final
+from threading import Event, Lock, Thread
+from typing import Final, cast
 
 import rclpy
+from rclpy.client import Client
 from rclpy.context import Context
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -37,6 +38,8 @@ from neurovis_spec.ros.middleware import (
 )
 from neurovis_spec.runtime.wire import Encoding
 
+#: seconds that another node has to answer
+_ANSWER: Final = 1.0
 _HUGE: Final = 1.7976931348623157e308
 #: names of primitives in interfaces, where they are others than in messages
 _PRIMITIVE: Final[Mapping[str, str]] = {"boolean": "bool", "octet": "byte", "double": "float64", "float": "float32"}
@@ -198,6 +201,7 @@ class Ros2Node:
         self._lock, self._subscriptions, self._following = Lock(), list[Ros2Subscription](), False
         self._later: list[Callable[[], None]] = []
         self._declared: set[str] = set()
+        self._clients: dict[str, Client] = {}
         self._context = Context()
         if wish.arguments and wish.arguments[0] != "--ros-args":
             raise MiddlewareError(f"ROS 2 does not take '{wish.arguments[0]}'", "write --ros-args -r /from:=/to")
@@ -340,6 +344,46 @@ class Ros2Node:
             self.rcl.set_parameters([Given(name, Given.Type.DOUBLE, value) for name, value in values.items()])
         finally:
             self._following = False
+
+    def parameters_of(self, node: str, names: Sequence[str]) -> Mapping[str, float] | None:
+        """Parameters of another node, by its services."""
+        from rcl_interfaces.msg import ParameterType
+        from rcl_interfaces.srv import GetParameters
+
+        request = GetParameters.Request(names=list(names))
+        answer = cast("GetParameters.Response | None", self._call(GetParameters, f"{node}/get_parameters", request))
+        if answer is None or len(answer.values) != len(names):
+            return None
+        found = zip(names, answer.values, strict=True)
+        return {name: one.double_value for name, one in found if one.type == ParameterType.PARAMETER_DOUBLE}
+
+    def set_parameters_of(self, node: str, values: Mapping[str, float]) -> str | None:
+        """Set parameters of another node, all or none."""
+        from rcl_interfaces.srv import SetParametersAtomically
+
+        given = [Given(name, Given.Type.DOUBLE, float(value)).to_parameter_msg() for name, value in values.items()]
+        request = SetParametersAtomically.Request(parameters=given)
+        answer = cast(
+            "SetParametersAtomically.Response | None",
+            self._call(SetParametersAtomically, f"{node}/set_parameters_atomically", request),
+        )
+        if answer is None:
+            return f"{node} does not answer"
+        return None if answer.result.successful else answer.result.reason or f"{node} refuses it"
+
+    def _call(self, type_: type, name: str, request: object) -> object:
+        """What a service answers; None where there is none, or it takes too long."""
+        client = self._clients.get(name)
+        if client is None:
+            client = self._clients[name] = self.rcl.create_client(type_, name)
+        if not client.service_is_ready():
+            return None
+        future, answered = client.call_async(request), Event()
+        future.add_done_callback(lambda _: answered.set())
+        if not answered.wait(_ANSWER):
+            client.remove_pending_request(future)
+            return None
+        return None if future.exception() is not None else future.result()
 
     def close(self) -> None:
         """Go, once what was sent has been taken by those who take it for sure."""
