@@ -20,8 +20,8 @@ import neurovis_spec as nv
 from neurovis_spec.ros.bags import read_bag
 from neurovis_spec.ros.export import Form, save, texts
 from neurovis_spec.ros.middleware import Ros
-from neurovis_spec.ros.wire import ENCODINGS, array_of
 from neurovis_spec.runtime.recording import Recording
+from neurovis_spec.runtime.wire import ENCODINGS, array_of
 
 pytestmark = pytest.mark.ros
 
