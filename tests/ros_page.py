@@ -5,9 +5,9 @@
 
 A block of the page that begins with ```sh is for bash; words after it say for which ROS it is (``kilted``, ``jazzy``,
 ``one``, ``ros2``; all of them where none does), and more: ``install`` makes the environment, ``packages`` needs root,
-``stays`` goes on until its section (##) ends, and is then ended as by Ctrl-C. Each is a terminal of its own, in which
-the environment is activated. A block ```text after it is what is printed (among other lines); … is anything. A page
-whose address is printed by what stays is opened, and must show further and further steps.
+``stays`` goes on until its section (##) ends, ``remains`` until the page does; it is then ended as by Ctrl-C. Each is a
+terminal of its own, in which the environment is activated. A block ```text after it is what is printed (among other
+lines); … is anything. A page whose address is printed by what stays is opened, and must show further and further steps.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ from test_live_server import Eyes
 
 PAGE = ROOT / "docs" / "ros.md"
 _VERSIONS = {"kilted": "ros2", "jazzy": "ros2", "one": "ros1"}
-_WORDS = {*_VERSIONS, *_VERSIONS.values(), "install", "packages", "stays"}
+_STAYING = ("stays", "remains")
+_WORDS = {*_VERSIONS, *_VERSIONS.values(), "install", "packages", *_STAYING}
 _BLOCK = re.compile(r"^## (?P<title>[^\n]*)$|^```(?P<kind>sh|text)(?P<words>[ \w]*)\n(?P<text>.*?)^```$", re.M | re.S)
 
 
@@ -105,7 +106,7 @@ class Terminals:
         print(f"$ {block.text.rstrip()}", flush=True)
         process = Process(bash(f"cd '{self.folder}'\n{activate}\n{block.text}"), self.environment)
         try:
-            if "stays" in block.words:
+            if block.words & {*_STAYING}:
                 assert block.printed, "what stays must say when it is there"
                 for line in block.printed:
                     process.wait_for(pattern(line))
@@ -145,6 +146,7 @@ def run(name: str, folder: Path) -> None:
     (folder / ".ros").symlink_to(FOLDER)
     terminals = Terminals(name, folder, {**kept, "PYTHONUNBUFFERED": "1", "ROS_LOG_DIR": str(folder / "log")})
     section = ""
+    remaining: list[Process] = []
     staying: list[Process] = []
     try:
         for block in blocks(PAGE.read_text(encoding="utf-8")):
@@ -157,9 +159,12 @@ def run(name: str, folder: Path) -> None:
             process = terminals.run(block)
             if "stays" in block.words:
                 staying.append(process)
+            if "remains" in block.words:
+                remaining.append(process)
         close(staying)
+        close(remaining)
     finally:
-        for process in staying:
+        for process in (*staying, *remaining):
             process.kill()
 
 

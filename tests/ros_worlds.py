@@ -26,7 +26,9 @@ PEER = Path(__file__).parent / "ros_peer.py"
 NAMES = ("kilted", "jazzy", "one")
 #: set by the wheels of ROS 2 for their own process, and by whoever runs the tests
 _OURS = ("LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE", "PYTHONPATH")
-_domains = itertools.count(os.getpid() % 100 + 1)
+#: domains of ROS 2 whose ports are below those that systems give away
+_DOMAINS = 100
+_next = itertools.count(os.getpid())
 #: seconds for what takes one: machines of tests are slow
 PATIENCE = 60.0
 
@@ -121,13 +123,15 @@ class World:
         kept = {key: value for key, value in os.environ.items() if key not in _OURS and not key.startswith("ROS_")}
         self.environment = {**kept, "PYTHONUNBUFFERED": "1"}
         self._core: Process | None = None
+        self._claim: socket.socket | None = None
         if self.ros == 1:
             self.port = free_port()
             uri = f"http://127.0.0.1:{self.port}"
             self.environment |= {"ROS_MASTER_URI": uri, "ROS_LOG_DIR": f"/tmp/neurovis-ros-{self.port}"}
             self.start_core()
         else:
-            self.environment |= {"ROS_DOMAIN_ID": str(next(_domains) % 200)}
+            self._claim, domain = claimed_domain()
+            self.environment |= {"ROS_DOMAIN_ID": str(domain)}
 
     def started(self, command: Sequence[str | Path], **more: str) -> Process:
         """A process in the environment of this world, with more variables."""
@@ -175,6 +179,8 @@ class World:
         """Kill what still runs."""
         for process in self.processes:
             process.kill()
+        if self._claim is not None:
+            self._claim.close()
 
 
 @contextmanager
@@ -185,6 +191,20 @@ def world(name: str) -> Iterator[World]:
         yield made
     finally:
         made.close()
+
+
+def claimed_domain() -> tuple[socket.socket, int]:
+    """A domain of ROS 2 that no other world in this network has, as long as the socket is open."""
+    for _ in range(_DOMAINS):
+        domain = 1 + next(_next) % _DOMAINS
+        claim = socket.socket(socket.AF_UNIX)
+        try:
+            claim.bind(f"\0neurovis ROS domain {domain}")
+        except OSError:
+            claim.close()
+            continue
+        return claim, domain
+    raise AssertionError("all domains of ROS 2 are taken")
 
 
 def free_port() -> int:

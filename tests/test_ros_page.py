@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from ros_page import PAGE, blocks, installing, packages
-from ros_worlds import NAMES, ROOT
+from ros_worlds import NAMES, ROOT, claimed_domain
 
 import neurovis_spec as nv
 
@@ -47,3 +47,11 @@ def test_the_specs_on_the_page_are_without_findings() -> None:
     assert len(specs) == 2
     for spec in specs:
         assert nv.compile_text(spec).warnings == ()
+
+
+def test_two_worlds_do_not_meet() -> None:
+    """Domains are claimed, whichever process asks."""
+    claims = [claimed_domain() for _ in range(5)]
+    assert len({domain for _, domain in claims}) == 5
+    for claim, _ in claims:
+        claim.close()
