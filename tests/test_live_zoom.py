@@ -155,3 +155,31 @@ def test_a_picture_that_takes_long_is_made_anew_only_when_the_camera_stands(tmp_
             assert opened.errors == []
 
     asyncio.run(main())
+
+
+def test_the_ring_around_what_is_held_keeps_its_weight_near_by(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path) as (opened, compiled, _):
+            await pause(opened)
+            x, y = places(compiled)["O"]
+            await opened.click(x, y)
+            await opened.point(5, 5)
+
+            async def ring(x: float, y: float) -> int:
+                """How many pixels of the darkest ink lie left of a disc's middle, but for its label."""
+                await opened.ask("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+                row = (
+                    Image.open(io.BytesIO(await opened.shot()))
+                    .convert("L")
+                    .crop((0, round(y), round(x) - 20, round(y) + 1))
+                )
+                return sum(row.histogram()[:60])
+
+            before = await ring(x, y)
+            for _ in range(5):  # the pixel under the pointer stays where it is
+                await opened.call("Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, deltaX=0, deltaY=-160)
+            await opened.point(5, 5)
+            assert 1 <= before <= 5
+            assert 1 <= await ring(x, y) <= 5
+
+    asyncio.run(main())

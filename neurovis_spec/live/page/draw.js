@@ -270,12 +270,13 @@ export class Drawing {
     for (const name of ['back', 'between', 'words', 'front']) mosaic.compare(before[name], this.pictures[name]);
   }
 
-  /** Show that a disc is held. @param {Context} context @param {Shape} shape */
+  /** Show that a disc is held, near by as thin as lines are there. @param {Context} context @param {Shape} shape */
   ring(context, { at, radius }) {
+    const ink = Math.min(1, (this.scene.density * devicePixelRatio) / this.seen.scale);
     context.strokeStyle = this.scene.theme.ink;
-    context.lineWidth = 2;
+    context.lineWidth = 2 * ink;
     context.beginPath();
-    context.arc(at[0], at[1], radius + 3, 0, 2 * Math.PI);
+    context.arc(at[0], at[1], radius + 3 * ink, 0, 2 * Math.PI);
     context.stroke();
   }
 
