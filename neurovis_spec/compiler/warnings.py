@@ -20,6 +20,7 @@ from neurovis_spec.compiler.own_ends import look_for_own_ends
 from neurovis_spec.compiler.references import Section, key_span
 from neurovis_spec.compiler.replaced import look_for_replaced_weights
 from neurovis_spec.compiler.tables import Files
+from neurovis_spec.compiler.undefined import look_for_undefined
 from neurovis_spec.compiler.unit import Unit
 from neurovis_spec.compiler.unused_parts import look_for_unused_parts
 from neurovis_spec.diagnostics import Findings, Span
@@ -39,6 +40,7 @@ def warn(compiled: Compiled, findings: Findings) -> None:
     look_for_ignored(compiled, findings)
     look_for_own_ends(compiled, findings)
     look_for_unused_parts(compiled, findings)
+    look_for_undefined(compiled, findings)
     look_for_replaced_weights(compiled, findings)
     look_beyond(compiled, findings)
     _events(compiled, findings)
