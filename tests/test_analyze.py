@@ -129,6 +129,14 @@ def test_a_recording_is_measured_and_what_it_lacks_is_said(folder: Path) -> None
     assert "no weights" in text
 
 
+def test_what_is_run_beside_a_recording_is_told_from_it(folder: Path) -> None:
+    call("run small.yaml --steps 300 -o some.npz")
+    for words, said in (("", 0), (" --recording some.npz", 2)):
+        assert call(f"analyze small.yaml{words} -o out").exit_code == 0
+        text = (folder / "out" / "index.html").read_text(encoding="utf-8")
+        assert text.count("runs of the spec, not of the recording") == said
+
+
 def test_what_does_not_apply_is_left_out(folder: Path) -> None:
     (folder / "still.yaml").write_text("neurovis: 1\nname: x\nneurons: {A: {bias: 1}}\ntime: {steps: 5}\n", "utf-8")
     assert call("analyze still.yaml -o out").exit_code == 0

@@ -146,7 +146,7 @@ def bars(names: Sequence[str], values: FloatArray, title: str, caption: str, the
         y, value = top + row * _ROW, float(values[place])
         length = span * max(_height(value), 0.0) / longest if longest > 0 else 0.0
         said = texts.number(value) if np.isfinite(value) else "–"
-        label = texts.shorten(names[place], SMALL, room - 6)
+        label = texts.shorten(names[place].replace("->", "→"), SMALL, room - 6)
         shapes: list[Shape] = [Text((left - 6, y + 11), label, SMALL, theme.ink, "end")]
         if length > 0:
             shapes.append(Rectangle((left, y + 1), length, _BAR, 0.0, theme.positive, theme.positive, 0.0))

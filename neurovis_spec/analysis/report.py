@@ -94,7 +94,7 @@ def analyze(
         run = network.run(inputs=asked.inputs, progress=progress)
     else:
         run = fitted(recording, network.network)
-    report = _Report(network, cut(run, asked.start, asked.stop), asked, progress)
+    report = _Report(network, cut(run, asked.start, asked.stop), asked, recording is not None, progress)
     readings = list(report.readings())
     files: dict[str, bytes] = {}
     for reading in readings:
@@ -117,8 +117,12 @@ def _shown(readings: Sequence[Reading]) -> list[Shown]:
 class _Report:
     """The readings of one recording, each made when it is asked for."""
 
-    def __init__(self, network: CompiledNetwork, recording: Recording, wish: Wish, progress: Progress | None) -> None:
+    def __init__(
+        self, network: CompiledNetwork, recording: Recording, wish: Wish, given: bool, progress: Progress | None
+    ) -> None:
         self.network, self.recording, self.wish, self._progress = network, recording, wish, progress
+        #: said of what is run, where the rest is of a recording that was given
+        self._apart = ("These are runs of the spec, not of the recording.",) if given else ()
         self.theme: Theme = theme_of(network.settings_for(wish.theme))
         self._part = excerpt(recording, wish.of)
         self._late = cut(recording, int(recording.step[-_SEEN])) if len(recording) > _SEEN else recording
@@ -316,7 +320,7 @@ class _Report:
         title = catalogue()[key].title
         scene = pictures.bars([names[p] for p in order.tolist()], values[order], title, caption, self.theme)
         notes = (f"The picture has the first {_BARS} of {len(names):,}.",) if len(names) > _BARS else ()
-        return Reading(key, {key: table}, {key: self._draw(scene)}, (*said, *notes))
+        return Reading(key, {key: table}, {key: self._draw(scene)}, (*self._apart, *said, *notes))
 
 
 def catalogue_title(name: str) -> str:
