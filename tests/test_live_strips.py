@@ -189,3 +189,34 @@ def test_the_matrix_is_in_place_of_the_picture_with_the_same_click(tmp_path: Pat
             await told(opened, "K3")
 
     asyncio.run(main())
+
+
+def test_a_click_on_a_cell_holds_the_next_of_parallel_connections(tmp_path: Path) -> None:
+    async def main() -> None:
+        async with shown("reward.yaml", tmp_path) as (opened, _, _):
+            await pause(opened)
+            await opened.key("m")
+            await opened.key("/")
+            await opened.call("Input.insertText", text="L -> B")
+            await opened.until("document.querySelector('#found b')?.textContent == 'L → B'")
+            await opened.key("Enter")
+            await told(opened, "L → B")
+            await opened.key("Escape")
+            await opened.ask("new Promise(done => setTimeout(() => requestAnimationFrame(done), 300))")
+            box = await opened.ask(
+                "(({left, top, right, bottom}) => [left - 14, top - 14, right + 14, bottom + 14])"
+                "(document.querySelector('#tip').getBoundingClientRect())"
+            )
+            assert isinstance(box, list)
+            title = "document.querySelector('#tip').textContent.split('\\n')[0]"
+            for x, y in ((box[across], box[down]) for across in (0, 2) for down in (1, 3)):
+                await opened.point(x, y)  # what is held stands at a corner of its tooltip
+                await opened.ask("new Promise(done => setTimeout(() => requestAnimationFrame(done), 100))")
+                if await opened.ask(title) == "L → B (2)":
+                    break
+            for name in ("L → B (2)", "L → B"):
+                await opened.click(x, y)
+                await opened.point(2, 2)
+                await told(opened, name)
+
+    asyncio.run(main())
