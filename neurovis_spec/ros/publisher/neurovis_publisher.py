@@ -119,7 +119,8 @@ class _Ros2:
 
         if node is None:
             if not rclpy.ok():
-                rclpy.init(args=[])
+                # Ctrl-C stays the controller's own
+                rclpy.init(args=[], signal_handler_options=rclpy.SignalHandlerOptions.NO)
             node = rclpy.create_node(f"{network.name}_publisher")
         self._node = node
         reliability = ReliabilityPolicy.RELIABLE if network.reliable else ReliabilityPolicy.BEST_EFFORT
