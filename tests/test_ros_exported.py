@@ -14,7 +14,6 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from neurovis_spec.ros.wire import ENCODINGS, array_of
 from ros_worlds import NAMES, Process, World, world
 
 import neurovis_spec as nv
