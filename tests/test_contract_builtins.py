@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+import neurovis_spec as nv
 from neurovis_spec import plugins
-from neurovis_spec.compiler import builtin
+from neurovis_spec.compiler import builtin, hidden
 
 THEIRS = """\
 neurovis: 1
@@ -20,6 +21,7 @@ activations:
 @pytest.mark.parametrize("entry", ["acme", "zebra"])
 def test_a_package_cannot_replace_a_built_in(entry: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Only a spec's own definitions replace built-in ones: wherever its entry point sorts, a package's is left out."""
+    builtin.builtin_definitions()  # kept by the process: what is installed here only for a moment must not be
     package = tmp_path / f"{entry}_lib"
     package.mkdir()
     (package / "__init__.py").touch()
@@ -30,12 +32,24 @@ def test_a_package_cannot_replace_a_built_in(entry: str, tmp_path: Path, monkeyp
     monkeypatch.setattr(
         plugins, "package", lambda group, name: f"{name}_lib" if name == entry else "neurovis_spec.library"
     )
-    with pytest.warns(RuntimeWarning) as caught:
-        libraries = builtin.libraries.__wrapped__()
-    said = [str(warning.message) for warning in caught]
-    assert len(said) == 2
-    assert said[0].startswith(f"'tanh' in the activations of {entry}_lib/more.yaml is not used: neurovis_spec.library/")
-    assert f"{entry}_lib/other.yaml is not used: {entry}_lib/more.yaml defines it" in said[1]
+    found = builtin.installed.__wrapped__()
+    libraries = found.libraries
+    assert set(found.hidden) == {("activations", "tanh"), ("activations", "twofold")}
+    assert found.hidden["activations", "tanh"].place == f"{entry}_lib/more.yaml"
+    assert found.hidden["activations", "tanh"].owner.startswith("neurovis_spec.library/")
+    assert found.hidden["activations", "twofold"] == (f"{entry}_lib/more.yaml", f"{entry}_lib/other.yaml")
     ours = [library for library in libraries if "tanh" in library.activations]
     assert [library.source.span.file for library in ours] == ["builtin/activations.yaml"]
     assert sum("twofold" in library.activations for library in libraries) == 1
+    monkeypatch.setattr(hidden, "installed", lambda: found)
+    network = nv.compile_text(
+        "neurovis: 1\nname: x\nmodules: {m: {neurons: {A: {activation: tanh, bias: 1}}}}\ninstances: {a: {module: m}}\n"
+        "neurons: {B: {activation: sin, bias: 1}}\n"
+    )
+    (told,) = network.warnings
+    assert (told.code, told.span.line) == ("hidden-definition", 3)
+    assert f"{entry}_lib/more.yaml defines one, too, which is not used" in told.message
+    own = nv.compile_text(
+        "neurovis: 1\nname: x\nactivations: {tanh: {value: x}}\nneurons: {A: {activation: tanh, bias: 1}}\n"
+    )
+    assert [one.code for one in own.warnings] == ["replaces-builtin"]

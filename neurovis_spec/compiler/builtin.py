@@ -9,9 +9,10 @@ time is warned of and not heard. A spec of one's own may still replace a built-i
 
 from __future__ import annotations
 
-import warnings
+from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
+from typing import NamedTuple
 
 from neurovis_spec import plugins
 from neurovis_spec.compiler.definitions import Definitions, define
@@ -25,22 +26,45 @@ OURS = "builtin"
 _SECTIONS = ("activations", "models", "rules")
 
 
+class Hidden(NamedTuple):
+    """A definition in ``place`` that is not used: ``owner``, which comes before it, defines one of that name."""
+
+    owner: str
+    place: str
+
+
+class Installed(NamedTuple):
+    """The library files as models, and the definitions that are left out of them, by section and name."""
+
+    libraries: tuple[Library, ...]
+    hidden: Mapping[tuple[str, str], Hidden]
+
+
 @cache
-def libraries() -> tuple[Library, ...]:
-    """The library files as models: ours, then in the order of the entry points' names, and of the files'; each without
-    what one before it defines already (RuntimeWarning). Raises SpecError if one is at fault."""
+def installed() -> Installed:
+    """All library files: ours, then in the order of the entry points' names, and of the files'; each without what one
+    before it defines already. Raises SpecError if one is at fault."""
     result: list[Library] = []
     owners: dict[tuple[str, str], str] = {}
+    hidden: dict[tuple[str, str], Hidden] = {}
     for name in sorted(plugins.names(plugins.LIBRARIES), key=lambda name: (name != OURS, name)):
         package = plugins.package(plugins.LIBRARIES, name)
         for file in sorted((f for f in files(package).iterdir() if f.name.endswith(".yaml")), key=lambda f: f.name):
             library = _read(file.read_text(encoding="utf-8"), f"{name}/{file.name}")
-            result.append(_without_known(library, f"{package}/{file.name}", owners))
-    return tuple(result)
+            result.append(_without_known(library, f"{package}/{file.name}", owners, hidden))
+    return Installed(tuple(result), hidden)
 
 
-def _without_known(library: Library, place: str, owners: dict[tuple[str, str], str]) -> Library:
-    """The library without the definitions that ``owners`` has already; the others are noted there as of ``place``."""
+def libraries() -> tuple[Library, ...]:
+    """The library files as models."""
+    return installed().libraries
+
+
+def _without_known(
+    library: Library, place: str, owners: dict[tuple[str, str], str], hidden: dict[tuple[str, str], Hidden]
+) -> Library:
+    """The library without the definitions that ``owners`` has already, which are ``hidden``; the others are noted as of
+    ``place``."""
     kept: dict[str, dict[str, object]] = {}
     for section in _SECTIONS:
         kept[section] = {}
@@ -48,9 +72,8 @@ def _without_known(library: Library, place: str, owners: dict[tuple[str, str], s
             owner = owners.setdefault((section, name), place)
             if owner == place:
                 kept[section][name] = definition
-                continue
-            message = f"'{name}' in the {section} of {place} is not used: {owner} defines it; rename it in that package"
-            warnings.warn(message, RuntimeWarning, stacklevel=2)
+            else:
+                hidden.setdefault((section, name), Hidden(owner, place))
     return library.model_copy(update=kept)
 
 

@@ -12,6 +12,7 @@ from typing import Final
 from neurovis_spec.compiler.beyond import look_beyond
 from neurovis_spec.compiler.compiled import Compiled
 from neurovis_spec.compiler.doubled import look_for_doubled
+from neurovis_spec.compiler.hidden import look_for_hidden
 from neurovis_spec.compiler.idle import idle_neurons
 from neurovis_spec.compiler.ignored import look_for_ignored
 from neurovis_spec.compiler.inert import changes_nothing
@@ -41,6 +42,7 @@ def warn(compiled: Compiled, findings: Findings) -> None:
     look_for_own_ends(compiled, findings)
     look_for_unused_parts(compiled, findings)
     look_for_undefined(compiled, findings)
+    look_for_hidden(compiled, findings)
     look_for_replaced_weights(compiled, findings)
     look_beyond(compiled, findings)
     _events(compiled, findings)
