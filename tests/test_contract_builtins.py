@@ -49,6 +49,8 @@ def test_a_package_cannot_replace_a_built_in(entry: str, tmp_path: Path, monkeyp
     (told,) = network.warnings
     assert (told.code, told.span.line) == ("hidden-definition", 3)
     assert f"{entry}_lib/more.yaml defines one, too, which is not used" in told.message
+    allowed = "neurons:\n  A: {activation: tanh, bias: 1}   # neurovis: allow hidden-definition\n"
+    assert not nv.compile_text("neurovis: 1\nname: x\n" + allowed).warnings
     own = nv.compile_text(
         "neurovis: 1\nname: x\nactivations: {tanh: {value: x}}\nneurons: {A: {activation: tanh, bias: 1}}\n"
     )
