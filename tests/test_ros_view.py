@@ -130,25 +130,75 @@ def test_hostile_messages_are_counted_and_survived(ros: World, spec: Path, tmp_p
     bare = ArrayForm.of("", 150, "cdr").message(float("nan"), -1, np.full(150, float("nan")))
     odd = bytearray(good[0])
     odd[good[0].index(b"\x02\0\0\0\x98\0\0\0")] = 7  # data_offset
-    messages = [data for one in good for data in (one, other, short, bare, bytes(odd))] * 2
-    file, out = recording(tmp_path / "played.mcap", messages), tmp_path / "x.mcap"
+    messages = [data for one in good for data in (one, other, short, bare, bytes(odd))] * 10
+    file, out = recording(tmp_path / "played.mcap", messages, rate=2000), tmp_path / "x.mcap"
     view = ros.neurovis("ros", "view", spec, "--record", out, "--format", "json")
     view.wait_for("ready")
     assert ros.neurovis("ros", "play", file, "--wait", "20").end() == 0
     time.sleep(1)
     assert view.stop() == 0
     counts = view.json()["topics"]["activity"]
-    assert counts["received"] == 1000
-    assert counts["rejected"] == {"type": 0, "parse": 200, "hash": 200, "length": 200}
-    assert (counts["recorded"], counts["unlabelled"], counts["not_finite"]) == (400, 200, 200)
-    assert len(arrays_in(out)) == 400
+    assert counts["received"] == 5000
+    assert counts["rejected"] == {"type": 0, "parse": 1000, "hash": 1000, "length": 1000}
+    assert (counts["recorded"], counts["unlabelled"], counts["not_finite"]) == (2000, 1000, 1000)
+    assert len(arrays_in(out)) == 2000
+
+
+def test_messages_of_another_type_and_quality_of_ros_2_are_told(spec: Path) -> None:
+    """ROS 2 delivers nothing of these, so that nothing can be counted."""
+    words = {"type": "std_msgs/String", "values": {"data": "x"}, "count": 1000, "rate": 20}
+    with world("kilted") as ros:
+        view = ros.neurovis("ros", "view", spec, "--live", "0")
+        view.wait_for("ready")
+        announced = ros.neurovis("ros", "view", "--live", "0")
+        announced.wait_for("waiting")
+        activity = {"topic": "/neurovis/other/activity", "type": ARRAY, "values": {}, "count": 1}
+        ros.peer(send=[{"topic": TOPIC, **words}, {"topic": "/neurovis/other/spec", **words}, activity], wait=1)
+        assert view.wait_for("a publisher sends").startswith(f"{TOPIC}: a publisher sends std_msgs/String, not {ARRAY}")
+        line = announced.wait_for("another quality of service")
+        assert line.startswith("/neurovis/other/spec: a publisher offers")
+        assert "DURABILITY" in line
+        assert view.stop() == 0
+        assert announced.stop() == 1
+
+
+def test_messages_of_another_type_of_ros_1_are_counted(spec: Path) -> None:
+    with world("one") as ros:
+        view = ros.neurovis("ros", "view", spec, "--live", "0", "--format", "json")
+        view.wait_for("ready")
+        sender = {"topic": TOPIC, "type": "std_msgs/String", "values": {"data": "x"}, "count": 20}
+        assert ros.peer(send=[sender], seconds=1).end() == 0
+        view.wait_for("of another type")
+        assert view.stop() == 0
+        counts = view.json()["topics"]["activity"]
+        assert (counts["received"], counts["rejected"]["type"]) == (20, 20)
+
+
+def test_of_several_networks_the_one_that_is_named_is_viewed(spec: Path, tmp_path: Path) -> None:
+    """With a master: without one a node may hear of another after seconds only."""
+    other = tmp_path / "small.yaml"
+    other.write_text("neurovis: 1\nname: small\nneurons: {A: {}}\n")
+    with world("one") as ros:
+        for path in (spec, other):
+            ros.neurovis("ros", "run", path, "--rate", "20").wait_for("ready")
+        view = ros.neurovis("ros", "view", "--live", "0")
+        assert view.end() == 1
+        assert view.err[-2:] == [
+            "error: several networks announce themselves: big, small",
+            "help: say which with --network NAME",
+        ]
+        view = ros.neurovis("ros", "view", "--network", "small", "--live", "0", "--format", "json")
+        view.wait_for("ready: small")
+        assert view.stop() == 0
+        assert view.json()["network"] == "small"
 
 
 def test_kill_9_of_the_recorder_and_of_the_publisher(ros: World, spec: Path, tmp_path: Path) -> None:
     messages = [step(number) for number in range(20_000)]
     file, out = recording(tmp_path / "played.mcap", messages), tmp_path / name_of(ros)
     first = ros.neurovis("ros", "view", spec, "--record", out)
-    second = ros.neurovis("ros", "view", spec, "--record", tmp_path / "y.mcap", "--format", "json")
+    pieces = tmp_path / "y.mcap"
+    second = ros.neurovis("ros", "view", spec, "--record", pieces, "--rotate", "500kB", "--format", "json")
     first.wait_for("ready")
     second.wait_for("ready")
     play = ros.neurovis("ros", "play", file, "--wait", "20")
@@ -167,6 +217,9 @@ def test_kill_9_of_the_recorder_and_of_the_publisher(ros: World, spec: Path, tmp
     counts = second.json()["topics"]["activity"]
     assert counts["lost"] == 0
     assert counts["received"] == counts["recorded"] > len(found)
+    files = second.json()["files"]
+    assert files[:3] == [str(tmp_path / name) for name in ("y.mcap", "y-1.mcap", "y-2.mcap")]
+    assert counts["recorded"] == len(arrays_in(pieces))  # and what comes next
 
 
 def test_the_master_of_ros_1_may_begin_anew(spec: Path, tmp_path: Path) -> None:
@@ -208,6 +261,37 @@ def test_a_run_records_what_it_publishes_and_its_inputs(ros: World, tmp_path: Pa
     names = [one.topic.name for one in read_bag(out).messages()]
     assert names[0] == "/neurovis/run/spec"
     assert (names.count("/neurovis/run/activity"), names.count("/target")) == (steps, 20)
+
+
+@pytest.mark.parametrize("name", ["kilted", "one"])
+def test_a_hostile_controller_of_the_first_neurovis_is_survived(name: str, tmp_path: Path) -> None:
+    texts = {
+        "neuronPos": ["A-B_C_0_0_1/nothing", "A_B_1_2/A_B_x_y", "A_B-C_1_2_3/_-_", "////", "é_1_1"],
+        "connectionsLayers": ["A-B", "A-B-C/A_B-A-B", "--", "-", "A_B-C-A-B_C"],
+        "connections": ["nan,inf,1", "1,2,3,4", "x", "1e400 0 0 0 0 0 0 0 0", ""],
+        "activity": ["1;2;3", "nan,inf,-inf", "1", "eins,zwei,drei", "0x10,0,0"],
+        "weightsAll": ["1/2", ",,,", "", "1,1,1,1,1,1,1,1,1", "\t"],
+    }
+    names = {"values": {"data": "A_B/A-B_C/A_B-C/"}, "count": 100, "rate": 50, "topic": "/neurovis/neuronName"}
+    send = [{"type": "std_msgs/String", **names}] + [
+        {"topic": f"/neurovis/{kind}", "type": "std_msgs/String", "values": [{"data": one} for one in every],
+         "count": 1000, "rate": 500}
+        for kind, every in texts.items()
+    ]  # fmt: skip
+    spec = tmp_path / "old.yaml"
+    with world(name) as ros:
+        legacy = ros.neurovis("ros", "legacy", "-o", spec, "--format", "json")
+        legacy.wait_for("ready")
+        assert ros.peer(send=send, seconds=4).end() == 0
+        time.sleep(1)
+        assert legacy.stop() == 0
+        counts = legacy.json()["topics"]
+    assert nv.compile(spec).network.neurons.labels == ("A_B", "A-B_C", "A_B-C")
+    assert sum(counts[kind]["received"] for kind in texts) > 1000
+    for kind in texts.keys() - {"connectionsLayers"}:  # what "connections" says stands in its place
+        rejected = counts[kind]["rejected"]
+        assert rejected["parse"] + rejected["length"] > 0
+        assert rejected["type"] == rejected["hash"] == 0
 
 
 def test_a_controller_of_the_first_neurovis_is_recorded_and_described(ros: World, tmp_path: Path) -> None:
