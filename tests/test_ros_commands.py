@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +11,7 @@ from types import SimpleNamespace
 import pytest
 from click.testing import CliRunner
 
+import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.ros import middleware
 from neurovis_spec.ros.definitions import definition
@@ -55,3 +57,23 @@ def test_the_seconds_of_a_view_are_those_in_which_it_listens(quiet: Quiet, tmp_p
     assert found.exit_code == 0, found.output
     assert min(quiet.listened) >= 0.3
     assert "nothing came on /neurovis/a/activity" in found.output
+
+
+def test_the_summary_in_json_is_one_object_on_one_line(quiet: Quiet, tmp_path: Path) -> None:
+    """To this command nothing came: it has made no file."""
+    spec, out = tmp_path / "a.yaml", tmp_path / "a.mcap"
+    spec.write_text("neurovis: 1\nname: a\nneurons: {A: {}}\n")
+    asked = ["ros", "view", str(spec), "--record", str(out), "--seconds", "0.1", "--format", "json"]
+    found = CliRunner().invoke(neurovis, asked)
+    (line,) = found.stdout.splitlines()
+    summary = json.loads(line)
+    assert summary.pop("seconds") > 0
+    nothing = {
+        **dict.fromkeys(("received", "recorded", "lost", "unlabelled", "not_finite"), 0),
+        "rejected": dict.fromkeys(("length", "hash", "type", "parse"), 0),
+    }
+    assert summary == {
+        **{"network": "a", "hash": nv.compile(spec).hash, "ros": 2, "steps": 0, "late": 0, "reconnects": 0},
+        **{"shown": 0, "skipped": 0, "files": [], "topics": {"activity": nothing}},
+    }
+    assert not out.exists()
