@@ -6,6 +6,8 @@
 Rates: ``ros run`` steps at a rate, ``ros view --record`` in another process records; from 100 Hz upwards, until one
 does not hold, twice: a message is lost, or more than one step in a hundred began more than half a period late.
 
+At most 2,000 messages wait for a recorder that does not get its turn (``qos: {depth: 2000}``).
+
 Jitter: how far the time between two steps is from the period, in microseconds, from the stamps in the messages; the
 median, 99 of 100, the largest. A bare loop makes nothing but the same message: rclpy's timer, or rospy's Rate.
 
@@ -47,6 +49,7 @@ connections:
     weight: "normal(0, 0.5)"
     pattern: {{random: {{probability: {probability}}}}}
     plasticity: {{oja: {{rate: 0.0001}}}}
+ros: {{qos: {{depth: 2000}}}}
 """
 #: a loop that makes messages of so many numbers at a rate for so many seconds, and nothing else
 _BARE_2 = """
