@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 #: what is said of such a file where its rows are steps, and what to do
 NUMBERED = "the first row, 0, 1, …, seems to number the columns; it is read as step 0"
-AS_TEXTS = "remove it, or give the columns names; in pandas, to_csv(…, header=False)"
+AS_TEXTS = "remove it, or give the columns names; in pandas, that is the argument header of to_csv"
 _POINT = re.compile(rb"[.eE]")
 #: rows without which nothing can be said: the first one and two others
 _LEAST = 3
