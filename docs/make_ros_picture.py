@@ -44,7 +44,7 @@ def main() -> None:
         ros.neurovis("ros", "run", SPEC).wait_for("ready")
         view = ros.neurovis("ros", "view", "--live", "0")
         taken = asyncio.run(picture(view.wait_for("live: ").removeprefix("live: ")))
-    taken.quantize(128).save(TARGET, optimize=True)
+    taken.save(TARGET, optimize=True)
     print(f"{TARGET.name}: {TARGET.stat().st_size / 1024:.0f} KiB")
 
 
