@@ -3,8 +3,14 @@ committed."""
 
 from __future__ import annotations
 
+import signal
+
 import pytest
 from hypothesis import settings
+
+# A shell that starts the tests in the background has them ignore Ctrl-C, and so all that they start; some test it.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # How long an example takes says something of the machine, not of the program. The examples are the same in each run, so
 # that a change is judged by what it changes; --hypothesis-profile=explore looks for new ones.
