@@ -326,7 +326,7 @@ def test_parameters_of_ros_2(name: str, tmp_path: Path) -> None:
         about, low, high, done = json.loads(setter.out[-1])
         assert (about, low, high) == ("How strongly it follows.", 0, 2)
         assert done == [0.5, True, 1.5, False, False, False, 1.5]
-        peer = ros.peer(listen=[COMMANDS], send=[targets(2.0, 20)], until={"/cmd_vel": 40})
+        peer = ros.peer(listen=[COMMANDS], send=[targets(2.0, 20)], until={"/cmd_vel": 400})
         assert peer.end() == 0
         assert 3.0 in [one[0] for one in peer.json()["/cmd_vel"]]
         assert run.stop() == 0
@@ -349,7 +349,7 @@ print(json.dumps([master.getParam(prefix), set_("gain", 1.5), set_("gain", 3.0),
         setter = ros.python(code)
         assert setter.end() == 0, setter.err
         assert json.loads(setter.out[-1]) == [{"gain": 0.5}, 1.5, 1.5, 1.5]
-        peer = ros.peer(listen=[COMMANDS], send=[targets(2.0, 20)], until={"/cmd_vel": 40})
+        peer = ros.peer(listen=[COMMANDS], send=[targets(2.0, 20)], until={"/cmd_vel": 400})
         assert peer.end() == 0
         assert 3.0 in [one[0] for one in peer.json()["/cmd_vel"]]
         assert run.stop() == 0
@@ -460,7 +460,7 @@ def test_the_live_page_turns_the_run(ros: World, tmp_path: Path) -> None:
     page = run.wait_for("live: ")
     run.wait_for("ready")
     ask(page, {"type": "set", "values": {"gain": 1.5}}, gain_is(1.5))
-    peer = ros.peer(listen=[COMMANDS], send=[targets(2.0, 20)], until={"/cmd_vel": 60})
+    peer = ros.peer(listen=[COMMANDS], send=[targets(2.0, 20)], until={"/cmd_vel": 400})
     assert peer.end() == 0
     assert 3.0 in [one[0] for one in peer.json()["/cmd_vel"]]
     assert run.stop() == 0
@@ -479,7 +479,7 @@ def test_the_live_page_of_who_views_sets_the_parameters_of_the_run(ros: World, t
         ({"type": "lesion", "part": "A"}, "its parameters can be set, and nothing else"),
     ):
         ask(page, asked, lambda told, why=why: why in told.get("reason", ""))  # type: ignore[misc]
-    peer = ros.peer(listen=[COMMANDS], send=[targets(2.0, 20)], until={"/cmd_vel": 60})
+    peer = ros.peer(listen=[COMMANDS], send=[targets(2.0, 20)], until={"/cmd_vel": 400})
     assert peer.end() == 0
     assert 3.0 in [one[0] for one in peer.json()["/cmd_vel"]]
     assert run.stop() == 0
