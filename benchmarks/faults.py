@@ -10,8 +10,8 @@ import random
 from collections.abc import Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass
 
-from neurovis_spec.language.source import Entry, Mapping, Node, Scalar
-from neurovis_spec.language.source import Sequence as List
+from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Scalar
+from neurovis_spec.language.yaml.source import Sequence as List
 
 #: Numbers that are whole and not negative, by the key they stand under.
 _COUNTS = {"count", "steps", "episode", "size", "delay", "at", "from", "to", "probability"}

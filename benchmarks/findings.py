@@ -31,8 +31,8 @@ from faults import Fault, faults, pick, with_faults
 import neurovis_spec as nv
 from neurovis_spec.diagnostics import Diagnostic, Findings, Span, slips
 from neurovis_spec.language.expressions.lexer import WORDS
-from neurovis_spec.language.reader import read_text
-from neurovis_spec.language.source import Mapping, Node, Scalar, Sequence
+from neurovis_spec.language.yaml.reader import read_text
+from neurovis_spec.language.yaml.source import Mapping, Node, Scalar, Sequence
 
 ERRORS = Path(__file__).resolve().parent.parent / "tests" / "errors"
 _EXPECTED = re.compile(r"# (error|warning): (\d+):(\d+) ([\w-]+)")

@@ -49,7 +49,7 @@ def load(text: str) -> object:
 
 def read(text: str) -> object:
     from neurovis_spec.diagnostics import Findings
-    from neurovis_spec.language.reader import read_text
+    from neurovis_spec.language.yaml.reader import read_text
 
     findings = Findings()
     document = read_text(text, "big.yaml", findings)

@@ -33,7 +33,7 @@ sys.path.insert(0, str(HERE.parent / "tests"))
 
 from ros_worlds import World, world  # noqa: E402
 
-from neurovis_spec.compiler.arrays import FloatArray  # noqa: E402
+from neurovis_spec.arrays import FloatArray  # noqa: E402
 from neurovis_spec.ros.bags import read_bag  # noqa: E402
 from neurovis_spec.runtime.wire import array_of  # noqa: E402
 

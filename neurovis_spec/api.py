@@ -14,7 +14,7 @@ from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.compile import Request
 from neurovis_spec.compiler.limits import Limits
 from neurovis_spec.diagnostics import Diagnostic, Findings, Span, SpecError
-from neurovis_spec.language.source import SourceDocument
+from neurovis_spec.language.yaml.source import SourceDocument
 
 if TYPE_CHECKING:
     from neurovis_spec.runtime.recording import Recording

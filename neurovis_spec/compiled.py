@@ -20,15 +20,15 @@ import numpy.typing as npt
 
 from neurovis_spec import arguments, pipeline
 from neurovis_spec.compiler.compile import Request
+from neurovis_spec.compiler.drawing.drawing_settings import Panel, RenderSettings
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.wishes import Panel, RenderSettings
 from neurovis_spec.diagnostics import Diagnostic, suggest
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.files import replacing
 
 if TYPE_CHECKING:
-    from neurovis_spec.compiler.arrays import FloatArray
+    from neurovis_spec.arrays import FloatArray
     from neurovis_spec.layout import Layout, Point, Route
     from neurovis_spec.notebook.widget import LiveWidget
     from neurovis_spec.runtime.columns import Keep

@@ -5,8 +5,8 @@ In: a Network, and the layout engine with the reason for it. Out: a dict of plai
 
 from __future__ import annotations
 
+from neurovis_spec.compiler.names.state_references import names_of_states
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.states import names_of_states
 
 
 def describe(network: Network, engine: tuple[str, str]) -> dict[str, object]:

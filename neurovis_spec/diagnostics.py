@@ -50,7 +50,7 @@ class Diagnostic:
 
 
 class SpecError(Exception):
-    """The input is at fault. ``diagnostics`` holds every finding, sorted by place; ``sources`` the texts read."""
+    """The input is invalid. ``diagnostics`` holds every finding, sorted by place; ``sources`` the texts read."""
 
     def __init__(self, diagnostics: Iterable[Diagnostic], sources: Mapping[str, str] | None = None) -> None:
         self.diagnostics: tuple[Diagnostic, ...] = tuple(diagnostics)
@@ -78,8 +78,8 @@ class Findings:
     _unread: dict[Span, frozenset[Diagnostic]] = field(default_factory=dict)
 
     def error(self, code: str, span: Span, message: str, hint: Hint = None, *, several: bool = False) -> None:
-        """Note a mistake. ``several``: it is one of a data file that the stretch names, which may have several; they
-        are told in the order in which they are noted."""
+        """Report a mistake. ``several``: it is one of a data file that the stretch names, which may have several; they
+        are told in the order in which they are reported."""
         if callable(hint):
             hint = None if self.many else hint()
         found = Diagnostic(code, message, span, "error", hint)
@@ -94,12 +94,12 @@ class Findings:
         self._items.append(Diagnostic(code, message, span, "warning", hint))
 
     def unread(self, span: Span) -> None:
-        """What stands there could not be read, for a reason that is noted: all else that is found there follows."""
+        """What stands there could not be read, for a reason that is reported: all else that is found there follows."""
         self._unread[span] = frozenset(item for item in self._items if item.span == span)
         self._faults.add(span)
 
     def take(self, others: Findings) -> None:
-        """Note what others have noted."""
+        """Report what others have noted."""
         self.files |= others.files
         for item in others._items:
             self._items.append(item)
@@ -126,15 +126,15 @@ class Findings:
         """Whether there are so many errors that unknown names are no longer compared with known ones."""
         return self._errors >= MOST_HINTS
 
-    def at_fault(self, span: Span) -> bool:
+    def is_invalid(self, span: Span) -> bool:
         """Whether there is an error about exactly this stretch of a text."""
         return span in self._faults
 
     def sorted(self) -> tuple[Diagnostic, ...]:
-        """All findings by place, each once, and once also where it is the same but for numbers: a module is looked at
+        """All findings by place, each once, and once also where it is the same but for numbers: a module is checked
         in each of its instances.
 
-        Where a stretch of the text is at fault in one way, what later stages make of it is a follow-up and held back.
+        Where a stretch of the text is invalid in one way, what later stages make of it is a follow-up and held back.
         """
         first: dict[Span, str] = {}
         for item in self._items:
@@ -167,7 +167,7 @@ def headline(diagnostic: Diagnostic) -> str:
     return f"{place}: {diagnostic.severity}[{diagnostic.code}]: {diagnostic.message}"
 
 
-def shown(text: str, most: int = 40) -> str:
+def shorten(text: str, most: int = 40) -> str:
     """A piece of the author's text in a finding: the beginning of a long one."""
     return text if len(text) <= most else text[: most - 3] + "…"
 
@@ -178,7 +178,7 @@ def listed(names: Collection[str]) -> str:
     >>> listed(["kernel", "sigmoid"]), listed(["x" * 300, *(f"C{number}" for number in range(100))])[37:]
     ('kernel, sigmoid', '…, C0, C1, C2, C3, C4, C5, C6, C7, C8, C9, C10, …')
     """
-    words = [shown(name) for name in islice(names, 12)]
+    words = [shorten(name) for name in islice(names, 12)]
     while len(words) > 1 and sum(map(len, words)) > 240:
         words.pop()
     return ", ".join(words) + (", …" if len(words) < len(names) else "")

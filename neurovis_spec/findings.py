@@ -23,7 +23,7 @@ _INVISIBLE: Final = re.compile("[\u061c\u200b\u200e\u200f\u202a-\u202e\u2060-\u2
 
 
 def show_text(diagnostics: Iterable[Diagnostic], sources: Mapping[str, str], most: int = 20) -> str:
-    """Findings for a terminal: each with its place, the line at fault, carets under it and a help line.
+    """Findings for a terminal: each with its place, the invalid line, carets under it and a help line.
 
     ``sources`` maps file names to texts; a finding about a file without a text is shown without the line. At most
     ``most`` are shown. The last line counts them all. Empty where there is nothing to show.

@@ -8,7 +8,7 @@ Each function is one stage: it takes a value, gives a new one, and reaches back 
     Network + Layout + Snapshot ─encode (Eqs. 2–5)─▶ Scene ─draw─▶ bytes of a picture
     Network + Layout + Snapshots ─film─▶ Film ─animate─▶ bytes of a moving one
 
-What the first four find at fault goes into Findings, all at once; ``Findings.check`` raises SpecError.
+What the first four find invalid goes into Findings, all at once; ``Findings.check`` raises SpecError.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 from neurovis_spec.compiler.compile import Request, compile_spec
+from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, Panel, RenderSettings
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.wishes import LayoutSettings, Panel, RenderSettings
 from neurovis_spec.diagnostics import Diagnostic, Findings, Span
-from neurovis_spec.garbage import uncollected
+from neurovis_spec.gc_paused import uncollected
 from neurovis_spec.language.includes import read_includes
-from neurovis_spec.language.reader import read_file, read_text
 from neurovis_spec.language.shape import read_spec
-from neurovis_spec.language.source import SourceDocument
 from neurovis_spec.language.spec import Spec
+from neurovis_spec.language.yaml.reader import read_file, read_text
+from neurovis_spec.language.yaml.source import SourceDocument
 from neurovis_spec.progress import Progress
 
 if TYPE_CHECKING:  # what only some stages need is imported there: a spec is validated without all of it
-    from neurovis_spec.compiler.arrays import FloatArray
+    from neurovis_spec.arrays import FloatArray
     from neurovis_spec.layout.model import Layout, LayoutRefusalError
     from neurovis_spec.runtime.record import Course
     from neurovis_spec.runtime.recording import Recording, Snapshot
@@ -121,9 +121,9 @@ def foresee(spec: Spec, network: Network, findings: Findings) -> None:
     """What the layout will surely not be as it is meant."""
     if spec.layout is None or spec.layout.engine is None or not network.instances:
         return
-    from neurovis_spec.layout.framing import look_at_engine
+    from neurovis_spec.layout.framing import check_engine
 
-    look_at_engine(spec.layout.engine, network, findings)
+    check_engine(spec.layout.engine, network, findings)
 
 
 def refusal(spec: Spec, request: Request, network: Network, memory: Layout | None) -> Diagnostic | None:

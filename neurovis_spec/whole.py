@@ -13,12 +13,12 @@ from typing import TypeAlias
 
 from neurovis_spec.compiler.compile import Request
 from neurovis_spec.diagnostics import Findings
-from neurovis_spec.language.data_files import read_edges, read_table
-from neurovis_spec.language.data_files_edges import EdgeTable
+from neurovis_spec.language.data.edge_list import EdgeTable
+from neurovis_spec.language.data.files import read_edges, read_table
 from neurovis_spec.language.located import Located
-from neurovis_spec.language.source import Mapping as SourceMapping
-from neurovis_spec.language.source import Node, Packed, Scalar, Sequence
 from neurovis_spec.language.spec import Spec
+from neurovis_spec.language.yaml.source import Mapping as SourceMapping
+from neurovis_spec.language.yaml.source import Node, Packed, Scalar, Sequence
 
 Plain: TypeAlias = "bool | int | float | str | list[Plain] | dict[str, Plain] | None"
 #: sections that an included file brings in

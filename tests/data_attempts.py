@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from neurovis_spec.diagnostics import Diagnostic, Findings, Span
-from neurovis_spec.language.data_files import Table, read_table
+from neurovis_spec.language.data.files import Table, read_table
 from neurovis_spec.language.located import Located
-from neurovis_spec.language.source import Scalar
+from neurovis_spec.language.yaml.source import Scalar
 
 #: where the path stands in the spec, and where the key does
 HERE = Span("net.yaml", 4, 20, 4, 30)

@@ -12,10 +12,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings, StatedGain
 from neurovis_spec.compiler.network import Connections, Group, Network, Neurons
 from neurovis_spec.compiler.program import Plasticity, Rule
-from neurovis_spec.compiler.wishes import LayoutSettings, RenderSettings, StatedGain
 from neurovis_spec.layout.model import Layout, Point, Route
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.scene.gains import Gains, choose_gains

@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
 from neurovis_spec.compiler.network import Connections, Group, Input, Network, Neurons, Output
 from neurovis_spec.compiler.program import (
     Activation,
@@ -28,7 +29,6 @@ from neurovis_spec.compiler.program import (
     Send,
     Update,
 )
-from neurovis_spec.compiler.wishes import LayoutSettings, RenderSettings
 from neurovis_spec.language.expressions.parser import parse
 from neurovis_spec.language.expressions.tree import Tree
 

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from hand_networks import use_case_1
 from PIL import Image as Pillow
 
-from neurovis_spec.compiler.wishes import RenderSettings
+from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.scene import (
     THEMES,
     Arrowhead,

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from neurovis_renderers.animated_svg import LETTERS, LEVELS, AnimatedSvgRenderer, animation
 from neurovis_renderers.svg import SvgRenderer
 
-from neurovis_spec.compiler.wishes import RenderSettings
+from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.scene import Film, still
 from neurovis_spec.scene.film import film
 from neurovis_spec.scene.gains import choose_gains

@@ -28,7 +28,7 @@ from PIL import Image
 from renderer_conformance import ALIKE, SCENES, short_film, similarity
 
 import neurovis_spec as nv
-from neurovis_spec.compiler.wishes import RenderSettings
+from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.scene import THEMES, Disc, Film, Group, Scene, channels, colours, still
 from neurovis_spec.scene.encode import encode
 from neurovis_spec.scene.film import film

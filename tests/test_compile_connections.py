@@ -9,7 +9,7 @@ import pytest
 from small_specs import HEAD, answer, codes, compiled, network_of, pairs, weights, wires
 
 import neurovis_spec as nv
-from neurovis_spec.compiler.draws import Stream
+from neurovis_spec.compiler.values.draws import Stream
 
 AB = """parameters: {a: 2}
 neurons: {A: {count: 2}, B: {count: 3}, O: {}, D: {count: 2, combine: distance}}

@@ -9,7 +9,7 @@ import pytest
 from small_specs import HEAD, answer, codes, compiled, network_of
 
 import neurovis_spec as nv
-from neurovis_spec.compiler.meanings import MEANINGS
+from neurovis_spec.compiler.names.reserved_names import MEANINGS
 
 USE = "\nneurons: {A: {activation: %s, bias: 2}}"
 

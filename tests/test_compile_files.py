@@ -10,9 +10,9 @@ from data_attempts import npz
 from small_specs import compiled, network_of, wires
 
 from neurovis_spec.diagnostics import Findings, Span
-from neurovis_spec.language.data_files import Room, Table, read_table
+from neurovis_spec.language.data.files import Room, Table, read_table
 from neurovis_spec.language.located import Located
-from neurovis_spec.language.reader_files import FileFault, read_bytes
+from neurovis_spec.language.yaml.opening import FileFault, read_bytes
 
 NEURONS = "neurons: {A: {count: 2, bias: 1}, B: {count: 3}, D: {count: 3, combine: distance, activation: gaussian}}\n"
 WEIGHTS = np.array([[1.0, 2, 3], [4, 5, 6]])
@@ -86,7 +86,7 @@ def test_a_file_is_read_once_for_each_key(folder: Path, monkeypatch: pytest.Monk
         read.append((path, None if key is None else key.value))
         return read_table(path, root, base, span, findings, key, keyed=keyed, gaps=gaps, room=room)
 
-    monkeypatch.setattr("neurovis_spec.compiler.tables.read_table", counting)
+    monkeypatch.setattr("neurovis_spec.compiler.values.data_files.read_table", counting)
     bodies = ["{matrix: {file: w.npz, key: weights}}", "{matrix: {file: w.npz, key: turned}, rows: to}"]
     bodies += ["{matrix: {file: w.mtx}}"]
     entries = "".join(f"  - A -> B: {body}\n" for body in bodies * 2)
@@ -103,7 +103,7 @@ def test_events_read_no_file_again(folder: Path, monkeypatch: pytest.MonkeyPatch
         opened.append(path.name)
         return read_bytes(path, most)
 
-    monkeypatch.setattr("neurovis_spec.language.data_files.read_bytes", reading)
+    monkeypatch.setattr("neurovis_spec.language.data.files.read_bytes", reading)
     (folder / "s.csv").write_text("1\n2\n", encoding="utf-8")
     (folder / "e.csv").write_text("from,to,weight\nA1,B1,1\n", encoding="utf-8")
     text = "parameters: {gain: 1}\ninputs: {s: {file: s.csv}}\nmodules: {leg: {neurons: {M: {}}}}\n" + NEURONS

@@ -9,7 +9,7 @@ import pytest
 from small_specs import answer, codes, compiled, network_of, pairs
 
 import neurovis_spec as nv
-from neurovis_spec.compiler.draws import Stream
+from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.runtime.simulation import ParameterError
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import neurovis_spec as nv
-from neurovis_spec.compiler.draws import Stream
+from neurovis_spec.compiler.values.draws import Stream
 
 HERE = Path(__file__).parent
 pytestmark = pytest.mark.compiler

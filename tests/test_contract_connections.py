@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small_specs import answer, codes, compiled, network_of, pairs, weights, wires
 
-from neurovis_spec.compiler.draws import Stream
+from neurovis_spec.compiler.values.draws import Stream
 
 ABD = "neurons: {A: {count: 2, bias: 1}, B: {count: 3}, O: {}, D: {count: 2, combine: distance}}\nconnections: "
 

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from small_specs import codes, compiled
 
 from neurovis_spec.cli.commands import neurovis
-from neurovis_spec.compiler.builtin import builtin_definitions, libraries
+from neurovis_spec.compiler.values.builtin import builtin_definitions, libraries
 from neurovis_spec.language.expressions.evaluate import evaluate
 
 PRINTED = """\

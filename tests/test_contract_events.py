@@ -10,7 +10,7 @@ import pytest
 from small_specs import answer, codes, compiled
 
 import neurovis_spec as nv
-from neurovis_spec.compiler.draws import Stream
+from neurovis_spec.compiler.values.draws import Stream
 
 PRINTED = """\
 parameters: {phi: 0.049}

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from neurovis_spec.compiler.arrays import FloatArray
-from neurovis_spec.compiler.ends import Ends
-from neurovis_spec.compiler.patterns_near import nearest
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiler.connections.ends import Ends
+from neurovis_spec.compiler.connections.patterns_near import nearest
 
 
 def plain(ends: Ends, count: int) -> list[tuple[int, int]]:

@@ -9,7 +9,7 @@ import pytest
 
 import neurovis_spec as nv
 from neurovis_spec.diagnostics import Diagnostic, Findings
-from neurovis_spec.language.reader import read_text
+from neurovis_spec.language.yaml.reader import read_text
 
 HEAD = "neurovis: 1\nname: x\n"
 

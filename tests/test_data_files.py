@@ -16,11 +16,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from neurovis_spec.diagnostics import Diagnostic, Findings
-from neurovis_spec.language.data_files import read_edges, read_table
-from neurovis_spec.language.data_files_csv import parse_numbers
-from neurovis_spec.language.data_files_edges import EdgeTable, parse_edges
-from neurovis_spec.language.data_files_npy import parse_npy
-from neurovis_spec.language.data_files_table import CellError
+from neurovis_spec.language.data.csv_table import parse_numbers
+from neurovis_spec.language.data.edge_list import EdgeTable, parse_edges
+from neurovis_spec.language.data.files import read_edges, read_table
+from neurovis_spec.language.data.npy import parse_npy
+from neurovis_spec.language.data.table import CellError
 
 
 def npy_header(text: str, data: bytes = b"", version: int = 1) -> bytes:
@@ -309,7 +309,7 @@ def told(name: str, data: str, folder: Path) -> list[str]:
 def test_all_faults_of_a_csv_are_told_in_their_order(
     tmp_path: Path, mark: str, stretch: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("neurovis_spec.language.data_files_csv._STRETCH", stretch)
+    monkeypatch.setattr("neurovis_spec.language.data.csv_table._STRETCH", stretch)
     data = f"{mark}1{mark},x,nan\n4,y\n1,2,3\n1,2,3,4\n5,6,nan\n\nz,1,inf\n"
     assert told("a.csv", data, tmp_path) == [
         "row 1, column 2: 'x' is no number",

@@ -19,10 +19,11 @@ from small_specs import HEAD, answer, network_of
 
 import neurovis_spec as nv
 from neurovis_spec.diagnostics import Findings
-from neurovis_spec.language import data_files_csv, data_files_edges
-from neurovis_spec.language.data_files import CellError, locate, read_edges, read_table
-from neurovis_spec.language.data_files_csv import parse_numbers
-from neurovis_spec.language.data_files_edges import parse_edges
+from neurovis_spec.language.data import csv_table as data_files_csv
+from neurovis_spec.language.data import edge_list as data_files_edges
+from neurovis_spec.language.data.csv_table import parse_numbers
+from neurovis_spec.language.data.edge_list import parse_edges
+from neurovis_spec.language.data.files import CellError, locate, read_edges, read_table
 
 CELLS = ["1", "-2.5", "3e-7", "", " 7", "\t8 ", "\u00a09", "0", ".5", "1.", " "]
 NAMES = ["A", " B1 ", "K", '"Q"']

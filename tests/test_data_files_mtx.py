@@ -12,8 +12,8 @@ from data_attempts import fault, table
 from hypothesis import given
 from hypothesis import strategies as st
 
-from neurovis_spec.language.data_files_mtx import parse_mtx
-from neurovis_spec.language.data_files_table import CellError
+from neurovis_spec.language.data.mtx import parse_mtx
+from neurovis_spec.language.data.table import CellError
 
 NO = np.nan
 

@@ -15,9 +15,9 @@ from data_attempts import HERE, THERE, attempt, fault, npy, npz, table, zipped
 from hypothesis import given
 from hypothesis import strategies as st
 
-from neurovis_spec.language.data_files_npz import parse_npz
-from neurovis_spec.language.data_files_table import CellError
-from neurovis_spec.language.data_files_zip import MOST_MEMBERS, members
+from neurovis_spec.language.data.archive import MOST_MEMBERS, members
+from neurovis_spec.language.data.npz import parse_npz
+from neurovis_spec.language.data.table import CellError
 
 MATRIX = np.array([[1.0, -2.5, 0.0], [4.0, 5.0, 1e-300]])
 
@@ -251,7 +251,7 @@ def test_members_that_share_their_bytes_are_refused(tmp_path: Path) -> None:
 def test_a_bomb_takes_no_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """64 MB of zeros in 64 KB, whose header is none or promises another size, are never unpacked."""
     made: list[int] = []
-    monkeypatch.setattr("neurovis_spec.language.data_files_npz.unpack", lambda data, member: made.append(member.size))
+    monkeypatch.setattr("neurovis_spec.language.data.npz.unpack", lambda data, member: made.append(member.size))
     wrong = npy(np.zeros(10))[:-80]
     for content in (bytes(1 << 26), wrong + bytes(1 << 26)):
         fault(tmp_path, "a.npz", zipped({"w.npy": content}))

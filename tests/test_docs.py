@@ -13,7 +13,7 @@ import yaml
 import neurovis_spec as nv
 from neurovis_spec.cli.topics import contents, text_of
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.compiler.patterns import PATTERNS
+from neurovis_spec.compiler.connections.patterns import PATTERNS
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.manual.builtins import builtins
 from neurovis_spec.manual.keys import Key, keys

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from neurovis_spec.compiler import box_muller, draws
-from neurovis_spec.compiler.draws import Stream, philox4x32
+from neurovis_spec.compiler.values import box_muller, draws
+from neurovis_spec.compiler.values.draws import Stream, philox4x32
 
 SEEDS = st.integers(-(2**63), 2**63 - 1)
 

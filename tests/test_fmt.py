@@ -21,11 +21,11 @@ import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.differences import difference
-from neurovis_spec.language.fmt import FormattingError, format_read, format_text
-from neurovis_spec.language.fmt_keys import normal
-from neurovis_spec.language.fmt_parse import TreeReader
-from neurovis_spec.language.reader import event_source, read_text
-from neurovis_spec.language.source import Mapping, Node, Scalar
+from neurovis_spec.language.format.connection_keys import normal
+from neurovis_spec.language.format.format import FormattingError, format_read, format_text
+from neurovis_spec.language.format.parse import TreeReader
+from neurovis_spec.language.yaml.reader import event_source, read_text
+from neurovis_spec.language.yaml.source import Mapping, Node, Scalar
 
 ROOT = Path(__file__).parents[1]
 CANONICAL = sorted(
@@ -637,7 +637,7 @@ def test_standard_input_goes_to_standard_output(folder: Path) -> None:
 
 
 def test_what_would_change_the_meaning_is_not_written(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("neurovis_spec.language.fmt.print_document", lambda document: "neurovis: 2\n")
+    monkeypatch.setattr("neurovis_spec.language.format.format.print_document", lambda document: "neurovis: 2\n")
     with pytest.raises(FormattingError):
         format_read(LOOSE)
     (folder / "loose.yaml").write_text(LOOSE)

@@ -75,8 +75,10 @@ def test_validating_asks_no_engine_where_the_spec_names_none() -> None:
 def test_validating_imports_no_more_than_the_spec_needs() -> None:
     """This spec has no events, no comment that allows, one table as ``.csv`` and no mistake."""
     modules = loaded(command("validate", "specs/cpg_rbf.yaml"))
-    kinds = {f"neurovis_spec.language.data_files_{kind}" for kind in ("edges", "mtx", "npy", "npz", "zip")}
-    assert not modules & (kinds | {"neurovis_spec.compiler.events", "neurovis_spec.language.allow", "difflib", "json"})
+    kinds = {f"neurovis_spec.language.data.{kind}" for kind in ("edge_list", "mtx", "npy", "npz", "archive")}
+    assert not modules & (
+        kinds | {"neurovis_spec.compiler.events.events", "neurovis_spec.language.allow", "difflib", "json"}
+    )
 
 
 def test_running_imports_nothing_that_lays_out_or_draws() -> None:

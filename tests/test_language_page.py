@@ -12,8 +12,8 @@ import pytest
 import yaml
 
 import neurovis_spec as nv
-from neurovis_spec.language.data_files import KINDS, LARGEST
-from neurovis_spec.language.data_files_table import MOST_CELLS
+from neurovis_spec.language.data.files import KINDS, LARGEST
+from neurovis_spec.language.data.table import MOST_CELLS
 from neurovis_spec.language.model import RESERVED
 from neurovis_spec.manual.keys import keys
 

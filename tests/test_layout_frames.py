@@ -7,7 +7,7 @@ import neurovis_layouts.layered.drawing
 import numpy as np
 import pytest
 from neurovis_layouts.frame import to_picture
-from neurovis_layouts.layered.compose import Composer
+from neurovis_layouts.layered.hierarchy import Composer
 
 import neurovis_spec as nv
 import neurovis_spec.scene.boxes

@@ -10,9 +10,10 @@ import layout_conformance as suite
 import pytest
 from neurovis_layouts.routing import nearby, walls
 from neurovis_layouts.routing.detours import Detours
-from neurovis_layouts.routing.walls import FloatArray, IntArray, Walls
+from neurovis_layouts.routing.walls import Walls
 
 import neurovis_spec as nv
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.layout.problem import problem_of
 
 HEAD = "neurovis: 1\nname: many\n"

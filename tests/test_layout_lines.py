@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from neurovis_layouts.routing.channels import channels
+from neurovis_layouts.routing.channel_routing import channels
 from neurovis_layouts.routing.lines import Lines, crossed
 
 import neurovis_spec as nv

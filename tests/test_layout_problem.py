@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from networks_by_hand import cpg_rbf
 
-from neurovis_spec.compiler.wishes import LayoutSettings
+from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings
 from neurovis_spec.layout.arrange import lay_out
 from neurovis_spec.layout.naming import edge_key, natural_key
 from neurovis_spec.layout.problem import canonical, problem_of

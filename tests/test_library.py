@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pytest
 
 import neurovis_spec as nv
-from neurovis_spec.compiler.builtin import builtin_definitions, libraries
+from neurovis_spec.compiler.values.builtin import builtin_definitions, libraries
 from neurovis_spec.runtime.recording import Recording
 
 BACKENDS = ("reference", "numpy")

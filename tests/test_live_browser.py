@@ -16,7 +16,7 @@ from renderer_conformance import similarity
 
 import neurovis_spec as nv
 from neurovis_spec import pipeline
-from neurovis_spec.compiler.wishes import RenderSettings
+from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.live.access import Access
 from neurovis_spec.live.hub import Hub
 from neurovis_spec.live.live import listen

@@ -17,7 +17,7 @@ from test_live_browser import SPECS, STEP, pause, shown
 from test_live_looking import TIP, places, told
 
 import neurovis_spec as nv
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.live.declared import declared
 from neurovis_spec.live.view import view_of
 from neurovis_spec.themes import THEMES

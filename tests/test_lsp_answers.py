@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from lsp_marks import marked
 
 from neurovis_spec.language.patterns import SETTINGS
-from neurovis_spec.lsp import wire
+from neurovis_spec.lsp import protocol as wire
 from neurovis_spec.lsp.check import check
 from neurovis_spec.lsp.completion import Completion, complete
 from neurovis_spec.lsp.definition import definition

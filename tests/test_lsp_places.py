@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from lsp_marks import MARK, marked
 
 from neurovis_spec.diagnostics import Findings, Span
-from neurovis_spec.language.reader import read_text
+from neurovis_spec.language.yaml.reader import read_text
 from neurovis_spec.lsp.outline import Item, item_at, outline
 from neurovis_spec.lsp.rename import apply, rename
 from neurovis_spec.lsp.text import Place, Text, holds

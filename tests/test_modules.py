@@ -17,8 +17,8 @@ from small_specs import HEAD, codes, compiled, network_of, wires
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.compiler.draws import Stream
 from neurovis_spec.compiler.limits import DEEPEST, MOST_INSTANCES
+from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.simulation import ParameterError
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import neurovis_spec as nv
-from neurovis_spec.compiler.draws import Stream
+from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.runtime import inputs
 from neurovis_spec.runtime.inputs import InputReader
 

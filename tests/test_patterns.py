@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import neurovis_spec as nv
-from neurovis_spec.compiler import patterns_drawn
-from neurovis_spec.compiler.draws import Stream
-from neurovis_spec.compiler.ends import Ends
+from neurovis_spec.compiler.connections import patterns_drawn
+from neurovis_spec.compiler.connections.ends import Ends
+from neurovis_spec.compiler.values.draws import Stream
 
 Edges = list[tuple[int, int]]
 

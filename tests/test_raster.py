@@ -28,7 +28,7 @@ from neurovis_renderers.raster import PillowRenderer
 from neurovis_renderers.stack import slots
 from PIL import Image
 
-from neurovis_spec.compiler.wishes import RenderSettings
+from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.scene import (
     THEMES,
     Arrowhead,

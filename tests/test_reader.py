@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 
 from neurovis_spec.diagnostics import Diagnostic, Findings
 from neurovis_spec.findings import show_text
-from neurovis_spec.language.reader import read_file, read_text
-from neurovis_spec.language.reader_characters import Lines
-from neurovis_spec.language.scalars import NumberRangeError, resolve
-from neurovis_spec.language.source import Mapping, Node, Packed, Scalar, ScalarValue, Sequence, SourceDocument
+from neurovis_spec.language.yaml.characters import Lines
+from neurovis_spec.language.yaml.reader import read_file, read_text
+from neurovis_spec.language.yaml.scalars import NumberRangeError, resolve
+from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, ScalarValue, Sequence, SourceDocument
 
 both_parsers = pytest.mark.parametrize("pure", [False, True], ids=["c", "python"])
 

@@ -28,7 +28,7 @@ from networks_by_hand import (
 )
 
 from neurovis_spec.api import compile_text
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Input, Network
 from neurovis_spec.compiler.program import Activation, Combine, Model
 from neurovis_spec.runtime.backend import BackendError, Capabilities, choose_backend, listing, load, prepare

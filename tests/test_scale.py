@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import neurovis_spec as nv
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray
 
 HEAD = "neurovis: 1\nname: x\nseed: 3\nparameters: {rho: 0.9}\nneurons: {A: {count: 40}, B: {count: 3}}\nconnections:\n"
 

@@ -16,7 +16,7 @@ from neurovis_renderers.svg import SvgRenderer
 from PIL import Image
 from test_animated_svg import tokens_at
 
-from neurovis_spec.compiler.wishes import RenderSettings
+from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.scene import Arrowhead, Film, Scene, Spline, Text, still
 from neurovis_spec.scene.encode import encode
 from neurovis_spec.scene.film import film

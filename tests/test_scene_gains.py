@@ -10,8 +10,8 @@ from hand_networks import C, G, network, numbered, use_case_1
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from neurovis_spec.compiler.arrays import FloatArray
-from neurovis_spec.compiler.wishes import RenderSettings, StatedGain
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings, StatedGain
 from neurovis_spec.scene.gains import choose_gains
 from neurovis_spec.scene.reached import Reached, nothing, reached_by
 

@@ -17,7 +17,7 @@ import neurovis_spec as nv
 from neurovis_spec import pipeline
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.compiler.wishes import RenderSettings
+from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.scene import Disc, Group, Rectangle, Scene, Spline, Text
 from neurovis_spec.scene.cut import Cut
 from neurovis_spec.scene.film import film

@@ -14,8 +14,8 @@ from hand_networks import C, Case, G, loop, network, numbered, plain_gains, stra
 
 import neurovis_spec as nv
 from neurovis_spec import pipeline
+from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.layout.model import Layout, Point
 from neurovis_spec.scene import Arrowhead, Disc, Group, Rectangle, Scene, Spline, Text, legend, still, texts
 from neurovis_spec.scene.encode import encode

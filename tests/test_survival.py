@@ -15,8 +15,8 @@ import pytest
 from small_specs import compiled
 
 import neurovis_spec as nv
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.runtime import parts, stream
 from neurovis_spec.runtime.numpy_backend import NumpyStepper
 from neurovis_spec.runtime.recording import Recording, RecordingError

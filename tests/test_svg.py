@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from neurovis_renderers.markup import escape, exact, num, path
 from neurovis_renderers.svg import SvgRenderer
 
-from neurovis_spec.compiler.wishes import RenderSettings
+from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.scene import encoding
 from neurovis_spec.scene.encode import encode
 from neurovis_spec.scene.themes import THEMES, channels

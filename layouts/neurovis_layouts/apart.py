@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from neurovis_layouts.wiring import FloatArray, IntArray
+from neurovis_spec.layout import FloatArray, IntArray
 from neurovis_spec.layout.model import GRID, RADIUS
 
 #: Centres are kept this far apart at least: rounding to the grid of coordinates takes some of it.

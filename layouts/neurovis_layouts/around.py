@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from neurovis_layouts.kept import kept
+from neurovis_layouts.incremental import kept
 from neurovis_spec.layout.model import Layout, LayoutProblem, Point
 
 

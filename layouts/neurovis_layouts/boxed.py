@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from neurovis_layouts.apart import apart
-from neurovis_layouts.wiring import FloatArray, IntArray
+from neurovis_spec.layout import FloatArray, IntArray
 from neurovis_spec.layout.frames import BOX_ACROSS, BOX_DOWN, TITLE
 from neurovis_spec.layout.model import RADIUS, LayoutProblem
 

@@ -13,10 +13,10 @@ import numpy as np
 from neurovis_layouts.apart import near_pairs
 from neurovis_layouts.around import around_pins, gives_way
 from neurovis_layouts.frame import from_picture, to_picture
-from neurovis_layouts.kept import kept
+from neurovis_layouts.incremental import kept
 from neurovis_layouts.pins import fit, with_origins
 from neurovis_layouts.routing import route_all
-from neurovis_layouts.wiring import FloatArray, IntArray
+from neurovis_spec.layout import FloatArray, IntArray
 from neurovis_spec.layout.geometry import snap, straight
 from neurovis_spec.layout.model import Layout, LayoutProblem, Point
 

@@ -11,7 +11,7 @@ from neurovis_layouts.around import around_pins, gives_way
 from neurovis_layouts.blocks import Blocks, Drawing, keys_of, routed
 from neurovis_layouts.formations import offsets
 from neurovis_layouts.frame import to_picture
-from neurovis_layouts.kept import kept
+from neurovis_layouts.incremental import kept
 from neurovis_layouts.pins import fit, with_origins
 from neurovis_spec.layout.model import Arrangement, Layout, LayoutProblem, Point
 

@@ -13,7 +13,7 @@ import numpy as np
 from neurovis_layouts.apart import apart, jitter
 from neurovis_layouts.finish import drawn, nearest, pinned_places
 from neurovis_layouts.frame import from_picture
-from neurovis_layouts.wiring import FloatArray
+from neurovis_spec.layout import FloatArray
 from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem
 
 #: In spacings: how far half of the discs are from their next, how far nine tenths of them (the picture may grow by this

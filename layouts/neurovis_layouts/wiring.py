@@ -12,10 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec.layout import FloatArray, IntArray
 from neurovis_spec.layout.model import LayoutProblem
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
 #: How heavy a hub is, and its links.

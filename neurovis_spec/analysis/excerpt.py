@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from neurovis_spec import arguments
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.runtime.recording import Recording, RecordingError
 
 #: A measure of pairs is of at most so many neurons: its tables have the square of it.

@@ -16,7 +16,7 @@ from neurovis_spec import arguments
 from neurovis_spec.analysis.coactivity import THRESHOLD
 from neurovis_spec.analysis.excerpt import Excerpt, excerpt
 from neurovis_spec.analysis.named import Axis, NamedArray
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.runtime.recording import Recording
 
 QUANTITIES = ("onset", "duty", "phase", "period", "times")

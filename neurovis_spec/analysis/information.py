@@ -13,7 +13,7 @@ import numpy as np
 from neurovis_spec import arguments
 from neurovis_spec.analysis.excerpt import paired
 from neurovis_spec.analysis.named import NamedArray, pairs
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.runtime.recording import Recording
 
 MOST_BINS = 1000

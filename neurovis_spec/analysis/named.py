@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.arrays import FloatArray, frozen
+from neurovis_spec.arrays import FloatArray, frozen
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.runtime.recording import UnknownNameError
 

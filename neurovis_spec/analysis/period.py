@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray
 
 #: What repeats is at least so alike a period later (1: the same).
 _ALIKE = 0.5

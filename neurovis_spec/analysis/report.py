@@ -30,8 +30,8 @@ from neurovis_spec.analysis.sensitivity import sensitivity_by
 from neurovis_spec.analysis.structure import connection_matrix
 from neurovis_spec.analysis.trials import STEPS, Trials
 from neurovis_spec.analysis.weights import updates, weight_changes, weights
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.layout.model import LayoutRefusalError
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.files import replacing

@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec import arguments
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Input, Network
 from neurovis_spec.runtime.backend import Availability, Capabilities, Stepper, prepare
 from neurovis_spec.runtime.columns import ALL, columns_of

@@ -9,7 +9,7 @@ import numpy as np
 
 from neurovis_spec.analysis.excerpt import cut
 from neurovis_spec.analysis.named import Axis, NamedArray
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.runtime.recording import Recording, RecordingError
 
 QUANTITIES = ("first", "last", "change", "travelled", "largest update", "at step")

@@ -68,8 +68,8 @@ def _items(values: Iterable[str]) -> Items:
 def _names_in(ctx: click.Context, section: str) -> tuple[str, ...]:
     """The keys of a section of the spec on the line, none where it cannot be read in a moment: it is not compiled."""
     from neurovis_spec.diagnostics import Findings
-    from neurovis_spec.language.reader import read_file
-    from neurovis_spec.language.source import Mapping
+    from neurovis_spec.language.yaml.reader import read_file
+    from neurovis_spec.language.yaml.source import Mapping
 
     spec = ctx.params.get("spec") or next(iter(ctx.args), None)  # an option without its value ends click's parsing
     if not isinstance(spec, str):

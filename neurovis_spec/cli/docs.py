@@ -42,8 +42,8 @@ def command(name: str | None) -> None:
     if not found:
         from neurovis_spec.cli.failure import fault
         from neurovis_spec.codes import catalogue
-        from neurovis_spec.diagnostics import shown
+        from neurovis_spec.diagnostics import shorten
 
         hint = f"it is the code of a finding: neurovis explain {name}" if name in catalogue() else near(name)
-        raise fault(f"there is nothing about '{shown(name)}'", hint, "unknown-name")
+        raise fault(f"there is nothing about '{shorten(name)}'", hint, "unknown-name")
     click.echo(text_of(found))

@@ -62,7 +62,7 @@ def said(error: OSError) -> str:
 
 
 def _input_errors() -> tuple[type[Exception], ...]:
-    """What running and drawing raise where the input is at fault; imported when something has gone wrong."""
+    """What running and drawing raise where the input is invalid; imported when something has gone wrong."""
     from neurovis_spec.plugins import PluginError
     from neurovis_spec.ros.middleware import MiddlewareError
     from neurovis_spec.runtime.backend import BackendError

@@ -18,8 +18,8 @@ from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.progress import progress
 
 if TYPE_CHECKING:
+    from neurovis_spec.arrays import FloatArray
     from neurovis_spec.compiled import CompiledNetwork, NetworkLayout
-    from neurovis_spec.compiler.arrays import FloatArray
     from neurovis_spec.compiler.network import Network
     from neurovis_spec.diagnostics import Findings
     from neurovis_spec.layout import Layout
@@ -107,8 +107,8 @@ def earlier_layout(path: Path) -> Layout | None:
     """The layout in a file, if it is there: all that it says, of neurons that are gone as well. Raises SpecError for
     what is no layout file."""
     from neurovis_spec.diagnostics import Findings, Span
-    from neurovis_spec.language.reader import LARGEST
-    from neurovis_spec.language.reader_files import FileFault, read_bytes
+    from neurovis_spec.language.yaml.opening import FileFault, read_bytes
+    from neurovis_spec.language.yaml.reader import LARGEST
     from neurovis_spec.layout.file import parse_bytes
 
     data = read_bytes(path, LARGEST)
@@ -137,7 +137,7 @@ def tables(named: Mapping[str, str], network: Network) -> dict[str, FloatArray]:
     if not named:
         return {}
     from neurovis_spec.diagnostics import Findings, Span
-    from neurovis_spec.language.data_files import read_table
+    from neurovis_spec.language.data.files import read_table
     from neurovis_spec.runtime.inputs import check_names
 
     check_names(network, named)
@@ -150,7 +150,7 @@ def tables(named: Mapping[str, str], network: Network) -> dict[str, FloatArray]:
         if table is None:
             continue
         if table.numbered:
-            from neurovis_spec.language.data_files_header import AS_TEXTS, NUMBERED
+            from neurovis_spec.language.data.header import AS_TEXTS, NUMBERED
 
             findings.warning("numbered-columns", place, NUMBERED, AS_TEXTS)
         arrays[name] = table.values

@@ -63,7 +63,7 @@ def command(specs: tuple[str, ...], check: bool, diff: bool) -> None:
 
 def _read(spec: str) -> str:
     """The text of a spec with its byte-order mark. Raises SpecError where the reader refuses it."""
-    from neurovis_spec.language.reader import read_file, read_text
+    from neurovis_spec.language.yaml.reader import read_file, read_text
 
     findings = Findings()
     if spec == "-":
@@ -80,7 +80,7 @@ def _read(spec: str) -> str:
 
 
 def _formatted(spec: str, text: str) -> str:
-    from neurovis_spec.language.fmt import FormattingError, format_read
+    from neurovis_spec.language.format.format import FormattingError, format_read
 
     try:
         return format_read(text)

@@ -13,12 +13,12 @@ import numpy as np
 
 from neurovis_spec.cli.files import count
 from neurovis_spec.cli.tables import number, spread, table
-from neurovis_spec.compiler.states import names_of_states
+from neurovis_spec.compiler.names.state_references import names_of_states
 from neurovis_spec.findings import printable
 
 if TYPE_CHECKING:
+    from neurovis_spec.arrays import IntArray
     from neurovis_spec.compiled import CompiledNetwork
-    from neurovis_spec.compiler.arrays import IntArray
     from neurovis_spec.compiler.network import Group, Input, Network
 
 #: The largest network whose connection matrix is shown, in neurons.

@@ -13,7 +13,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import IntArray
+from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.network import Input, Neurons, Output
 from neurovis_spec.compiler.program import Activation, Block, Model, Plasticity, Rule
 

@@ -1,8 +1,8 @@
 """The compiler: from a Spec to a Network, one stage after the other.
 
 In: a Spec, as far as it could be read, the folder of its data files, parameters to set. Out: a Network, or None with
-findings. All findings come at once: what is at fault is left out or stands in, and what would follow from it (``gaps``)
-is held back.
+findings. All findings come at once: what is invalid is left out or stands in, and what would follow from it
+(``names.unresolved``) is held back.
 """
 
 from __future__ import annotations
@@ -14,34 +14,34 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import IntArray
-from neurovis_spec.compiler.bound import make_settable, own_weights
+from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.canonical import canonical
-from neurovis_spec.compiler.compiled import Compiled
-from neurovis_spec.compiler.connect import Connected, connect, join
-from neurovis_spec.compiler.constants import Constants, parse_formula
-from neurovis_spec.compiler.crowds import crowded
+from neurovis_spec.compiler.checks.compiled import Compiled
+from neurovis_spec.compiler.checks.warnings import warn
+from neurovis_spec.compiler.connections.connect import Connected, connect, join
+from neurovis_spec.compiler.connections.connection_limit import crowded
+from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.digest import digest
-from neurovis_spec.compiler.entries import Bundle
-from neurovis_spec.compiler.gaps import Gaps, gaps_of
+from neurovis_spec.compiler.drawing.sections import layout_settings, render_settings
+from neurovis_spec.compiler.events.bound import make_settable, own_weights
 from neurovis_spec.compiler.limits import MOST_SIGNALS, Limits, amount
 from neurovis_spec.compiler.lower import make_blocks, make_plasticity, make_program
-from neurovis_spec.compiler.modules import library_of
+from neurovis_spec.compiler.names.connection_references import Finder, wires_of
+from neurovis_spec.compiler.names.expand import Expander, constants_of
+from neurovis_spec.compiler.names.modules import library_of
+from neurovis_spec.compiler.names.outputs import make_outputs
+from neurovis_spec.compiler.names.references import Directory, other_parameter
+from neurovis_spec.compiler.names.scope import Scope
+from neurovis_spec.compiler.names.state_references import singles
+from neurovis_spec.compiler.names.unresolved import Gaps, gaps_of
 from neurovis_spec.compiler.network import Input, Instance, Network, Output
-from neurovis_spec.compiler.noise import make_noises
+from neurovis_spec.compiler.neurons.noise import make_noises
+from neurovis_spec.compiler.neurons.populate import Population, populate, without_neurons
 from neurovis_spec.compiler.order import Cycle, levels
-from neurovis_spec.compiler.outputs import make_outputs
-from neurovis_spec.compiler.parameters import make_parameters
-from neurovis_spec.compiler.populate import Population, populate, without_neurons
-from neurovis_spec.compiler.references import Directory, other_parameter
 from neurovis_spec.compiler.ros_settings import RosSettings
-from neurovis_spec.compiler.sections import layout_settings, render_settings
-from neurovis_spec.compiler.states import singles
-from neurovis_spec.compiler.tables import Files
-from neurovis_spec.compiler.unit import Unit
-from neurovis_spec.compiler.units import Expander, constants_of
-from neurovis_spec.compiler.warnings import warn
-from neurovis_spec.compiler.wires import Finder, wires_of
+from neurovis_spec.compiler.values.constants import Constants, parse_formula
+from neurovis_spec.compiler.values.data_files import Files
+from neurovis_spec.compiler.values.parameters import make_parameters
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.includes import Includes, read_includes
@@ -49,7 +49,7 @@ from neurovis_spec.language.model import opening
 from neurovis_spec.language.spec import Spec, is_library
 
 if TYPE_CHECKING:
-    from neurovis_spec.compiler.events import Event
+    from neurovis_spec.compiler.events.events import Event
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Request:
 
 
 def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | None:
-    """The network of a spec; None where it is at fault (the findings say why)."""
+    """The network of a spec; None where it is invalid (the findings say why)."""
     before = findings.errors
     seed = request.seed if request.seed is not None else 0 if spec.seed is None else spec.seed.value
     includes = request.includes
@@ -87,27 +87,27 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         return None
     expander = Expander(library, request.root, findings, constants.dt, files={**request.files}, limits=request.limits)
     expansion = expander.expand(spec, constants, request.base)
-    units, inputs = expansion.units, expansion.inputs
-    population = populate(units, request.limits, seed)
-    _look_at_unused(expander, request.limits, seed)
+    scopes, inputs = expansion.scopes, expansion.inputs
+    population = populate(scopes, request.limits, seed)
+    _check_unused(expander, request.limits, seed)
     if not len(population.neurons):
         _report_no_neurons(spec, population, findings)
         population = without_neurons(population)
     directory = population.directory
-    layout = layout_settings(spec.layout, units, population, findings)
-    made = connect(units, population, request.limits, seed)
+    layout = layout_settings(spec.layout, scopes, population, findings)
+    made = connect(scopes, population, request.limits, seed)
     bundles = made.bundles
     render = render_settings(spec.render, Finder(wires_of(made), directory, findings), constants, directory)
     outputs = make_outputs(spec, population, made, findings)
     if spec.render is not None and spec.render.figure:
-        from neurovis_spec.compiler.figure import figure_of
+        from neurovis_spec.compiler.drawing.figure import figure_of
 
         render = replace(render, figure=figure_of(spec, population, made, outputs, findings))
-    ros = _ros(spec, inputs, outputs, units[0].gaps, constants)
-    noises = make_noises(units, population, sum(entry.size for entry in inputs))
+    ros = _ros(spec, inputs, outputs, scopes[0].gaps, constants)
+    noises = make_noises(scopes, population, sum(entry.size for entry in inputs))
     expansion.depend()
     if not made.complete or findings.errors > before or not _under_way(bundles, findings):
-        _look_at_cycles(made, population, findings)
+        _check_cycles(made, population, findings)
         _read_events(spec, made, directory, constants)
         return None
     plasticity, rules = make_plasticity(bundles)
@@ -157,15 +157,15 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         render=render,
         hash=content,
         noises=noises,
-        instances=_instances(units, population),
+        instances=_instances(scopes, population),
         numbering=own_weights(slots, bundles, connections.weights),
         settable=make_settable(slots, population, bundles, connections, inputs, blocks, plasticity, noises),
         ros=ros,
     )
     eventful = _eventful(spec, network, directory, constants, made)
-    if eventful is not None and not findings.failed:  # the shape may have been at fault
+    if eventful is not None and not findings.failed:  # the shape may have been invalid
         files = tuple(file.model for file in includes.files)
-        warn(Compiled(spec, units, library, expander.used, eventful, bundles, population, files), findings)
+        warn(Compiled(spec, scopes, library, expander.used, eventful, bundles, population, files), findings)
     return eventful
 
 
@@ -180,9 +180,9 @@ def _ros(
     return ros_settings(spec.ros, Surroundings(spec, inputs, outputs, gaps), constants)
 
 
-def _look_at_unused(expander: Expander, limits: Limits, seed: int) -> None:
-    """A module that nobody uses is looked at by itself, with its own parameters: mistakes are found at once. Modules
-    that others hold come last, since they are looked at in these; and together they may be as large as a network."""
+def _check_unused(expander: Expander, limits: Limits, seed: int) -> None:
+    """A module that nobody uses is checked by itself, with its own parameters: mistakes are found at once. Modules
+    that others hold come last, since they are checked in these; and together they may be as large as a network."""
     modules = expander.library.modules
     inner = {instance.module.value for module in modules.values() for instance in module.model.instances.values()}
     neurons, connections = limits.neurons, limits.connections
@@ -192,20 +192,20 @@ def _look_at_unused(expander: Expander, limits: Limits, seed: int) -> None:
         module = modules[name]
         constants = constants_of(module, expander.dt, expander.findings)
         make_parameters(module.model, constants, {})
-        units = expander.expand(module.model, constants, module.folder, name).units
-        population = populate(units, limits, seed)
-        made = connect(units, population, limits, seed)
-        make_noises(units, population, 0)
-        layout_settings(None, units, population, expander.findings)
+        scopes = expander.expand(module.model, constants, module.folder, name).scopes
+        population = populate(scopes, limits, seed)
+        made = connect(scopes, population, limits, seed)
+        make_noises(scopes, population, 0)
+        layout_settings(None, scopes, population, expander.findings)
         neurons -= len(population.neurons)
         connections -= sum(len(bundle.sources) for bundle in made.bundles)
 
 
-def _instances(units: tuple[Unit, ...], population: Population) -> tuple[Instance, ...]:
+def _instances(scopes: tuple[Scope, ...], population: Population) -> tuple[Instance, ...]:
     return tuple(
-        Instance(unit.path, unit.module, members.start, len(members), unit.declared, unit.number)
-        for unit, members in zip(units, (directory.members for directory in population.directories), strict=True)
-        if unit.module is not None
+        Instance(scope.path, scope.module, members.start, len(members), scope.declared, scope.number)
+        for scope, members in zip(scopes, (directory.members for directory in population.directories), strict=True)
+        if scope.module is not None
     )
 
 
@@ -215,7 +215,7 @@ def _eventful(
     """The network with what its events change; its hash says that they are there."""
     if not spec.events:
         return network
-    from neurovis_spec.compiler.timeline import with_changes
+    from neurovis_spec.compiler.events.timeline import with_changes
 
     before = constants.findings.errors
     events = _read_events(spec, connected, directory, constants)
@@ -229,14 +229,14 @@ def _read_events(spec: Spec, connected: Connected, directory: Directory, constan
     """The events of a spec. Most specs have none: nothing that reads them is imported then."""
     if not spec.events:
         return ()
-    from neurovis_spec.compiler.events import EventReader
+    from neurovis_spec.compiler.events.events import EventReader
 
     finder = Finder(wires_of(connected), directory, constants.findings)
     return EventReader(finder, constants).read(spec.events)
 
 
 def _report_no_neurons(spec: Spec, population: Population, findings: Findings) -> None:
-    """Without neurons nothing else can be looked at; if that is because groups are at fault, it is said already."""
+    """Without neurons nothing else can be checked; if that is because groups are invalid, it is said already."""
     for directory in population.directories:
         gaps = directory.gaps
         if gaps.sections & {"neurons", "instances"} or gaps.names["neurons"] or gaps.names["instances"]:
@@ -251,8 +251,8 @@ def _report_no_neurons(spec: Spec, population: Population, findings: Findings) -
     findings.error("no-neurons", span, message, hint, several=True)  # also where the name is missing there
 
 
-def _look_at_cycles(made: Connected, population: Population, findings: Findings) -> None:
-    """A cycle of the connections that are not at fault is one whatever becomes of the others."""
+def _check_cycles(made: Connected, population: Population, findings: Findings) -> None:
+    """A cycle of the connections that are not invalid is one whatever becomes of the others."""
     sizes = [len(bundle.sources) for bundle in made.bundles]
     delays = np.concatenate([bundle.delays for bundle in made.bundles] or [np.zeros(0, dtype=np.int64)])
     level = levels(len(population.neurons), made.sources, made.targets, delays)

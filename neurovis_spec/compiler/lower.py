@@ -11,11 +11,11 @@ from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray, IntArray, frozen
-from neurovis_spec.compiler.entries import Bundle
-from neurovis_spec.compiler.groups import Kind
-from neurovis_spec.compiler.learning import Learning
-from neurovis_spec.compiler.populate import Population
+from neurovis_spec.arrays import FloatArray, IntArray, frozen
+from neurovis_spec.compiler.connections.entries import Bundle
+from neurovis_spec.compiler.connections.plasticity import Learning
+from neurovis_spec.compiler.neurons.groups import Kind
+from neurovis_spec.compiler.neurons.populate import Population
 from neurovis_spec.compiler.program import (
     Block,
     Combine,

@@ -15,14 +15,14 @@ from typing import Literal
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray, IntArray, frozen
-from neurovis_spec.compiler.changes import Change
+from neurovis_spec.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.digest import digest
+from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
+from neurovis_spec.compiler.events.changes import Change
+from neurovis_spec.compiler.events.settable import Binding, ParameterFormula, Part, Settable
+from neurovis_spec.compiler.names.state_references import StateOf
 from neurovis_spec.compiler.program import Block, Combine, Operation, Plasticity
 from neurovis_spec.compiler.ros_settings import RosSettings
-from neurovis_spec.compiler.settable import Binding, ParameterFormula, Part, Settable
-from neurovis_spec.compiler.states import StateOf
-from neurovis_spec.compiler.wishes import LayoutSettings, RenderSettings
 from neurovis_spec.language.expressions.tree import Tree
 
 Role = Literal["input", "hidden", "output"]

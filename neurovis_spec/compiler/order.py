@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import IntArray
+from neurovis_spec.arrays import IntArray
 
 
 class Cycle(NamedTuple):

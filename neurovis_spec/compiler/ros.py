@@ -10,13 +10,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final, Literal, cast
 
-from neurovis_spec.compiler.constants import Constants
-from neurovis_spec.compiler.gaps import Gaps
 from neurovis_spec.compiler.limits import plural
+from neurovis_spec.compiler.names.references import key_of, known_inputs
+from neurovis_spec.compiler.names.unresolved import Gaps
 from neurovis_spec.compiler.network import Input, Output
-from neurovis_spec.compiler.references import key_of, known_inputs
 from neurovis_spec.compiler.ros_settings import NAMESPACE, Publication, RosSettings, Subscription
-from neurovis_spec.diagnostics import Findings, shown, suggest
+from neurovis_spec.compiler.values.constants import Constants
+from neurovis_spec.diagnostics import Findings, shorten, suggest
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.model import lost_names
 from neurovis_spec.language.ros import PublishModel, QosModel, RosModel, SubscribeModel
@@ -137,7 +137,7 @@ def _report_input(name: str, model: RosModel, known: tuple[str, ...], gaps: Gaps
     if gaps.cover("inputs", name) or ("." in name and findings.failed):  # that of an instance may be missing therefore
         return
     span = key_of(model.source, "subscribe", name).span
-    findings.error("unknown-input", span, f"there is no input '{shown(name)}'", lambda: known_inputs(name, known))
+    findings.error("unknown-input", span, f"there is no input '{shorten(name)}'", lambda: known_inputs(name, known))
 
 
 def _report_output(name: str, model: RosModel, spec: Spec, findings: Findings) -> None:
@@ -147,7 +147,7 @@ def _report_output(name: str, model: RosModel, spec: Spec, findings: Findings) -
     findings.error(
         "unknown-output",
         key_of(model.source, "publish", name).span,
-        f"there is no output '{shown(name)}'",
+        f"there is no output '{shorten(name)}'",
         lambda: suggest(name, declared, "outputs") or "no outputs are declared; add it under 'outputs'",
     )
 
@@ -162,7 +162,7 @@ def _check_numbers(entry: SubscribeModel | PublishModel, size: int | None, who: 
     if fields is None:
         if entry.type is not None and misspelt(name):
             hint = suggest(name, all_types(), "types")
-            findings.error("unknown-message", entry.type.span, f"there is no message type '{shown(name)}'", hint)
+            findings.error("unknown-message", entry.type.span, f"there is no message type '{shorten(name)}'", hint)
         return
     path = _DATA if entry.field is None else entry.field.value
     span = (entry.field or entry.type or entry.topic).span
@@ -170,7 +170,7 @@ def _check_numbers(entry: SubscribeModel | PublishModel, size: int | None, who: 
     if field is None:
         if not _within_unknown(path, fields):
             hint = _where(entry, path, name)
-            findings.error("unknown-field", span, f"messages of type {name} have no field '{shown(path)}'", hint)
+            findings.error("unknown-field", span, f"messages of type {name} have no field '{shorten(path)}'", hint)
     elif field.kind == "number":
         if size is not None and field.size is not None and field.size != size:
             holds = "one number" if not field.several else plural(field.size, "number")
@@ -179,7 +179,7 @@ def _check_numbers(entry: SubscribeModel | PublishModel, size: int | None, who: 
         what = (
             {"text": "a text", "message": "a message"}[field.kind] if not field.several else f"a list of {field.kind}s"
         )
-        message = f"'{shown(path)}' of {name} is {what}, neither a number nor an array of numbers"
+        message = f"'{shorten(path)}' of {name} is {what}, neither a number nor an array of numbers"
         findings.error("unknown-field", span, message, _where(entry, path, name))
 
 
@@ -215,7 +215,7 @@ def _check_joints(entry: SubscribeModel, size: int | None, name: str, findings: 
     seen = set[str]()
     for joint in entry.names:
         if joint.value in seen:
-            findings.error("repeated-reference", joint.span, f"the joint '{shown(joint.value)}' is named twice")
+            findings.error("repeated-reference", joint.span, f"the joint '{shorten(joint.value)}' is named twice")
         seen.add(joint.value)
     if size is not None and len(entry.names) != size:
         message = f"{plural(len(entry.names), 'joint')}; the input '{name}' takes {plural(size, 'number')}"

@@ -17,7 +17,7 @@ import yaml
 
 from neurovis_spec.codes import VALIDATE, catalogue
 from neurovis_spec.diagnostics import Diagnostic, Findings, Span, suggest
-from neurovis_spec.language.reader_characters import FORBIDDEN, REPLACEMENT, Lines
+from neurovis_spec.language.yaml.characters import FORBIDDEN, REPLACEMENT, Lines
 
 USELESS: Final = "useless-allow"
 _MOST: Final = 1000  # of these in a spec; nobody reads what more would say
@@ -125,7 +125,7 @@ def _key(item: Diagnostic) -> tuple[str, int, str]:
 
 
 def _judge(allow: Allow, there: set[tuple[str, int, str]], complete: bool, findings: Findings) -> None:
-    """Note an allow that can allow nothing."""
+    """Report an allow that can allow nothing."""
     if (allow.span.file, allow.span.line, allow.code) in there:
         return
     code = catalogue().get(allow.code)

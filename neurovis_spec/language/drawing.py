@@ -30,10 +30,10 @@ from neurovis_spec.language.located import (
     words,
 )
 from neurovis_spec.language.model import Keyed, Model
-from neurovis_spec.language.source import Mapping, Node, Packed, Scalar, Sequence
 from neurovis_spec.language.theme import ThemeField
 from neurovis_spec.language.values import REFERENCES, PointField, Reference, ReferenceField, TitleField, as_reference
 from neurovis_spec.language.views import VIEWS
+from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence
 
 
 def _references(node: Node, info: ValidationInfo) -> tuple[Reference, ...]:
@@ -160,7 +160,7 @@ def _factor_or_range(node: Node, info: ValidationInfo) -> Formula | Range:
 def _gains(
     node: Node, info: ValidationInfo, read: Callable[[Node, ValidationInfo], Formula | Range]
 ) -> tuple[GainValue, ...]:
-    """One gain for all, or a mapping from references to gains, each of which is looked at."""
+    """One gain for all, or a mapping from references to gains, each of which is checked."""
     if not isinstance(node, Mapping):
         return (GainValue(None, read(node, info), node.span),)
     if not node.entries:

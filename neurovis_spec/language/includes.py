@@ -13,14 +13,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, NamedTuple, TypeAlias
 
-from neurovis_spec.diagnostics import Findings, shown
-from neurovis_spec.language.data_files import locate
+from neurovis_spec.diagnostics import Findings, shorten
+from neurovis_spec.language.data.files import locate
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.modules import IncludedModel
-from neurovis_spec.language.reader import LARGEST, read_content
-from neurovis_spec.language.reader_files import FileFault, read_bytes
 from neurovis_spec.language.shape import read_included
 from neurovis_spec.language.spec import Spec
+from neurovis_spec.language.yaml.opening import FileFault, read_bytes
+from neurovis_spec.language.yaml.reader import LARGEST, read_content
 
 #: The most files that a spec may include, and how deep files may include one another.
 MOST: Final = 1000
@@ -93,7 +93,7 @@ class _Reader:
             return False
         data = self.bytes_of(place, LARGEST)
         if isinstance(data, FileFault):
-            self.findings.error(data.code, path.span, f"the file '{shown(path.value)}' {data.reason}")
+            self.findings.error(data.code, path.span, f"the file '{shorten(path.value)}' {data.reason}")
             return False
         name = os.path.normpath(Path(file).parent / path.value)
         document = read_content(data, name, self.findings, mend=True)

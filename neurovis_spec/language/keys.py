@@ -1,7 +1,7 @@
 """Keys: those of a mapping of the language, against the known ones.
 
 In: a Mapping as written. Out: the same, in which a misspelt key bears the name that it can only be meant for, with the
-place where it stands; so what it holds is looked at as well, and nothing that it declares is missed elsewhere.
+place where it stands; so what it holds is checked as well, and nothing that it declares is missed elsewhere.
 """
 
 from __future__ import annotations
@@ -9,15 +9,15 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator
 from typing import Final, NamedTuple
 
-from neurovis_spec.diagnostics import Findings, did_you_mean, meant, nearest, shown, slips, suggest
-from neurovis_spec.language.source import Entry, Mapping
+from neurovis_spec.diagnostics import Findings, did_you_mean, meant, nearest, shorten, slips, suggest
+from neurovis_spec.language.yaml.source import Entry, Mapping
 
 #: Errors after which unknown keys are no longer compared with the known ones.
 _MOST_HINTS: Final = 200  # as in the compiler
 
 
 class Keys(NamedTuple):
-    """A mapping whose unknown keys are noted; ``perhaps`` are the known ones that those still unknown may be meant
+    """A mapping whose unknown keys are reported; ``perhaps`` are the known ones that those still unknown may be meant
     for."""
 
     mapping: Mapping
@@ -33,7 +33,7 @@ class Words(NamedTuple):
 
 
 def read_keys(data: Mapping, known: Collection[str], findings: Findings, words: Words | None = None) -> Keys:
-    """Note the unknown keys of a mapping."""
+    """Report the unknown keys of a mapping."""
     if all(entry.name in known for entry in data.entries):
         return Keys(data, frozenset())
     perhaps: set[str] = set()
@@ -74,8 +74,8 @@ def _joined(name: str, known: Collection[str]) -> tuple[str, str] | None:
     key, colon, value = name.partition(":")
     if not colon or key not in known:
         return None
-    return _unknown(name), f"a blank belongs behind the colon: {shown(key)}: {shown(value)}"
+    return _unknown(name), f"a blank belongs behind the colon: {shorten(key)}: {shorten(value)}"
 
 
 def _unknown(name: str) -> str:
-    return f"unknown key '{shown(name)}'"
+    return f"unknown key '{shorten(name)}'"

@@ -22,8 +22,8 @@ from neurovis_spec.language.located import (
     refuse,
 )
 from neurovis_spec.language.model import Model, Named, StandIns
-from neurovis_spec.language.source import Mapping, Node, Scalar
 from neurovis_spec.language.values import ParameterField
+from neurovis_spec.language.yaml.source import Mapping, Node, Scalar
 
 LANGUAGE_VERSION = 1
 

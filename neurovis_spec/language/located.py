@@ -18,10 +18,10 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import PydanticCustomError, core_schema
 
-from neurovis_spec.diagnostics import Findings, Span, meant, nearest, shown, suggest
+from neurovis_spec.diagnostics import Findings, Span, meant, nearest, shorten, suggest
 from neurovis_spec.language.expressions.lexer import decimal_hint
-from neurovis_spec.language.scalars import INTEGER_HIGH, INTEGER_LOW
-from neurovis_spec.language.source import Node, Packed, Scalar, Sequence, describe
+from neurovis_spec.language.yaml.scalars import INTEGER_HIGH, INTEGER_LOW
+from neurovis_spec.language.yaml.source import Node, Packed, Scalar, Sequence, describe
 
 T = TypeVar("T")
 N = TypeVar("N", bound=Node)
@@ -76,14 +76,14 @@ def findings_of(info: ValidationInfo) -> Findings:
 
 
 def give_up() -> NoReturn:
-    """Leave this value; the finding is noted."""
+    """Leave this value; the finding is reported."""
     raise PydanticCustomError(REPORTED, "reported")
 
 
 def refuse(
     info: ValidationInfo, node: Node, wanted: str, hint: str | None = None, code: str = "wrong-type"
 ) -> NoReturn:
-    """Note that something else was wanted here, and leave this value."""
+    """Report that something else was wanted here, and leave this value."""
     findings_of(info).error(code, node.span, f"expected {wanted}, found {describe(node)}", hint)
     give_up()
 
@@ -113,12 +113,12 @@ NAME_RULE = "a name is a letter or underscore, then letters, digits and undersco
 
 def too_long(name: str) -> str:
     """The sentence for a name that a count makes too long."""
-    return f"the count makes '{shown(name)}' of {len(name)} characters"
+    return f"the count makes '{shorten(name)}' of {len(name)} characters"
 
 
 def bad_name(name: str) -> str:
     """The sentence for a name that is none."""
-    return f"'{shown(name)}' is not a name"
+    return f"'{shorten(name)}' is not a name"
 
 
 def as_bool(node: Node, info: ValidationInfo) -> Located[bool]:
@@ -133,7 +133,7 @@ def as_bool(node: Node, info: ValidationInfo) -> Located[bool]:
 
 
 def formula_of(node: Node, findings: Findings, hint: str | None = None) -> Formula | None:
-    """A finite number, or the text of an expression; None where it is neither (that is noted, with the hint)."""
+    """A finite number, or the text of an expression; None where it is neither (that is reported, with the hint)."""
     if isinstance(node, Scalar):
         value = node.value
         if isinstance(value, str) and value.strip():
@@ -181,7 +181,7 @@ def as_integer(node: Node, info: ValidationInfo) -> Located[int]:
 
 
 def as_texts(node: Node, info: ValidationInfo) -> tuple[Located[str], ...]:
-    """A text or a list of texts; each that is none is noted."""
+    """A text or a list of texts; each that is none is reported."""
     before = findings_of(info).errors
     result = as_parts(node, info)
     if findings_of(info).errors > before:
@@ -209,7 +209,7 @@ def one_of(*words: str) -> Callable[[Node, ValidationInfo], Located[str]]:
     def check(node: Node, info: ValidationInfo) -> Located[str]:
         text = as_text(node, info)
         if text.value not in words:
-            message = f"'{shown(text.value)}' is not one of {', '.join(words)}"
+            message = f"'{shorten(text.value)}' is not one of {', '.join(words)}"
             hint = suggest(text.value, words) if nearest(text.value, words) else None
             findings_of(info).error("unknown-value", node.span, message, hint)
             right = meant(text.value, words)

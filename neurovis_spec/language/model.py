@@ -1,9 +1,9 @@
 """The base of all models of the language: a mapping with known keys.
 
 In: a Mapping of the document. Out: the model, its ``source`` the Mapping, in which misspelt keys bear the right names
-(``keys``). Missing keys are answered with what is missing. A key whose value is at fault is noted and left out, and so
-is an entry of a mapping of the author's names: all others are still read, so that later stages have something to look
-at. What was left out is what stands in ``source`` and not in the model (``lost``).
+(``keys``). Missing keys are answered with what is missing. A key whose value is invalid is reported and left out, and
+so is an entry of a mapping of the author's names: all others are still read, so that later stages have something to
+look at. What was left out is what stands in ``source`` and not in the model (``lost``).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from pydantic_core import core_schema
 from neurovis_spec.diagnostics import Findings, Span, nearest
 from neurovis_spec.language.keys import Words, read_keys
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Leaf, bad_name, findings_of, give_up, refuse
-from neurovis_spec.language.source import Entry, Mapping, Node, Scalar, ScalarValue, Sequence
+from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Scalar, ScalarValue, Sequence
 
 V = TypeVar("V")
 
@@ -40,7 +40,7 @@ def _as_it_is(value: Node, info: ValidationInfo) -> Node:
     return value
 
 
-#: What required keys are taken for where they are missing or at fault, to go on looking: scalars, or mappings of these.
+#: What required keys are taken for where they are missing or invalid, to go on looking: scalars, or mappings of these.
 StandIns: TypeAlias = dict[str, ScalarValue | dict[str, ScalarValue]]
 
 
@@ -93,7 +93,7 @@ class Model(BaseModel):
 
     @classmethod
     def _keys(cls, data: Mapping, perhaps: Collection[str], findings: Findings) -> dict[str, object]:
-        """The values by key, under ``$`` the Mapping itself; what is missing is noted, unless an unknown key is
+        """The values by key, under ``$`` the Mapping itself; what is missing is reported, unless an unknown key is
         ``perhaps`` meant for it."""
         fields = cls._fields()
         result: dict[str, object] = {"$": data}
@@ -102,7 +102,7 @@ class Model(BaseModel):
             if field is None:
                 continue
             if isinstance(entry.value, Scalar) and entry.value.value is None and not field.is_required():
-                if not findings.at_fault(entry.value.span):  # such as an alias, which is refused and read as nothing
+                if not findings.is_invalid(entry.value.span):  # such as an alias, which is refused and read as nothing
                     message = f"'{entry.name}' has no value"
                     findings.error("no-value", entry.key.span, message, cls.UNSAID)
             else:
@@ -134,7 +134,7 @@ class Model(BaseModel):
 
     @cached_property
     def lost(self) -> frozenset[str]:
-        """The keys of the source that are not in the model: unknown ones, and those whose value is at fault."""
+        """The keys of the source that are not in the model: unknown ones, and those whose value is invalid."""
         written = self._written()
         return frozenset(entry.name for entry in self.source.entries).difference(
             written[name] for name in self.model_fields_set
@@ -182,7 +182,7 @@ def opening(mapping: Mapping) -> Span:
 
 
 def lost_names(source: Mapping, section: str, kept: dict[str, V]) -> tuple[str, ...]:
-    """The names of a section that were left out because what they name is at fault."""
+    """The names of a section that were left out because what they name is invalid."""
     node = source.get(section)
     entries = node.entries if isinstance(node, Mapping) else ()
     return tuple(entry.name for entry in entries if entry.name not in kept)
@@ -236,7 +236,7 @@ class Filled:
     wanted: str
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
-        """The value is looked at before anything is made of it."""
+        """The value is checked before anything is made of it."""
         return core_schema.with_info_before_validator_function(self._check, handler(source))
 
     def __get_pydantic_json_schema__(

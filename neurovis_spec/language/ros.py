@@ -12,7 +12,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field, ValidationInfo
 
-from neurovis_spec.diagnostics import shown
+from neurovis_spec.diagnostics import shorten
 from neurovis_spec.language.located import (
     FormulaField,
     Leaf,
@@ -25,7 +25,7 @@ from neurovis_spec.language.located import (
 )
 from neurovis_spec.language.model import Keyed, Model
 from neurovis_spec.language.ros_types import all_types
-from neurovis_spec.language.source import Node
+from neurovis_spec.language.yaml.source import Node
 
 #: Names joined with slashes; ROS 2 has no two underscores in a row.
 _PATH = r"(?!.*__)[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*"
@@ -51,7 +51,7 @@ def _named(what: str, pattern: re.Pattern[str], hint: Callable[[str], str]) -> L
     def check(node: Node, info: ValidationInfo) -> Located[str]:
         text = as_text(node, info)
         if not pattern.fullmatch(text.value) or len(text.value) > _LONGEST:
-            message = f"'{shown(text.value)}' is not the name of {what}"
+            message = f"'{shorten(text.value)}' is not the name of {what}"
             findings_of(info).error("bad-ros-name", node.span, message, hint(text.value))
             give_up()
         return text

@@ -12,8 +12,8 @@ from typing import Annotated, ClassVar
 from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
-from neurovis_spec.diagnostics import shown
-from neurovis_spec.language.combinations import CONNECTION, EVENT, GROUP, INPUT, ONE_KEY
+from neurovis_spec.diagnostics import shorten
+from neurovis_spec.language.exclusions import CONNECTION, EVENT, GROUP, INPUT, ONE_KEY
 from neurovis_spec.language.located import (
     FORMULA,
     IDENTIFIER,
@@ -30,7 +30,6 @@ from neurovis_spec.language.located import (
 )
 from neurovis_spec.language.model import Filled, Keyed, KeysAreNames, Model
 from neurovis_spec.language.patterns import PatternField
-from neurovis_spec.language.source import Entry, Mapping, Node, Packed, Scalar, Sequence
 from neurovis_spec.language.values import (
     FILE,
     FORMULAS,
@@ -44,6 +43,7 @@ from neurovis_spec.language.values import (
     MatrixField,
     as_file,
 )
+from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Packed, Scalar, Sequence
 
 
 class Time(Model):
@@ -234,7 +234,7 @@ _PATIENCE = 20
 
 
 def _mappings(node: Node, info: ValidationInfo, wanted: str) -> Iterator[Mapping]:
-    """The mappings of a list; what is none is noted."""
+    """The mappings of a list; what is none is reported."""
     findings = findings_of(info)
     before = findings.errors
     for item in node.items if isinstance(node, (Sequence, Packed)) else (node,):
@@ -256,8 +256,8 @@ def _as_it_is(value: Located[str], info: ValidationInfo) -> Located[str]:
 
 
 def _connections(node: Node, info: ValidationInfo) -> list[tuple[Located[str], object]]:
-    """One mapping, or a list of mappings: in both cases the entries in the order written. What is at fault is noted and
-    left out."""
+    """One mapping, or a list of mappings: in both cases the entries in the order written. What is invalid is reported
+    and left out."""
     result: list[tuple[Located[str], object]] = []
     for mapping in _mappings(node, info, "a mapping FROM -> TO: weight, or a list of such"):
         if _in_parts(mapping, info):
@@ -267,7 +267,7 @@ def _connections(node: Node, info: ValidationInfo) -> list[tuple[Located[str], o
             same = first.setdefault("".join(entry.name.split()), entry)
             if same is not entry:  # two spellings of one key
                 place = f"{same.key.span.line}:{same.key.span.column}"
-                message = f"'{shown(entry.name)}' is there twice: first at {place} as '{shown(same.name)}'"
+                message = f"'{shorten(entry.name)}' is there twice: first at {place} as '{shorten(same.name)}'"
                 hint = "connections that share both ends are written as a list of mappings"
                 findings_of(info).error("duplicate-key", entry.key.span, message, hint)
             with suppress(PydanticCustomError):
@@ -276,11 +276,11 @@ def _connections(node: Node, info: ValidationInfo) -> list[tuple[Located[str], o
 
 
 def _in_parts(mapping: Mapping, info: ValidationInfo) -> bool:
-    """Whether a mapping says ``from`` and ``to`` with keys of their own, as other languages do, which is noted."""
+    """Whether a mapping says ``from`` and ``to`` with keys of their own, as other languages do, which is reported."""
     ends = [entry for entry in mapping.entries if entry.name in _ENDS]
     if len(ends) != 2 or any("->" in entry.name for entry in mapping.entries):
         return False
-    source, target = (shown(str(entry.value.value)) if isinstance(entry.value, Scalar) else "…" for entry in ends)
+    source, target = (shorten(str(entry.value.value)) if isinstance(entry.value, Scalar) else "…" for entry in ends)
     message = f"'{ends[0].name}' is no connection"
     findings_of(info).error("bad-connection", ends[0].key.span, message, f"write {source} -> {target}: {{weight: …}}")
     return True

@@ -1,6 +1,6 @@
 """From a SourceDocument to a Spec: the shape is checked, nothing is resolved.
 
-In: a SourceDocument and Findings. Out: the Spec, without what is at fault in it (the Findings say what that is), so
+In: a SourceDocument and Findings. Out: the Spec, without what is invalid in it (the Findings say what that is), so
 that the compiler can look at the rest; None where nothing can be said, as in another version of the language.
 """
 
@@ -16,14 +16,14 @@ from neurovis_spec.language.library import Library
 from neurovis_spec.language.located import REPORTED
 from neurovis_spec.language.model import Model, opening
 from neurovis_spec.language.modules import IncludedModel
-from neurovis_spec.language.source import Mapping, SourceDocument
 from neurovis_spec.language.spec import Spec
+from neurovis_spec.language.yaml.source import Mapping, SourceDocument
 
 M = TypeVar("M", bound=Model)
 
 
 def read_shape(document: SourceDocument, model: type[M], findings: Findings) -> M | None:
-    """Check a document against a model. All findings are noted; the result holds what could be read, None where that
+    """Check a document against a model. All findings are reported; the result holds what could be read, None where that
     is too little to go on."""
     before = findings.errors
     if _foreign(document, findings):
@@ -40,8 +40,8 @@ def read_shape(document: SourceDocument, model: type[M], findings: Findings) -> 
 
 
 def _foreign(document: SourceDocument, findings: Findings) -> bool:
-    """Whether the document is written in another version of the language, which is noted. Of its other keys nothing can
-    be said then: they would all be follow-ups."""
+    """Whether the document is written in another version of the language, which is reported. Of its other keys nothing
+    can be said then: they would all be follow-ups."""
     entry = document.root.entry("neurovis")
     if entry is None:
         return False

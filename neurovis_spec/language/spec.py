@@ -17,8 +17,8 @@ from neurovis_spec.language.model import Named, NamedParameters, StandIns
 from neurovis_spec.language.modules import INCLUDED, InstanceModel, ModuleModel
 from neurovis_spec.language.ros import RosModel
 from neurovis_spec.language.sections import ConnectionsField, EventsField, GroupModel, InputModel, Time
-from neurovis_spec.language.source import Mapping
 from neurovis_spec.language.values import ParameterField, ReferenceField
+from neurovis_spec.language.yaml.source import Mapping
 
 
 class Spec(Library):

@@ -12,10 +12,10 @@ from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, ValidationInf
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import core_schema
 
-from neurovis_spec.diagnostics import shown
+from neurovis_spec.diagnostics import shorten
 from neurovis_spec.language.located import Leaf, Located, as_text, findings_of, give_up, refuse, words
 from neurovis_spec.language.model import Model
-from neurovis_spec.language.source import Entry, Mapping, Node, Scalar
+from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Scalar
 
 _COLOUR = re.compile(r"#[0-9A-Fa-f]{6}")
 THEME_NAMES = ("default", "dark", "print", "paper")
@@ -25,7 +25,7 @@ def _colour(node: Node, info: ValidationInfo) -> Located[str]:
     """``#rrggbb``."""
     text = as_text(node, info)
     if not _COLOUR.fullmatch(text.value):
-        message = f"'{shown(text.value)}' is not a colour"
+        message = f"'{shorten(text.value)}' is not a colour"
         findings_of(info).error("bad-colour", node.span, message, "write six hexadecimal digits, '#d55e00', in quotes")
         give_up()
     return Located(text.value.lower(), text.node)

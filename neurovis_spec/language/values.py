@@ -12,7 +12,7 @@ from typing import Annotated, NamedTuple, TypeAlias, TypeVar
 from pydantic import ValidationInfo
 from pydantic_core import PydanticCustomError
 
-from neurovis_spec.diagnostics import Span, shown
+from neurovis_spec.diagnostics import Span, shorten
 from neurovis_spec.language.keys import read_keys
 from neurovis_spec.language.located import (
     FORMULA,
@@ -28,7 +28,7 @@ from neurovis_spec.language.located import (
     refuse,
 )
 from neurovis_spec.language.model import opening
-from neurovis_spec.language.source import Entry, Mapping, Node, Packed, Scalar, Sequence
+from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Packed, Scalar, Sequence
 
 T = TypeVar("T")
 
@@ -62,7 +62,10 @@ def as_choice(node: Node, info: ValidationInfo) -> Choice:
         return Choice(name, ())
     if not isinstance(entry.value, Mapping):
         refuse(
-            info, entry.value, f"a mapping of the settings of '{shown(entry.name)}'", "write {name: {parameter: value}}"
+            info,
+            entry.value,
+            f"a mapping of the settings of '{shorten(entry.name)}'",
+            "write {name: {parameter: value}}",
         )
     return Choice(name, entry.value.entries)
 
@@ -237,7 +240,7 @@ InitialField = Annotated[Initial, Leaf(as_initial, {"anyOf": [*FORMULAS["anyOf"]
 
 
 class Parameter(NamedTuple):
-    """A named constant: its value, and the bounds within which it may be set. ``failed``: something of it is at fault;
+    """A named constant: its value, and the bounds within which it may be set. ``failed``: something of it is invalid;
     a value of 0 stands in then."""
 
     value: Formula
@@ -267,7 +270,7 @@ def as_parameter(node: Node, info: ValidationInfo) -> Parameter:
 
 
 def _tried(check: Callable[[Node, ValidationInfo], T], node: Node, info: ValidationInfo) -> T | None:
-    """A value, None where it is at fault, which is noted."""
+    """A value, None where it is invalid, which is reported."""
     with suppress(PydanticCustomError):
         return check(node, info)
     return None

@@ -1,5 +1,6 @@
 """Layouts: the problem an engine is given, the Layout it gives back, layout files and metrics."""
 
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.layout.model import (
     GRID,
     RADIUS,
@@ -24,6 +25,8 @@ __all__ = [
     "Arrangement",
     "Capabilities",
     "Direction",
+    "FloatArray",
+    "IntArray",
     "Layout",
     "LayoutEdge",
     "LayoutEngine",

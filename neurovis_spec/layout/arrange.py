@@ -10,7 +10,7 @@ import math
 from typing import cast
 
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.garbage import uncollected
+from neurovis_spec.gc_paused import uncollected
 from neurovis_spec.layout.choose import choose_engine
 from neurovis_spec.layout.engines import engine_of
 from neurovis_spec.layout.geometry import distance, snap

@@ -10,10 +10,10 @@ import json
 import math
 import re
 
-from neurovis_spec.compiler.pins import FARTHEST
+from neurovis_spec.compiler.drawing.pins import FARTHEST
 from neurovis_spec.diagnostics import Findings, suggest
-from neurovis_spec.language.reader import read_content, read_text
-from neurovis_spec.language.source import Mapping, Node, Packed, Scalar, Sequence, SourceDocument, describe
+from neurovis_spec.language.yaml.reader import read_content, read_text
+from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence, SourceDocument, describe
 from neurovis_spec.layout.model import Layout, Point, Route
 from neurovis_spec.layout.naming import edge_key, natural_key
 

@@ -18,9 +18,9 @@ from neurovis_spec.layout.model import LayoutEngine
 _WITH_FRAMES: Final = ("layered", "circular", "grid")
 
 
-def look_at_engine(engine: Located[str], network: Network, findings: Findings) -> None:
-    """Note a warning (``engine-without-frames``) where instances will not be drawn alike. An engine that draws what is
-    pinned alone (``manual``) has no choice, and one that cannot be loaded is told of when it is called."""
+def check_engine(engine: Located[str], network: Network, findings: Findings) -> None:
+    """Report a warning (``engine-without-frames``) where instances will not be drawn alike. An engine that draws what
+    is pinned alone (``manual``) has no choice, and one that cannot be loaded is told of when it is called."""
     name = engine.value
     if not network.instances or name == "auto" or name in _WITH_FRAMES:
         return

@@ -12,12 +12,10 @@ import networkx as nx
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.layout.geometry import cubics, distance
 from neurovis_spec.layout.model import RADIUS, Direction, Layout, LayoutProblem, Point, Route
 from neurovis_spec.layout.segments import meet
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 #: Crossings this close to a neuron that both routes have are how edges meet, not how they cross.
 _MEETING = 0.35

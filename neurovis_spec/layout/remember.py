@@ -9,11 +9,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.diagnostics import Findings, Span, shown
-from neurovis_spec.language.data_files import locate
+from neurovis_spec.diagnostics import Findings, Span, shorten
+from neurovis_spec.language.data.files import locate
 from neurovis_spec.language.located import Located
-from neurovis_spec.language.reader import LARGEST
-from neurovis_spec.language.reader_files import FileFault, read_bytes
+from neurovis_spec.language.yaml.opening import FileFault, read_bytes
+from neurovis_spec.language.yaml.reader import LARGEST
 from neurovis_spec.layout.file import parse_bytes
 from neurovis_spec.layout.model import Layout
 
@@ -29,11 +29,11 @@ def read_memory(path: Located[str], folder: Path, root: Path, network: Network, 
     data = read_bytes(place, LARGEST)
     if isinstance(data, FileFault):
         if data.code == "file-missing":
-            message = f"there is no layout file '{shown(path.value)}' yet"
+            message = f"there is no layout file '{shorten(path.value)}' yet"
             hint = f"make it with: neurovis layout SPEC --update {path.value}"
             findings.warning("layout-file-missing", path.span, message, hint)
         else:
-            findings.error(data.code, path.span, f"the file '{shown(path.value)}' {data.reason}")
+            findings.error(data.code, path.span, f"the file '{shorten(path.value)}' {data.reason}")
         return None
     name = str(Path(path.span.file).parent / path.value)
     layout = parse_bytes(data, name, findings)

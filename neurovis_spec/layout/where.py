@@ -12,9 +12,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from neurovis_spec.compiler.compile import Request
-from neurovis_spec.compiler.modules import library_of
+from neurovis_spec.compiler.names.modules import library_of
+from neurovis_spec.compiler.names.references import Section, key_of, key_span
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.references import Section, key_of, key_span
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.layout.clashes import Clash

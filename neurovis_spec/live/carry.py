@@ -13,7 +13,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import SourceError, Turned

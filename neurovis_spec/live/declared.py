@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.compiler.arrays import FloatArray
-from neurovis_spec.compiler.settable import Dependent
+from neurovis_spec.compiler.events.settable import Dependent
 from neurovis_spec.live.rules import rules
 
 

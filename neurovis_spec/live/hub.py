@@ -128,7 +128,7 @@ class Hub:
         """Tell a client something, from any thread."""
         self._loop.call_soon_threadsafe(client.tell, text)
 
-    def look_at(self, client: Client, items: tuple[str, ...]) -> None:
+    def check(self, client: Client, items: tuple[str, ...]) -> None:
         """A client wants values: now, and with each frame."""
         client.items, client.asked = items, bool(items)
         client.wake.set()

@@ -14,8 +14,8 @@ from typing import Final, Literal, TypeAlias
 
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.differences import difference
-from neurovis_spec.language.fmt_edit import Path as Keys
-from neurovis_spec.language.fmt_edit import Value, put
+from neurovis_spec.language.format.edit import Path as Keys
+from neurovis_spec.language.format.edit import Value, put
 from neurovis_spec.layout.file import dump, name_text, number_text
 from neurovis_spec.layout.model import GRID, Layout, Point
 from neurovis_spec.live.placing import Placed

@@ -26,7 +26,7 @@ class Reception:
             return
         command = command_of(message)
         if isinstance(command, LookAt):
-            self._hub.look_at(client, command.items)
+            self._hub.check(client, command.items)
         elif isinstance(command, Trace):
             self._hub.trace(client, command)
         elif not client.owner:

@@ -9,7 +9,7 @@ from bisect import bisect_left
 
 import numpy as np
 
-from neurovis_spec.compiler.changes import Clamp
+from neurovis_spec.compiler.events.changes import Clamp
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.history import Recorded
 from neurovis_spec.live.source import Capabilities, Mask, Reach, Seen, SourceError, Turned

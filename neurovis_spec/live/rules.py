@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.arrays import IntArray
+from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.names import Found, names_of
 

@@ -13,8 +13,8 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.live.appearance import AS_IT_IS, Appearance
 from neurovis_spec.live.declared import declared

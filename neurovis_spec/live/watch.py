@@ -53,5 +53,5 @@ class Watch:
             if now == self._marks:
                 continue
             files = self._changed()
-            # what was saved while it was looked at counts as changed
+            # what was saved while it was checked counts as changed
             self._marks = {file: now.get(file, mark) for file, mark in marks(files).items()}

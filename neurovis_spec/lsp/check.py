@@ -1,4 +1,4 @@
-"""What is at fault in a document, by the same way that ``neurovis validate`` goes.
+"""What is invalid in a document, by the same way that ``neurovis validate`` goes.
 
 In: a Document. Out: its findings and those of the files that it includes, which are taken as the editor has them; the
 network where there is one. A file to be included is checked within a spec that has one instance of each of its modules.

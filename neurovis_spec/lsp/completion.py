@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from neurovis_spec import plugins
-from neurovis_spec.compiler.constants import ALWAYS
+from neurovis_spec.compiler.values.constants import ALWAYS
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.ros_types import all_types, numbers_of
 from neurovis_spec.language.templates import Hole, pieces

@@ -14,8 +14,8 @@ from pathlib import Path
 
 from neurovis_spec import plugins
 from neurovis_spec.diagnostics import Findings, Span
-from neurovis_spec.language.data_files import locate
-from neurovis_spec.language.reader import read_file
+from neurovis_spec.language.data.files import locate
+from neurovis_spec.language.yaml.reader import read_file
 from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.names import Name
 from neurovis_spec.lsp.outline import Item, outline

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 
-from neurovis_spec.compiler.builtin import libraries
+from neurovis_spec.compiler.values.builtin import libraries
 from neurovis_spec.lsp.outline import Item, outline
 from neurovis_spec.lsp.roles import DEFINITIONS, SECTIONS, Kind
 

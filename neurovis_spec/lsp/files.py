@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Final, TypeAlias
 
 from neurovis_spec.diagnostics import Findings
-from neurovis_spec.language.data_files import locate
+from neurovis_spec.language.data.files import locate
 from neurovis_spec.language.includes import MOST
-from neurovis_spec.language.reader import LARGEST
-from neurovis_spec.language.reader_files import FileFault, read_bytes
+from neurovis_spec.language.yaml.opening import FileFault, read_bytes
+from neurovis_spec.language.yaml.reader import LARGEST
 from neurovis_spec.lsp.page import Page
 
 #: How many entries of the folders of a workspace are looked through for specs, and the largest of these.

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 
-from neurovis_spec.compiler.constants import ALWAYS
+from neurovis_spec.compiler.values.constants import ALWAYS
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.templates import Hole, pieces
 from neurovis_spec.lsp.outline import Item

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from neurovis_spec.diagnostics import Span
-from neurovis_spec.language.source import TEXT, Mapping, Node, Packed, Scalar, Sequence
+from neurovis_spec.language.yaml.source import TEXT, Mapping, Node, Packed, Scalar, Sequence
 from neurovis_spec.lsp.text import Place, holds
 
 #: Keys and indices from the root.
@@ -64,7 +64,7 @@ def outline(node: Node, path: Path = (), edges: bool = True) -> Iterator[Item]:
 
 
 def item_at(node: Node, place: Place, path: Path = ()) -> Item | None:
-    """The key or the text at a place; only the nodes around it are looked at."""
+    """The key or the text at a place; only the nodes around it are checked."""
 
     def _first(parts: Iterable[tuple[Node, str | int]]) -> Item | None:
         # A block ends where the next begins, so that a place may be in two.

@@ -14,7 +14,7 @@ from pathlib import Path
 from neurovis_spec.diagnostics import Diagnostic, Span
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, bad_name
 from neurovis_spec.language.model import RESERVED
-from neurovis_spec.language.scalars import resolve
+from neurovis_spec.language.yaml.scalars import resolve
 from neurovis_spec.lsp.check import check
 from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.files import CrowdedError

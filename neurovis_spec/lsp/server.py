@@ -19,11 +19,10 @@ from pygls.exceptions import JsonRpcInvalidParams
 from pygls.lsp.server import LanguageServer
 from pygls.uris import from_fs_path, to_fs_path
 
-from neurovis_spec.lsp import wire
+from neurovis_spec.lsp import protocol as wire
 from neurovis_spec.lsp.check import Checked, check, stumbled
 from neurovis_spec.lsp.completion import complete
 from neurovis_spec.lsp.definition import definition
-from neurovis_spec.lsp.desk import Desk
 from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.formatting import formatting
 from neurovis_spec.lsp.hover import hover
@@ -31,6 +30,7 @@ from neurovis_spec.lsp.references import references
 from neurovis_spec.lsp.rename import RenameError, prepare, rename
 from neurovis_spec.lsp.symbols import symbols
 from neurovis_spec.lsp.text import Text
+from neurovis_spec.lsp.workspace import Desk
 from neurovis_spec.version import __version__
 
 #: Seconds without a change until findings are looked for.

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from neurovis_spec.diagnostics import Span
-from neurovis_spec.language.reader_characters import Lines
+from neurovis_spec.language.yaml.characters import Lines
 
 _BOM = "\ufeff"
 #: How many units a character takes.

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from neurovis_spec.diagnostics import Span
-from neurovis_spec.language.scalars import NumberRangeError, resolve
-from neurovis_spec.language.source import Scalar, ScalarValue
+from neurovis_spec.language.yaml.scalars import NumberRangeError, resolve
+from neurovis_spec.language.yaml.source import Scalar, ScalarValue
 from neurovis_spec.lsp.outline import Item, Path
 from neurovis_spec.lsp.text import Place, Text
 

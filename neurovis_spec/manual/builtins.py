@@ -12,10 +12,10 @@ from importlib.resources import files
 from typing import Literal, TypeAlias
 
 from neurovis_spec import plugins
-from neurovis_spec.compiler.builtin import libraries
+from neurovis_spec.compiler.values.builtin import libraries
 from neurovis_spec.language.library import ActivationModel, Library, ModelModel, RuleModel
-from neurovis_spec.language.source import Entry, Mapping
 from neurovis_spec.language.values import Parameter
+from neurovis_spec.language.yaml.source import Entry, Mapping
 
 Kind: TypeAlias = Literal["activation", "model", "rule"]
 _Definition: TypeAlias = ActivationModel | ModelModel | RuleModel

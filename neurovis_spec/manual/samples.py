@@ -9,8 +9,8 @@ from functools import cache
 from importlib.resources import files
 
 from neurovis_spec.diagnostics import Findings
-from neurovis_spec.language.reader import read_text
-from neurovis_spec.language.source import Mapping, Scalar
+from neurovis_spec.language.yaml.reader import read_text
+from neurovis_spec.language.yaml.source import Mapping, Scalar
 
 
 @cache

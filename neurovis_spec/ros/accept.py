@@ -13,7 +13,7 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.language.ros_types import plain
 from neurovis_spec.ros.counts import REASONS, Counts, Reason, Teller
 from neurovis_spec.ros.middleware import Arrival

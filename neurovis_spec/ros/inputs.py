@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.ros_settings import Subscription as Settings
 from neurovis_spec.ros.counts import REASONS, Counts, Reason, Teller
 from neurovis_spec.ros.fields import Definition, numbers_at, texts_at

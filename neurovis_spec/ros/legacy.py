@@ -16,8 +16,8 @@ from typing import Final, Literal, TypeAlias, get_args
 import numpy as np
 import yaml
 
-from neurovis_spec.compiler.arrays import FloatArray
-from neurovis_spec.compiler.pins import DIAMETER
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiler.drawing.pins import DIAMETER
 from neurovis_spec.runtime.wire import Encoding, WireError, array_of, text_of
 
 Kind: TypeAlias = Literal["neuronName", "neuronPos", "connections", "connectionsLayers", "activity", "weightsAll"]

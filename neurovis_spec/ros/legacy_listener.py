@@ -12,8 +12,8 @@ from typing import Final
 
 import numpy as np
 
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.language.ros_types import plain
 from neurovis_spec.ros.accept import ARRAY
 from neurovis_spec.ros.announced import compiled_from

@@ -15,7 +15,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.clock import FRAMES
 from neurovis_spec.live.history import Ring

@@ -16,8 +16,8 @@ from typing import Final
 
 import numpy as np
 
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.ros.accept import ARRAY, STRING
 from neurovis_spec.ros.counts import Counts, Teller

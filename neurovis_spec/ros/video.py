@@ -18,8 +18,8 @@ from threading import Event, Thread
 from typing import IO, Final, cast
 
 from neurovis_spec.compiled import CompiledNetwork
+from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.ros.received import ReceivedSource
 from neurovis_spec.runtime.environment import for_others

@@ -16,7 +16,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.language.expressions.emit_c import Emitter
 from neurovis_spec.runtime import c_library
@@ -121,7 +121,7 @@ NV_PUBLIC int64_t nv_run(const nv_state *p, const nv_course *c)
             activity += NEURONS;
         }
         made = i + 1;
-        // what no step looked at is looked at here; what no step changes, once
+        // what no step looked at is checked here; what no step changes, once
         if (c->look && (odd != 0.0 || LOOK_NEURONS || ((!WATCHED || form || !i) && LOOK_CONNECTIONS)))
             break;
     }

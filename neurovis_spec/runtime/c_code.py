@@ -15,8 +15,8 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
-from neurovis_spec.compiler.settable import Variable
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.events.settable import Variable
 from neurovis_spec.language.expressions.emit_c import Drawn, Emitter, Made, Value
 from neurovis_spec.language.expressions.tree import Tree, names
 from neurovis_spec.runtime.state import constants

@@ -5,7 +5,7 @@ In: the constants of these. Out: the text of functions: ``nv_uniform`` and ``nv_
 
 from __future__ import annotations
 
-from neurovis_spec.compiler import box_muller
+from neurovis_spec.compiler.values import box_muller
 
 _TEXT = """static void nv_philox(uint32_t k0, uint32_t k1, uint32_t i, uint32_t step, uint32_t draw, uint32_t w[4])
 {

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
-from neurovis_spec.compiler.changes import Change, Clamp
-from neurovis_spec.compiler.draws import Stream
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.events.changes import Change, Clamp
 from neurovis_spec.compiler.network import Input, Network, Noise
+from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.language.expressions.emit_c import Emitter, Value
 from neurovis_spec.language.expressions.tree import Draw
 from neurovis_spec.runtime.c_backend import SMALL

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from neurovis_spec.compiler.settable import (
+from neurovis_spec.compiler.events.settable import (
     Assembled,
     Binding,
     Dependent,

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import IntArray
+from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Block, Gather, Learn, Plasticity, ReadInputs, Send, Update
 from neurovis_spec.language.expressions.emit_c import Value
@@ -40,7 +40,7 @@ class Form:
     take it at step 0 (``first`` is not 0). ``held``: neurons whose byte of ``held`` is set have the activity
     ``holding``. ``gone`` and ``still``: connections whose byte is set are left out, do not learn. ``fused``: what
     arrives after one step along weights that stay is formed where it arrives, from the activities ``before`` and the
-    weights ``packed`` in that order; it is not sent. ``watched``: what loops over connections store is looked at:
+    weights ``packed`` in that order; it is not sent. ``watched``: what loops over connections store is checked:
     the number ``odd`` is NaN after the step where some of it is not finite, else 0."""
 
     written_out: bool = False

@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
-from neurovis_spec.compiler.changes import Clamp
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.events.changes import Clamp
+from neurovis_spec.compiler.events.settable import ParameterFormula
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.settable import ParameterFormula
 from neurovis_spec.language.expressions.tree import Number
 from neurovis_spec.runtime.conditions import Controls
 from neurovis_spec.runtime.files import regular_size, replacing

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
-from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.states import (
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.names.state_references import (
     Refusal,
     StateOf,
     connections_state,
@@ -25,6 +24,7 @@ from neurovis_spec.compiler.states import (
     split_sum,
     wiring_of,
 )
+from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.recording import UnknownNameError
 from neurovis_spec.runtime.state import State

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
-from neurovis_spec.compiler.changes import Change, Held
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.events.changes import Change, Held
+from neurovis_spec.compiler.events.patch import Patcher
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.patch import Patcher
 from neurovis_spec.runtime.signals import signal_layout
 
 if TYPE_CHECKING:

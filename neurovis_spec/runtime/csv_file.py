@@ -21,8 +21,8 @@ from typing import BinaryIO
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
-from neurovis_spec.compiler.states import split_state
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.names.state_references import split_state
 from neurovis_spec.runtime.files import regular_size, replacing
 from neurovis_spec.runtime.recording import After, Recording, RecordingError, after_rows
 from neurovis_spec.runtime.rows import RowWriter, Steps
@@ -137,7 +137,7 @@ def _whole(file: FileIO, end: int) -> int:
 
 
 def read_csv(path: Path) -> Recording:
-    """Read a recording. Raises RecordingError, with the line at fault."""
+    """Read a recording. Raises RecordingError, with the invalid line."""
     return _read(path, lambda lines: lines)
 
 

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.conditions import Controls
 from neurovis_spec.runtime.measures import Meter, measure_of

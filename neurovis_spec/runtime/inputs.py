@@ -13,9 +13,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.arrays import FloatArray
-from neurovis_spec.compiler.draws import Stream
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Input, Network, Noise
+from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.tree import Draw

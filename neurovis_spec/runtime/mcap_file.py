@@ -22,7 +22,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.runtime import mcap_records as records
 from neurovis_spec.runtime.files import regular_size
 from neurovis_spec.runtime.mcap_records import Channel, DamagedError, Found, Message, Schema, Topic

@@ -14,10 +14,10 @@ from typing import Final
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiler.names.state_references import StateOf, names_of_states, split_state
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.states import StateOf, names_of_states, split_state
-from neurovis_spec.diagnostics import Findings, Span, shown, suggest
+from neurovis_spec.diagnostics import Findings, Span, shorten, suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.measures import PLACE, Formula, parse_measure
@@ -140,7 +140,7 @@ def _named(formula: Formula) -> Iterable[Name]:
 def _resolve_state(
     name: str, span: Span, network: Network, directory: Names, states: dict[str, StateOf], findings: Findings
 ) -> bool:
-    """Whether a name is a state, or an output that is one; what it is, or what is wrong with it, is noted."""
+    """Whether a name is a state, or an output that is one; what it is, or what is wrong with it, is reported."""
     output = next((one for one in network.outputs if one.name == name and one.states), None)
     if output is None:
         split = split_state(name)
@@ -160,7 +160,7 @@ def _resolve_state(
         states[name] = first
     else:
         (one,) = names_of_states(network, [StateOf(first.state, first.neurons[:1], first.connections[:1])])
-        message = f"'{shown(name)}' is {sum(state.size for state in found)} states, and no single one"
+        message = f"'{shorten(name)}' is {sum(state.size for state in found)} states, and no single one"
         findings.error("not-one-number", span, message, f"name one of them, as in '{one}'")
     return True
 
@@ -180,7 +180,7 @@ def _resolve(
         if not own:
             known = (*network.neuron_index, *directory.views, *network.parameters, *_OF_TIME)
             hint = suggest(name, known, "neurons, outputs and parameters")
-            message = f"there is no neuron, output or parameter '{shown(name)}'"
+            message = f"there is no neuron, output or parameter '{shorten(name)}'"
             findings.error("unknown-name", span, message, hint)
         elif name in network.parameters:
             slots[name] = network.settable.index[name]
@@ -191,7 +191,7 @@ def _resolve(
         findings.error("not-one-number", span, f"'{name}' is a neuron and {what}", hint)
     elif not found.single:
         first = network.neurons.names[found.neurons[0]]
-        message = f"'{shown(name)}' is {_counted(len(found.neurons))}, and no single one"
+        message = f"'{shorten(name)}' is {_counted(len(found.neurons))}, and no single one"
         findings.error("not-one-number", span, message, f"name one of them, as in '{first}'")
     else:
         neurons[name] = found.neurons[0]

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from itertools import count
 from typing import NamedTuple
 
+from neurovis_spec.compiler.names.state_references import StateName, split_state, split_sum
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.states import StateName, split_state, split_sum
 from neurovis_spec.diagnostics import suggest
 
 _RANGE = re.compile(

@@ -24,10 +24,10 @@ from typing import IO, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.limits import DEEPEST
-from neurovis_spec.language.data_files_npy import LONGEST_HEADER, read_header
-from neurovis_spec.language.data_files_table import CellError
+from neurovis_spec.language.data.npy import LONGEST_HEADER, read_header
+from neurovis_spec.language.data.table import CellError
 from neurovis_spec.runtime.files import regular_size, replacing
 from neurovis_spec.runtime.journal import Journal, JournalWriter, Widths, is_begun, read_journal
 from neurovis_spec.runtime.recording import After, Recording, RecordingError, after_rows, ended

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from neurovis_spec.compiler.arrays import FloatArray, subscript
+from neurovis_spec.arrays import FloatArray, subscript
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Block, Gather, Learn, ReadInputs, Send, Update
 from neurovis_spec.runtime.backend import Availability, Capabilities

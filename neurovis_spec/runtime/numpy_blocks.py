@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import IntArray
+from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Block, Gather, Update
 from neurovis_spec.language.expressions.tree import Tree

@@ -13,8 +13,8 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
-from neurovis_spec.compiler.settable import Variable
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.events.settable import Variable
 from neurovis_spec.language.expressions.emit import emit
 from neurovis_spec.language.expressions.tree import Name, Tree, Unary, names
 from neurovis_spec.runtime.state import State, constants

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import IntArray
+from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Plasticity
 from neurovis_spec.language.expressions.tree import Tree

@@ -15,10 +15,10 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.arrays import FloatArray, subscript
-from neurovis_spec.compiler.changes import Change
+from neurovis_spec.arrays import FloatArray, subscript
+from neurovis_spec.compiler.events.changes import Change
+from neurovis_spec.compiler.events.patch import PatchError
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.patch import PatchError
 from neurovis_spec.interrupts import Asked, deferred
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.backend import Backend, Runner, Stepper, prepare

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from neurovis_spec import arguments
-from neurovis_spec.compiler.arrays import FloatArray, IntArray, frozen
+from neurovis_spec.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import listed
 from neurovis_spec.runtime.names import Found, Names, names_of, unknown_text

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Block, Gather, Learn, ReadInputs, Send, Update
 from neurovis_spec.language.expressions.evaluate import evaluate

@@ -19,9 +19,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.events.patch import PatchError
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.patch import PatchError
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.runtime.conditions import Controls
 from neurovis_spec.runtime.recording import Recording, RecordingError

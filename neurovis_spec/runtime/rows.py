@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.runtime.recording import After
 
 

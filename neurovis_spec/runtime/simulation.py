@@ -17,11 +17,11 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec import arguments
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
-from neurovis_spec.compiler.changes import Clamp
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.events.changes import Clamp
+from neurovis_spec.compiler.events.patch import PatchError
+from neurovis_spec.compiler.events.settable import ParameterFormula
 from neurovis_spec.compiler.network import Network, Output
-from neurovis_spec.compiler.patch import PatchError
-from neurovis_spec.compiler.settable import ParameterFormula
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.expressions.tree import Number
 from neurovis_spec.runtime.backend import Backend, prepare

@@ -12,10 +12,10 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.neurons.initial_states import starts_of
 from neurovis_spec.compiler.program import Plasticity, Quantity, Rule
-from neurovis_spec.compiler.starts import starts_of
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.runtime.conditions import Conditions, first_conditions

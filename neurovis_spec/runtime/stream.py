@@ -14,7 +14,7 @@ from time import monotonic
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.interrupts import Asked, Ended, deferred
 from neurovis_spec.progress import Progress

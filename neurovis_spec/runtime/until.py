@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.measures import Measure, Meter, measure_of
 from neurovis_spec.runtime.state import State

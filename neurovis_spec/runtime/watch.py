@@ -13,7 +13,7 @@ from math import isfinite
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.state import State
 
@@ -42,7 +42,7 @@ class Watch:
             self._step, self._vector = first + int(wrong[0]), vectors[wrong[0]]
 
     def until(self, k: int, stop: int) -> int:
-        """How far steps from k on may be made, ``stop`` at most, before one must be looked at: one behind the first
+        """How far steps from k on may be made, ``stop`` at most, before one must be checked: one behind the first
         whose inputs are not finite."""
         return self._step + 1 if not self.warned and k <= self._step < stop else stop
 

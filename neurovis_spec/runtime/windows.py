@@ -12,7 +12,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.language.expressions.functions import maximum, minimum
 from neurovis_spec.language.expressions.measures import Summary
 

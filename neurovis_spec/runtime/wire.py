@@ -14,7 +14,7 @@ from typing import Final, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray
 
 #: the encodings, as MCAP calls them
 Encoding: TypeAlias = Literal["ros1", "cdr"]

@@ -3,6 +3,7 @@
 Renderers use what stands here; ``encode``, ``film`` and ``choose_gains`` are in the modules of these names.
 """
 
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.progress import Progress
 from neurovis_spec.scene.film import filled_shape, part, still
 from neurovis_spec.scene.model import (
@@ -44,8 +45,10 @@ __all__ = [
     "Arrowhead",
     "Disc",
     "Film",
+    "FloatArray",
     "Group",
     "Image",
+    "IntArray",
     "Point",
     "Polyline",
     "Progress",

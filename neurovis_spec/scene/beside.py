@@ -15,7 +15,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from neurovis_spec.scene.geometry import FloatArray, Rect
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.scene.geometry import Rect
 
 #: The smallest scale (page units for a layout unit) at which there are labels, and the steps from it on.
 _FIRST, _STEP = 6.0, 1.25

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Group, Network
 from neurovis_spec.layout.frames import (
     BOX_ACROSS,
@@ -23,7 +24,7 @@ from neurovis_spec.layout.frames import (
     TITLE,
 )
 from neurovis_spec.scene import texts
-from neurovis_spec.scene.geometry import FloatArray, Rect, bounds, overlap, sample
+from neurovis_spec.scene.geometry import Rect, bounds, overlap, sample
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.scene.geometry import FloatArray
 
 
 def caption(network: Network, step: int, activity: FloatArray) -> str:

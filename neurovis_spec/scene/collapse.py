@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
-from neurovis_spec.compiler.changes import Change
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, Mirror, RenderSettings, StatedGain
+from neurovis_spec.compiler.events.changes import Change
+from neurovis_spec.compiler.events.settable import Settable
 from neurovis_spec.compiler.network import Connections, Group, Instance, Network, Neurons
 from neurovis_spec.compiler.program import Plasticity
-from neurovis_spec.compiler.settable import Settable
-from neurovis_spec.compiler.wishes import LayoutSettings, Mirror, RenderSettings, StatedGain
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.lesions import lesions_of
 from neurovis_spec.scene.reached import Reached, reached, reached_by

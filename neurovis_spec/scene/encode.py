@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.scene import encoding, texts
 from neurovis_spec.scene.caption import caption
@@ -21,7 +22,6 @@ from neurovis_spec.scene.collapse import gathered
 from neurovis_spec.scene.fading import seconds_of
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.gathered_layout import laid_out
-from neurovis_spec.scene.geometry import FloatArray
 from neurovis_spec.scene.glyphs import marks_of
 from neurovis_spec.scene.lesions import FAINT
 from neurovis_spec.scene.model import Disc, Group, Scene, Shape, Spline, ended

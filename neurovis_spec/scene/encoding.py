@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from neurovis_spec.arrays import FloatArray
+
 #: One for all, or one for each.
 Gain: TypeAlias = float | FloatArray
 

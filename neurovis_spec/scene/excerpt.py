@@ -9,8 +9,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.scene.renderers import RendererError
 from neurovis_spec.scene.shown import check_path

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.recording import Recording, Snapshot
 from neurovis_spec.scene.film_size import frames_a_second

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from neurovis_spec.compiler.drawing.drawing_settings import Panel, RenderSettings
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.wishes import Panel, RenderSettings
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.scene.caption import caption
 from neurovis_spec.scene.encode import CAPTION

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.scene.caption import caption
 from neurovis_spec.scene.collapse import Gathered, gathered

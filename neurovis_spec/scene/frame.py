@@ -16,7 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neurovis_spec.scene.geometry import FloatArray, Rect
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.scene.geometry import Rect
 
 #: Page units for one layout unit in a picture that is small enough.
 UNIT = 66.0

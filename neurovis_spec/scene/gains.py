@@ -10,18 +10,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings, StatedGain
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.wishes import RenderSettings, StatedGain
 from neurovis_spec.scene.called import Names, names_of, unit_of
 from neurovis_spec.scene.reached import Reached
-
-FloatArray: TypeAlias = npt.NDArray[np.float64]
-IntArray: TypeAlias = npt.NDArray[np.int64]
 
 #: what reaches so many times the full colour can be told from grey for most of a period, in every theme; at its height
 #: alone; or what reaches nearly as much as the strongest

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Instance, Network
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.geometry import snap

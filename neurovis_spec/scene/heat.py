@@ -13,10 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.arrays import IntArray
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.scene import strips, texts
 from neurovis_spec.scene.cut import Cut
-from neurovis_spec.scene.geometry import FloatArray
 from neurovis_spec.scene.model import Group, Image, Polyline, Shape, Text, Theme
 from neurovis_spec.scene.parts import Changes, Part
 from neurovis_spec.scene.scales import Scale

@@ -12,12 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import IntArray
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.cut import Cut
-from neurovis_spec.scene.geometry import FloatArray
 from neurovis_spec.scene.heat import Band, bands_of
 from neurovis_spec.scene.model import Group, Image, Polyline, Rectangle, Shape, Text, Theme
 from neurovis_spec.scene.parts import Changes, Part

@@ -15,6 +15,7 @@ from typing import BinaryIO, ClassVar, Literal, Protocol, TypeAlias, runtime_che
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.progress import Progress
 from neurovis_spec.themes import Theme as Theme
 
@@ -236,9 +237,6 @@ class Scene:
         """All shapes from back to front."""
         for group in self.groups:
             yield from group.shapes
-
-
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.scene.geometry import FloatArray, Rect, overlap
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.scene.geometry import Rect, overlap
 
 
 class Obstacles:

@@ -1,7 +1,7 @@
 """Panels: the views that a caller asks for by words: ``traces``, ``traces: C1, C2``, ``weights: K -> O``.
 
 In: a network, words. Out: Panels with what they name resolved. What the spec's own ``figure`` shows is resolved when it
-is compiled (``compiler/figure``).
+is compiled (``compiler/drawing/figure``).
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from typing import TypeAlias
 import numpy as np
 
 from neurovis_spec import arguments
+from neurovis_spec.compiler.drawing.drawing_settings import Curve, Panel
+from neurovis_spec.compiler.names.state_references import split_state, split_sum
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.states import split_state, split_sum
-from neurovis_spec.compiler.wishes import Curve, Panel
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.views import VIEWS
 from neurovis_spec.runtime.columns import find_states

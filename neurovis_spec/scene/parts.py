@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from neurovis_spec.scene.geometry import FloatArray
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.scene.model import Film, Group, Scene, Theme, shifted
 
 

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiler.drawing.drawing_settings import Curve, Panel
+from neurovis_spec.compiler.names.state_references import StateOf, names_of_states
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.states import StateOf, names_of_states
-from neurovis_spec.compiler.wishes import Curve, Panel
 from neurovis_spec.runtime.recording import Recording, RecordingError
-from neurovis_spec.scene.geometry import FloatArray
 
 _NONE: npt.NDArray[np.int64] = np.zeros(0, dtype=np.int64)
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import IntArray
+from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.recording import Recording, RecordingError
 from neurovis_spec.snapshots import fitted

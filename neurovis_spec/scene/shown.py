@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.wishes import RenderSettings
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.renderers import RendererError
 

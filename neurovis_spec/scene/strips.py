@@ -11,9 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import IntArray
+from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.scene import texts
-from neurovis_spec.scene.geometry import FloatArray
 from neurovis_spec.scene.model import Group, Polyline, Rectangle, Shape, Text, Theme
 from neurovis_spec.scene.ticks import ticks, words
 

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.scene.geometry import FloatArray, sample
+from neurovis_spec.scene.geometry import sample
 from neurovis_spec.scene.lines import Line, trimmed
 from neurovis_spec.scene.obstacles import Obstacles
 

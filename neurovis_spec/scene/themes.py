@@ -10,11 +10,10 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.compiler.wishes import RenderSettings
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.themes import THEMES as THEMES
 from neurovis_spec.themes import Theme, changed
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def theme_of(settings: RenderSettings) -> Theme:

@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.boxes import Box
-from neurovis_spec.scene.geometry import FloatArray, Point, Rect, overlap
+from neurovis_spec.scene.geometry import Point, Rect, overlap
 from neurovis_spec.scene.model import Text, Theme
 from neurovis_spec.scene.obstacles import Obstacles
 

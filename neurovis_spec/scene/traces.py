@@ -14,9 +14,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.scene import strips, texts
 from neurovis_spec.scene.cut import Cut
-from neurovis_spec.scene.geometry import FloatArray
 from neurovis_spec.scene.model import Disc, Group, Point, Polyline, Shape, Text, Theme
 from neurovis_spec.scene.palette import MOST, distinct
 from neurovis_spec.scene.parts import Changes, Part

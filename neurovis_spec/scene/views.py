@@ -12,9 +12,9 @@ from typing import Protocol
 
 import numpy as np
 
-from neurovis_spec.compiler.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.drawing.drawing_settings import Curve, Panel
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.wishes import Curve, Panel
 from neurovis_spec.layout.model import Layout
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.scene import encoding, strips
@@ -37,7 +37,7 @@ from neurovis_spec.scene.traces import PLOT, Trace, Traces
 
 #: The most curves of a view that names them, and of one that chooses them.
 _MOST_NAMED, _MOST_CHOSEN = 4 * MOST_COLOURS, MOST_COLOURS
-#: Columns of a recording that are looked at together.
+#: Columns of a recording that are checked together.
 _TOGETHER = 512
 #: The share of the weights of a scale that do not go beyond its full colour in a matrix.
 _MOST = 0.9

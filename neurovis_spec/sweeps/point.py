@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from neurovis_spec import api
+from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.compiler.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import SpecError
 from neurovis_spec.findings import printable

@@ -26,7 +26,9 @@ from neurovis_spec.scene import (
     Arrowhead,
     Disc,
     Film,
+    FloatArray,
     Group,
+    IntArray,
     Point,
     Progress,
     Rectangle,
@@ -40,9 +42,6 @@ from neurovis_spec.scene import (
     filled_shape,
     readable,
 )
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 #: Levels of colour from −1 to +1; an odd number, so that 0 is one of them.
 LEVELS = 51

@@ -13,10 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_renderers import coverage
-from neurovis_renderers.coverage import LEAST, BoolArray, FloatArray, Fragments, Heads, IntArray, Pieces, Size, Strokes
+from neurovis_renderers.coverage import LEAST, BoolArray, Fragments, Heads, Pieces, Size, Strokes
 from neurovis_renderers.sheet import Sheet, packed, unpacked
 from neurovis_renderers.stack import Stack
-from neurovis_spec.scene import Scene
+from neurovis_spec.scene import FloatArray, IntArray, Scene
 
 Pixels = npt.NDArray[np.uint8]
 

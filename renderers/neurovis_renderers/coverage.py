@@ -12,11 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.scene import Arrowhead
+from neurovis_spec.scene import Arrowhead, FloatArray, IntArray
 
-FloatArray = npt.NDArray[np.float64]
 Numbers = npt.NDArray[np.float32]
-IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 Point = tuple[float, float]
 Size = tuple[int, int]  # width, height

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from neurovis_renderers import coverage
 from neurovis_renderers.canvas import Pixels, bands, portions, veiled
-from neurovis_renderers.coverage import BoolArray, FloatArray, Fragments, Heads, IntArray, Numbers, Size, Strokes
+from neurovis_renderers.coverage import BoolArray, Fragments, Heads, Numbers, Size, Strokes
 from neurovis_renderers.sheet import LANE, WHOLE, Sheet, packed, packed_all
 from neurovis_renderers.stack import COVERED, Stack, slots
 from neurovis_spec.scene import (
@@ -27,8 +27,10 @@ from neurovis_spec.scene import (
     Arrowhead,
     Disc,
     Film,
+    FloatArray,
     Group,
     Image,
+    IntArray,
     Polyline,
     Ramp,
     Rectangle,

@@ -16,19 +16,23 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_renderers import coverage
-from neurovis_renderers.coverage import (
-    BoolArray,
-    FloatArray,
-    Fragments,
-    Heads,
-    IntArray,
-    Numbers,
-    Pieces,
-    Size,
-    Strokes,
-)
+from neurovis_renderers.coverage import BoolArray, Fragments, Heads, Numbers, Pieces, Size, Strokes
 from neurovis_renderers.lettering import lettering
-from neurovis_spec.scene import Arrowhead, Disc, Group, Image, Point, Polyline, Ramp, Rectangle, Shape, Spline, Text
+from neurovis_spec.scene import (
+    Arrowhead,
+    Disc,
+    FloatArray,
+    Group,
+    Image,
+    IntArray,
+    Point,
+    Polyline,
+    Ramp,
+    Rectangle,
+    Shape,
+    Spline,
+    Text,
+)
 
 #: A colour and its weight are whole numbers: red, green and blue times a weight of at most ``WHOLE`` stand side by side
 #: in one integer of 64 bits, ``LANE`` bits each, and are added at once.

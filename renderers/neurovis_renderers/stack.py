@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neurovis_renderers.coverage import BoolArray, Fragments, IntArray, Numbers
+from neurovis_renderers.coverage import BoolArray, Fragments, Numbers
 from neurovis_renderers.sheet import LANE, WHOLE
+from neurovis_spec.scene import IntArray
 
 #: A pixel of whose weight no more than this is left shows nothing further back.
 COVERED = WHOLE // 512

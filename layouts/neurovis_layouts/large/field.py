@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from neurovis_layouts.wiring import FloatArray, IntArray
+from neurovis_spec.layout import FloatArray, IntArray
 
 _FEWEST_CELLS, _MOST_CELLS = 16, 1024
 

@@ -10,7 +10,8 @@ from collections import deque
 
 import numpy as np
 
-from neurovis_layouts.wiring import FloatArray, IntArray, Wiring, parts_of
+from neurovis_layouts.wiring import Wiring, parts_of
+from neurovis_spec.layout import FloatArray, IntArray
 
 #: Heights are evened out in so many rounds: what has one source ends up a step below it.
 _ROUNDS = 50

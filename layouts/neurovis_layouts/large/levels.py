@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neurovis_layouts.wiring import FloatArray, IntArray, Wiring, linked, summed
+from neurovis_layouts.wiring import Wiring, linked, summed
+from neurovis_spec.layout import FloatArray, IntArray
 
 _COARSEST = 30
 #: A level that saves less than this is not worth it.

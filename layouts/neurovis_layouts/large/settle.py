@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from neurovis_layouts.large.field import Field
-from neurovis_layouts.wiring import FloatArray, IntArray, Wiring
+from neurovis_layouts.wiring import Wiring
+from neurovis_spec.layout import FloatArray, IntArray
 
 #: How strongly points push each other off, and the power of length with which links pull.
 _PUSH, _POWER = 0.2, 0.7

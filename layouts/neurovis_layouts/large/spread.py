@@ -15,7 +15,8 @@ from neurovis_layouts.large.field import Field, GridField, PairField
 from neurovis_layouts.large.flow import heights
 from neurovis_layouts.large.levels import Level, levels_of
 from neurovis_layouts.large.settle import Cooling, settle
-from neurovis_layouts.wiring import FloatArray, IntArray, Wiring
+from neurovis_layouts.wiring import Wiring
+from neurovis_spec.layout import FloatArray, IntArray
 
 #: Parts of at most so many points are laid out together, pair by pair.
 SMALL = 64

@@ -13,7 +13,8 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from neurovis_layouts.wiring import FloatArray, IntArray, Wiring
+from neurovis_layouts.wiring import Wiring
+from neurovis_spec.layout import FloatArray, IntArray
 from neurovis_spec.layout.geometry import turn
 
 #: In steps: how far rows are apart at least, and how far links keep off the discs beside their ends.

@@ -28,7 +28,7 @@ class LayeredEngine:
     def lay_out(self, problem: LayoutProblem) -> Layout:
         """Place every neuron and route every connection. Raises LayoutRefusalError for what cannot be met, such as
         lines that a formation cannot keep."""
-        from neurovis_layouts.kept import kept  # only here: who asks what it can do needs none of it
+        from neurovis_layouts.incremental import kept  # only here: who asks what it can do needs none of it
         from neurovis_layouts.layered.engine import drawn
 
         return kept(problem, drawn(problem, self.name))

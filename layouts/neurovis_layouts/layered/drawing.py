@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from neurovis_layouts.layered.book import Key
 from neurovis_layouts.layered.parts import Part
+from neurovis_layouts.layered.templates import Key
 from neurovis_spec.layout.frames import PAD, PAD_FRAME, PAD_ROUTE, TITLE, Rect
 from neurovis_spec.layout.geometry import sampled
 from neurovis_spec.layout.model import GRID, Direction, Point, Route

@@ -1,9 +1,9 @@
 """The layered engine: from a problem to a layout.
 
 In: a LayoutProblem. Out: a Layout. After Sugiyama, Tagawa and Toda (1981), frame by frame from the inside out
-(``compose``); in a frame units and blocks (``units``), what shares a rank (``bonds``), components, ranks, order, places
-(``sheet``), pins (``settle``), routes (``links``). Every stage is deterministic and computes in plain IEEE arithmetic,
-so the result is the same everywhere.
+(``hierarchy``); in a frame units and blocks (``units``), what shares a rank (``same_rank``), components, ranks, order,
+places (``component_layout``), pins (``pinning``), routes (``frame_routing``). Every stage is deterministic and computes
+in plain IEEE arithmetic, so the result is the same everywhere.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from neurovis_layouts.frame import from_picture, to_picture
-from neurovis_layouts.layered.book import keys_of
-from neurovis_layouts.layered.compose import Composer
+from neurovis_layouts.layered.hierarchy import Composer
+from neurovis_layouts.layered.templates import keys_of
 from neurovis_spec.layout.model import Layout, LayoutProblem, Point
 
 

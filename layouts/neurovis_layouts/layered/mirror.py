@@ -12,9 +12,9 @@ from bisect import bisect_right, insort
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 
-from neurovis_layouts.layered.book import keys_of
 from neurovis_layouts.layered.levels import Levels, Node, Segment
 from neurovis_layouts.layered.order import ordered
+from neurovis_layouts.layered.templates import keys_of
 from neurovis_spec.layout.model import LayoutProblem
 
 _ROUNDS = 6

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_layouts.isotonic import spread
-from neurovis_layouts.layered.columns import Strips
+from neurovis_layouts.layered.box_columns import Strips
 from neurovis_layouts.layered.levels import Levels, Segment
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import Point

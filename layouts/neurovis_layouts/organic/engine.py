@@ -17,7 +17,8 @@ from neurovis_layouts.finish import drawn, nearest, pinned_places
 from neurovis_layouts.organic.paths import distances
 from neurovis_layouts.organic.stress import Arcs, least_stress
 from neurovis_layouts.packing import packed
-from neurovis_layouts.wiring import FloatArray, IntArray, Wiring, loops_of, parts_of, wiring_of
+from neurovis_layouts.wiring import Wiring, loops_of, parts_of, wiring_of
+from neurovis_spec.layout import FloatArray, IntArray
 from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem
 
 #: In spacings: how far linked neurons are apart, discs of any two, three quarters of the discs from their next at

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_layouts.wiring import FloatArray, IntArray
+from neurovis_spec.layout import FloatArray, IntArray
 
 
 def distances(count: int, a: IntArray, b: IntArray) -> FloatArray:

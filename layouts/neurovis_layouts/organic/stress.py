@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from neurovis_layouts.wiring import FloatArray, IntArray
+from neurovis_spec.layout import FloatArray, IntArray
 
 _STEPS = 200
 #: Ends when a step moves the places by less than this on the average.

@@ -15,10 +15,11 @@ import numpy as np
 
 from neurovis_layouts.routing.bows import bow
 from neurovis_layouts.routing.detours import Detours
+from neurovis_layouts.routing.line_overlap import crossings, line_of, together, tolerable
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
 from neurovis_layouts.routing.polylines import polylines
-from neurovis_layouts.routing.strokes import crossings, line_of, together, tolerable
-from neurovis_layouts.routing.walls import FloatArray, Frame, Walls
+from neurovis_layouts.routing.walls import Frame, Walls
+from neurovis_spec.layout import FloatArray
 from neurovis_spec.layout.geometry import distance, snap
 from neurovis_spec.layout.model import Point, Route
 

@@ -17,8 +17,9 @@ import numpy as np
 
 from neurovis_layouts.routing.nearby import Nearby
 from neurovis_layouts.routing.rounded import rounded
-from neurovis_layouts.routing.sight import MOST, Sight, lengths, runs_along
-from neurovis_layouts.routing.walls import BoolArray, FloatArray, IntArray, Walls, blocked, meet, touch
+from neurovis_layouts.routing.visibility import MOST, Sight, lengths, runs_along
+from neurovis_layouts.routing.walls import BoolArray, Walls, blocked, meet, touch
+from neurovis_spec.layout import FloatArray, IntArray
 from neurovis_spec.layout.geometry import distance, sampled
 from neurovis_spec.layout.model import Point, Route
 
@@ -74,7 +75,7 @@ class _Taken:
     lines: dict[tuple[int, float], list[Point]] = field(default_factory=dict)
 
     def add(self, path: Sequence[Point]) -> None:
-        """Note a detour."""
+        """Report a detour."""
         for point in path[1:-1]:
             self.corners[point] = self.corners.get(point, 0.0) + _TAKEN
         for a, b in pairwise(path):
@@ -252,7 +253,7 @@ class Detours:
 class _Graph:
     """The ends of a way, corners and places beside discs, in this order: ``points`` (n, 2); from where one sees what.
     ``number`` are the corners' (c,) in ``sight``, ``among`` those of the rectangles that are in the way; without
-    ``sight`` all is looked at anew."""
+    ``sight`` all is checked anew."""
 
     def __init__(
         self,

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from neurovis_layouts.routing.walls import FloatArray
+from neurovis_spec.layout import FloatArray
 from neurovis_spec.layout.model import Point
 
 #: How many heights and runs there is room for at first.
@@ -29,7 +29,7 @@ class Lines:
         self._table: FloatArray = np.full((_FEW, _FEW), np.nan)
 
     def add(self, line: Sequence[Point]) -> range:
-        """Note a line; the numbers of its runs, which go one way."""
+        """Report a line; the numbers of its runs, which go one way."""
         first = len(self._runs)
         run: list[Point] = list(line[:1])
         for (_, before), point in pairwise(line):

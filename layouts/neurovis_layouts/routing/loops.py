@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles, points_on
-from neurovis_layouts.routing.walls import FloatArray, Walls
+from neurovis_layouts.routing.walls import Walls
+from neurovis_spec.layout import FloatArray
 from neurovis_spec.layout.geometry import cubics, distance
 from neurovis_spec.layout.model import Point, Route
 
@@ -84,7 +85,7 @@ class Loops:
         self._close: list[float] = [0.0] * len(self._choice)
 
     def add(self, route: Route) -> None:
-        """Note a loop that is there."""
+        """Report a loop that is there."""
         if route not in self._there:
             self._there.add(route)
             self._new.append(route)

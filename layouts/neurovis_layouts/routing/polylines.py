@@ -10,7 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from neurovis_layouts.routing.walls import BoolArray, FloatArray, IntArray, blocked
+from neurovis_layouts.routing.walls import BoolArray, blocked
+from neurovis_spec.layout import FloatArray, IntArray
 from neurovis_spec.layout.geometry import cubics
 from neurovis_spec.layout.model import Route
 from neurovis_spec.layout.segments import meet
@@ -18,10 +19,10 @@ from neurovis_spec.layout.segments import meet
 #: Into how many segments a piece is cut that is not straight, and how far off its chord such a piece reaches, by the
 #: length of that.
 _PARTS, _STRAIGHT = 8, 0.01
-#: How far apart points are that are looked at for what else runs there, how large their cells; those this close to the
+#: How far apart points are that are checked for what else runs there, how large their cells; those this close to the
 #: ends of a line are left out.
 STEP, _CELL, _END = 0.15, 0.16, 0.6
-#: On a line so many are looked at, at most: memory has an end.
+#: On a line so many are checked, at most: memory has an end.
 _MOST = 2000
 _ROW = 1 << 31
 #: Crossings this close to an end of a line are how it meets others at a disc.

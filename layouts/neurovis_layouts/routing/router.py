@@ -9,18 +9,18 @@ import math
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 
-from neurovis_layouts.routing.arrivals import parted
 from neurovis_layouts.routing.bows import FEW_TRIES, MANY_TRIES, Wish, clear_bow, clear_bows
 from neurovis_layouts.routing.bypasses import round_discs, round_frames
 from neurovis_layouts.routing.curves import Waypoint, curve
-from neurovis_layouts.routing.easing import MOST_EASED, eased
+from neurovis_layouts.routing.end_separation import parted
 from neurovis_layouts.routing.ends import shared_ends
-from neurovis_layouts.routing.judge import OFF, Judge
 from neurovis_layouts.routing.loops import Loops
-from neurovis_layouts.routing.nests import nested
+from neurovis_layouts.routing.nested_bows import nested
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
+from neurovis_layouts.routing.parallel_edges import spread_out
 from neurovis_layouts.routing.ports import Port, leanings
-from neurovis_layouts.routing.sheaves import spread_out
+from neurovis_layouts.routing.route_cost import OFF, Judge
+from neurovis_layouts.routing.simplify_routes import MOST_EASED, eased
 from neurovis_layouts.routing.walls import Frame, Walls
 from neurovis_spec.layout.frames import padded
 from neurovis_spec.layout.geometry import distance

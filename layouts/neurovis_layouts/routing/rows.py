@@ -23,7 +23,7 @@ _DISC, _ROW = 0.45, 0.42
 _BESIDE_FRAME, _ON_LINE = 0.2, 0.12
 #: Rows closer than this are one.
 _FINE = 0.15
-#: With more rows than this by ways only those are looked at that matter to a way.
+#: With more rows than this by ways only those are checked that matter to a way.
 _MOST = 30_000
 
 
@@ -126,7 +126,7 @@ class Rows:
             insort(self._used.setdefault(y, []), x)
 
     def leave(self, path: Iterable[Point]) -> None:
-        """Forget a way that was noted."""
+        """Forget a way that was reported."""
         for x, y in path:
             self._used[y].remove(x)
 

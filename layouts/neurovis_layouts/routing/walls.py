@@ -13,11 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_layouts.routing.obstacles import points_on
+from neurovis_spec.layout import FloatArray, IntArray
 from neurovis_spec.layout.geometry import cubics
 from neurovis_spec.layout.model import Route
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
-IntArray: TypeAlias = npt.NDArray[np.int64]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 #: x0, y0, x1, y1
 Rect: TypeAlias = tuple[float, float, float, float]
@@ -86,7 +85,7 @@ def meetings(a: FloatArray, b: FloatArray, rects: FloatArray) -> tuple[IntArray,
     wide, high = np.abs(ex), np.abs(ey)
     near = np.abs(mx[:, None] - middle[:, 0]) < half[:, 0] + wide[:, None]
     near &= np.abs(my[:, None] - middle[:, 1]) < half[:, 1] + high[:, None]
-    # few are near on both axes: the third is looked at for these alone
+    # few are near on both axes: the third is checked for these alone
     k, f = np.nonzero(near)
     ex, ey, wide, high = ex[k], ey[k], wide[k], high[k]
     x, y = mx[k] - middle[f, 0], my[k] - middle[f, 1]

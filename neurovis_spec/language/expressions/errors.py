@@ -9,7 +9,7 @@ from __future__ import annotations
 
 
 class ExpressionError(Exception):
-    """An expression is at fault from character ``start`` to ``end`` (0-based, exclusive) of its text. ``others`` are
+    """An expression is invalid from character ``start`` to ``end`` (0-based, exclusive) of its text. ``others`` are
     further mistakes in it; ``used`` its names, each with where it begins and ends, as far as these are known."""
 
     def __init__(self, code: str, message: str, start: int, end: int, hint: str | None = None) -> None:

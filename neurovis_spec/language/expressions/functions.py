@@ -14,9 +14,9 @@ from types import MappingProxyType
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
+from neurovis_spec.arrays import FloatArray
+
 Scalar: TypeAlias = Callable[..., float]
 Vector: TypeAlias = Callable[..., FloatArray]
 

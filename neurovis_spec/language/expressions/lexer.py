@@ -13,7 +13,7 @@ import unicodedata
 from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple
 
-from neurovis_spec.diagnostics import shown
+from neurovis_spec.diagnostics import shorten
 from neurovis_spec.language.expressions.errors import ExpressionError
 
 Kind = Literal["number", "name", "operator", "end"]
@@ -144,16 +144,16 @@ def _number(text: str, number: re.Match[str]) -> Token:
         written = text[start : tail.end()]
         raise ExpressionError(
             "malformed-number",
-            f"'{shown(written)}' is no number",
+            f"'{shorten(written)}' is no number",
             start,
             tail.end(),
             _number_hint(number.group(), tail.group()),
         )
     if _ZEROS.fullmatch(number.group()):
-        message = f"'{shown(number.group())}' is no number: a zero stands in front of it"
+        message = f"'{shorten(number.group())}' is no number: a zero stands in front of it"
         raise ExpressionError("malformed-number", message, start, end, decimal_hint(number.group()))
     if math.isinf(float(number.group())):
-        message = f"{shown(number.group(), 20)} is beyond the range of numbers, which ends near 1.8e308"
+        message = f"{shorten(number.group(), 20)} is beyond the range of numbers, which ends near 1.8e308"
         raise ExpressionError("number-overflow", message, start, end)
     return Token("number", number.group(), start, end)
 
@@ -167,7 +167,7 @@ def decimal_hint(text: str) -> str | None:
     digits = text.strip().lstrip("+-")
     if not _ZEROS.fullmatch(digits):
         return None
-    return f"numbers are decimal here: write {shown(digits.lstrip('0') or '0')}"
+    return f"numbers are decimal here: write {shorten(digits.lstrip('0') or '0')}"
 
 
 def _number_hint(number: str, tail: str) -> str | None:
@@ -176,9 +176,9 @@ def _number_hint(number: str, tail: str) -> str | None:
     if number == "0" and re.fullmatch(r"[xXoObB][0-9a-fA-F]+", tail):
         return "numbers are decimal here"
     if re.fullmatch(r"[eE]", tail):
-        return f"an exponent needs digits, as in {shown(number)}e-3"
+        return f"an exponent needs digits, as in {shorten(number)}e-3"
     if _NAME.fullmatch(tail):
-        return f"for a product write {shown(number)} * {shown(tail)}"
+        return f"for a product write {shorten(number)} * {shorten(tail)}"
     return None
 
 

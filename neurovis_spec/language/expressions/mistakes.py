@@ -1,14 +1,14 @@
 """The words for what the parser meets and no grammar has.
 
 In: the token at which the parser stopped, and the one before it. Out: the ExpressionError that says what is wrong, at
-the characters at fault, with what to write instead where a habit from another language shows.
+the invalid characters, with what to write instead where a habit from another language shows.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from neurovis_spec.diagnostics import nearest, shown
+from neurovis_spec.diagnostics import nearest, shorten
 from neurovis_spec.language.expressions.errors import ExpressionError
 from neurovis_spec.language.expressions.lexer import Token, is_operand
 
@@ -80,9 +80,9 @@ def unexpected(previous: Token | None, token: Token) -> ExpressionError:
         return _at("unexpected-comma", message, token, "write decimals with a point, as in 0.5")
     if token.text == "else":
         return _at("missing-if", "'else' without 'if'", token, "write 'a if condition else b'")
-    before = "" if previous is None else shown(previous.text)
-    product = f"{before} * {shown(token.text)}" if is_operand(token) else "*"
-    message = f"an operator is missing between '{before}' and '{shown(token.text)}'"
+    before = "" if previous is None else shorten(previous.text)
+    product = f"{before} * {shorten(token.text)}" if is_operand(token) else "*"
+    message = f"an operator is missing between '{before}' and '{shorten(token.text)}'"
     return _at("missing-operator", message, token, f"for a product write '{product}'")
 
 
@@ -96,8 +96,8 @@ def unknown_function(name: Token, functions: Sequence[str], fitting: Sequence[st
     elif close:
         hint = "did you mean " + " or ".join(f"'{other}'" for other in close) + "?"
     else:
-        hint = f"for a product write '{shown(name.text)} * (…)'; the functions are {', '.join(functions)}"
-    return _at("unknown-function", f"unknown function '{shown(name.text)}'", name, hint)
+        hint = f"for a product write '{shorten(name.text)} * (…)'; the functions are {', '.join(functions)}"
+    return _at("unknown-function", f"unknown function '{shorten(name.text)}'", name, hint)
 
 
 def wrong_arguments(

@@ -1,7 +1,7 @@
 """From text to a typed tree, by precedence climbing.
 
 In: the text of an expression (§6) and what its place allows. Out: a tree of ``tree.py``, or an ExpressionError at the
-characters at fault. From loose to tight: ``a if c else b`` (to the right), ``or``, ``and``, ``not``, comparisons
+characters invalid. From loose to tight: ``a if c else b`` (to the right), ``or``, ``and``, ``not``, comparisons
 (which do not chain), ``+ -``, ``* / %``, signs, ``^`` and ``**`` (to the right, so -x^2 is −(x²) and 2^-1 is a half).
 Names are not looked up here: who parses knows which there are (``unknown_names``).
 """

@@ -164,7 +164,7 @@ _NONE: frozenset[str] = frozenset()
 
 @lru_cache(maxsize=4096)
 def _names(tree: Tree) -> frozenset[str]:
-    """The same; formulas of a module are looked at in each of its instances."""
+    """The same; formulas of a module are checked in each of its instances."""
     return frozenset(node.name for node in walk(tree) if isinstance(node, Name))
 
 

@@ -1,0 +1,229 @@
+"""Kept: a layout that remembers an earlier one.
+
+In: a problem with an earlier layout, and a fresh layout of it. Out: the layout in which what was there stays where it
+was, routes included; what is new, or runs into something new, is routed anew, alike where neurons are drawn alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from neurovis_layouts.alike import Alike, Move
+from neurovis_layouts.frame import from_picture, to_picture
+from neurovis_layouts.incremental_places import remembered
+from neurovis_layouts.routing import route_all
+from neurovis_layouts.routing.obstacles import TOUCH, Obstacles
+from neurovis_layouts.routing.walls import Frame, Walls
+from neurovis_spec.layout.frames import Frames, bounds
+from neurovis_spec.layout.model import Layout, LayoutProblem, Point, Route
+
+#: With more new connections than this nobody can follow one: they do not go round frames.
+_CAREFULLY = 1000
+
+
+def kept(problem: LayoutProblem, fresh: Layout) -> Layout:
+    """The fresh layout as it is without memory; with it, what the earlier one knew exactly where it was."""
+    memory = problem.memory
+    if memory is None:
+        return fresh
+    placed = {m for module in problem.modules if module.origin is not None for m in module.members}
+    problem = replace(problem, pins={**{m: fresh.positions[problem.neurons[m]] for m in placed}, **problem.pins})
+    there = {i: fresh.routes[edge.name] for i, edge in enumerate(problem.edges)}
+    centres = remembered(problem, [fresh.positions[name] for name in problem.neurons], there)
+    ways = _Ways(problem, centres)
+    routes = _old_routes(problem, memory, ways)
+    new = [i for i in range(len(problem.edges)) if i not in routes]
+    twins = _Twins(problem, centres) if problem.modules or problem.mirrors else None
+    if twins is not None:
+        _copied(problem, ways, twins, new, routes)
+    _moved_routes(problem, fresh, ways, routes)
+    # what is within a frame first, since the frame is around it: others may then run into it that did not before
+    within = [i for i in range(len(problem.edges)) if i not in routes and ways.within(i)]
+    routes.update(_found(problem, ways, within, routes))
+    outside = [i for i in sorted(routes) if not ways.within(i)]
+    for i, entering in zip(outside, _entering(problem, memory, ways, outside, routes), strict=True):
+        if entering:
+            del routes[i]
+    new = sorted({*new, *(i for i in outside if i not in routes)})
+    rest = [i for i in range(len(problem.edges)) if i not in routes]
+    routes.update(_found(problem, ways, rest, routes))
+    if twins is not None:
+        _draw_alike(problem, ways, twins, new, routes)
+    return Layout(
+        fresh.network,
+        fresh.engine,
+        dict(zip(problem.neurons, centres, strict=True)),
+        {edge.name: routes[i] for i, edge in enumerate(problem.edges)},
+    )
+
+
+class _Ways:
+    """Where the neurons are and what is in the way between them."""
+
+    def __init__(self, problem: LayoutProblem, centres: Sequence[Point]) -> None:
+        self.problem, self.centres = problem, centres
+        self.frames = Frames(problem)
+        self._obstacles = Obstacles(centres)
+
+    def within(self, edge: int) -> bool:
+        """Whether an edge runs within an instance."""
+        ends = self.problem.edges[edge]
+        around = self.frames.around
+        return not set(around.get(ends.source, ())).isdisjoint(around.get(ends.target, ()))
+
+    def walls(self, routes: Mapping[int, Route]) -> list[Frame]:
+        """The frames as they are drawn with these routes; what somebody foreign stands in is not drawn."""
+        x, y = np.array(self.centres, dtype=np.float64).reshape(-1, 2).T
+        rects = self.frames.rects(dict(enumerate(self.centres)), routes)
+        found: list[Frame] = []
+        for own, rect in zip(self.frames.members, rects, strict=True):
+            if rect is not None:
+                inside = (x > rect[0]) & (x < rect[2]) & (y > rect[1]) & (y < rect[3])
+                if int(inside.sum()) <= len(own):
+                    found.append((own, rect))
+        return found
+
+    def clear(self, chosen: Sequence[int], routes: Sequence[Route], walls: Sequence[Frame]) -> list[bool]:
+        """For each of these edges whether it has a clear way on this route."""
+        ends = [(self.problem.edges[i].source, self.problem.edges[i].target) for i in chosen]
+        over = self._obstacles.crowded(routes, ends, TOUCH)
+        through = Walls(walls, len(self.centres)).entered(routes, ends)
+        return [not (a or b) for a, b in zip(over, through, strict=True)]
+
+
+def _found(problem: LayoutProblem, ways: _Ways, rest: Sequence[int], routes: Mapping[int, Route]) -> dict[int, Route]:
+    """Routes found anew for these edges, beside those between the same neurons, which have theirs."""
+    if not rest:
+        return {}
+
+    def flat(point: Point) -> Point:
+        return from_picture(point, problem.direction)
+
+    ends = {frozenset((problem.edges[i].source, problem.edges[i].target)) for i in rest}
+    shown = [i for i, e in enumerate(problem.edges) if frozenset((e.source, e.target)) in ends]
+    walls = ways.walls(routes) if len(shown) <= _CAREFULLY else []
+    walls = [(own, bounds([flat(rect[:2]), flat(rect[2:])])) for own, rect in walls]
+    edges, centres = [problem.edges[i] for i in shown], [flat(point) for point in ways.centres]
+    others = [tuple(map(flat, routes[i])) for i in sorted(routes.keys() - set(shown))]
+    there = {k: tuple(map(flat, routes[i])) for k, i in enumerate(shown) if i in routes}
+    made = route_all(edges, centres, {}, frames=walls, drawn=others, there=there)
+    new = [k for k in range(len(shown)) if k not in there]
+    return {shown[k]: tuple(to_picture(point, problem.direction) for point in made[k]) for k in new}
+
+
+def _old_routes(problem: LayoutProblem, memory: Layout, ways: _Ways) -> dict[int, Route]:
+    """Earlier routes that still lead from centre to centre, run over nobody who was not there, and through no frame
+    that was not there."""
+    there = [memory.positions.get(name) == point for name, point in zip(problem.neurons, ways.centres, strict=True)]
+    routes: dict[int, Route] = {}
+    for i, edge in enumerate(problem.edges):
+        route = memory.routes.get(edge.name)
+        if route is not None and (route[0], route[-1]) == (ways.centres[edge.source], ways.centres[edge.target]):
+            routes[i] = route
+    chosen = list(routes)
+    ends = [(problem.edges[i].source, problem.edges[i].target) for i in chosen]
+    new = [k for k, known in enumerate(there) if not known]
+    place = {neuron: k for k, neuron in enumerate(new)}
+    over = Obstacles([ways.centres[k] for k in new]).crowded(
+        [routes[i] for i in chosen], [(place.get(a, -1), place.get(b, -1)) for a, b in ends], TOUCH
+    )
+    through = _entering(problem, memory, ways, chosen, routes)
+    return {i: routes[i] for i, a, b in zip(chosen, over, through, strict=True) if not (a or b)}
+
+
+def _entering(
+    problem: LayoutProblem, memory: Layout, ways: _Ways, chosen: Sequence[int], routes: Mapping[int, Route]
+) -> list[bool]:
+    """For each of these edges whether its route runs through a frame that is not drawn as it was."""
+    places = zip(problem.neurons, ways.centres, strict=True)
+    known = {i: point for i, (name, point) in enumerate(places) if memory.positions.get(name) == point}
+    old = {i: memory.routes[edge.name] for i, edge in enumerate(problem.edges) if edge.name in memory.routes}
+    before = ways.frames.rects(known, old)
+    changed = [wall for wall in ways.walls(routes) if wall[1] not in before]
+    ends = [(problem.edges[i].source, problem.edges[i].target) for i in chosen]
+    return Walls(changed, len(ways.centres)).entered([routes[i] for i in chosen], ends)
+
+
+def _moved_routes(problem: LayoutProblem, fresh: Layout, ways: _Ways, routes: dict[int, Route]) -> None:
+    """Fresh routes between neurons that went the same way together, such as those of a new instance."""
+    found: dict[int, Route] = {}
+    for i, edge in enumerate(problem.edges):
+        if i in routes:
+            continue
+        ends = [(fresh.positions[problem.neurons[n]], ways.centres[n]) for n in (edge.source, edge.target)]
+        moves = {(b[0] - a[0], b[1] - a[1]) for a, b in ends}
+        if len(moves) == 1:
+            dx, dy = moves.pop()
+            found[i] = tuple((x + dx, y + dy) for x, y in fresh.routes[edge.name])
+    chosen = list(found)
+    clear = ways.clear(chosen, [found[i] for i in chosen], ways.walls({**routes, **found}))
+    routes.update({i: found[i] for i, free in zip(chosen, clear, strict=True) if free})
+
+
+class _Twins:
+    """Which edges are drawn alike: those between neurons that are."""
+
+    def __init__(self, problem: LayoutProblem, centres: Sequence[Point]) -> None:
+        self._edges = problem.edges
+        self._alike = Alike(problem, dict(enumerate(centres)))
+        self._between: dict[tuple[int, int], list[int]] = {}
+        for i, edge in enumerate(problem.edges):
+            self._between.setdefault((edge.source, edge.target), []).append(i)
+
+    def of(self, edge: int) -> Iterator[tuple[int, Move]]:
+        """The edges drawn like this one, itself first, each with the move from its route."""
+        source, target = self._edges[edge].source, self._edges[edge].target
+        place = self._between[source, target].index(edge)
+        targets = dict(self._alike.of(target))
+        by_move: dict[Move, list[int]] = {}
+        for mate, move in targets.items():
+            by_move.setdefault(move, []).append(mate)
+        for mate, move in self._alike.of(source):
+            for other in by_move.get(move, ()):
+                equal = self._between.get((mate, other), [])
+                if place < len(equal):
+                    yield equal[place], move
+
+
+def _moved(route: Route, move: Move, start: Point, end: Point) -> Route:
+    """A route moved, from centre to centre exactly."""
+    (fx, fy), (dx, dy) = move.flip, move.shift
+    return (start, *((dx + fx * x, dy + fy * y) for x, y in route[1:-1]), end)
+
+
+def _copied(problem: LayoutProblem, ways: _Ways, twins: _Twins, new: Sequence[int], routes: dict[int, Route]) -> None:
+    """Routes of new edges as old ones are that are drawn alike, such as those within other instances of the make."""
+    found: dict[int, Route] = {}
+    for i in new:
+        for twin, move in twins.of(i):
+            if twin in routes:
+                ends = ways.centres[problem.edges[i].source], ways.centres[problem.edges[i].target]
+                (fx, fy), (x, y) = move.flip, move.shift
+                found[i] = _moved(routes[twin], Move(move.flip, (-fx * x, -fy * y)), *ends)
+                break
+    chosen = list(found)
+    clear = ways.clear(chosen, [found[i] for i in chosen], ways.walls({**routes, **found}))
+    routes.update({i: found[i] for i, free in zip(chosen, clear, strict=True) if free})
+
+
+def _draw_alike(
+    problem: LayoutProblem, ways: _Ways, twins: _Twins, new: Sequence[int], routes: dict[int, Route]
+) -> None:
+    """The routes found anew, those between neurons drawn alike copied from the first of them, where their way is
+    clear."""
+    open_ones = set(new)
+    found: dict[int, Route] = {}
+    for i in new:
+        if i not in open_ones:
+            continue
+        for twin, move in twins.of(i):
+            if twin in open_ones and twin != i:
+                ends = ways.centres[problem.edges[twin].source], ways.centres[problem.edges[twin].target]
+                found[twin] = _moved(routes[i], move, *ends)
+            open_ones.discard(twin)
+    chosen = list(found)
+    clear = ways.clear(chosen, [found[i] for i in chosen], ways.walls({**routes, **found}))
+    routes.update({i: found[i] for i, free in zip(chosen, clear, strict=True) if free})

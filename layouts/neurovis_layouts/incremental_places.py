@@ -1,0 +1,264 @@
+"""Memory: what an earlier layout placed stays there; what is new finds a place beside it.
+
+In: a problem with an earlier layout (``memory``), and a fresh layout of the whole as if there were none. Out: positions
+in which every neuron that the earlier layout knew stands exactly where it stood, unless it has to follow another
+(``conflicts``), and a new one near where the fresh layout puts it in relation to what it is connected with, in a free
+place (``room``). What is to be drawn alike is placed together: the same new neuron in all instances of one make, both
+of a mirrored pair.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from neurovis_layouts.alike import Alike, Move
+from neurovis_layouts.conflicts import resolved, whole
+from neurovis_layouts.free_space import Copy, Room, Side
+from neurovis_layouts.manual_edits import by_hand, giving_way, moved_routes
+from neurovis_layouts.pins import Cells
+from neurovis_layouts.rows import Rows
+from neurovis_spec.layout.frames import Frames, Rect, bounds
+from neurovis_spec.layout.geometry import snap
+from neurovis_spec.layout.model import RADIUS, LayoutMirror, LayoutModule, LayoutProblem, Point, Route
+
+#: Discs that touch do not overlap, whatever rounding says.
+_SLACK = 1e-6
+
+
+def remembered(problem: LayoutProblem, fresh: Sequence[Point], routes: Mapping[int, Route]) -> list[Point]:
+    """Positions by neuron: earlier ones where there are such, pins before them, new ones found; ``routes`` are the
+    fresh ones by edge."""
+    assert problem.memory is not None
+    earlier = problem.memory.positions
+    known = {i: earlier[name] for i, name in enumerate(problem.neurons) if name in earlier}
+    placed = {**known, **problem.pins}
+    if not placed:
+        return list(fresh)
+    wanted, put = resolved(problem, fresh, placed, by_hand(problem))
+    frames = Frames(problem)
+    before = {**placed, **put, **wanted}
+    old = moved_routes(problem, before)
+    newly = put.keys() | {i for i, point in problem.pins.items() if known.get(i) != point}
+    for i in whole(problem, giving_way(problem, frames, before, newly, old)) & before.keys():
+        if i not in problem.pins and i not in put:
+            wanted.setdefault(i, before[i])
+    placed = _apart(problem, {i: point for i, point in before.items() if i not in wanted})
+    shapes = _Shapes(problem, frames, fresh, routes, before, old)
+    room = Room(frames, placed, frames.rects(placed, old), _sides(problem, fresh, before), old.values())
+    wishes = _Wishes(problem, fresh, placed)
+    for piece in _pieces(problem, shapes, before, frozenset(placed), frozenset(wanted)):
+        first = piece[0].offsets[0]
+        wish, row = wanted.get(first[0]), wishes.row(piece[0], room.placed)
+        if wish is None:
+            room.put(piece, wishes.wish(piece[0], room.placed) if row is None else row, in_row=row is not None)
+        else:
+            room.put(piece, wish, stay=True)
+        for neuron in (i for copy in piece for i in copy.members):
+            wishes.note(neuron, room.placed[neuron])
+    return [room.placed[i] for i in range(len(problem.neurons))]
+
+
+def _apart(problem: LayoutProblem, placed: dict[int, Point]) -> dict[int, Point]:
+    """Without what stands on a pin, or in a file edited by hand on one before it: that has to find another place, like
+    what is new."""
+    taken = Cells()
+    for point in problem.pins.values():
+        taken.add(point)
+    found: dict[int, Point] = {}
+    for i in sorted(placed):
+        if i in problem.pins:
+            found[i] = placed[i]
+        elif taken.free(placed[i], 2 * RADIUS - _SLACK):
+            found[i] = placed[i]
+            taken.add(placed[i])
+    return found
+
+
+def _innermost(problem: LayoutProblem) -> dict[int, LayoutModule]:
+    """For each neuron of an instance the smallest that it is in: instances come before those within them."""
+    return {member: module for module in problem.modules for member in module.members}
+
+
+class _Wishes:
+    """Where the fresh layout would have something new, seen from what is placed."""
+
+    def __init__(self, problem: LayoutProblem, fresh: Sequence[Point], placed: Mapping[int, Point]) -> None:
+        self._fresh = fresh
+        self._near: dict[int, list[int]] = {}
+        for edge in problem.edges:
+            if edge.source != edge.target:
+                self._near.setdefault(edge.source, []).append(edge.target)
+                self._near.setdefault(edge.target, []).append(edge.source)
+        self._own = _innermost(problem)
+        self._rows = Rows(problem, fresh)
+        #: by axis and coordinate in the fresh layout: how many are placed, and on which lines
+        self._ranks: dict[tuple[int, float], tuple[int, set[float]]] = {}
+        for neuron, point in placed.items():
+            self.note(neuron, point)
+        self._drift = _drift(fresh, placed, sorted(placed)) if placed else (0.0, 0.0)
+
+    def note(self, neuron: int, point: Point) -> None:
+        """A neuron has its place."""
+        for axis in (0, 1):
+            count, lines = self._ranks.get((axis, self._fresh[neuron][axis]), (0, set()))
+            lines.add(point[axis])
+            self._ranks[axis, self._fresh[neuron][axis]] = count + 1, lines
+
+    def row(self, copy: Copy, placed: Mapping[int, Point]) -> Point | None:
+        """Where a member of a group goes on with its row."""
+        row = self._rows.next(copy.offsets[0][0], placed) if len(copy.offsets) == 1 else None
+        return None if row is None else (snap(row[0]), snap(row[1]))
+
+    def wish(self, copy: Copy, placed: Mapping[int, Point]) -> Point:
+        """Where the fresh layout puts the anchor, moved as the neighbours have been moved, or, without any, all
+        others."""
+        mates = sorted({mate for neuron, _ in copy.offsets for mate in self._near.get(neuron, ()) if mate in placed})
+        if copy.instance < 0 and copy.offsets[0][0] in self._own:
+            # what its instance is drawn like goes before what is outside
+            own = sorted(i for i in self._own[copy.offsets[0][0]].members if i in placed)
+            mates = sorted(set(mates).intersection(own)) or own or mates
+        dx, dy = _drift(self._fresh, placed, mates) if mates else self._drift
+        neuron = copy.offsets[0][0]
+        wish = self._fresh[neuron][0] + dx, self._fresh[neuron][1] + dy
+        # on the line of those that share its rank in the fresh layout, where these still share one
+        for axis in (0, 1):
+            count, lines = self._ranks.get((axis, self._fresh[neuron][axis]), (0, set()))
+            if count >= 2 and len(lines) == 1:
+                (line,) = lines
+                wish = (line, wish[1]) if axis == 0 else (wish[0], line)
+                break
+        return snap(wish[0]), snap(wish[1])
+
+
+def _drift(fresh: Sequence[Point], placed: Mapping[int, Point], mates: Sequence[int]) -> Point:
+    return (
+        _median([placed[mate][0] - fresh[mate][0] for mate in mates]),
+        _median([placed[mate][1] - fresh[mate][1] for mate in mates]),
+    )
+
+
+def _median(values: list[float]) -> float:
+    ordered = sorted(values)
+    return ordered[len(ordered) // 2]
+
+
+def _sides(problem: LayoutProblem, fresh: Sequence[Point], before: Mapping[int, Point]) -> dict[int, Side]:
+    """For neurons with a mirror image the axis, and on which side of it they are, as in the fresh layout."""
+    across = 0 if problem.direction in ("down", "up") else 1
+    scopes: dict[int, list[LayoutMirror]] = {}
+    for mirror in problem.mirrors:
+        scopes.setdefault(mirror.scope, []).append(mirror)
+    sides: dict[int, Side] = {}
+    for mirrors in scopes.values():
+        pairs = [pair for mirror in mirrors for pair in mirror.pairs]
+        there = [(a, b) for a, b in pairs if a in before and b in before]
+        if not there:
+            continue
+        axis = _median([before[a][across] + before[b][across] for a, b in there]) / 2
+        other = _median([fresh[a][across] + fresh[b][across] for a, b in pairs]) / 2
+        agree = sum(_sign(before[a][across] - axis) * _sign(fresh[a][across] - other) for a, b in there)
+        for a, b in pairs:
+            side = _sign(fresh[a][across] - other) * (-1 if agree < 0 else 1)
+            if side:
+                sides[a], sides[b] = Side(across, axis, side), Side(across, axis, -side)
+    return sides
+
+
+def _sign(value: float) -> int:
+    return (value > 0) - (value < 0)
+
+
+class _Shapes:
+    """How instances are drawn: their neurons in relation to the first, and how far their frame is around these."""
+
+    def __init__(
+        self,
+        problem: LayoutProblem,
+        frames: Frames,
+        fresh: Sequence[Point],
+        routes: Mapping[int, Route],
+        before: Mapping[int, Point],
+        old: Mapping[int, Route],
+    ) -> None:
+        self._fresh, self._before = fresh, before
+        self._fresh_rects = frames.rects(dict(enumerate(fresh)), routes)
+        self._rects = frames.rects(before, old)
+        self._makes: dict[str, int] = {}
+        self._modules = problem.modules
+        for number, module in enumerate(problem.modules):
+            if all(i in before for i in module.members):
+                self._makes.setdefault(module.template, number)
+
+    def of(self, number: int) -> tuple[tuple[tuple[int, Point], ...], Rect]:
+        """The neurons of an instance, each with its offset from the first, and its frame in relation to that."""
+        module = self._modules[number]
+        drawn = self._makes.get(module.template)
+        where: Mapping[int, Point] | Sequence[Point] = self._fresh if drawn is None else self._before
+        rect = self._fresh_rects[number] if drawn is None else self._rects[drawn]
+        at = [where[i] for i in (module if drawn is None else self._modules[drawn]).members]
+        (x0, y0), rect = at[0], rect or bounds(at)
+        offsets = tuple((i, (x - x0, y - y0)) for i, (x, y) in zip(module.members, at, strict=True))
+        return offsets, (rect[0] - x0, rect[1] - y0, rect[2] - x0, rect[3] - y0)
+
+
+def _pieces(
+    problem: LayoutProblem,
+    shapes: _Shapes,
+    before: Mapping[int, Point],
+    placed: frozenset[int],
+    wanted: frozenset[int],
+) -> Iterator[tuple[Copy, ...]]:
+    """What is placed together, each with its copies: instances as a piece, then neurons one by one; what has been
+    there before comes first, then what instances lack of which a part is there."""
+    done = set(placed)
+    alike = Alike(problem, before)
+
+    def single(neuron: int) -> tuple[Copy, ...]:
+        found = [(mate, move) for mate, move in alike.of(neuron) if mate not in done]
+        singles = [Copy(((mate, (0.0, 0.0)),), flip=move.flip, origin=move.shift) for mate, move in found]
+        done.update(i for copy in singles for i in copy.members)
+        return tuple(singles)
+
+    for again in (True, False):
+        own = {} if again else _innermost(problem)
+        for neuron in sorted(i for i, module in own.items() if not done.isdisjoint(module.members)):
+            if neuron not in done:
+                yield single(neuron)
+        for number, module in enumerate(problem.modules):
+            if not module.members or any(i in done for i in module.members):
+                continue
+            if again and not all(i in wanted for i in module.members):
+                continue
+            offsets, rect = shapes.of(number)
+            copies = [Copy(offsets, number, rect)]
+            for mates, move in _copies(alike, module):
+                if not any(i in done for i in mates) and not any(set(mates) & set(c.members) for c in copies):
+                    mirrored = tuple((i, offset) for i, (_, offset) in zip(mates, offsets, strict=True))
+                    copies.append(Copy(mirrored, _number(problem, number, mates), rect, move.flip, move.shift))
+            done.update(i for copy in copies for i in copy.members)
+            yield tuple(copies)
+        for neuron in range(len(problem.neurons)):
+            if neuron not in done and (neuron in wanted or not again):
+                yield single(neuron)
+
+
+def _copies(alike: Alike, module: LayoutModule) -> Iterator[tuple[tuple[int, ...], Move]]:
+    """The same instance in instances around it that are drawn alike, and mirror images; not all of its make."""
+    if module.parent < 0:
+        image = alike.image(module)
+        if image is not None:
+            yield image
+        return
+    others = [dict(alike.of(neuron)) for neuron in module.members]
+    moves = [list(other.items()) for other in others]
+    for k in range(min(len(one) for one in moves)):
+        mates = tuple(one[k][0] for one in moves)
+        if mates[0] != module.members[0] and all(one[k][1] == moves[0][k][1] for one in moves):
+            yield mates, moves[0][k][1]
+
+
+def _number(problem: LayoutProblem, number: int, mates: Sequence[int]) -> int:
+    """The instance that these are the neurons of, of the make of another."""
+    own = set(mates)
+    template = problem.modules[number].template
+    return next((k for k, m in enumerate(problem.modules) if m.template == template and set(m.members) == own), -1)

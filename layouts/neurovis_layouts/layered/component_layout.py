@@ -1,0 +1,223 @@
+"""A sheet: units of one problem in ranks, side by side where they are not connected.
+
+In: a problem, its units, who shares a rank. Out: a Plan: places of neurons and passages, which frames are reflected.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+from neurovis_layouts.formations import columns, grid
+from neurovis_layouts.layered.box_columns import straightened, tied, with_spines
+from neurovis_layouts.layered.components import components_of, packed
+from neurovis_layouts.layered.flips import turned
+from neurovis_layouts.layered.fold_ports import with_exits
+from neurovis_layouts.layered.folds import folded, interleaved, stacked
+from neurovis_layouts.layered.levels import Levels, levels_of
+from neurovis_layouts.layered.mirror import mirrored, symmetric
+from neurovis_layouts.layered.order import crossings, ordered
+from neurovis_layouts.layered.place import placed, reaches
+from neurovis_layouts.layered.ranks import INSTANT, ranks_of
+from neurovis_layouts.layered.units import Unit
+from neurovis_layouts.routing import Waypoint
+from neurovis_spec.layout.geometry import snap
+from neurovis_spec.layout.model import LayoutProblem, Point
+
+
+@dataclass(slots=True)
+class Plan:
+    """Places in the engine's frame: neurons by index, waypoints by edge; the first neurons of frames that are drawn as
+    their mirror images."""
+
+    places: dict[int, Point] = field(default_factory=dict)
+    ways: dict[int, list[Waypoint]] = field(default_factory=dict)
+    #: edges whose waypoints are all that they need
+    firm: set[int] = field(default_factory=set)
+    turned: set[int] = field(default_factory=set)
+    #: how far the frames and the passages reach
+    corners: list[Point] = field(default_factory=list)
+
+    def extent(self) -> tuple[Point, Point]:
+        """The low and the high corner of all."""
+        points = [*self.places.values(), *self.corners]
+        xs = [x for x, _ in points] + [way.x for ways in self.ways.values() for way in ways]
+        ys = [y for _, y in points]
+        return (min(xs), min(ys)), (max(xs), max(ys))
+
+    def add(self, other: Plan, shift: Point) -> None:
+        """Put another beside it."""
+        dx, dy = shift
+        self.places.update({i: (x + dx, y + dy) for i, (x, y) in other.places.items()})
+        self.corners += [(x + dx, y + dy) for x, y in other.corners]
+        self.turned |= other.turned
+        self.firm |= other.firm
+        for i, ways in other.ways.items():
+            self.ways[i] = [Waypoint(way.x + dx, way.y + dy, way.half) for way in ways]
+
+
+def planned(
+    problem: LayoutProblem,
+    units: Sequence[Unit],
+    bonds: Sequence[int],
+    pair: Mapping[int, int],
+    columns: AbstractSet[int] = frozenset(),
+) -> Plan:
+    """All components laid out and packed; units without connections beside the last rank of the largest component.
+
+    ``bonds`` are numbers that units of one rank share. With ``pair`` (mirror images, both ways) all is one component,
+    its axis at 0. ``columns`` are boxes to be drawn as such where that can be.
+    """
+    if pair:
+        return _component(problem, units, bonds, (), range(len(problem.edges)), pair, frozenset())
+    connected, alone = components_of(problem, units, bonds)
+    largest = max(connected, key=lambda part: sum(len(units[u].members) for u in part), default=None)
+    parts: list[Plan] = []
+    hosts = _hosts(problem, units, connected, alone)
+    few = sum(len(units[u].members) for u in alone) <= 6
+    owner = {m: u for u, unit in enumerate(units) for m in unit.members}
+    edges: dict[int, list[int]] = {}
+    part_of = {u: k for k, part in enumerate(connected) for u in part}
+    for i, edge in enumerate(problem.edges):
+        if owner[edge.source] in part_of:
+            edges.setdefault(part_of[owner[edge.source]], []).append(i)
+    for k, part in enumerate(connected):
+        guests = [units[u] for u in alone if few and hosts.get(u, largest) == part]
+        own, tied = [units[u] for u in part], [bonds[u] for u in part]
+        parts.append(_component(problem, own, tied, guests, edges.get(k, []), {}, columns))
+    if alone and not (few and connected):
+        parts.append(_unconnected(problem, [units[u] for u in alone]))
+    plan = Plan()
+    for part_plan, shift in zip(parts, packed([part.extent() for part in parts]), strict=True):
+        plan.add(part_plan, shift)
+    return plan
+
+
+def _hosts(
+    problem: LayoutProblem, units: Sequence[Unit], connected: Sequence[list[int]], alone: Sequence[int]
+) -> dict[int, list[int]]:
+    """For units without connections that share a box with connected ones: the component to stand beside."""
+    part_of = {m: part for part in connected for u in part for m in units[u].members}
+    box_of = {m: box for _, box in problem.boxes for m in box}
+    hosts: dict[int, list[int]] = {}
+    for u in alone:
+        mates = [m for m in box_of.get(units[u].members[0], ()) if m in part_of]
+        if mates:
+            hosts[u] = part_of[mates[0]]
+    return hosts
+
+
+def _component(
+    problem: LayoutProblem,
+    units: Sequence[Unit],
+    bonds: Sequence[int],
+    guests: Sequence[Unit],
+    edges: Sequence[int],
+    pair: Mapping[int, int],
+    columns: AbstractSet[int],
+) -> Plan:
+    everyone = [*units, *guests]
+    here = {m for unit in units for m in unit.members}
+    columns = {box for box in columns if here.issuperset(problem.boxes[box][1])}
+    rank = _ranks(problem, units, bonds, edges)
+    if pair:
+        rank = _one_on_axis(units, bonds, rank, pair)
+    folds = folded(problem, units, bonds, rank, edges, pair)
+    rank = folds.rank
+    rank += [max(rank)] * len(guests)
+    levels = levels_of(problem, everyone, rank, edges, columns)
+    interleaved(levels, problem, folds)
+    with_spines(problem, levels, columns)
+    partner: list[int] | None = None
+    if pair:
+        order, partner = mirrored(problem, levels, pair)
+    else:
+        order = ordered(levels)
+        straight = straightened(levels, order, columns) if columns else None
+        if straight is None:
+            columns = frozenset()
+        else:
+            levels, order = tied(levels, straight, columns)
+    levels, flipped = turned(levels, order, {min(unit.members) for unit in units if unit.turns})
+    places = placed(
+        stacked(levels, folds), order, problem.neuron_spacing, problem.rank_spacing, partner, columns, folds.ranks
+    )
+    _draw_in(levels, order, places, {m for unit in guests for m in unit.members}, problem.neuron_spacing)
+    plan = Plan(turned=flipped)
+    for node, (x, y) in zip(levels.nodes, places, strict=True):
+        for member, dx, dy in node.members:
+            plan.places[member] = (x + dx, y + dy)
+        if node.framed:
+            plan.corners += [(x - node.reach[0], y - node.reach[1]), (x + node.reach[0], y + node.reach[1])]
+    spans = list(zip(*reaches(levels, order), strict=True))
+    for i, passages in levels.passages.items():
+        plan.ways[i] = [_passage(places[n], *spans[levels.nodes[n].rank]) for n in passages]
+    plan.ways, whole = with_exits(problem, edges, levels, places, spans, folds, plan.ways)
+    if whole and not crossings(levels, order):
+        plan.firm |= whole
+    return plan
+
+
+def _passage(place: Point, before: float, behind: float) -> Waypoint:
+    """Straight through all of a rank."""
+    return Waypoint(place[0], place[1] + (behind - before) / 2, (before + behind) / 2)
+
+
+def _ranks(problem: LayoutProblem, units: Sequence[Unit], bonds: Sequence[int], edges: Sequence[int]) -> list[int]:
+    numbers = {bond: number for number, bond in enumerate(dict.fromkeys(bonds))}
+    owner = {m: numbers[bond] for unit, bond in zip(units, bonds, strict=True) for m in unit.members}
+    arcs: dict[tuple[int, int], float] = {}
+    for i in edges:
+        edge = problem.edges[i]
+        ends = owner[edge.source], owner[edge.target]
+        if ends[0] != ends[1]:
+            arcs[ends] = arcs.get(ends, 0.0) + (INSTANT if edge.delay == 0 else 1.0)
+    first = {owner[m] for m in problem.entries if m in owner}
+    last = {owner[m] for m in problem.exits if m in owner}
+    ranks = ranks_of(len(numbers), arcs, first, last)
+    return [ranks[numbers[bond]] for bond in bonds]
+
+
+def _one_on_axis(
+    units: Sequence[Unit], bonds: Sequence[int], rank: Sequence[int], pair: Mapping[int, int]
+) -> list[int]:
+    """Ranks in which no two units have to stand on the axis."""
+    fixed = [
+        u for u, unit in enumerate(units) if symmetric(unit.members, pair) and pair.get(unit.members[0]) in unit.members
+    ]
+    result = [2 * len(units) * r for r in rank]
+    taken: dict[int, int] = {}
+    for u in fixed:
+        number = taken[rank[u]] = taken.get(rank[u], -1) + 1
+        if number:
+            for mate, bond in enumerate(bonds):
+                if bond == bonds[u]:
+                    result[mate] += number
+    levels = {value: place for place, value in enumerate(sorted(set(result)))}
+    return [levels[value] for value in result]
+
+
+def _draw_in(
+    levels: Levels, order: Sequence[Sequence[int]], places: list[Point], guests: set[int], spacing: float
+) -> None:
+    """Unconnected neurons at the end of a rank stand close to their neighbour, two units off, not where the rank left
+    them."""
+    for rank in order:
+        for before, node in pairwise(rank):
+            own, other = levels.nodes[node], levels.nodes[before]
+            if own.members and own.members[0][0] in guests and node == rank[-1] and other.members:
+                beside = 2.0 if other.members[0][0] not in guests else 1.0
+                places[node] = (
+                    snap(places[before][0] + other.reach[0] + own.reach[0] + beside * spacing),
+                    places[node][1],
+                )
+
+
+def _unconnected(problem: LayoutProblem, units: Sequence[Unit]) -> Plan:
+    """Neurons that nothing connects: in a row, or a grid where they are many."""
+    members = sorted(m for unit in units for m in unit.members)
+    width = len(members) if len(members) <= 12 else columns(len(members))
+    points = grid(len(members), width, max(problem.neuron_spacing, 0.65))
+    return Plan({m: (snap(x), snap(y)) for m, (x, y) in zip(members, points, strict=True)})

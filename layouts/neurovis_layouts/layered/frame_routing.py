@@ -1,0 +1,189 @@
+"""Links: the connections between what stands in one frame, in no frame within it.
+
+In: places, frames, the plan's waypoints. Out: a route for each; those of mirror images are reflections of each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+from neurovis_layouts.layered.component_layout import Plan
+from neurovis_layouts.layered.pinning import Settled
+from neurovis_layouts.layered.templates import Key
+from neurovis_layouts.layered.units import Unit
+from neurovis_layouts.routing import Waypoint, route_all, told_apart
+from neurovis_layouts.routing.arcs import Arcs, even
+from neurovis_layouts.routing.channel_routing import channels
+from neurovis_layouts.routing.corners import reflected
+from neurovis_layouts.routing.route_cost import Judge
+from neurovis_layouts.routing.simplify_routes import MOST_EASED, eased
+from neurovis_spec.layout.frames import Rect
+from neurovis_spec.layout.geometry import snap
+from neurovis_spec.layout.model import LayoutEdge, LayoutProblem, Point, Route
+
+#: With more connections than this nobody can tell them apart.
+_MOST = 1000
+
+
+def linked(
+    problem: LayoutProblem,
+    links: Sequence[int],
+    keys: Sequence[Key],
+    plan: Plan,
+    rests: Settled,
+    units: Sequence[Unit],
+    frames: Sequence[tuple[tuple[int, ...], Rect]],
+    boxes: Sequence[tuple[tuple[int, ...], Rect]],
+    pair: Mapping[int, int],
+    drawn: Sequence[Route],
+) -> dict[Key, Route]:
+    """Routes of these edges by key; ``boxes`` are drawn, though nothing had to make room for them; ``drawn`` are the
+    routes within the frames."""
+    edges = [problem.edges[i] for i in links]
+    framed = [(frozenset(members), rect) for members, rect in (*frames, *boxes)]
+    # what has its waypoints from the plan crosses nothing, and what would be drawn anew beside it might
+    firm: dict[int, list[Waypoint]] = {}
+    lateral: dict[int, list[Waypoint]] = {}
+    planned = _passing(problem, plan, rests)
+    if frames:
+        gates = {k: planned[i] for k, i in enumerate(links) if i in planned}
+        firm = {k: gates[k] for k, i in enumerate(links) if k in gates and i in plan.firm and not rests.moved}
+        lines = [*drawn, *(_through(rests.places, edges[k], line) for k, line in firm.items())]
+        free = {k: edge for k, edge in enumerate(edges) if k not in firm}
+        ways, lateral = channels(free, rests.places, framed, gates, lines)
+        ways.update(firm)
+    else:
+        ways = planned
+    bowed, ease = _bowed(edges, units), not pair and not firm
+    routes = route_all(edges, rests.places, ways, bowed, lateral, frames=framed, drawn=drawn, ease=ease)
+    found = {keys[i]: tuple(_snapped(route)) for i, route in zip(links, routes, strict=True)}
+    if not pair:
+        return found
+    found = _reflected(found, rests, pair)
+    if len(found) <= _MOST:
+        found.update(_mended(found, rests, pair, framed, drawn))
+    if len(found) <= MOST_EASED and not firm:
+        found.update(_eased(found, edges, [keys[i] for i in links], rests, pair, framed, drawn))
+    # what has no image may now meet the image of another
+    here = {i: found[keys[link]] for i, link in enumerate(links) if edges[i].source != edges[i].target}
+    single = {i for i in here if not _imaged(keys[links[i]], found, rests, pair)}
+    if len(here) <= _MOST:
+        moved = told_apart(edges, rests.places, here, single, framed, drawn)
+        found.update({keys[links[i]]: tuple(_snapped(route)) for i, route in moved.items()})
+    return found
+
+
+def _eased(
+    routes: Mapping[Key, Route],
+    edges: Sequence[LayoutEdge],
+    keys: Sequence[Key],
+    rests: Settled,
+    pair: Mapping[int, int],
+    frames: Sequence[tuple[frozenset[int], Rect]],
+    drawn: Sequence[Route],
+) -> dict[Key, Route]:
+    """Routes with fewer bends, those of mirror images reflections of each other."""
+    number = {key: i for i, key in enumerate(keys)}
+    image: dict[int, int] = {}
+    free: set[int] = set()
+    for key, i in number.items():
+        source, target, _ = key
+        other = number.get(_image_of(key, rests, pair), -1)
+        if source == target or other == i or pair.get(source) == target:
+            continue
+        if other >= 0:
+            image[i] = other
+        if other < 0 or i < other:
+            free.add(i)
+    here = {i: routes[key] for key, i in number.items() if key[0] != key[1]}
+    loops = [routes[key] for key in keys if key[0] == key[1]]
+    judge = Judge(edges, rests.places, here, frames, [*drawn, *loops], image, 2 * rests.axis)
+    return {keys[i]: route for i, route in eased(judge, free).items()}
+
+
+def _through(places: Sequence[Point], edge: LayoutEdge, line: Sequence[Waypoint]) -> Route:
+    """A route straight from waypoint to waypoint."""
+    stops = [places[edge.source], *((way.x, way.y) for way in line), places[edge.target]]
+    return (stops[0], *(point for a, b in pairwise(stops) for point in (a, b, b)))
+
+
+def _imaged(key: Key, routes: Mapping[Key, Route], rests: Settled, pair: Mapping[int, int]) -> bool:
+    """Whether a route is the reflection of another, or of itself."""
+    return _image_of(key, rests, pair) in routes or pair.get(key[0]) == key[1]
+
+
+def _snapped(route: Route) -> list[Point]:
+    return [route[0], *((snap(x), snap(y)) for x, y in route[1:-1]), route[-1]]
+
+
+def _bowed(edges: Sequence[LayoutEdge], units: Sequence[Unit]) -> frozenset[int]:
+    """Edges within a block that is no frame."""
+    block = {
+        m: k for k, unit in enumerate(units) if unit.places is not None and unit.reach is None for m in unit.members
+    }
+    return frozenset(i for i, e in enumerate(edges) if e.source in block and block[e.source] == block.get(e.target))
+
+
+def _passing(problem: LayoutProblem, plan: Plan, rests: Settled) -> dict[int, list[Waypoint]]:
+    """The plan's waypoints, of edges whose ends stand where the plan has them."""
+    ways: dict[int, list[Waypoint]] = {}
+    dx, dy = rests.shift
+    for i, line in sorted(plan.ways.items()):
+        edge = problem.edges[i]
+        if edge.source not in rests.moved and edge.target not in rests.moved:
+            passing = [Waypoint(way.x + dx, way.y + dy, way.half) for way in line]
+            ways[i] = passing if plan.places[edge.source][1] < plan.places[edge.target][1] else passing[::-1]
+    return ways
+
+
+def _reflected(routes: dict[Key, Route], rests: Settled, pair: Mapping[int, int]) -> dict[Key, Route]:
+    """For every two routes that are mirror images the second as the reflection of the first; of two neurons that are
+    images of each other and drive each other, both ways as their own reflections, else they would share a line. There
+    and back are taken from the same side: the sides that they bow to are exchanged on the other."""
+    twice = 2 * rests.axis
+    result: dict[Key, Route] = {}
+    for key, route in sorted(routes.items(), key=lambda item: (sorted(item[0][:2]), item[0])):
+        source, target, _ = key
+        image = _image_of(key, rests, pair)
+        if pair.get(source) == target and (target, source, 0) in routes:
+            result[key] = even(route, twice)
+        if key in result or image == key or image not in routes:
+            result.setdefault(key, route)
+            continue
+        result[key] = route
+        result[image] = reflected(route, twice, rests.places[image[0]], rests.places[image[1]])
+    return result
+
+
+def _mended(
+    routes: Mapping[Key, Route],
+    rests: Settled,
+    pair: Mapping[int, int],
+    frames: Sequence[tuple[frozenset[int], Rect]],
+    drawn: Sequence[Route],
+) -> dict[Key, Route]:
+    """Routes there and back between images of each other, clear of what is in the way and of each other."""
+    between: dict[tuple[int, int], list[Key]] = {}
+    for source, target, number in sorted(routes):
+        if pair.get(source) == target and (target, source, 0) in routes:
+            between.setdefault((min(source, target), max(source, target)), []).append((source, target, number))
+    result = dict(routes)
+    arcs = Arcs(rests.places, frames, pair, 2 * rests.axis) if between else None
+    for keys in between.values():
+        if arcs is not None:
+            others = [*drawn, *(result[key] for key in sorted(result.keys() - set(keys)))]
+            mended = arcs.mended([key[:2] for key in keys], [result[key] for key in keys], others)
+            result.update(zip(keys, mended, strict=True))
+    return result
+
+
+def _image_of(key: Key, rests: Settled, pair: Mapping[int, int]) -> Key:
+    """The key that the mirror image of a connection has, if there is one."""
+    source, target, number = key
+    return _image(source, rests, pair), _image(target, rests, pair), number
+
+
+def _image(neuron: int, rests: Settled, pair: Mapping[int, int]) -> int:
+    """The mirror image of a neuron: itself on the axis, −1 where it has none."""
+    return pair.get(neuron, neuron if rests.places[neuron][0] == rests.axis else -1)

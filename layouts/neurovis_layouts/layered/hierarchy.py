@@ -1,0 +1,256 @@
+"""Compose: drawings of frames, from the inside out, put together into the drawing of the whole.
+
+In: a problem. Out: a Drawing. Every kind of instance is drawn once, by itself, with the instances in it as blocks; the
+drawing is then a block in what is around it, moved or reflected by steps of the grid, so that copies are exact. A box
+becomes such a frame where neurons that are not its own would stand in it otherwise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import replace
+
+from neurovis_layouts.layered.component_layout import Plan, planned
+from neurovis_layouts.layered.drawing import Drawing, Move, Piece
+from neurovis_layouts.layered.frame_routing import linked
+from neurovis_layouts.layered.mirror_units import symmetric_units
+from neurovis_layouts.layered.parts import Part, columns_of, firm, images_of, may_be_frame, parts_of
+from neurovis_layouts.layered.pinning import Settled, settled
+from neurovis_layouts.layered.same_rank import bonded
+from neurovis_layouts.layered.templates import Book, Key, keys_of, restricted
+from neurovis_layouts.layered.units import Unit
+from neurovis_spec.layout.frames import BOX_DOWN, Rect
+from neurovis_spec.layout.geometry import distance, snap
+from neurovis_spec.layout.model import LayoutMirror, LayoutProblem, Point, Route
+
+#: What a module pins gives way to pins closer than this.
+_OFF = 0.75
+
+
+class Composer:
+    """Draws a problem; each kind of instance in it once."""
+
+    def __init__(self, problem: LayoutProblem) -> None:
+        """Raises LayoutRefusalError where a mirror pairs what cannot be mirror images."""
+        self._book = Book(problem)
+        self._kinds: dict[int, Drawing] = {}
+
+    def whole(self) -> Drawing:
+        """The drawing of the problem. Raises LayoutRefusalError for what cannot be met."""
+        problem = self._book.whole()
+        return self.compose(replace(problem, pins=self._with_origins(problem)))
+
+    def _with_origins(self, problem: LayoutProblem) -> dict[int, Point]:
+        """The pins, and for instances whose origin is pinned the places of all of their neurons that keep off these.
+
+        The origin of an instance whose module pins nothing is where its smallest x and y are in the picture: where the
+        direction is up or left, the far end of it along the direction.
+        """
+        second = {b for mirror in problem.mirrors for _, b in mirror.pairs}
+        found: dict[int, Point] = {}
+        for module in problem.modules:
+            if module.origin is None:
+                continue
+            drawing = self.kind(int(module.template))
+            flip = not drawing.fixed and module.members[0] in second
+            places = [Move((0.0, 0.0), flip).point(place) for place in drawing.places]
+            x, y = module.origin
+            if not drawing.fixed:
+                first = max if problem.direction in ("up", "left") else min
+                x, y = x - min(px for px, _ in places), y - first(py for _, py in places)
+            for member, (px, py) in zip(module.members, places, strict=True):
+                place = (x + px, y + py)
+                if all(distance(place, other) >= _OFF for other in problem.pins.values()):
+                    found[member] = place
+        return dict(sorted({**found, **problem.pins}.items()))
+
+    def kind(self, number: int) -> Drawing:
+        """The drawing of a kind of instance."""
+        if number not in self._kinds:
+            self._kinds[number] = self.compose(self._book.problem_of(number))
+        return self._kinds[number]
+
+    def compose(self, problem: LayoutProblem) -> Drawing:
+        """The drawing of one problem, its modules named by their kinds."""
+        pair = {a: b for mirror in problem.mirrors for one in mirror.pairs for a, b in (one, one[::-1])}
+        frames = firm(problem, pair)
+        loose = {i for i in range(len(problem.boxes)) if i not in frames and may_be_frame(problem, i, pair)}
+        while True:
+            parts = parts_of(problem, frames, pair)
+            drawing = self._attempt(problem, parts, pair)
+            entered = {i for i in loose - frames if _entered(drawing, problem.boxes[i][1])}
+            if not entered:
+                return drawing
+            columns = columns_of(problem, parts, loose - frames) if not pair else frozenset()
+            if entered <= columns:
+                drawing = self._attempt(problem, parts, pair, columns)
+                if not any(_entered(drawing, problem.boxes[i][1]) for i in loose - frames):
+                    return drawing
+            frames |= entered
+
+    def _attempt(
+        self,
+        problem: LayoutProblem,
+        parts: Sequence[Part],
+        pair: Mapping[int, int],
+        columns: AbstractSet[int] = frozenset(),
+    ) -> Drawing:
+        pieces: list[Piece] = []
+        for part in parts:
+            pieces.append(self._piece(problem, part, pieces, pair))
+        kin: dict[str, int] = {}
+        for number, piece in enumerate(pieces):
+            kin.setdefault(piece.part.family, len(problem.groups) + number)
+        frames = [_unit(piece, kin[piece.part.family] if piece.part.family else -1, pair) for piece in pieces]
+        units = symmetric_units(problem, frames, pair)
+        families: dict[tuple[str, int], list[int]] = {}
+        for piece in pieces:
+            if piece.part.family:
+                families.setdefault((piece.part.family, piece.part.kind), []).append(min(piece.part.members))
+        units, bonds = bonded(problem, units, pair, list(families.values()))
+        # a ring or a line of which a box holds some alone can be in no strip of its own
+        columns = {box for box in columns if _whole(units, problem.boxes[box][1])}
+        plan = planned(problem, units, bonds, pair, columns)
+
+        def redraw(piece: Piece, pins: Mapping[int, Point]) -> Piece:
+            inner = (
+                self._book.problem_of(piece.part.kind) if piece.part.kind >= 0 else _boxed(problem, piece.part, pair)
+            )
+            return _as_piece(piece.part, self.compose(replace(inner, pins=_around_pins(piece.drawing, pins, inner))))
+
+        rests = settled(problem, plan, [_resting(plan, piece) for piece in pieces], pair, redraw)
+        return _joined(problem, plan, rests, units, pair, columns)
+
+    def _piece(self, problem: LayoutProblem, part: Part, before: Sequence[Piece], pair: Mapping[int, int]) -> Piece:
+        if part.image_of >= 0:
+            drawing = before[part.image_of].drawing
+        elif part.kind >= 0:
+            drawing = self.kind(part.kind)
+        else:
+            drawing = self.compose(_boxed(problem, part, pair))
+        return _as_piece(part, drawing)
+
+
+def _as_piece(part: Part, drawing: Drawing) -> Piece:
+    rect = drawing.rect()
+    x = (rect[0] + rect[2]) / 2 if drawing.axis is None else drawing.axis
+    return Piece(part, drawing, (x, (rect[1] + rect[3]) / 2), rect)
+
+
+def _around_pins(drawing: Drawing, pins: Mapping[int, Point], inner: LayoutProblem) -> dict[int, Point]:
+    """Absolute pins of a part, and those of its module that keep off them, their origin where the others fit best."""
+    if not inner.pins:
+        return dict(sorted(pins.items()))
+    apart = [(x - drawing.places[i][0], y - drawing.places[i][1]) for i, (x, y) in sorted(pins.items())]
+    origin = snap(math.fsum(x for x, _ in apart) / len(apart)), snap(math.fsum(y for _, y in apart) / len(apart))
+    found = dict(pins)
+    for i, (x, y) in inner.pins.items():
+        place = (x + origin[0], y + origin[1])
+        if i not in found and all(distance(place, other) >= _OFF for other in pins.values()):
+            found[i] = place
+    return dict(sorted(found.items()))
+
+
+def _unit(piece: Piece, kin: int, pair: Mapping[int, int]) -> Unit:
+    part, (x, y), rect = piece.part, piece.middle, piece.rect
+    flip = part.image_of >= 0
+    places = tuple((-(px - x) + 0.0 if flip else px - x, py - y) for px, py in piece.drawing.places)
+    reach = max(rect[2] - x, x - rect[0]), rect[3] - y
+    alone = not images_of(part, pair) and piece.drawing.axis is None
+    return Unit(part.members, places, reach, kin, alone)
+
+
+def _resting(plan: Plan, piece: Piece) -> tuple[Piece, Move]:
+    """Where a piece has come to stand."""
+    first = piece.part.members[0]
+    flip = (piece.part.image_of >= 0) != (min(piece.part.members) in plan.turned)
+    x, y = plan.places[first]
+    dx, dy = Move((0.0, 0.0), flip).point(piece.drawing.places[0])
+    return piece, Move((x - dx, y - dy), flip)
+
+
+def _boxed(problem: LayoutProblem, part: Part, pair: Mapping[int, int]) -> LayoutProblem:
+    """A box as a problem of its own."""
+    place = {neuron: i for i, neuron in enumerate(part.members)}
+    driven = {e.target for e in problem.edges if e.target in place and e.source not in place} | set(problem.entries)
+    drives = {e.source for e in problem.edges if e.source in place and e.target not in place} | set(problem.exits)
+    edges = [(place[e.source], place[e.target], e) for e in problem.edges if e.source in place and e.target in place]
+    pairs = tuple(
+        (place[a], place[b]) for mirror in problem.mirrors for a, b in mirror.pairs if a in place and b in place
+    )
+    lines = (tuple(place[m] for m in line if m in place) for line in problem.align)
+    return replace(
+        restricted(problem, part.members),
+        edges=tuple(replace(e, source=a, target=b) for a, b, e in edges),
+        entries=tuple(sorted(place[m] for m in driven - drives if m in place)),
+        exits=tuple(sorted(place[m] for m in drives - driven if m in place)),
+        mirrors=(LayoutMirror(-1, pairs),) if pairs else (),
+        align=tuple(line for line in lines if len(line) > 1),
+    )
+
+
+def _joined(
+    problem: LayoutProblem,
+    plan: Plan,
+    rests: Settled,
+    units: Sequence[Unit],
+    pair: Mapping[int, int],
+    columns: AbstractSet[int],
+) -> Drawing:
+    """Neurons, what is within frames, and the connections between them."""
+    places = rests.places
+    routes: dict[Key, Route] = {}
+    frames: list[tuple[tuple[int, ...], Rect]] = []
+    keys = keys_of(problem.edges)
+    known = set(keys)
+    for piece, move in rests.pieces:
+        part, drawing = piece.part, piece.drawing
+        for (a, b, number), route in drawing.routes.items():
+            key = part.members[a], part.members[b], number
+            if key in known:
+                ends = places[key[0]], places[key[1]]
+                routes[key] = (ends[0], *move.route(route)[1:-1], ends[1])
+        frames += [(tuple(part.members[m] for m in own), move.rect(rect)) for own, rect in drawing.frames]
+        if part.module >= 0 or part.box >= 0:
+            frames.append((part.members, move.rect(piece.rect)))
+    frames += [(problem.boxes[i][1], _box(places, problem.boxes[i][1])) for i in sorted(columns)]
+    boxes = [(own, move.rect(rect)) for own, move, rect in _boxes_within(rests)]
+    done = {frozenset(own) for own, _ in (*frames, *boxes)}
+    boxes += [(own, _box(places, own)) for _, own in problem.boxes if frozenset(own) not in done]
+    links = [i for i, key in enumerate(keys) if key not in routes]
+    drawn = list(routes.values())
+    routes.update(linked(problem, links, keys, plan, rests, units, frames, boxes, pair, drawn))
+    axis = rests.axis if pair else None
+    return Drawing(
+        tuple(places), routes, tuple(frames), tuple(boxes), axis, bool(problem.pins), direction=problem.direction
+    )
+
+
+def _boxes_within(rests: Settled) -> Iterator[tuple[tuple[int, ...], Move, Rect]]:
+    for piece, move in rests.pieces:
+        for own, rect in piece.drawing.boxes:
+            yield tuple(piece.part.members[m] for m in own), move, rect
+
+
+def _box(places: Sequence[Point], members: Sequence[int]) -> Rect:
+    xs, ys = [places[m][0] for m in members], [places[m][1] for m in members]
+    return snap(min(xs) - BOX_DOWN), snap(min(ys) - BOX_DOWN), snap(max(xs) + BOX_DOWN), snap(max(ys) + BOX_DOWN)
+
+
+def _whole(units: Sequence[Unit], members: Sequence[int]) -> bool:
+    """Whether every unit is either all of these neurons' or none of it is."""
+    own = set(members)
+    return all(own.isdisjoint(unit.members) or own.issuperset(unit.members) for unit in units)
+
+
+def _entered(drawing: Drawing, members: Sequence[int]) -> bool:
+    """Whether a neuron stands, or a frame reaches, where the line round these neurons is drawn."""
+    own = set(members)
+    x0, y0, x1, y1 = _box(drawing.places, members)
+    if any(x0 < x < x1 and y0 < y < y1 for i, (x, y) in enumerate(drawing.places) if i not in own):
+        return True
+    return any(
+        not own & set(inside) and r[0] < x1 and x0 < r[2] and r[1] < y1 and y0 < r[3] for inside, r in drawing.frames
+    )

@@ -1,0 +1,231 @@
+"""Judge: how hard routes are to follow, among all that is drawn.
+
+In: routes that are drawn, neurons, frames. Out: what a route costs: for what it runs over or into, crosses, runs along,
+for its length and its bends, and for ends that meet others at a disc.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from neurovis_layouts.routing.corners import reflected
+from neurovis_layouts.routing.ends import by_ends
+from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
+from neurovis_layouts.routing.polylines import STEP, Polylines, polylines
+from neurovis_layouts.routing.walls import Frame, Walls, meet
+from neurovis_spec.layout import FloatArray, IntArray
+from neurovis_spec.layout.frames import padded
+from neurovis_spec.layout.geometry import distance
+from neurovis_spec.layout.model import LayoutEdge, Point, Route
+
+#: What it costs to enter a foreign frame or a disc, to come a unit closer to a disc than ``REACH``, to cross a line, to
+#: run on others for a unit.
+_ENTERING, _NEARING, _CROSSING, _ALONG = 1000.0, 10.0, 1.2, 1.5
+#: To come too close to a foreign frame, and to cross a line that leads from or to the same neuron, besides.
+_GRAZING, _KIN = 6.0, 2.4
+#: To be a unit longer, to be longer by the straight way, to turn by a chord of 1, the same in a bend of radius 1.
+_LONGER, _RATIO, _BENDING, _TIGHT = 0.1, 1.0, 0.5, 0.25
+#: To run back a unit along the direction, where the route did not, to lead a unit beyond all that is drawn, and to pass
+#: the border of a frame around an end more than once.
+_BACK, _OUTSIDE, _BORDER = 3.0, 0.5, 0.8
+#: To leave where another arrives at the disc, or the other way round, and to do as it does.
+_MEETING, _BESIDE = 2.0, 1.0
+#: What is this close to a disc may be measured to run over it.
+_SLACK = 0.02
+#: How far off a foreign frame lines stay, at least: it may grow by what is drawn in it.
+OFF = 0.06
+#: How far beyond discs and frames a line may lead for nothing; how far back along the direction.
+_MARGIN, _ONWARD = 0.8, 0.05
+#: How far from a centre ends are checked, how far apart they are to be.
+_AT, _APART = 0.45, 0.16
+#: How many routes are checked closely at a time.
+_CLOSELY = 12
+
+
+class Judge:
+    """All that is drawn: ``routes`` by edge index, and others, which stay. ``image`` are mirror images of edges, of
+    which only one has to be drawn; the axis is at half of ``twice``."""
+
+    def __init__(
+        self,
+        edges: Sequence[LayoutEdge],
+        centres: Sequence[Point],
+        routes: Mapping[int, Route],
+        frames: Sequence[Frame] = (),
+        drawn: Sequence[Route] = (),
+        image: Mapping[int, int] | None = None,
+        twice: float = 0.0,
+    ) -> None:
+        self.edges, self.centres, self.twice = edges, centres, twice
+        self.routes: dict[int, Route] = dict(routes)
+        self._drawn, self._image = list(drawn), dict(image or {})
+        wide = [(own, padded(rect, OFF)) for own, rect in frames]
+        self.rects: FloatArray = np.array([rect for _, rect in frames], dtype=np.float64).reshape(-1, 4)
+        self.obstacles, self.walls = Obstacles(centres), Walls(wide, len(centres))
+        self.discs: FloatArray = np.array(centres, dtype=np.float64).reshape(-1, 2)
+        self.low: FloatArray = np.concatenate([self.discs, self.walls.rects[:, :2]]).min(axis=0) - _MARGIN
+        self.high: FloatArray = np.concatenate([self.discs, self.walls.rects[:, 2:]]).max(axis=0) + _MARGIN
+        self._number = {centre: k for k, centre in enumerate(centres)}
+        self._look()
+
+    def winding(self) -> dict[int, tuple[float, float]]:
+        """How much each route bends, and by which factor it is longer than the straight way."""
+        lengths, (bends, _) = self._lines.lengths().tolist(), self._lines.bends()
+        return {
+            i: (bend, length / max(distance(self.routes[i][0], self.routes[i][-1]), 1e-9))
+            for i, bend, length in zip(sorted(self.routes), bends.tolist(), lengths, strict=False)
+        }
+
+    def in_fans(self, most: int) -> set[int]:
+        """The edges of which more than so many share both ends, in either direction."""
+        fans = by_ends((i, self.edges[i]) for i in self.routes).values()
+        return {i for fan in fans if len(fan) > most for i in fan}
+
+    def both(self, i: int) -> tuple[int, ...]:
+        """An edge and its mirror image, if it has one."""
+        other = self._image.get(i, i)
+        return (i,) if other == i else (i, other)
+
+    def draw(self, i: int, route: Route) -> None:
+        """Report that an edge has another route now, and its image with it."""
+        self.routes[i] = route
+        for other in self.both(i)[1:]:
+            ends = self.centres[self.edges[other].source], self.centres[self.edges[other].target]
+            self.routes[other] = reflected(route, self.twice, *ends)
+        self._look()
+
+    def _look(self) -> None:
+        chosen = sorted(self.routes)
+        routes = [*(self.routes[i] for i in chosen), *self._drawn]
+        edges = np.array([*chosen, *([-1] * len(self._drawn))], dtype=np.int64)
+        self._lines = lines = polylines(routes)
+        self.a, self.b, self.segment_edges = lines.a, lines.b, edges[lines.owner]
+        cells, owner = lines.cells()
+        order = np.argsort(cells, kind="stable")
+        self.cells, self.cell_edges = cells[order], edges[owner[order]]
+        self._ends: dict[int, list[tuple[int, bool, Point]]] = {}
+        for leaves, places in ((True, lines.leave(_AT)), (False, lines.arrive(_AT))):
+            for edge, route, (x, y) in zip(edges.tolist(), routes, places.tolist(), strict=True):
+                neuron = self._number.get(route[0 if leaves else -1])
+                if neuron is not None:
+                    self._ends.setdefault(neuron, []).append((edge, leaves, (x, y)))
+
+    def ends(self, neuron: int, but: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+        """(k, 2) and (k,) where the ends at a neuron are seen, and which of them leave (1) or arrive (0)."""
+        found = [(place, leaves) for edge, leaves, place in self._ends.get(neuron, ()) if edge not in but]
+        places = np.array([place for place, _ in found], dtype=np.float64).reshape(-1, 2)
+        return places, np.array([leaves for _, leaves in found], dtype=np.float64)
+
+
+class Pen:
+    """Judges routes for one edge."""
+
+    def __init__(self, judge: Judge, edge: int) -> None:
+        self._judge, self.route = judge, judge.routes[edge]
+        self._own = judge.edges[edge].source, judge.edges[edge].target
+        self._far = max(distance(self.route[0], self.route[-1]), 1e-9)
+        self._onward = float(polylines([self.route]).backward()[0]) < _ONWARD
+        both = judge.both(edge)
+        self._reflect = len(both) > 1
+        others = ~np.isin(judge.segment_edges, both)
+        self._a, self._b = judge.a[others], judge.b[others]
+        kin = [i for i in judge.routes if judge.edges[i].source in self._own or judge.edges[i].target in self._own]
+        self._kin = np.isin(judge.segment_edges[others], kin)
+        self._cells = judge.cells[~np.isin(judge.cell_edges, both)]
+        self._ends = [(leaves, *judge.ends(n, both)) for n, leaves in zip(self._own, (True, False), strict=True)]
+        walls = judge.walls
+        inside = walls.inside[self._own[0]].astype(np.int64) + walls.inside[self._own[1]]
+        foreign = walls.foreign(*self._own)
+        self._margins: FloatArray = walls.rects[foreign]
+        self._foreign: FloatArray = judge.rects[foreign]
+        self._discs: FloatArray = np.delete(judge.discs, self._own, axis=0)
+        # into or out of those that hold one end a route has to go once
+        self._rects: FloatArray = walls.rects[inside > 0]
+        self._least: IntArray = (inside[inside > 0] == 1).astype(np.int64)
+
+    def trespass(self, route: Route) -> tuple[int, float]:
+        """How many foreign frames a route enters, and by how much it is too close to a disc, looked at as closely as
+        any."""
+        lines = polylines([route])
+        entered = int(meet(lines.a, lines.b, self._foreign).any(axis=0).sum())
+        return entered, max(0.0, TOUCH + _SLACK - self._judge.obstacles.clearance(route, self._own))
+
+    def cost(self) -> float:
+        """What the route costs that the edge has."""
+        found = self.cheapest([self.route], np.inf)
+        return found[1] if found is not None else np.inf
+
+    def cheapest(self, routes: Sequence[Route], limit: float, most: int | None = None) -> tuple[int, float] | None:
+        """The cheapest of these routes and its cost, if that is below the limit; no more than so many are checked
+        closely, those first that are cheap by themselves."""
+        if not routes:
+            return None
+        lines = polylines(routes)
+        plain = self._by_itself(lines)
+        some = np.flatnonzero(plain < limit)
+        some = some[np.argsort(plain[some], kind="stable")][:most]
+        best: tuple[int, float] | None = None
+        for start in range(0, len(some), _CLOSELY):
+            chosen = some[start : start + _CLOSELY]
+            chosen = chosen[plain[chosen] < limit]
+            if not len(chosen):
+                break
+            costs = plain[chosen]
+            for add in (self._in_the_way, self._beside, self._across):
+                near = np.flatnonzero(costs < limit)
+                chosen, costs = chosen[near], costs[near]
+                if len(chosen):
+                    costs += add(lines.some(chosen))
+            if len(chosen) and float(costs.min()) < limit:
+                least = int(np.argmin(costs))
+                limit, best = float(costs[least]), (int(chosen[least]), float(costs[least]))
+        return best
+
+    def _by_itself(self, lines: Polylines) -> FloatArray:
+        """(n,) what they cost whatever there is around them."""
+        (low, high), (bends, tight), lengths = lines.extents(), lines.bends(), lines.lengths()
+        outside = np.maximum(self._judge.low - low, 0.0) + np.maximum(high - self._judge.high, 0.0)
+        cost = _LONGER * lengths + _RATIO * (lengths / self._far - 1) + _BENDING * bends + _TIGHT * tight
+        cost += _OUTSIDE * (outside[:, 0] + outside[:, 1])
+        if self._onward:
+            cost += _BACK * lines.backward()
+        return cost
+
+    def _in_the_way(self, lines: Polylines) -> FloatArray:
+        """(n,) what the discs and frames cost that they come close to or enter."""
+        clear = lines.clearances(self._discs, REACH)
+        grazing, entering = lines.enter(self._margins), lines.enter(self._foreign)
+        cost: FloatArray = _NEARING * (REACH - clear) + _GRAZING * grazing.astype(np.float64)
+        cost += _ENTERING * (entering.astype(np.float64) + (clear < TOUCH + _SLACK))
+        return cost
+
+    def _beside(self, lines: Polylines) -> FloatArray:
+        """(n,) what it costs to meet others at a disc and to run on them, and to pass borders."""
+        cost = np.zeros(len(lines))
+        for (leaves, places, kinds), here in zip(self._ends, (lines.leave(_AT), lines.arrive(_AT)), strict=True):
+            away = here[:, None, :] - places[None, :, :]
+            close = np.maximum(1 - np.sqrt((away * away).sum(axis=2)) / _APART, 0.0)
+            cost += (close * np.where(kinds == leaves, _BESIDE, _MEETING)).sum(axis=1)
+        cost += _BORDER * lines.passed(self._rects, self._least)
+        cells, owner = lines.cells()
+        if len(self._cells):
+            there = self._cells[np.minimum(np.searchsorted(self._cells, cells), len(self._cells) - 1)] == cells
+            cost += _ALONG * STEP * np.bincount(owner[there], minlength=len(lines))
+        return cost
+
+    def _across(self, lines: Polylines) -> FloatArray:
+        """(n,) what it costs to cross others."""
+        crossings = lines.crossed(self._a, self._b).astype(np.float64)
+        cost: FloatArray = _CROSSING * crossings
+        if self._kin.any():
+            cost += _KIN * lines.crossed(self._a[self._kin], self._b[self._kin])
+        if self._reflect:
+            (low, high), axis = lines.extents(), self._judge.twice / 2
+            flip, shift = np.array([-1.0, 1.0]), np.array([self._judge.twice, 0.0])
+            # only what reaches over the axis meets its own image
+            for k in np.flatnonzero((low[:, 0] <= axis) & (high[:, 0] >= axis)).tolist():
+                one = lines.some(np.array([k], dtype=np.int64))
+                cost[k] += _CROSSING * float(one.crossed(one.a * flip + shift, one.b * flip + shift)[0])
+        return cost

@@ -1,0 +1,159 @@
+"""Easing: routes with needless bends are drawn anew, as seldom and as gently bent as what stands around allows.
+
+In: routes that are drawn, what is in the way. Out: for those that wind, a better route where there is one: with fewer
+corners or with its corners elsewhere, judged by all that makes a line hard to follow (``Judge``).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
+from itertools import pairwise, product
+
+from neurovis_layouts.routing.corners import corners, smooth
+from neurovis_layouts.routing.route_cost import Judge, Pen
+from neurovis_spec.layout.geometry import distance
+from neurovis_spec.layout.model import RADIUS, Point, Route
+
+#: A route is checked that bends by more than this (in chords of the unit circle) and is no single curve, or is longer
+#: than the straight way by this factor.
+_WINDS, _LONG = 1.2, 1.35
+#: How much of a corner is cut off, at most.
+_CUTS = (4.0, 1.0)
+#: So many corners in a row are left out at once, at first and later on.
+_MOST_CORNERS, _FEW_CORNERS = 9, 2
+#: How far corners are moved, and how far off the straight way a lone one is tried.
+_MOVES = (1.0, 0.45, 0.2)
+_BOWS = (0.35, 0.7, 1.2, 2.0, 3.2, 5.0)
+#: A new route is better than the old one by this at least.
+_BETTER = 0.4
+#: What is worse than the old one by this, where the search begins, will not become better.
+_HOPELESS = 0.7
+#: More than so many connections between two neurons are a fan, in which each has its place.
+_FAN = 3
+#: How many routes are checked, at most, by how many there are: in a crowd nobody follows one. How many in vain.
+_LEAST, _MOST, _WORK, _VAIN = 15, 40, 5000, 12
+_ROUNDS, _PASSES = 2, 4
+#: A step on the way there is worth this at least.
+_GAIN = 0.05
+#: Of all ways that are tried from there so many are checked closely.
+_SOME = 24
+#: With more routes than this none is drawn anew: they cross too much to be followed.
+MOST_EASED = 300
+_DIAGONAL = 0.7071067811865476
+_AROUND = (
+    (1.0, 0.0), (_DIAGONAL, _DIAGONAL), (0.0, 1.0), (-_DIAGONAL, _DIAGONAL),
+    (-1.0, 0.0), (-_DIAGONAL, -_DIAGONAL), (0.0, -1.0), (_DIAGONAL, -_DIAGONAL),
+)  # fmt: skip
+
+
+def eased(judge: Judge, free: AbstractSet[int]) -> dict[int, Route]:
+    """Routes by edge index for those that are eased, of those that are ``free`` to be; the worst first."""
+    most = max(_LEAST, min(_MOST, _WORK // max(1, len(judge.routes))))
+    changed: set[int] = set()
+    looked = sorted(free - judge.in_fans(_FAN))
+    for _ in range(_ROUNDS):
+        winding = judge.winding()
+        chosen = [i for i in looked if winding[i][1] > _LONG or (winding[i][0] > _WINDS and len(judge.routes[i]) > 4)]
+        chosen.sort(key=lambda i: (-winding[i][0] - 2 * winding[i][1], i))
+        looked, vain = [], 0
+        for i in chosen[:most]:
+            found = _better(Pen(judge, i))
+            if found is not None:
+                judge.draw(i, found)
+                looked.append(i)
+            vain = vain + 1 if found is None else 0
+            if vain == _VAIN:
+                break
+        changed.update(looked)
+        looked.sort()
+    return {i: judge.routes[i] for k in sorted(changed) for i in judge.both(k)}
+
+
+@dataclass(frozen=True, slots=True)
+class _Try:
+    """A route, the line that it follows, how much is cut off its corners, and what it costs."""
+
+    cost: float
+    line: tuple[Point, ...]
+    cut: float
+    route: Route
+
+
+def _better(pen: Pen) -> Route | None:
+    """A route that is clearly better than the one that is there, if one is found."""
+    if distance(pen.route[0], pen.route[-1]) < 2 * RADIUS:
+        return None  # between discs that overlap, as pins may have it
+    now = pen.cost()
+    line = corners(pen.route)
+    starts = [line, *_fewer(line), *_bowed(line[0], line[-1])]
+    best = _best(pen, product(starts, _CUTS), now + _HOPELESS)
+    if best is None:
+        return None
+    for far in _MOVES:
+        for _ in range(_PASSES):
+            lines = *_moved(best.line, far), *_fewer(best.line, _FEW_CORNERS)
+            better = _best(pen, ((line, best.cut) for line in lines), best.cost - _GAIN, _SOME)
+            if better is None:
+                break
+            best = better
+    best = _best(pen, product([best.line], _CUTS), best.cost - _GAIN) or best
+    if best.cost > now - _BETTER:
+        return None
+    entered, close = pen.trespass(best.route)
+    before = pen.trespass(pen.route)
+    return best.route if entered <= before[0] and close <= before[1] else None
+
+
+def _best(
+    pen: Pen, tries: Iterable[tuple[tuple[Point, ...], float]], limit: float, most: int | None = None
+) -> _Try | None:
+    """The best of these lines, with so much cut off their corners, None where all cost more than the limit; at most so
+    many are checked closely."""
+    ways = list(tries)
+    routes = [smooth(line, cut) for line, cut in ways]
+    found = pen.cheapest(routes, limit, most)
+    return None if found is None else _Try(found[1], *ways[found[0]], routes[found[0]])
+
+
+def _fewer(line: tuple[Point, ...], most: int = _MOST_CORNERS) -> Iterator[tuple[Point, ...]]:
+    """The line without some corners in a row, up to so many, and with one in their middle."""
+    for first in range(1, len(line) - 1):
+        for last in range(first, min(first + most, len(line) - 1)):
+            yield line[:first] + line[last + 1 :]
+            if last > first:
+                left_out = line[first : last + 1]
+                x, y = (math.fsum(part) / len(left_out) for part in zip(*left_out, strict=True))
+                yield (*line[:first], (x, y), *line[last + 1 :])
+
+
+def _moved(line: tuple[Point, ...], far: float) -> Iterator[tuple[Point, ...]]:
+    for k in range(1, len(line) - 1):
+        x, y = line[k]
+        for dx, dy in _AROUND:
+            yield (*line[:k], (x + far * dx, y + far * dy), *line[k + 1 :])
+    for k, (a, b) in enumerate(pairwise(line[1:-1]), 1) if far == _MOVES[0] else ():
+        for dx, dy in _AROUND[::2]:
+            yield (
+                *line[:k], (a[0] + far * dx, a[1] + far * dy), (b[0] + far * dx, b[1] + far * dy), *line[k + 2 :],
+            )  # fmt: skip
+
+
+def _bowed(start: Point, end: Point) -> Iterator[tuple[Point, ...]]:
+    """The straight way, and lines with a corner or two beside it."""
+    yield start, end
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    length = distance(start, end)
+    for high in _BOWS:
+        for side in (high, -high):
+            nx, ny = dy / length * side, -dx / length * side
+            for share in (0.25, 0.5, 0.75):
+                yield start, (start[0] + share * dx + nx, start[1] + share * dy + ny), end
+            yield (
+                start,
+                (start[0] + 0.2 * dx + nx, start[1] + 0.2 * dy + ny),
+                (start[0] + 0.8 * dx + nx, start[1] + 0.8 * dy + ny),
+                end,
+            )

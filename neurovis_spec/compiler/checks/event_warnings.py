@@ -1,0 +1,172 @@
+"""Events that are legal but surely not meant: beyond the run, clamps upon clamps, what is lesioned already.
+
+In: the ``events`` as written, the Directory that their references mean, the Constants. Out: warnings. What an event
+comes to be in a run does not matter here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.names.references import Directory, key_of, piece, resolve_end
+from neurovis_spec.compiler.values.constants import Constants
+from neurovis_spec.diagnostics import Findings, Span, shorten
+from neurovis_spec.language.located import Formula, Located
+from neurovis_spec.language.sections import EventModel
+
+
+class _Clamp(NamedTuple):
+    """A key of a clamp: its neurons, and from which step (inclusive) to which (exclusive) it holds; ``number`` counts
+    the keys in the order written."""
+
+    number: int
+    key: Located[str]
+    neurons: IntArray
+    begin: float
+    end: float
+
+
+class _Lesions(NamedTuple):
+    """Since when each neuron is lesioned, and the number of the place that says so."""
+
+    since: FloatArray
+    number: IntArray
+    places: list[Span]
+
+
+def check_events(
+    models: tuple[EventModel, ...], directory: Directory, constants: Constants, steps: int | None, findings: Findings
+) -> None:
+    """Warn of events that change nothing, or are lost among others. ``steps``: the length of a run, if the spec has
+    it."""
+    reader = _Reader(directory, replace(constants, findings=Findings(), structural=set()))
+    if steps is not None:
+        for model in models:
+            _check_beyond(model, reader, steps, findings)
+    lesions = _lesions(models, reader, findings)
+    clamps = [clamp for clamp in reader.clamps(models) if not _is_lesioned(clamp, lesions, findings)]
+    _check_overlaps(clamps, reader.count, findings)
+
+
+@dataclass(frozen=True)
+class _Reader:
+    """What events say, which has been found right before: ``constants`` tell nobody of anything."""
+
+    directory: Directory
+    constants: Constants
+    known: dict[str, IntArray] = field(default_factory=dict)
+
+    @property
+    def count(self) -> int:
+        """How many neurons there are."""
+        return self.directory.members.stop
+
+    def step(self, formula: Formula | None) -> float | None:
+        """A step, which may be an expression."""
+        return None if formula is None else self.constants.scalar(formula)
+
+    def neurons(self, text: Located[str]) -> IntArray:
+        """The neurons of a reference, or of the end of a connection."""
+        if text.value not in self.known:
+            found = resolve_end(text, self.directory, self.constants.findings) or ()
+            self.known[text.value] = np.array(found, dtype=np.int64)
+        return self.known[text.value]
+
+    def ends(self, text: Located[str]) -> tuple[IntArray, ...]:
+        """The neurons of a reference, or those of either end of a connection."""
+        arrow = text.value.find("->")
+        if arrow < 0:
+            return (self.neurons(text),)
+        return self.neurons(piece(text, 0, arrow)), self.neurons(piece(text, arrow + 2, len(text.value)))
+
+    def clamps(self, models: tuple[EventModel, ...]) -> Iterator[_Clamp]:
+        """All clamps, key by key."""
+        number = 0
+        for model in models:
+            begin, end = self.step(model.from_), self.step(model.to)
+            for name in model.clamp if begin is not None else ():
+                key = key_of(model.source, "clamp", name)
+                yield _Clamp(number, key, self.neurons(key), begin or 0.0, math.inf if end is None else end)
+                number += 1
+
+
+def _check_beyond(model: EventModel, reader: _Reader, steps: int, findings: Findings) -> None:
+    formula = model.at if model.at is not None else model.from_
+    begin = reader.step(formula)
+    if formula is not None and begin is not None and begin >= steps:
+        message = f"step {begin:.0f} is never reached: a run has the steps 0 to {steps - 1} ('steps')"
+        hint = f"let it be earlier, or lengthen the run: time: {{steps: {begin + 1:.0f}}}"
+        findings.warning("beyond-steps", formula.span, message, hint)
+
+
+def _lesions(models: tuple[EventModel, ...], reader: _Reader, findings: Findings) -> _Lesions:
+    """Since when each neuron is lesioned; a warning at what is lesioned again."""
+    lesions = _Lesions(np.full(reader.count, np.inf), np.zeros(reader.count, dtype=np.int64), [])
+    mended = np.zeros(reader.count, dtype=np.bool_)  # these come and go
+    for model in models:
+        for text in model.mend:
+            mended[np.concatenate(reader.ends(text))] = True
+    timed = [(begin, model) for model in models if model.lesion and (begin := reader.step(model.at)) is not None]
+    for begin, model in sorted(timed, key=lambda one: one[0]):
+        for text in model.lesion:
+            ends = reader.ends(text)
+            gone = next((end for end in ends if len(end) and np.isfinite(lesions.since[end]).all()), None)
+            if gone is not None:
+                since, place = _last(lesions, gone)
+                message = f"'{shorten(text.value)}' is lesioned already, since step {since:.0f}"
+                findings.warning("no-effect", text.span, f"{message} ({_place(place, text.span)})", "remove it")
+            elif len(ends) == 1:
+                new = ends[0][np.isinf(lesions.since[ends[0]]) & ~mended[ends[0]]]
+                lesions.since[new], lesions.number[new] = begin, len(lesions.places)
+                lesions.places.append(text.span)
+    return lesions
+
+
+def _last(lesions: _Lesions, neurons: IntArray) -> tuple[float, Span]:
+    """Since when all of some lesioned neurons are, and where that is said."""
+    last = int(neurons[np.argmax(lesions.since[neurons])])
+    return float(lesions.since[last]), lesions.places[int(lesions.number[last])]
+
+
+def _is_lesioned(clamp: _Clamp, lesions: _Lesions, findings: Findings) -> bool:
+    """Whether the neurons of a clamp are all lesioned before it begins; a warning if so."""
+    if not len(clamp.neurons) or (lesions.since[clamp.neurons] > clamp.begin).any():
+        return False
+    since, place = _last(lesions, clamp.neurons)
+    message = f"'{shorten(clamp.key.value)}' is lesioned from step {since:.0f} on ({_place(place, clamp.key.span)})"
+    findings.warning("no-effect", clamp.key.span, f"{message}: clamping it changes nothing", "remove it")
+    return True
+
+
+def _check_overlaps(clamps: list[_Clamp], count: int, findings: Findings) -> None:
+    """Clamps that hold a neuron while another one does; a warning at the one written later."""
+    end, owner = np.zeros(count), np.zeros(count, dtype=np.int64)  # until when a neuron is clamped, and by which
+    order = sorted(clamps, key=lambda one: one.begin)
+    told: set[int] = set()
+    for number, clamp in enumerate(order):
+        for other in np.unique(owner[clamp.neurons[end[clamp.neurons] > clamp.begin]]).tolist():
+            first, second = sorted((order[other], clamp), key=lambda one: one.number)
+            if second.number not in told:
+                told.add(second.number)
+                _tell(first, second, findings)
+        longer = clamp.neurons[end[clamp.neurons] < clamp.end]
+        end[longer], owner[longer] = clamp.end, number
+
+
+def _tell(first: _Clamp, second: _Clamp, findings: Findings) -> None:
+    begin, end = max(first.begin, second.begin), min(first.end, second.end) - 1
+    when = f"from step {begin:.0f} on" if math.isinf(end) else f"at the steps {begin:.0f} to {end:.0f}"
+    when = f"at step {begin:.0f}" if begin == end else when
+    both = f"'{shorten(second.key.value)}' and '{shorten(first.key.value)}' ({_place(first.key.span, second.key.span)})"
+    message = f"{both} clamp the same neuron {when}: this one, written last, holds"
+    findings.warning("clamps-overlap", second.key.span, message, "end one, with 'to', before the other")
+
+
+def _place(other: Span, here: Span) -> str:
+    return f"column {other.column}" if other.line == here.line else f"line {other.line}"

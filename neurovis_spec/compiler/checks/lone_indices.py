@@ -1,0 +1,130 @@
+"""Indices that can only be 0: ``i`` of one neuron, source or instance, ``j`` of one target.
+
+In: what a spec without errors became. Out: a warning at each such index. A group or an instance with a ``count`` of 1,
+and what refers to it, is let be: another count may be meant to follow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator
+
+from neurovis_spec.compiler.checks.compiled import Compiled
+from neurovis_spec.compiler.names.expand import COUNTED
+from neurovis_spec.compiler.names.references import Section, parts, piece
+from neurovis_spec.diagnostics import Findings, shorten
+from neurovis_spec.language.expressions.parser import parse, unknown_names
+from neurovis_spec.language.expressions.tree import Name, names
+from neurovis_spec.language.located import Located
+from neurovis_spec.language.sections import ConnectionModel, GroupModel
+from neurovis_spec.language.values import EdgeRows
+from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence
+
+#: the keys of a group whose expressions know ``i`` and ``n``
+_OF_A_GROUP = ("bias", "initial", "noise", "position")
+
+
+def check_lone_indices(compiled: Compiled, findings: Findings) -> None:
+    """Warn of every index that can only be 0 (and of ``n`` where it can only be 1)."""
+    signals = {one.key: one.learning.rule.signals for one in compiled.bundles if one.learning is not None}
+    for section, scopes in compiled.sections():
+        _instances(section, findings)
+        for name, group in section.neurons.items():
+            if group.count is None and group.names is None:
+                _group(name, group, findings)
+        place = compiled.scopes.index(scopes[0])
+        for key, body in section.connections:
+            alone = _alone(key, compiled, place)
+            if alone:
+                _connection(body, alone, signals.get(key.span, ()), findings)
+
+
+def _instances(section: Section, findings: Findings) -> None:
+    for name, model in section.instances.items():
+        if model.count is None:
+            for formula in model.set.values():
+                for place, index in _found(formula.node, COUNTED):
+                    hint = "'i' and 'n' count the instances of an entry; give it a 'count'"
+                    _warn(place, index, f"'{name}' is one instance", hint, findings)
+
+
+def _group(name: str, group: GroupModel, findings: Findings) -> None:
+    nodes = [group.source.get(key) for key in _OF_A_GROUP]
+    states = group.source.get("initial")
+    nodes += [entry.value for entry in states.entries] if isinstance(states, Mapping) else []
+    for choice in (group.activation, group.model):
+        nodes += [] if choice is None else [entry.value for entry in choice.settings]
+    for place, index in _found_in(nodes, COUNTED):
+        hint = "'i' and 'n' count the neurons of a group; give it a 'count'"
+        _warn(place, index, f"'{name}' is one neuron", hint, findings)
+
+
+def _connection(body: ConnectionModel, alone: dict[str, str], signals: Collection[str], findings: Findings) -> None:
+    """``i`` and ``j`` in an entry; ``alone`` has those that stand for one neuron, with what that is called."""
+    for place, index in _found_in(_nodes(body, signals), alone):
+        hint = "'i' counts the sources and 'j' the targets, both from 0"
+        if len(alone) == 1:
+            hint += f"; did you mean '{'j' if index.name == 'i' else 'i'}'?"
+        _warn(place, index, f"'{shorten(alone[index.name])}' is one neuron", hint, findings)
+
+
+def _nodes(body: ConnectionModel, signals: Collection[str]) -> Iterator[Node | None]:
+    """What of the body of a connection knows ``i`` and ``j``; a rule's signals are names."""
+    for key in ("weight", "matrix", "centre"):
+        yield body.source.get(key)
+    if body.plasticity is not None:
+        yield from (entry.value for entry in body.plasticity.settings if entry.name not in signals)
+    if isinstance(body.edges, EdgeRows) and _mentions(body.edges.node):
+        for row in body.edges.node.items:  # the first two cells are names
+            yield from row.items[2:] if isinstance(row, (Sequence, Packed)) else ()
+
+
+def _mentions(node: Sequence | Packed) -> bool:
+    """Whether there may be an index among the cells: of many, only the different texts are checked."""
+    return not isinstance(node, Packed) or any(not text.isidentifier() or text in ("i", "j") for text in node.texts)
+
+
+def _alone(key: Located[str], compiled: Compiled, place: int) -> dict[str, str]:
+    """Which indices of an entry stand for one neuron, of the scope at a place."""
+    arrow = key.value.index("->")
+    ends = {"i": piece(key, 0, arrow), "j": piece(key, arrow + 2, len(key.value))}
+    alone = {}
+    for index, end in ends.items():
+        named = [name for name, _ in parts(end)]
+        if len(named) == 1 and _is_one(named[0], compiled, place):
+            alone[index] = named[0]
+    return alone
+
+
+def _is_one(name: str, compiled: Compiled, place: int) -> bool:
+    """Whether a reference of a scope names a neuron itself, no group or instance that is counted."""
+    head, dot, rest = name.partition(".")
+    if not dot:
+        return name in compiled.population.directories[place].neurons
+    scope = compiled.scopes[place]
+    inside = scope.children.get(head, ())
+    counted = head in scope.section.instances and scope.section.instances[head].count is not None
+    return len(inside) == 1 and not counted and _is_one(rest, compiled, inside[0])
+
+
+def _found_in(nodes: Iterable[Node | None], wanted: Collection[str]) -> Iterator[tuple[Scalar, Name]]:
+    for node in nodes:
+        yield from _found(node, wanted)
+
+
+def _found(node: Node | None, wanted: Collection[str]) -> Iterator[tuple[Scalar, Name]]:
+    """The places of some names in the expressions of a node; a mapping is a file, which holds none."""
+    match node:
+        case Scalar(value=str() as text):
+            tree = parse(text, random=True)
+            for name in unknown_names(tree, names(tree).difference(wanted)):
+                yield node, name
+        case Packed(texts=()):
+            return
+        case Sequence() | Packed():
+            yield from _found_in(node.items, wanted)
+
+
+def _warn(place: Scalar, index: Name, one: str, hint: str, findings: Findings) -> None:
+    always = 1 if index.name == "n" else 0
+    message = f"'{index.name}' is always {always} here: {one}"
+    findings.warning("lone-index", place.at(index.start, index.end), message, hint)

@@ -1,0 +1,62 @@
+"""Inert rules: those whose weight is the old one, whatever is put in.
+
+In: a rule and its parameters. Out: whether it changes no weight, found by trying: its formulas are evaluated at a few
+points that nobody chose, and a formula that gives back the weight at all of them does so everywhere. Whether signals
+keep it from changing any is tried over some steps, as that may lie in its states.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+import numpy as np
+
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiler.program import Rule
+from neurovis_spec.language.expressions.arrays import Value, evaluate_array
+from neurovis_spec.language.expressions.functions import CONSTANTS
+
+_POINTS = 16
+_STEPS = 6
+_GIVEN = ("pre", "sent", "post", "weight")
+
+
+def changes_nothing(rule: Rule, parameters: Mapping[str, FloatArray]) -> bool:
+    """Whether neither a step nor an episode's end changes a weight, with the first connection's parameters."""
+    generator = np.random.default_rng(0)  # the points of a test, not a draw of the network
+    names = (*_GIVEN, *rule.signals, *(state.name for state in rule.state))
+    values: dict[str, Value] = {**CONSTANTS, "dt": 0.5, "k": np.arange(1.0, _POINTS + 1)}
+    values["t"] = values["k"] * 0.5
+    values |= {name: float(array[0]) for name, array in parameters.items()}
+    values |= {name: generator.uniform(-2.0, 2.0, _POINTS) for name in names}
+    for name, tree in rule.let:
+        values[name] = evaluate_array(tree, values)
+    formulas = [tree for tree in (rule.each_step, rule.each_episode) if tree is not None]
+    return all(bool(np.all(evaluate_array(tree, values) == values["weight"])) for tree in formulas)
+
+
+def ever_changes(rule: Rule, parameters: Mapping[str, FloatArray], own: Collection[str] = ()) -> bool:
+    """Whether a weight changes in a few steps and episodes that nobody chose, from the states' initial values; the
+    signals of ``own`` are the target's activity."""
+    generator = np.random.default_rng(0)
+    values: dict[str, Value] = {**CONSTANTS, "dt": 0.5, "weight": generator.uniform(-2.0, 2.0, _POINTS)}
+    values |= {name: float(array[0]) for name, array in parameters.items()}
+    values |= {state.name: evaluate_array(state.initial, values) for state in rule.state}
+    for k in range(_STEPS):
+        values |= {"k": float(k), "t": k * 0.5}
+        for name in ("pre", "sent", "post", *rule.signals):
+            values[name] = generator.uniform(-2.0, 2.0, _POINTS) * 10.0 ** (k % 3)
+        values |= dict.fromkeys(own, values["post"])
+        for episode in (False, True):
+            new: dict[str, Value] = {}
+            for name, tree in rule.let:
+                values[name] = evaluate_array(tree, values)
+            weight = rule.each_episode if episode else rule.each_step
+            if weight is not None and not np.array_equal(evaluate_array(weight, values), values["weight"]):
+                return True
+            for state in rule.state:
+                change = state.each_episode if episode else state.each_step
+                if change is not None:
+                    new[state.name] = evaluate_array(change, values)
+            values |= new
+    return False

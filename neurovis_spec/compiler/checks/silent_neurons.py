@@ -1,0 +1,158 @@
+"""Idle neurons: those whose activity is 0 at every step, whatever happens elsewhere.
+
+In: a Network. Out: for each group the neurons that nothing reaches but themselves or each other, that have no input,
+bias, initial value or noise, and that surely stay at 0 by their model and activation (a cosine would not), whatever
+events set: of a model that knows the time nothing is sure. Those that are only
+behind such neurons are not told of: they follow from these. A network without a single connection is a sketch: of its
+neurons only those are told of that an output or a rule asks for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.arrays import IntArray
+from neurovis_spec.compiler.network import Group, Network
+from neurovis_spec.compiler.neurons.initial_states import starts_of
+from neurovis_spec.compiler.program import Block
+from neurovis_spec.language.expressions.arrays import Value, evaluate_array
+from neurovis_spec.language.expressions.functions import CONSTANTS
+from neurovis_spec.language.expressions.tree import names
+
+Mask = npt.NDArray[np.bool_]
+#: How far what is active is followed at once; only long ways are gone step by step.
+_AT_ONCE = 8
+
+
+class Idle(NamedTuple):
+    """Neurons of a group that stay at 0; ``driven``: by themselves or each other."""
+
+    group: Group
+    members: list[int]
+    driven: bool
+
+
+def idle_neurons(network: Network) -> Iterator[Idle]:
+    """Groups with their idle neurons, in the order of the groups."""
+    neurons, connections = network.neurons, network.connections
+    quiet = (neurons.input < 0) & (neurons.bias == 0) & np.isnan(neurons.initial)
+    for noise in network.noises:
+        quiet[noise.members] = False
+    for block in network.blocks:
+        if block.combine == "distance":  # |c| away from a signal of 0
+            quiet[connections.targets[block.incoming]] = False
+    if not len(connections.sources):
+        quiet &= _needed(network)
+    if not quiet.any():
+        return
+    for block in network.blocks:
+        quiet[block.members] &= _stays_at_zero(block, network)
+    for binding in network.set_by_events:  # what an event makes of a neuron is not looked at
+        kind, _, number = binding.array.partition("/")
+        if kind == "bias":
+            quiet[binding.places] = False
+        elif kind in ("activation", "model"):
+            quiet[network.blocks[int(number.partition("/")[0])].members] = False
+    idle = _unreached(quiet, connections.sources, connections.targets)
+    if not idle.any():
+        return
+    idle = _first(idle, connections.sources, connections.targets)
+    driven = np.zeros(len(neurons), dtype=np.bool_)
+    driven[connections.targets] = True
+    for group in neurons.groups:
+        members = [member for member in group.indices if idle[member]]
+        if members:
+            yield Idle(group, members, bool(driven[members].any()))
+
+
+def _needed(network: Network) -> Mask:
+    """Whether an output or a rule asks for a neuron."""
+    n = len(network.neurons)
+    needed = np.zeros(n, dtype=np.bool_)
+    for output in network.outputs:
+        needed[output.neurons] = True
+    for plasticity in network.plasticity:
+        for signal in plasticity.signals.values():
+            needed[signal[signal < n]] = True
+    return needed
+
+
+def _unreached(quiet: Mask, sources: IntArray, targets: IntArray) -> Mask:
+    """The quiet neurons that no way leads to from one that is not."""
+    reached = ~quiet
+    for _ in range(_AT_ONCE):
+        before = int(reached.sum())
+        reached[targets[reached[sources]]] = True
+        if int(reached.sum()) == before:
+            return ~reached
+    rest = np.flatnonzero(~reached[targets])  # connections that may still lead somewhere
+    order = rest[np.argsort(sources[rest], kind="stable")]
+    starts = np.searchsorted(sources[order], np.arange(len(quiet) + 1))
+    waiting = np.flatnonzero(reached).tolist()
+    while waiting:
+        neuron = waiting.pop()
+        for target in targets[order[starts[neuron] : starts[neuron + 1]]].tolist():
+            if not reached[target]:
+                reached[target] = True
+                waiting.append(target)
+    return ~reached
+
+
+def _first(idle: Mask, sources: IntArray, targets: IntArray) -> Mask:
+    """Of the idle neurons those that are not behind other ones: without sources, or on a cycle that has none."""
+    inside = np.flatnonzero(idle[sources] & idle[targets] & (sources != targets))
+    behind = np.zeros(len(idle), dtype=np.bool_)
+    behind[targets[inside]] = True
+    if not behind.any():
+        return idle
+    import networkx
+
+    graph = networkx.DiGraph(zip(sources[inside].tolist(), targets[inside].tolist(), strict=True))
+    result = idle & ~behind
+    for cycle in networkx.strongly_connected_components(graph):
+        if len(cycle) > 1 and all(before in cycle for neuron in cycle for before in graph.predecessors(neuron)):
+            result[list(cycle)] = True
+    return result
+
+
+def _stays_at_zero(block: Block, network: Network) -> Mask:
+    """Whether the neurons of a block, never driven, surely keep their states and an activity of 0: then all that their
+    formulas read stays what it is at the first step."""
+    count = len(block.members)
+    if block.combine == "product" or not _TIME.isdisjoint(_read(block)):
+        return np.zeros(count, dtype=np.bool_)
+    result = np.ones(count, dtype=np.bool_)
+    values: dict[str, Value] = {**CONSTANTS, "dt": network.dt, **block.model_parameters, "drive": 0.0}
+    states = starts_of(block, network.neurons, network.dt)
+    values |= states
+    for name, tree in block.model.let:
+        values[name] = evaluate_array(tree, values)
+    for state in block.model.state:
+        for change in (state.each_step, state.each_episode):
+            if change is not None:
+                result &= np.broadcast_to(evaluate_array(change, values) == states[state.name], (count,))
+    result &= np.broadcast_to(_activity(block, values) == 0, (count,))
+    return result
+
+
+#: What changes by itself.
+_TIME = frozenset(("k", "t"))
+
+
+def _read(block: Block) -> frozenset[str]:
+    """All names that the formulas of a block's model read."""
+    model = block.model
+    trees = [model.activity, *(tree for _, tree in model.let)]
+    trees += [tree for state in model.state for tree in (state.each_step, state.each_episode) if tree is not None]
+    return frozenset().union(*map(names, trees))
+
+
+def _activity(block: Block, values: dict[str, Value]) -> Value:
+    """The model's activity; f is the neurons' activation."""
+    given = {**values, **block.activation_parameters}
+    functions = {"f": lambda x: evaluate_array(block.activation.value, {**given, "x": x})}
+    return evaluate_array(block.model.activity, values, functions=functions)

@@ -1,0 +1,1 @@
+"""Connections: from entries to structures of arrays."""

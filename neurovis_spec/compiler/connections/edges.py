@@ -1,0 +1,173 @@
+"""Edge lists: ``[from, to, weight, delay]`` rows, from the spec or from a file.
+
+In: rows as written or a file, the neurons of both ends. Out: positions within the ends, weights and delays (−1 where
+an edge names none), in the order written. Long plain lists go from the reader's packed arrays straight into arrays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.limits import LONGEST_DELAY, PATIENCE
+from neurovis_spec.compiler.names.references import few
+from neurovis_spec.compiler.values.cells import Cells, Pairs, cells_of, values_of
+from neurovis_spec.compiler.values.constants import Constants
+from neurovis_spec.compiler.values.data_files import Files
+from neurovis_spec.compiler.values.draws import Stream
+from neurovis_spec.diagnostics import Span, shorten, suggest
+from neurovis_spec.language.located import Formula, formula_of
+from neurovis_spec.language.values import EdgeRows, FileReference
+from neurovis_spec.language.yaml.source import NULL, TEXT
+
+_AN_EDGE = "an edge is [from, to], [from, to, weight] or [from, to, weight, delay]"
+
+
+class EdgeList(NamedTuple):
+    """Edges: positions within the ends, weights, delays (−1: the entry's)."""
+
+    i: IntArray
+    j: IntArray
+    weights: FloatArray
+    delays: IntArray
+
+
+@dataclass(frozen=True)
+class End:
+    """The positions within an end of the neurons that belong to it, by name. ``perhaps``: the end is invalid, and this
+    says which other names may belong to it."""
+
+    positions: Mapping[str, int]
+    perhaps: Callable[[str], bool] | None = None
+
+    def position(self, name: str) -> int:
+        """The position of a neuron; −1 where it cannot belong to the end."""
+        found = self.positions.get(name, -1)
+        return 0 if found < 0 and self.perhaps is not None and self.perhaps(name) else found
+
+
+@dataclass(frozen=True)
+class EdgeReader:
+    """Reads the edges of one entry."""
+
+    sources: End
+    targets: End
+    constants: Constants
+    files: Files
+    stream: Stream
+    #: how many connections may be made; None where that is not known
+    most: int | None = None
+
+    def read(self, edges: EdgeRows | FileReference) -> EdgeList | None:
+        """All edges; None where one is invalid."""
+        if isinstance(edges, FileReference):
+            return self._from_file(edges)
+        if len(edges.node) == 0:
+            self.constants.findings.error("wrong-size", edges.node.span, "there is no edge in this list")
+            return None
+        cells = cells_of(edges.node, self.constants.findings, _AN_EDGE, named=True)
+        return None if cells is None else self._written(cells)
+
+    def _written(self, cells: Cells) -> EdgeList | None:
+        findings = self.constants.findings
+        widths = cells.widths
+        right = (widths >= 2) & (widths <= 4)
+        wrong = np.flatnonzero(~right)
+        for row in wrong[:PATIENCE].tolist():
+            if widths[row] or not cells.failed:  # what failed may have been no row at all
+                findings.error("wrong-type", cells.row_span(row), _AN_EDGE)
+        first = cells.starts[:-1]
+        i = self._ends(cells, first[right], self.sources, "source")
+        j = self._ends(cells, first[right] + 1, self.targets, "target")
+        weighted, delayed = np.flatnonzero(right & (widths >= 3)), np.flatnonzero(right & (widths == 4))
+        ends = None if i is None or j is None or len(wrong) else (i[weighted], j[weighted])
+        with self.constants.following() as parts:
+            given = self._given(cells, first[weighted] + 2, ends)
+        self.constants.follow(part._replace(places=weighted[part.within(len(weighted))]) for part in parts)
+        later = self._delays(cells, first[delayed] + 3)
+        if i is None or j is None or given is None or later is None or len(wrong) or cells.failed:
+            return None
+        weights = np.ones(len(widths))
+        weights[weighted] = given
+        delays = np.full(len(widths), -1, dtype=np.int64)
+        delays[delayed] = later
+        return EdgeList(i, j, weights, delays)
+
+    def _ends(self, cells: Cells, which: IntArray, end: End, what: str) -> IntArray | None:
+        """The positions of the neurons that these cells name."""
+        findings = self.constants.findings
+        no_names = which[cells.kinds[which] != TEXT]
+        for cell in no_names[:PATIENCE].tolist():
+            if findings.is_invalid(cells.node(cell).span):  # it is no cell at all
+                continue
+            findings.error("wrong-type", cells.node(cell).span, f"the {what} of an edge is the name of a neuron")
+        which = which[cells.kinds[which] == TEXT]
+        texts = cells.numbers[which].astype(np.int64)
+        positions = np.array([end.position(text) for text in cells.texts], dtype=np.int64)[texts]
+        unknown = np.flatnonzero(positions < 0)
+        _, once = np.unique(texts[unknown], return_index=True)
+        for place in sorted(unknown[once].tolist())[:PATIENCE]:
+            self._outside(cells.texts[int(texts[place])], cells.node(int(which[place])).span, end, what)
+        return None if len(unknown) or len(no_names) or end.perhaps is not None else positions
+
+    def _given(self, cells: Cells, which: IntArray, ends: tuple[IntArray, IntArray] | None) -> FloatArray | None:
+        """The weights in these cells, 1 for a null; they are checked even if their ends are invalid."""
+        sizes = {"n_from": float(len(self.sources.positions)), "n_to": float(len(self.targets.positions))}
+        i, j = ends or (which, which)
+        values = values_of(cells, which, self.constants, Pairs(i, j, sizes, self.stream, vague=ends is None))
+        return None if values is None else np.where(cells.kinds[which] == NULL, 1.0, values)
+
+    def _delays(self, cells: Cells, which: IntArray) -> IntArray | None:
+        """The delays in these cells: few distinct ones, each looked at once."""
+        found: dict[tuple[int, float], int | None] = {}
+        result = np.zeros(len(which), dtype=np.int64)
+        for place, cell in enumerate(which.tolist()):
+            key = int(cells.kinds[cell]), float(cells.numbers[cell]) if cells.kinds[cell] != NULL else 0.0
+            if key not in found:
+                formula = formula_of(cells.node(cell), self.constants.findings)
+                found[key] = None if formula is None else delay_of(formula, self.constants)
+            result[place] = found[key] or 0
+        return None if None in found.values() else result
+
+    def _outside(self, name: str, span: Span, end: End, what: str, where: str = "") -> None:
+        if not name.strip():
+            message = f"the {what} of an edge is the name of a neuron, this is empty"
+            self.constants.findings.error("wrong-type", span, message)
+            return
+        hint = suggest(name, few(name, end.positions), f"{what}s of this entry" if end.perhaps is None else "neurons")
+        message = f"'{shorten(name)}'{where} is not among the {what}s of this entry"
+        self.constants.findings.error("edge-outside", span, message, hint, several=bool(where))
+
+    def _from_file(self, reference: FileReference) -> EdgeList | None:
+        table = self.files.edges(reference, self.most)
+        if table is None:
+            return None
+        span = reference.path.span
+        if not table.sources and table.fault is None:
+            self.constants.findings.error("wrong-size", span, "there is no edge in this file")
+            return None
+        i = self._named(table.sources, table.rows, self.sources, "source", span)
+        j = self._named(table.targets, table.rows, self.targets, "target", span)
+        long = np.flatnonzero(table.delays > LONGEST_DELAY).tolist()
+        for place in long[:PATIENCE]:
+            message = f"row {table.rows[place]} of the file: a delay must be at most {LONGEST_DELAY:,}"
+            self.constants.findings.error("out-of-range", span, message, several=True)
+        if i is None or j is None or long or table.fault is not None:
+            return None
+        return EdgeList(i, j, table.weights, table.delays)
+
+    def _named(self, names: tuple[str, ...], rows: IntArray, end: End, what: str, span: Span) -> IntArray | None:
+        positions = np.array([end.position(name) for name in names], dtype=np.int64)
+        unknown = {names[place]: int(rows[place]) for place in reversed(np.flatnonzero(positions < 0).tolist())}
+        for name in sorted(unknown, key=unknown.__getitem__)[:PATIENCE]:
+            self._outside(name, span, end, what, f" (row {unknown[name]} of the file)")
+        return None if unknown or end.perhaps is not None else positions
+
+
+def delay_of(formula: Formula, constants: Constants) -> int | None:
+    """A delay in steps; None, and a finding, where it is none."""
+    return constants.integer(formula, "a delay", 0, LONGEST_DELAY)

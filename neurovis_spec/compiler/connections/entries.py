@@ -1,0 +1,421 @@
+"""Entries: one entry of ``connections``, from its ends and its body to arrays.
+
+In: the neurons of both ends, where these are known, and the body. Out: a Bundle, or None: of an entry that is invalid
+every part is still looked at, whatever is wrong with the others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.connections.conflicts import check_conflicts
+from neurovis_spec.compiler.connections.edges import EdgeReader, End, delay_of
+from neurovis_spec.compiler.connections.ends import Ends
+from neurovis_spec.compiler.connections.patterns import all_to_all, is_drawn, pairs_of
+from neurovis_spec.compiler.connections.plasticity import Learning, Wired, learning_of
+from neurovis_spec.compiler.connections.weight_scale import Scaled, check_scale, scaled
+from neurovis_spec.compiler.events.settable import Assembled, Distance, Part
+from neurovis_spec.compiler.limits import Limits, amount
+from neurovis_spec.compiler.names.references import Directory
+from neurovis_spec.compiler.names.scope import Scope
+from neurovis_spec.compiler.neurons.populate import Population
+from neurovis_spec.compiler.values.constants import Constants, Randomness
+from neurovis_spec.compiler.values.draws import Stream
+from neurovis_spec.compiler.values.matrices import Grid, grid_of
+from neurovis_spec.diagnostics import Span
+from neurovis_spec.language.expressions.tree import names
+from neurovis_spec.language.located import Formula, Located
+from neurovis_spec.language.sections import ConnectionModel
+from neurovis_spec.language.values import FileReference, Rows
+from neurovis_spec.language.yaml.source import Scalar
+
+#: Keys of a body that say which connections there are.
+_SHAPING = frozenset({"matrix", "edges", "pattern", "centre", "rows", "self"})
+#: What a weight may depend on.
+_PAIR = ("i", "j", "n_from", "n_to", "distance")
+
+
+class Bundle(NamedTuple):
+    """The connections of one entry: neuron indices and values, and the rule, if any."""
+
+    name: str
+    key: Span
+    sources: IntArray
+    targets: IntArray
+    weights: FloatArray
+    centres: FloatArray
+    delays: IntArray
+    low: float
+    high: float
+    learning: Learning | None
+    description: str | None
+    #: whether no neuron is in both ends of the entry
+    apart: bool
+    #: what of it follows parameters: ``weights``, ``first`` of an entry that learns (its first weights, which nothing
+    #: that is set in a run changes), ``centres``, ``low``, ``high``, ``rule``
+    parts: tuple[Part, ...] = ()
+    label: str | None = None
+
+
+class _Shape(NamedTuple):
+    """Which pairs of an entry exist (positions within its ends), and what its shape says of weights and delays."""
+
+    i: IntArray
+    j: IntArray
+    weights: FloatArray | None = None
+    delays: IntArray | None = None
+    #: what of its weights follows parameters
+    parts: tuple[Part, ...] = ()
+
+
+class Place(NamedTuple):
+    """Where an entry stands: its scope, what is called how there, how many connections it may make."""
+
+    scope: Scope
+    directory: Directory
+    population: Population
+    limits: Limits
+    seed: int
+    room: int
+
+
+@dataclass(frozen=True)
+class EntryBuilder:
+    """Builds one entry, step by step: its shape, its weights, its rule. An end that is invalid is None.
+
+    ``name`` is what it is called in its scope.
+    """
+
+    place: Place
+    key: Located[str]
+    body: ConnectionModel
+    name: str
+    sources: IntArray | None
+    targets: IntArray | None
+
+    @property
+    def constants(self) -> Constants:
+        """What evaluates the formulas of the scope."""
+        return self.place.scope.constants
+
+    def _stream(self, purpose: str) -> Stream:
+        return Stream(self.place.seed, purpose, self.place.scope.declares(self.name))
+
+    def _kept(self, *keys: str) -> bool:
+        """Whether nothing was lost that these keys may have said."""
+        return self.body.lost_keys.isdisjoint(keys)
+
+    def build(self) -> Bundle | None:
+        """The connections; None where anything of the entry is invalid, which is reported."""
+        before = self.constants.findings.errors
+        check_conflicts(self.body, self.constants.findings)
+        if self.constants.findings.errors == before:
+            return self._built(before)
+        # which of the keys is meant is not known, so nothing is held against the sizes of the ends
+        return replace(self, sources=None, targets=None)._built(before)
+
+    def _built(self, before: int) -> Bundle | None:
+        body, findings = self.body, self.constants.findings
+        delay = 1 if body.delay is None else delay_of(body.delay, self.constants)
+        sound = findings.errors
+        with self.constants.following() as centre_cells:
+            centre = self._grid(body.centre, "centre") if isinstance(body.centre, (Rows, FileReference)) else None
+        shape = self._shape(centre)
+        if shape is not None and findings.errors == sound and not len(shape.i):
+            # whether a spec is valid must not depend on its seed
+            if body.pattern is not None and is_drawn(body.pattern, self.constants):
+                message = "this entry draws no connection at all"
+                findings.warning(
+                    "nothing-drawn", self.key.span, message, "another seed, or a larger probability, draws some"
+                )
+            else:
+                findings.error("no-connection", self.key.span, "this entry makes no connection at all")
+        if findings.errors > sound or (shape is not None and not self._fits(len(shape.i))):
+            shape = None
+        with self.constants.following() as weighted:
+            weights = self._weights(shape)
+        with self.constants.following() as centred:
+            centres = self._centres(centre, shape)
+            self.constants.follow(self._cells(centre, centre_cells, shape))
+        with self.constants.following() as bounding:
+            bounds = self._bounds(weights)
+        with self.constants.following() as ruled:
+            learning = self._learning(shape)
+        if shape is None or weights is None or centres is None or bounds is None or findings.errors > before:
+            return None
+        if self.sources is None or self.targets is None or body.lost:
+            return None
+        if not len(shape.i):  # there is nothing that a rule would change
+            learning = None
+        delays = np.full(len(shape.i), 0 if delay is None else delay, dtype=np.int64)
+        if shape.delays is not None:
+            delays = np.where(shape.delays >= 0, shape.delays, delays)
+        return Bundle(
+            self.place.scope.called(self.name),
+            self.key.span,
+            self.sources[shape.i],
+            self.targets[shape.j],
+            weights,
+            centres,
+            delays,
+            bounds[0],
+            bounds[1],
+            learning,
+            None if body.description is None else body.description.value,
+            not np.isin(self.sources, self.targets).any(),
+            (
+                *(part._replace(field="weights" if learning is None else "first") for part in weighted),
+                *(part._replace(field="centres") for part in centred),
+                *bounding,
+                *(part._replace(field="rule") for part in ruled if learning is not None),
+            ),
+            None if body.label is None else body.label.value,
+        )
+
+    def _fits(self, count: int) -> bool:
+        """Whether there is room for so many connections; a finding where there is not."""
+        room, limit = self.place.room, self.place.limits.connections
+        if count <= room:
+            return True
+        message = f"this makes {amount(limit - room + count)} connections; the limit is {limit:,}"
+        self.constants.findings.error("too-many", self.key.span, message, "raise it with --limit")
+        return False
+
+    def _grid(self, matrix: Rows | FileReference, purpose: str) -> Grid | None:
+        by_target = self.body.rows is not None and self.body.rows.value == "to"
+        n = None if self.sources is None or not self._kept("rows") else len(self.sources)
+        m = None if self.targets is None or not self._kept("rows") else len(self.targets)
+        return grid_of(matrix, n, m, by_target, self.constants, self.place.scope.files, self._stream(purpose))
+
+    def _cells(self, grid: Grid | None, parts: list[Part], shape: _Shape | None) -> tuple[Part, ...]:
+        """What of a matrix follows parameters, by connections instead of by cells as they are written."""
+        if grid is None or shape is None or not parts:
+            return ()
+        by_target = self.body.rows is not None and self.body.rows.value == "to"
+        order = np.full(grid.shape, -1, dtype=np.int64)
+        order[shape.i, shape.j] = np.arange(len(shape.i))
+        cells = (order.T if by_target else order).ravel()
+        return tuple(_present(part, cells[part.within(cells.size)]) for part in parts)
+
+    def _shape(self, centre: Grid | None) -> _Shape | None:
+        """The pairs; every key that may say which they are is checked."""
+        body = self.body
+        with self.constants.following() as cells:
+            grid = None if body.matrix is None else self._grid(body.matrix, "weight")
+        edges = None if body.edges is None else self._edges()
+        pattern = None if body.pattern is None else self._pattern()
+        if self.sources is None or self.targets is None or not self._kept(*_SHAPING):
+            return None
+        if body.edges is not None:
+            return edges
+        if body.matrix is not None:
+            if grid is None:
+                return None
+            present = grid.present if centre is None else grid.present & centre.present
+            i, j = np.nonzero(present)
+            shape = _Shape(i, j, np.ascontiguousarray(grid.values[i, j]))
+            return shape._replace(parts=self._cells(grid, cells, shape))
+        if isinstance(body.centre, (Rows, FileReference)):
+            if centre is None:
+                return None
+            i, j = np.nonzero(centre.present)
+            return _Shape(i, j)
+        return pattern if body.pattern is not None else self._all()
+
+    def _ends(self) -> Ends | None:
+        if self.sources is None or self.targets is None or not self._kept("self"):
+            return None
+        loops: bool | None = True if len(self.sources) == len(self.targets) == 1 else None
+        loops = loops if self.body.self is None else self.body.self.value
+        position = self.place.population.neurons.position
+        return Ends(self.sources, self.targets, loops, position[self.sources], position[self.targets])
+
+    def _pattern(self) -> _Shape | None:
+        assert self.body.pattern is not None
+        ends = None if self._misplaced() else self._ends()
+        pairs = pairs_of(self.body.pattern, ends, self.constants, self._stream("edges"), self._fits)
+        if ends is not None and self.body.pattern.name.value == "nearest":
+            self.place.population.go_by_position(np.concatenate((ends.sources, ends.targets)))
+        return None if pairs is None else _Shape(*pairs)
+
+    def _all(self) -> _Shape | None:
+        """All pairs, where nothing says which."""
+        ends = self._ends()
+        if ends is None:
+            return None
+        n, m = len(ends.sources), len(ends.targets)
+        if n > 1 and m > 1 and self._may_be_a_matrix():
+            return None
+        if n > 1 and m > 1:
+            message = f"{n} neurons to {m} neurons: how are they connected?"
+            hint = "add pattern: all_to_all, or pattern: one_to_one, or a matrix"
+            self.constants.findings.error("pattern-missing", self.key.span, message, hint)
+            return None
+        return _Shape(*all_to_all(ends))
+
+    def _may_be_a_matrix(self) -> bool:
+        """Whether what is given as the weight, and was refused, may have been meant to say who is connected."""
+        weight = self.body.source.get("weight")
+        return not self._kept("weight") and not (isinstance(weight, Scalar) and isinstance(weight.value, str))
+
+    def _edges(self) -> _Shape | None:
+        assert self.body.edges is not None
+        ends = (self._named(self.sources), self._named(self.targets))
+        reader = EdgeReader(*ends, self.constants, self.place.scope.files, self._stream("weight"), self.place.room)
+        with self.constants.following() as parts:
+            edges = reader.read(self.body.edges)
+        return None if edges is None else _Shape(edges.i, edges.j, edges.weights, edges.delays, tuple(parts))
+
+    def _named(self, neurons: IntArray | None) -> End:
+        """The places of an end's neurons by the names that they have in the scope."""
+        if neurons is None:
+            directory = self.place.directory
+            return End(directory.neurons, lambda name: directory.find(name) is not None or directory.covers(name))
+        called, own = self.place.population.neurons.names, len(self.place.scope.called(""))
+        return End({called[neuron][own:]: place for place, neuron in enumerate(neurons.tolist())})
+
+    def _values(self, formula: Formula, shape: _Shape | None, purpose: str) -> FloatArray | None:
+        """A formula of i, j, n_from, n_to (and distance) for every pair."""
+        if shape is None or self.sources is None or self.targets is None:
+            self.constants.look(formula, _PAIR, random=True)
+            return None
+        extra: dict[str, float | FloatArray] = {
+            "i": shape.i.astype(np.float64),
+            "j": shape.j.astype(np.float64),
+            "n_from": float(len(self.sources)),
+            "n_to": float(len(self.targets)),
+        }
+        tree = None
+        if isinstance(formula.value, str):
+            tree = self.constants.tree(formula, _PAIR, random=True)
+            if tree is None:
+                return None
+        if tree is not None and "distance" in names(tree):
+            position = self.place.population.neurons.position
+            ends = position[self.sources[shape.i]], position[self.targets[shape.j]]
+            if self._misplaced() or not all(np.isfinite(end).all() for end in ends):
+                if not self._misplaced():
+                    message = "'distance' needs a position of every neuron of both ends"
+                    self.constants.findings.error("no-position", formula.span, message, "give the groups a 'position'")
+                return None
+            with np.errstate(over="ignore"):  # what is then infinite is found where it matters
+                apart = ends[0] - ends[1]
+                extra["distance"] = np.hypot(apart[:, 0], apart[:, 1])
+        randomness = Randomness(self._stream(purpose), shape.i, shape.j)
+        with self.constants.following() as parts:
+            value = self.constants.value(formula, extra, randomness)
+        if tree is not None and "distance" in extra:
+            pairs = self.sources[shape.i], self.targets[shape.j]
+            distance = Distance(self.place.population.moving, *pairs)
+            if distance.slots:
+                parts = [Part(self.constants.bound(tree, {**extra, "distance": distance}, randomness))]
+        self.constants.follow(parts)
+        return None if value is None else np.broadcast_to(np.asarray(value, dtype=np.float64), shape.i.shape).copy()
+
+    def _misplaced(self) -> bool:
+        """Whether what the spec says of a position of these neurons is invalid."""
+        misplaced = self.place.population.misplaced
+        return any(end is not None and bool(misplaced[end].any()) for end in (self.sources, self.targets))
+
+    def _weights(self, shape: _Shape | None) -> FloatArray | None:
+        if self.body.scale is None:
+            weights = self._plain_weights(shape)
+            return weights if self._kept("scale") else None
+        with self.constants.following() as parts:
+            weights = self._plain_weights(shape)
+        if weights is None or shape is None or self.sources is None or self.targets is None:
+            check_scale(self.body.scale, self.constants)
+            return None
+        ends, pairs = (self.sources, self.targets), (shape.i, shape.j)
+        scale = Scaled(Assembled(weights, tuple(parts)), self.body.scale, ends, pairs, self.constants)
+        if scale.slots:
+            self.constants.follow([Part(scale)])
+        with self.constants.following():  # followed as a whole
+            return scaled(self.body.scale, weights, ends, pairs, self.constants)
+
+    def _plain_weights(self, shape: _Shape | None) -> FloatArray | None:
+        """The weights before they are scaled."""
+        weights = None if shape is None else shape.weights
+        if self.body.weight is not None:
+            return self._values(self.body.weight, shape, "weight")
+        if weights is None and shape is not None and self._kept("weight"):
+            return np.ones(len(shape.i))
+        if shape is not None:
+            self.constants.follow(shape.parts)
+        return weights
+
+    def _centres(self, grid: Grid | None, shape: _Shape | None) -> FloatArray | None:
+        centre = self.body.centre
+        if centre is None:
+            return None if shape is None else np.zeros(len(shape.i))
+        if not self._measures_distance():
+            entry = self.body.source.entry("centre")
+            span = self.key.span if entry is None else entry.key.span
+            message = "'centre' has no effect: none of the targets combines by distance"
+            self.constants.findings.error("useless-key", span, message, "give the targets combine: distance")
+        if isinstance(centre, Located):
+            return self._values(centre, shape, "centre")
+        if grid is None or shape is None:
+            return None
+        return np.ascontiguousarray(grid.values[shape.i, shape.j])
+
+    def _measures_distance(self) -> bool:
+        """Whether any of the targets combines by distance, or may, where what it says of that is invalid."""
+        return self.targets is None or bool(self.place.population.by_distance[self.targets].any())
+
+    def _bounds(self, weights: FloatArray | None) -> tuple[float, float] | None:
+        bounds = self.body.bounds
+        if bounds is None:
+            return (-np.inf, np.inf)
+        findings = self.constants.findings
+        entry = self.body.source.entry("bounds")
+        assert entry is not None
+        if self.body.plasticity is None and self._kept("plasticity"):
+            findings.error("useless-key", entry.key.span, "'bounds' hold plastic weights; there is no 'plasticity'")
+        with self.constants.following() as lower:
+            low = self.constants.scalar(bounds[0])
+        with self.constants.following() as upper:
+            high = self.constants.scalar(bounds[1])
+        if low is not None and high is not None and (lower or upper):  # what is below the other one must stay there
+            above = Assembled(np.array(high), tuple(upper))
+            lower = lower or [Part(Assembled(np.array(low), ()))]
+            self.constants.follow(part._replace(field="low", high=above) for part in lower)
+            self.constants.follow(part._replace(field="high") for part in upper)
+        if low is None or high is None:
+            return None
+        if low > high:
+            findings.error("out-of-range", entry.value.span, f"the lower bound {low:g} is above the upper one {high:g}")
+            return None
+        if weights is not None and ((weights < low) | (weights > high)).any():
+            first = weights[(weights < low) | (weights > high)][0]
+            message = f"the first weight {first:g} lies outside the bounds {low:g} to {high:g}"
+            findings.error("weight-outside", entry.value.span, message)
+            return None
+        return (low, high)
+
+    def _learning(self, shape: _Shape | None) -> Learning | None:
+        if self.body.plasticity is None:
+            return None
+        wired = None
+        if shape is not None and self.sources is not None and self.targets is not None:
+            wired = Wired(shape.i, shape.j, len(self.sources), len(self.targets))
+        return learning_of(
+            self.body.plasticity,
+            wired,
+            None if self.targets is None else len(self.targets),
+            self.place.scope,
+            self.place.directory,
+            len(self.place.population.neurons),
+        )
+
+
+def _present(part: Part, places: IntArray) -> Part:
+    """A part whose numbers stand at these places, without those that stand at none (−1)."""
+    inside = np.flatnonzero(places >= 0)
+    if len(inside) < len(places):
+        part = part.some(inside)
+    return part._replace(places=places[inside])

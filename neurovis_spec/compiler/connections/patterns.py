@@ -1,0 +1,235 @@
+"""Patterns: which pairs of two ends are connected.
+
+In: the neurons of both ends, by index, and a pattern with its settings. Out: positions (i, j) of the pairs within
+the ends, row by row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from neurovis_spec.compiler.connections.ends import Ends, Pairs
+from neurovis_spec.compiler.connections.patterns_drawn import fixed_indegree, fixed_outdegree, small_world
+from neurovis_spec.compiler.connections.patterns_near import band, in_band, nearest
+from neurovis_spec.compiler.limits import plural
+from neurovis_spec.compiler.values.arguments import check_settings
+from neurovis_spec.compiler.values.constants import Constants
+from neurovis_spec.compiler.values.draws import Stream
+from neurovis_spec.diagnostics import Findings, Span, meant, shorten, suggest
+from neurovis_spec.diagnostics import nearest as nearest_names
+from neurovis_spec.language.located import Formula, formula_of
+from neurovis_spec.language.patterns import SETTINGS
+from neurovis_spec.language.values import Choice
+
+
+def all_to_all(ends: Ends) -> Pairs:
+    """Every source with every target."""
+    n, m = len(ends.sources), len(ends.targets)
+    return ends.pairs(np.repeat(np.arange(n), m), np.tile(np.arange(m), n))
+
+
+def one_to_one(ends: Ends) -> Pairs:
+    """The first with the first and so on; within a group this makes self-loops, which is what was asked for."""
+    index = np.arange(len(ends.sources), dtype=np.int64)
+    return ends.pairs(index, index, loops=True)
+
+
+def chain(ends: Ends) -> Pairs:
+    """i to i + 1."""
+    index = np.arange(len(ends.sources) - 1, dtype=np.int64)
+    return ends.pairs(index, index + 1)
+
+
+def ring(ends: Ends) -> Pairs:
+    """i to i + 1, and the last to the first."""
+    index = np.arange(len(ends.sources), dtype=np.int64)
+    return ends.pairs(index, np.roll(index, -1))
+
+
+def random(ends: Ends, probability: float, stream: Stream) -> Pairs:
+    """Every pair with a probability; drawn row by row by geometric gaps (§4, Randomness)."""
+    return ends.pairs(*stream.random_pairs(len(ends.sources), len(ends.targets), probability))
+
+
+_FIXED: Mapping[str, Callable[[Ends], Pairs]] = {
+    "all_to_all": all_to_all,
+    "one_to_one": one_to_one,
+    "chain": chain,
+    "ring": ring,
+}
+#: Patterns with settings, and how they are written.
+_USES: Mapping[str, str] = {
+    "random": "{random: {probability: 0.1}}",
+    "fixed_indegree": "{fixed_indegree: {count: 3}}",
+    "fixed_outdegree": "{fixed_outdegree: {count: 3}}",
+    "nearest": "{nearest: {count: 3}}",
+    "small_world": "{small_world: {degree: 4, rewire: 0.1}}",
+    "band": "{band: {width: 1}}",
+}
+PATTERNS = (*_FIXED, *_USES)
+
+
+def pairs_of(
+    choice: Choice, ends: Ends | None, constants: Constants, stream: Stream, fits: Callable[[int], bool]
+) -> Pairs | None:
+    """The pairs of a pattern as the author wrote it; None where it is invalid, which is reported, or where the ends are
+    not known.
+
+    ``fits`` says, before they are made, whether there is room for so many.
+    """
+    findings = constants.findings
+    written, span = choice.name.value, choice.name.span
+    name = written if written in PATTERNS else meant(written, PATTERNS)
+    if written not in PATTERNS:
+        hint = suggest(written, PATTERNS, "patterns")
+        findings.error("unknown-pattern", span, f"there is no pattern '{shorten(written)}'", hint)
+    if name is None:
+        check_settings(choice, constants)
+        return None
+    settings = _settings(name, choice, findings)
+    sized = _Sized(name, span, settings, constants)
+    values = sized.values()
+    if ends is None:
+        return None
+    n, m = len(ends.sources), len(ends.targets)
+    if n != m and ((name in _FIXED and name != "all_to_all") or name == "small_world"):
+        message = f"'{name}' needs ends of equal size; these have {n} and {m} neurons"
+        findings.error("wrong-size", span, message)
+        return None
+    if len(values) < len(SETTINGS[name]) or name != written:
+        return None
+    if name in _FIXED:
+        return _FIXED[name](ends) if fits(least_pairs(name, n, m, {})) else None
+    return sized.pairs(values, ends, stream, fits)
+
+
+def least_pairs(name: str, n: int, m: int, values: Mapping[str, float]) -> int:
+    """How many pairs a pattern makes of n sources and m targets, but for a neuron's connection to itself: at the least,
+    or nearly so. 0 where that cannot be said, as these are no settings for such ends."""
+    if name in _FIXED:
+        return n * m if name == "all_to_all" else n
+    if not set(SETTINGS.get(name, (name,))) <= values.keys():
+        return 0
+    if name == "random":
+        probability = values["probability"]
+        if not 0 < probability <= 1:
+            return 0
+        # fewer there are in one case in a million; who has made them is asked again
+        return max(0, int(n * m * probability - 5 * (n * m * probability * (1 - probability)) ** 0.5))
+    if name == "band":
+        return max(0, in_band(n, m, min(int(values["width"]), max(n, m))) - min(n, m))
+    each, ends, others = (values["count"], n, m) if name != "small_world" else (values["degree"], n, n)
+    if name == "fixed_indegree":
+        ends, others = m, n
+    return int(each) * ends if each <= others else 0
+
+
+def is_drawn(choice: Choice, constants: Constants) -> bool:
+    """Whether chance decides which pairs a valid pattern makes."""
+    if choice.name.value != "random":
+        return False
+    formulas = [formula_of(entry.value, constants.findings) for entry in choice.settings]
+    return any(formula is not None and constants.scalar(formula) for formula in formulas)
+
+
+def _settings(name: str, choice: Choice, findings: Findings) -> dict[str, Formula]:
+    """The formulas of the settings; each of them has to be there."""
+    allowed = SETTINGS[name]
+    entries = {entry.name: entry for entry in choice.settings if entry.name in allowed}
+    perhaps: set[str] = set()
+    for entry in choice.settings:
+        if entry.name not in allowed:
+            hint = suggest(entry.name, allowed, "known here") or f"'{name}' has no settings"
+            findings.error("unknown-parameter", entry.key.span, f"there is no setting '{shorten(entry.name)}'", hint)
+            free = [setting for setting in allowed if setting not in entries]
+            right = meant(entry.name, free)
+            perhaps.update(nearest_names(entry.name, free))
+            if right is not None:
+                entries[right] = entry
+    for missing in [setting for setting in allowed if setting not in entries and setting not in perhaps][:1]:
+        message = f"'{name}' needs a {missing}"
+        findings.error("missing-key", choice.name.span, message, f"write {_USES[name]}")
+    formulas = {setting: formula_of(entry.value, findings) for setting, entry in entries.items()}
+    return {setting: formula for setting, formula in formulas.items() if formula is not None}
+
+
+@dataclass(frozen=True)
+class _Sized:
+    """A pattern with settings, which are checked before anything is made."""
+
+    name: str
+    span: Span
+    settings: Mapping[str, Formula]
+    constants: Constants
+
+    def values(self) -> dict[str, float]:
+        """What the settings are, without those invalid."""
+        found = {setting: self._value(setting, formula) for setting, formula in self.settings.items()}
+        return {setting: value for setting, value in found.items() if value is not None}
+
+    def _value(self, setting: str, formula: Formula) -> float | None:
+        if setting in ("probability", "rewire"):
+            return self._probability(formula)
+        least = {"width": 0, "degree": 2, "count": 1}[setting]
+        value = self.constants.integer(formula, f"a {setting}", least)
+        if setting != "degree" or value is None or not value % 2:
+            return value
+        self._too_many("degree", f"a degree is even, half of it on each side of the ring; this is {value}")
+        return None
+
+    def _probability(self, formula: Formula) -> float | None:
+        value = self.constants.scalar(formula, structural=True)
+        if value is None or 0 <= value <= 1:
+            return value
+        message = f"a probability lies between 0 and 1, this is {value:g}"
+        self.constants.findings.error("out-of-range", formula.span, message)
+        return None
+
+    def _too_many(self, setting: str, message: str) -> None:
+        self.constants.findings.error("out-of-range", self.settings[setting].span, message)
+
+    def pairs(
+        self, values: Mapping[str, float], ends: Ends, stream: Stream, fits: Callable[[int], bool]
+    ) -> Pairs | None:
+        """The pairs; None, and a finding, where the settings do not fit the ends."""
+        n, m = len(ends.sources), len(ends.targets)
+        least = least_pairs(self.name, n, m, values)
+        if self.name == "random":
+            return random(ends, values["probability"], stream) if fits(least) else None
+        if self.name == "band":
+            return band(ends, min(int(values["width"]), max(n, m))) if fits(least) else None
+        if self.name == "small_world":
+            degree = int(values["degree"])
+            if degree > n - 1:
+                self._too_many("degree", f"a degree of {degree} where each has {plural(n - 1, 'neighbour')}")
+                return None
+            return small_world(ends, degree, values["rewire"], stream) if fits(least) else None
+        return self._counted(int(values["count"]), ends, stream, fits)
+
+    def _counted(self, count: int, ends: Ends, stream: Stream, fits: Callable[[int], bool]) -> Pairs | None:
+        by_target = self.name == "fixed_indegree"
+        turned = ends.reversed() if by_target else ends
+        there = len(turned.targets) - bool((turned.excluded() >= 0).any())
+        if count > there:
+            from_, to = ("target", "source") if by_target else ("source", "target")
+            itself = " but itself" if there < len(turned.targets) else ""
+            self._too_many("count", f"a count of {count} where a {from_} has {plural(there, to)}{itself}")
+            return None
+        if not fits(count * len(turned.sources)):
+            return None
+        if self.name == "nearest":
+            return nearest(ends, count) if self._placed(ends) else None
+        return (fixed_indegree if by_target else fixed_outdegree)(ends, count, stream)
+
+    def _placed(self, ends: Ends) -> bool:
+        """Whether all neurons have a position, or none; a finding where some have."""
+        places = np.concatenate((ends.source_places, ends.target_places))
+        known = np.isfinite(places).all(axis=1)
+        if known.all() or not known.any():
+            return True
+        message = "'nearest' goes by position, and some neurons of these ends have none"
+        self.constants.findings.error("no-position", self.span, message, "give all of them a 'position', or none")
+        return False

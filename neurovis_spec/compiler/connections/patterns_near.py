@@ -1,0 +1,152 @@
+"""Patterns of nearness: the nearest targets, and bands.
+
+In: the Ends. Out: pairs, row by row. Nothing is drawn.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.connections.ends import Ends, Pairs
+
+#: Distances held at once.
+_CELLS = 1 << 22
+#: The fewest neurons in a leaf: the work on a leaf outweighs the call.
+_LEAF = 32
+
+
+def nearest(ends: Ends, count: int) -> Pairs:
+    """Every source with its ``count`` nearest targets, by position, or, where no neuron has one, by |i − j|. Of targets
+    equally far the first ones are taken; a source's own neuron is left out, if it may not connect to itself."""
+    n = len(ends.sources)
+    placed = np.isfinite(ends.source_places).all() and len(ends.source_places) == n
+    columns = _by_position(ends, count) if placed else _by_index(ends, count)
+    return np.repeat(np.arange(n, dtype=np.int64), count), columns
+
+
+def _by_index(ends: Ends, count: int) -> IntArray:
+    """The nearest by |i − j| lie in a window around i, or at the end of the shorter end."""
+    n, m = len(ends.sources), len(ends.targets)
+    excluded = ends.excluded()
+    width = min(m, 2 * count + 3)
+    found: list[IntArray] = []
+    together = max(1, _CELLS // width)
+    for start in range(0, n, together):
+        rows = np.arange(start, min(start + together, n), dtype=np.int64)
+        columns = np.clip(rows - count - 1, 0, m - width)[:, None] + np.arange(width)
+        apart = np.abs(rows[:, None] - columns).astype(np.float64)
+        apart[columns == excluded[rows, None]] = np.inf
+        found.append(columns[_least(apart, count)])
+    return np.concatenate(found)
+
+
+def _by_position(ends: Ends, count: int) -> IntArray:
+    """Sources and targets are split into leaves of neighbours. For a leaf of sources the closest leaves of targets say
+    how far the nearest can be; then only leaves whose boxes are within that reach are compared.
+
+    A box is never further away than a neuron in it, also as computed: differences, squares and their sum are rounded
+    in the same order, and rounding keeps an order. So the result is that of comparing all pairs.
+    """
+    sources, targets = _comparable(ends)
+    excluded, m = ends.excluded(), len(targets)
+    size = max(_LEAF, 2 * count, math.isqrt(m) // 16)
+    leaves = _leaves(targets, size)
+    lengths = np.array([len(leaf) for leaf in leaves])
+    low, high = _boxes(targets, leaves)
+    result = np.empty((len(sources), count), dtype=np.int64)
+    for rows in _leaves(sources, size):
+        places = sources[rows]
+        gaps = np.maximum(0.0, np.maximum(low - places.max(axis=0), places.min(axis=0) - high))
+        bound = _squared(gaps)
+        order = np.argsort(bound, kind="stable")
+        enough = int(np.searchsorted(np.cumsum(lengths[order]), min(count + 1, m))) + 1
+        first = np.concatenate([leaves[leaf] for leaf in order[:enough]])
+        reach = max(
+            float(np.partition(apart, count - 1, axis=1)[:, count - 1].max())
+            for _, apart in _apart(places, rows, targets, first, excluded)
+        )
+        columns = np.sort(np.concatenate([leaves[leaf] for leaf in np.flatnonzero(bound <= reach)]))
+        for some, apart in _apart(places, rows, targets, columns, excluded):
+            taken = np.broadcast_to(columns, apart.shape)[_least(apart, count)]
+            result[some] = taken.reshape(len(some), count)
+    return result.reshape(-1)
+
+
+def _apart(
+    places: FloatArray, rows: IntArray, targets: FloatArray, columns: IntArray, excluded: IntArray
+) -> Iterator[tuple[IntArray, FloatArray]]:
+    """Some of the rows at a time, and their squared distances to the columns; ∞ for what is excluded."""
+    together = max(1, _CELLS // len(columns))
+    for start in range(0, len(rows), together):
+        some = rows[start : start + together]
+        apart = _squared(places[start : start + together, None] - targets[columns])
+        apart[columns == excluded[some, None]] = np.inf
+        yield some, apart
+
+
+def _squared(differences: FloatArray) -> FloatArray:
+    """Squares and a sum are the same everywhere; a root need not be."""
+    result: FloatArray = differences[..., 0] ** 2 + differences[..., 1] ** 2
+    return result
+
+
+def _leaves(places: FloatArray, size: int) -> list[IntArray]:
+    """The indices of places, split at the median of the wider axis until there are at most ``size``."""
+    result: list[IntArray] = []
+    waiting = [np.arange(len(places), dtype=np.int64)]
+    while waiting:
+        part = waiting.pop()
+        if len(part) <= size:
+            result.append(part)
+            continue
+        inside = places[part]
+        axis = int(np.argmax(np.ptp(inside, axis=0)))
+        half = len(part) // 2
+        order = np.argpartition(inside[:, axis], half)
+        waiting += [part[order[:half]], part[order[half:]]]
+    return result
+
+
+def _boxes(places: FloatArray, leaves: list[IntArray]) -> tuple[FloatArray, FloatArray]:
+    """The lower and the upper corner of every leaf, (leaves, 2) each."""
+    low = np.array([places[leaf].min(axis=0) for leaf in leaves])
+    return low, np.array([places[leaf].max(axis=0) for leaf in leaves])
+
+
+def _least(apart: FloatArray, count: int) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+    """Which are the ``count`` least numbers of every row; of equal ones the first."""
+    limit = np.partition(apart, count - 1, axis=1)[:, count - 1, None]
+    less, equal = apart < limit, apart == limit
+    wanted = count - np.count_nonzero(less, axis=1)
+    taken: np.ndarray[tuple[int, ...], np.dtype[np.bool_]] = less | (
+        equal & (np.cumsum(equal, axis=1) <= wanted[:, None])
+    )
+    return taken
+
+
+def _comparable(ends: Ends) -> tuple[FloatArray, FloatArray]:
+    """The positions, brought by a power of two to a size whose squares are numbers."""
+    most = max(float(np.abs(ends.source_places).max()), float(np.abs(ends.target_places).max()))
+    power = -int(np.frexp(most)[1])
+    return np.ldexp(ends.source_places, power), np.ldexp(ends.target_places, power)
+
+
+def in_band(n: int, m: int, width: int) -> int:
+    """How many pairs of n sources and m targets have |i − j| ≤ width."""
+    i = np.arange(n, dtype=np.int64)
+    return int(np.maximum(0, np.minimum(m, i + width + 1) - np.maximum(0, i - width)).sum())
+
+
+def band(ends: Ends, width: int) -> Pairs:
+    """All pairs with |i − j| ≤ width."""
+    n, m = len(ends.sources), len(ends.targets)
+    i = np.arange(n, dtype=np.int64)
+    first = np.maximum(0, i - width)
+    sizes = np.maximum(0, np.minimum(m, i + width + 1) - first)
+    rows = np.repeat(i, sizes)
+    columns = np.arange(len(rows)) - np.repeat(np.cumsum(sizes) - sizes, sizes) + np.repeat(first, sizes)
+    return ends.pairs(rows, columns)

@@ -1,0 +1,173 @@
+"""Learning: what an entry of ``connections`` says of its plasticity.
+
+In: a Choice (a rule with settings and signals). Out: a Learning: the rule, its parameters (one value a connection),
+and for each signal where it comes from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.limits import PATIENCE
+from neurovis_spec.compiler.names.references import Directory, few, resolve_end
+from neurovis_spec.compiler.names.scope import Scope
+from neurovis_spec.compiler.program import Rule
+from neurovis_spec.compiler.values.arguments import Each, check_initials, check_settings, choose, parameters, settle
+from neurovis_spec.diagnostics import shorten, suggest
+from neurovis_spec.language.located import Located
+from neurovis_spec.language.values import Choice
+from neurovis_spec.language.yaml.source import Entry, Node, Packed, Scalar, Sequence
+
+
+class Learning(NamedTuple):
+    """A rule in use. ``signals`` are indices into all activities followed by all inputs, one a connection; ``texts``
+    are what the author calls them."""
+
+    rule: Rule
+    parameters: Mapping[str, FloatArray]
+    signals: Mapping[str, IntArray]
+    texts: Mapping[str, str]
+
+
+class Wired(NamedTuple):
+    """The connections of an entry: connection c goes from the ``i[c]``-th of ``n_from`` sources to the ``j[c]``-th of
+    ``n_to`` targets."""
+
+    i: IntArray
+    j: IntArray
+    n_from: int
+    n_to: int
+
+
+#: What a parameter of a rule may depend on.
+_PAIR = ("i", "j", "n_from", "n_to")
+#: Signals of a list that are named where a rule is shown.
+_SHOWN = 3
+
+
+def learning_of(
+    choice: Choice,
+    wired: Wired | None,
+    target_count: int | None,
+    scope: Scope,
+    directory: Directory,
+    neurons: int,
+) -> Learning | None:
+    """The rule of an entry with these connections; None where they are not known: the entry is invalid, and its rule
+    is checked only.
+
+    ``directory`` says what the names of the scope mean, ``neurons`` is how many the network has.
+    """
+    constants, definitions = scope.constants, scope.definitions
+    found = choose(choice, definitions.rules, "rule", definitions, constants.findings)
+    if found is None:
+        check_settings(choice, constants, _PAIR)
+        return None
+    rule, defaults = found
+    known = (*(default.name for default in defaults), *rule.signals)
+    settled = settle(choice, known, constants.findings)
+    targets = None if wired is None else wired.j
+    each = Each("connection", _PAIR, None if wired is None else wired._asdict())
+    values = parameters(choice, defaults, None if targets is None else len(targets), constants, settled, each)
+    signals: dict[str, IntArray] = {}
+    failed = values is None
+    for signal in rule.signals:
+        entry = settled.entries.get(signal)
+        if entry is None:
+            failed = True
+            if signal not in settled.perhaps:
+                message = f"the rule '{rule.name}' needs the signal '{signal}'"
+                hint = f"write {{{rule.name}: {{{signal}: NEURON_OR_INPUT}}}}"
+                constants.findings.error("missing-signal", choice.name.span, message, hint)
+            continue
+        where = _signal(entry, targets, target_count, scope, directory, neurons)
+        if where is None:
+            failed = True
+        else:
+            signals[signal] = where
+    if failed or values is None or not check_initials(rule.state, values, choice, constants):
+        return None
+    return Learning(rule, values, signals, {name: _text(settled.entries[name].value) for name in rule.signals})
+
+
+def _signal(
+    entry: Entry,
+    targets: IntArray | None,
+    target_count: int | None,
+    scope: Scope,
+    directory: Directory,
+    neurons: int,
+) -> IntArray | None:
+    """Where a signal comes from, for each connection; one name, or a list of names that are taken together."""
+    node, before = entry.value, scope.constants.findings.errors
+    items = node.items if isinstance(node, (Sequence, Packed)) else (node,)
+    parts: list[IntArray | None] = []
+    for item in items:
+        parts.append(_place(entry.name, item, scope, directory, neurons))
+        if scope.constants.findings.errors - before >= PATIENCE:
+            return None
+    if not parts:
+        message = f"the signal '{entry.name}' names no neuron, group or input"
+        scope.constants.findings.error("wrong-type", node.span, message)
+    found = [part for part in parts if part is not None]
+    if not found or len(found) < len(parts):
+        return None
+    where = np.concatenate(found)
+    if len(where) == 1 and targets is not None:
+        return np.repeat(where, len(targets))
+    if len(where) == target_count and targets is not None:
+        return where[targets]
+    if target_count is None or len(where) in (1, target_count):
+        return None
+    called = f"'{_text(node)}'" if isinstance(node, Scalar) else f"'{entry.name}'"
+    message = f"the signal {called} has {len(where)} components; 1 or {target_count}, one for each target, are wanted"
+    scope.constants.findings.error("wrong-size", node.span, message)
+    return None
+
+
+def _place(signal: str, node: Node, scope: Scope, directory: Directory, neurons: int) -> IntArray | None:
+    """Where a name of a signal is found, in all activities followed by all inputs."""
+    findings, inputs = scope.constants.findings, scope.inputs
+    if not isinstance(node, Scalar) or not isinstance(node.value, str):
+        message = f"the signal '{signal}' is the name of a neuron, a group or an input, or a list of these"
+        findings.error("wrong-type", node.span, message)
+        return None
+    name = node.value.strip()
+    if name in inputs:
+        source = inputs[name]
+        first = neurons + source.start
+        return np.arange(first, first + source.size, dtype=np.int64)
+    if scope.gaps.cover("inputs", name) or directory.covers(name):
+        return None
+    if directory.find(name) is None and not any(mark in name for mark in (".", "+")):
+        names = (*scope.section.inputs, *directory.known)
+        message = f"there is no neuron, group or input '{shorten(name)}'"
+        findings.error(
+            "unknown-signal", node.span, message, lambda: suggest(name, few(name, names), "inputs and neurons")
+        )
+        return None
+    found = resolve_end(Located(node.value, node), directory, findings)
+    return None if found is None else np.array(found, dtype=np.int64)
+
+
+def _text(node: Node) -> str:
+    """What an author calls a signal."""
+    if isinstance(node, (Sequence, Packed)):
+        few = [_text(item) for item in node.items[:_SHOWN]]
+        return f"[{', '.join(few if len(node.items) <= _SHOWN else [*few, '…'])}]"
+    return str(node.value).strip() if isinstance(node, Scalar) else "…"
+
+
+def title_of(learning: Learning) -> str:
+    """A rule in use for display: ``delta(rate=0.01, target=T)``; a parameter that has several values is ``…``."""
+    parts = [
+        f"{name}={array[0]:g}" if len(array) and (array == array[0]).all() else f"{name}=…"
+        for name, array in learning.parameters.items()
+    ]
+    rule = learning.rule
+    parts += [f"{signal}={learning.texts[signal]}" for signal in rule.signals]
+    return f"{rule.name}({', '.join(parts)})" if parts else rule.name

@@ -1,0 +1,160 @@
+"""Scale: the weights of an entry, scaled together when they are made (§4).
+
+In: the weights of an entry and where they go from and to, the ``scale`` of its body. Out: the scaled weights. The
+matrix of an entry has its sources as rows and its targets as columns; parallel connections add up in it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.events.settable import Assembled
+from neurovis_spec.compiler.values.constants import Constants
+from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.located import Formula
+from neurovis_spec.language.sections import ScaleModel
+
+#: Most neurons whose spectral radius is computed: all eigenvalues of a dense matrix are found.
+MOST = 3000
+#: A radius below this share of the norm is a rounding error of 0.
+_NOTHING = 1e-12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scaled:
+    """Weights that are scaled, where they or what they are scaled to follow parameters of a run."""
+
+    weights: Assembled
+    model: ScaleModel
+    ends: tuple[IntArray, IntArray]
+    pairs: tuple[IntArray, IntArray]
+    constants: Constants
+
+    @property
+    def slots(self) -> frozenset[int]:
+        """The parameters that they read."""
+        with self.constants.following() as parts:
+            check_scale(self.model, self.constants)
+        return self.weights.slots.union(*(part.formula.slots for part in parts))
+
+    def values(self, parameters: FloatArray) -> FloatArray:
+        """The scaled weights with these parameters; NaN where there is nothing to scale."""
+        given = self.constants
+        values = given.parameters | {name: float(parameters[slot]) for name, slot in given.settable.items()}
+        quiet = Constants(values, given.dt, Findings())
+        weights = self.weights.values(parameters)
+        result = scaled(self.model, weights, self.ends, self.pairs, quiet) if np.isfinite(weights).all() else None
+        return np.full(len(weights), np.nan) if result is None else result
+
+
+def scaled(
+    model: ScaleModel,
+    weights: FloatArray,
+    ends: tuple[IntArray, IntArray],
+    pairs: tuple[IntArray, IntArray],
+    constants: Constants,
+) -> FloatArray | None:
+    """The weights (one a connection), scaled as the author asks; None where that cannot be, which is reported.
+
+    ``ends`` are the neurons of both ends, ``pairs`` the positions in them of each connection's source and target.
+    """
+    wanted = check_scale(model, constants)
+    i, j = pairs
+    if model.indegree is not None and wanted is not None:
+        return weights / np.bincount(j)[j] if wanted else weights
+    exponent = _exponent(weights)
+    scopes = _times(weights, -exponent)
+    if model.norm is not None and wanted is not None:
+        cells = i * len(ends[1]) + j
+        _, place = np.unique(cells, return_inverse=True)
+        norm = float(np.linalg.norm(np.bincount(place, scopes)))
+        return _to(model.norm, wanted, weights, (norm, exponent), "norm", constants)
+    if model.spectral_radius is None or wanted is None:
+        return None
+    radius = _radius(model.spectral_radius, scopes, ends, pairs, constants)
+    if radius is None:
+        return None
+    return _to(model.spectral_radius, wanted, weights, (radius, exponent), "spectral radius", constants)
+
+
+def check_scale(model: ScaleModel, constants: Constants) -> float | None:
+    """The number that a ``scale`` asks for, whatever the weights are; None where it is invalid."""
+    result: list[float | None] = [] if model.indegree is None else [float(model.indegree.value)]
+    for formula, what in ((model.spectral_radius, "spectral radius"), (model.norm, "norm")):
+        if formula is None:
+            continue
+        value = constants.scalar(formula)
+        if value is not None and value < 0:
+            constants.findings.error("out-of-range", formula.span, f"a {what} is not negative, this is {value:g}")
+            value = None
+        result.append(value)
+    if model.lost:  # without what is invalid in it, it would be another one
+        return None
+    given = [key for key in ("spectral_radius", "norm", "indegree") if getattr(model, key) is not None]
+    if len(given) != 1:
+        entry = model.source.entry(given[1]) if given else None
+        span = model.source.span if entry is None else entry.key.span
+        message = f"expected one kind of scale here, found {len(given)}"
+        constants.findings.error("one-key", span, message, "keep one of spectral_radius, norm and indegree")
+        return None
+    return result[0]
+
+
+def _exponent(weights: FloatArray) -> int:
+    """The power of two that brings all weights to 1 at most: sums and squares of such neither overflow nor vanish."""
+    return int(np.frexp(np.abs(weights).max(initial=0.0))[1])
+
+
+def _times(weights: FloatArray, exponent: int) -> FloatArray:
+    """Weights times a power of two, which leaves their digits as they are."""
+    result: FloatArray = np.ldexp(weights, exponent)
+    return result
+
+
+def _to(
+    wanted: Formula, value: float, weights: FloatArray, found: tuple[float, int], what: str, constants: Constants
+) -> FloatArray | None:
+    """The weights times what makes a measure of theirs the wanted one; ``found`` is that of the weights times
+    2^-exponent, and the exponent. Digits and exponents are computed apart, so that only the result may overflow."""
+    measure, exponent = found
+    if measure <= _NOTHING * float(np.abs(_times(weights, -exponent)).sum()):
+        message = f"the {what} of these weights is 0: there is nothing to scale"
+        constants.findings.error("out-of-range", wanted.span, message)
+        return None
+    (digits, power), (least, shift) = math.frexp(value), math.frexp(measure)
+    mantissas, exponents = np.frexp(weights)
+    with np.errstate(over="ignore", under="ignore"):
+        result: FloatArray = np.ldexp(mantissas * (digits / least), exponents - exponent + power - shift)
+    if not np.isfinite(result).all():
+        message = f"with a {what} of {value:g} some of these weights are larger than any number"
+        constants.findings.error("not-finite", wanted.span, message)
+        return None
+    return result
+
+
+def _radius(
+    wanted: Formula,
+    weights: FloatArray,
+    ends: tuple[IntArray, IntArray],
+    pairs: tuple[IntArray, IntArray],
+    constants: Constants,
+) -> float | None:
+    """The largest magnitude of an eigenvalue of the matrix of the entry, whose ends must be the same neurons."""
+    sources, targets = ends
+    n = len(sources)
+    if not np.array_equal(np.sort(sources), np.sort(targets)):
+        message = "a spectral radius is that of a matrix from neurons to the same neurons; these ends differ"
+        constants.findings.error("wrong-size", wanted.span, message, "use norm or indegree")
+        return None
+    if n > MOST:
+        message = f"a spectral radius is computed for {MOST:,} neurons at most, these are {n:,}"
+        constants.findings.error("too-many", wanted.span, message, "use norm or indegree")
+        return None
+    column = np.argsort(sources)[np.searchsorted(np.sort(sources), targets)]
+    matrix = np.zeros((n, n))
+    np.add.at(matrix, (pairs[0], column[pairs[1]]), weights)
+    return float(np.abs(np.linalg.eigvals(matrix)).max())

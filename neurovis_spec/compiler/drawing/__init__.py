@@ -1,0 +1,1 @@
+"""The sections ``layout`` and ``render``, references resolved."""

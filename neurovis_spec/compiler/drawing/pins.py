@@ -1,0 +1,191 @@
+"""Pins: where neurons are put by hand, in the spec and in modules.
+
+In: ``layout.positions`` of every scope. Out: the places of neurons that are known, and for instances the places of
+their neurons relative to their origins, and these origins, as far as they are known. A pin of the spec names a neuron
+or an instance, whose origin it is then, and wins over what a module says; a module's pins are relative to the
+instance's origin.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Final, NamedTuple, TypeAlias
+
+from neurovis_spec.compiler.names.references import Directory, check_keys, key_of, resolve_end
+from neurovis_spec.compiler.names.scope import Scope
+from neurovis_spec.compiler.neurons.populate import Population
+from neurovis_spec.diagnostics import Findings, Span, shorten
+from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel
+from neurovis_spec.language.located import Located
+from neurovis_spec.language.values import Point
+
+Place: TypeAlias = tuple[float, float]
+
+#: The diameter of a neuron's disc, and how far out anything may be asked to stand (units of the layout).
+DIAMETER: Final = 0.6
+FARTHEST: Final = 1e6
+
+
+class Pins(NamedTuple):
+    """Places by neuron; for each instance with pins of its module these, relative to its origin, by its path; and the
+    origins that are known."""
+
+    places: Mapping[int, Place]
+    relative: tuple[tuple[str, Mapping[int, Place]], ...]
+    origins: Mapping[str, Place]
+    #: where the place of each neuron was said
+    spans: Mapping[int, Span]
+
+
+class _Pin(NamedTuple):
+    """A place, and where it was said."""
+
+    x: float
+    y: float
+    key: Located[str]
+    span: Span
+
+    def moved(self, by: Place) -> _Pin:
+        return _Pin(self.x + by[0], self.y + by[1], self.key, self.span)
+
+    def at(self, origin: _Pin) -> _Pin:
+        """The pin of an instance whose origin was said elsewhere."""
+        return _Pin(self.x + origin.x, self.y + origin.y, origin.key, origin.span)
+
+
+class _Said(NamedTuple):
+    """What one scope says: places of neurons, and origins of instances by the place of their scope."""
+
+    neurons: dict[int, _Pin]
+    origins: dict[int, _Pin]
+
+
+def pins_of(scopes: tuple[Scope, ...], population: Population, findings: Findings) -> Pins:
+    """All pins. Those closer than 0.6 to each other are a finding."""
+    by_identity = {id(directory): place for place, directory in enumerate(population.directories)}
+    said = [
+        _said(scope, directory, by_identity, findings)
+        for scope, directory in zip(scopes, population.directories, strict=True)
+    ]
+    own: dict[int, _Pin] = dict(said[0].neurons)
+    taken = set(own)  # what an outer scope says wins
+    # for each scope the instance whose origin its pins are relative to, and the way there from that origin
+    frames: list[tuple[int, Place]] = [(0, (0.0, 0.0))]
+    groups: dict[int, dict[int, _Pin]] = {}
+    for index in range(1, len(scopes)):
+        frames.append(_frame(index, scopes, said, frames))
+        base, shift = frames[index]
+        for neuron, pin in said[index].neurons.items():
+            if neuron not in taken:
+                groups.setdefault(base, {})[neuron] = pin.moved(shift)
+            taken.add(neuron)
+    _check_placing(said, population, taken, findings)
+    origins = said[0].origins
+    for base, pins in sorted(groups.items()):
+        if base in origins:
+            own.update({neuron: pin.at(origins[base]) for neuron, pin in pins.items()})
+        else:
+            _check_apart(pins, population.neurons.names, len(scopes[base].called("")), findings)
+    _check_apart(own, population.neurons.names, 0, findings)
+    return Pins(
+        {neuron: (pin.x, pin.y) for neuron, pin in own.items()},
+        tuple(
+            (scopes[base].path, {neuron: (pin.x, pin.y) for neuron, pin in pins.items()})
+            for base, pins in sorted(groups.items())
+        ),
+        {scopes[index].path: (pin.x, pin.y) for index, pin in origins.items()},
+        {neuron: pin.span for pins in (own, *groups.values()) for neuron, pin in pins.items()},
+    )
+
+
+def _check_placing(said: list[_Said], population: Population, taken: set[int], findings: Findings) -> None:
+    """A module that pins an instance within it needs pins in that one: they are what is placed."""
+    for scope in said[1:]:
+        for index, pin in scope.origins.items():
+            if taken.isdisjoint(population.directories[index].members):
+                message = f"'{pin.key.value}' has no pins of its own that this could place"
+                hint = "give its module 'layout: {positions: …}', or leave this pin out"
+                findings.error("bad-pin", pin.key.span, message, hint)
+
+
+def _frame(
+    index: int, scopes: tuple[Scope, ...], said: list[_Said], frames: list[tuple[int, Place]]
+) -> tuple[int, Place]:
+    """What the pins of an instance are relative to: its own origin, unless a module around it says where that is, the
+    outermost first."""
+    found: tuple[int, _Pin] | None = None
+    outer = scopes[index].parent
+    while outer > 0:
+        pin = said[outer].origins.get(index)
+        if pin is not None:
+            found = outer, pin
+        outer = scopes[outer].parent
+    if found is None or index in said[0].origins:
+        return index, (0.0, 0.0)
+    base, (x, y) = frames[found[0]]
+    return base, (x + found[1].x, y + found[1].y)
+
+
+def _said(scope: Scope, directory: Directory, by_identity: Mapping[int, int], findings: Findings) -> _Said:
+    result = _Said({}, {})
+    model = scope.section.layout
+    if model is None:
+        return result
+    check_keys(model.source, "positions", model.positions, directory, findings)
+    for key, point in _points(model):
+        x, y = scope.constants.scalar(point.x), scope.constants.scalar(point.y)
+        if x is None or y is None:
+            if not directory.instance(key.value):
+                _neuron(key, directory, findings)
+            continue
+        if max(abs(x), abs(y)) > FARTHEST:
+            findings.error("out-of-range", point.span, f"a pin lies within {FARTHEST:g} of the origin")
+            continue
+        pin = _Pin(x, y, key, point.span)
+        instances = directory.instance(key.value)
+        if len(instances) > 1:
+            message = f"'{shorten(key.value)}' is {len(instances)} instances; a pin names one"
+            findings.error("bad-pin", key.span, message, f"pin {key.value}1 and the others one by one")
+            continue
+        found = by_identity[id(instances[0])] if instances else _neuron(key, directory, findings)
+        if found is None:
+            continue
+        known = result.origins if instances else result.neurons
+        if found in known:
+            line = known[found].key.span.line
+            findings.error("duplicate-pin", key.span, f"'{key.value}' is pinned already (line {line})")
+            continue
+        known[found] = pin
+    return result
+
+
+def _points(model: LayoutModel | ModuleLayoutModel) -> Iterator[tuple[Located[str], Point]]:
+    for name, point in model.positions.items():
+        yield key_of(model.source, "positions", name), point
+
+
+def _neuron(key: Located[str], directory: Directory, findings: Findings) -> int | None:
+    members = resolve_end(key, directory, findings)
+    if members is not None and len(members) != 1:
+        message = f"'{shorten(key.value)}' is {len(members)} neurons; a pin names one"
+        findings.error("bad-pin", key.span, message, "pin its neurons one by one, or use 'arrange'")
+        return None
+    return None if members is None else members[0]
+
+
+def _check_apart(pins: Mapping[int, _Pin], names: tuple[str, ...], skip: int, findings: Findings) -> None:
+    """Pins that are closer than discs are wide, a finding for each that was said. Each is compared with those in the
+    cells next to its own. ``skip``: so many characters of the names are those of the instance that they are in."""
+    cells: dict[tuple[int, int], list[tuple[int, _Pin]]] = {}
+    told: set[Span] = set()
+    for neuron, pin in pins.items():
+        column, row = math.floor(pin.x / DIAMETER), math.floor(pin.y / DIAMETER)
+        near = (other for i in (-1, 0, 1) for j in (-1, 0, 1) for other in cells.get((column + i, row + j), ()))
+        for partner, other in near:
+            if math.dist((other.x, other.y), (pin.x, pin.y)) < DIAMETER - 1e-9 and pin.span not in told:
+                told.add(pin.span)
+                shown_pair = f"'{names[neuron][skip:]}' and '{names[partner][skip:]}' (line {other.key.span.line})"
+                findings.error("pins-overlap", pin.span, f"the pins of {shown_pair} are closer than {DIAMETER}")
+                break
+        cells.setdefault((column, row), []).append((neuron, pin))

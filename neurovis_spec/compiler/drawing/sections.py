@@ -1,0 +1,212 @@
+"""The sections ``layout`` and ``render``: references resolved, values checked.
+
+In: the sections as written, who finds what they name. Out: LayoutSettings, RenderSettings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal, cast
+
+from neurovis_spec import plugins
+from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings, StatedTrace
+from neurovis_spec.compiler.drawing.gains import stated_gains
+from neurovis_spec.compiler.drawing.mirrors import check_pins, lines_of, mirrors_of
+from neurovis_spec.compiler.drawing.pins import DIAMETER, FARTHEST, pins_of
+from neurovis_spec.compiler.names.connection_references import Finder
+from neurovis_spec.compiler.names.references import Directory, check_keys, key_of, resolve, resolve_end
+from neurovis_spec.compiler.names.scope import Scope
+from neurovis_spec.compiler.neurons.populate import Population
+from neurovis_spec.compiler.values.constants import Constants
+from neurovis_spec.diagnostics import Findings, Span, shorten, suggest
+from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel, RenderModel
+from neurovis_spec.language.located import Formula, Located
+from neurovis_spec.language.theme import ThemeModel
+from neurovis_spec.language.values import Reference
+from neurovis_spec.language.yaml.source import Mapping as SourceMapping
+from neurovis_spec.themes import COLOURS
+
+#: The most pixels of a picture: 8K is a little less. Its bytes take some 250 MB of memory.
+_MOST_PIXELS = 1 << 25
+_NOTHING = LayoutModel.model_validate(SourceMapping((), Span("", 1, 1, 1, 1)), context=Findings())
+
+
+def layout_settings(
+    model: LayoutModel | None, scopes: tuple[Scope, ...], population: Population, findings: Findings
+) -> LayoutSettings:
+    """The ``layout`` section, and those of modules. Which engines there are is known where they are called; here only
+    words are checked."""
+    pins = pins_of(scopes, population, findings)
+    arrange: list[tuple[tuple[int, ...], str]] = []
+    boxes: list[tuple[str, tuple[int, ...]]] = []
+    for scope, directory in zip(scopes, population.directories, strict=True):
+        if scope.section.layout is not None:
+            arrange += _arranged(scope.section.layout, directory, findings)
+            boxes += _boxed(scope, scope.section.layout, directory, findings)
+    if model is None:
+        model = _NOTHING
+    engine = "auto" if model.engine is None else model.engine.value
+    if model.engine is not None:
+        _check_engine(model.engine, findings)
+    mirrors = mirrors_of(scopes, population, findings)
+    lines = lines_of(scopes, population, findings)
+    direction = cast(
+        Literal["down", "up", "right", "left"], "down" if model.direction is None else model.direction.value
+    )
+    check_pins(mirrors, lines, pins, direction, population.neurons.names, findings)
+    spacing = model.spacing
+    neuron = _spacing(None if spacing is None else spacing.neuron, 1.0, scopes[0].constants)
+    rank = _spacing(None if spacing is None else spacing.rank, 2.0, scopes[0].constants)
+    return LayoutSettings(
+        engine=engine,
+        direction=direction,
+        positions=pins.places,
+        arrange=tuple(arrange),
+        boxes=tuple(boxes),
+        neuron_spacing=neuron,
+        rank_spacing=rank,
+        relative=pins.relative,
+        origins=pins.origins,
+        mirrors=mirrors,
+        align=lines,
+        file=None if model.file is None else model.file.value,
+    )
+
+
+def _spacing(formula: Formula | None, default: float, constants: Constants) -> float:
+    value = None if formula is None else constants.scalar(formula)
+    if formula is None or value is None:
+        return default
+    if not DIAMETER <= value <= FARTHEST:
+        message = f"a spacing lies between {DIAMETER}, the diameter of a neuron, and {FARTHEST:g}; this is {value:g}"
+        constants.findings.error("out-of-range", formula.span, message)
+    return value
+
+
+def _arranged(
+    model: LayoutModel | ModuleLayoutModel, directory: Directory, findings: Findings
+) -> Iterator[tuple[tuple[int, ...], str]]:
+    check_keys(model.source, "arrange", model.arrange, directory, findings)
+    for name, how in model.arrange.items():
+        members = resolve_end(key_of(model.source, "arrange", name), directory, findings)
+        if members is not None:
+            yield members, how.value
+
+
+def _boxed(
+    scope: Scope, model: LayoutModel | ModuleLayoutModel, directory: Directory, findings: Findings
+) -> Iterator[tuple[str, tuple[int, ...]]]:
+    """The named boxes; a reference in them may name an instance, which stands for all of its neurons."""
+    for name, reference in model.boxes.items():
+        if not reference.parts:
+            if reference.failed:
+                continue
+            findings.error("empty-reference", reference.span, f"the box '{shorten(name)}' holds no neuron")
+            continue
+        members = resolve(reference.parts, directory, findings, instances=True)
+        if members is not None:
+            yield scope.called(name), members
+
+
+def _check_engine(engine: Located[str], findings: Findings) -> None:
+    """An engine is ours or a plug-in's; who calls it asks again, as another machine may have others."""
+    name = engine.value
+    installed = plugins.names(plugins.LAYOUTS)
+    if name == "auto" or name in installed:
+        return
+    hint = suggest(name, ("auto", *installed), "known engines")
+    findings.error("unknown-engine", engine.span, f"there is no layout engine '{shorten(name)}' here", hint)
+
+
+def _collapsed(
+    reference: Reference | None, directory: Directory, findings: Findings
+) -> Iterator[tuple[str, tuple[int, ...]]]:
+    """What is drawn as one glyph each: no neuron is in two."""
+    texts = () if reference is None else reference.parts
+    if resolve(texts, directory, findings, instances=True) is None:
+        return
+    for text in texts:
+        found = resolve((text,), directory, findings, instances=True)
+        if found:
+            yield text.value.strip(), found
+
+
+def render_settings(
+    model: RenderModel | None, finder: Finder, constants: Constants, directory: Directory
+) -> RenderSettings:
+    """The ``render`` section; ``finder`` and ``directory`` know what references in it name."""
+    if model is None:
+        return RenderSettings()
+    gain, theme = model.gain, model.theme
+    size = None
+    if model.size is not None:
+        width, height = (_side(side, constants) for side in model.size)
+        size = None if width is None or height is None else (width, height)
+        if size is not None and size[0] * size[1] > _MOST_PIXELS:
+            message = f"a picture has at most {_MOST_PIXELS:,} pixels, this one {size[0] * size[1]:,}"
+            hint = "an '.svg' can be shown as large as one likes"
+            constants.findings.error("out-of-range", model.size[1].span, message, hint)
+    least = None if model.min_weight is None else constants.scalar(model.min_weight)
+    if least is not None and model.min_weight is not None and least < 0:
+        message = f"'min_weight' is not negative, this is {least:g}"
+        constants.findings.error("out-of-range", model.min_weight.span, message)
+    return RenderSettings(
+        activity=() if gain is None else stated_gains(gain.activity, "activity", finder, constants),
+        signal=() if gain is None else stated_gains(gain.signal, "signal", finder, constants),
+        thickness=() if gain is None else stated_gains(gain.thickness, "thickness", finder, constants),
+        change=() if gain is None else stated_gains(gain.change, "change", finder, constants),
+        traces=_traces(model, finder, constants),
+        theme="default" if theme is None or theme.base is None else theme.base.value,
+        colours=() if theme is None else _changes(theme),
+        size=size,
+        labels=model.labels is None or model.labels.value,
+        legend=model.legend is None or model.legend.value,
+        title=True if model.title is None else model.title.value,
+        window=None if model.window is None else constants.integer(model.window, "a window of steps", 1),
+        collapse=tuple(_collapsed(model.collapse, directory, constants.findings)),
+        min_weight=least,
+    )
+
+
+def _traces(model: RenderModel, finder: Finder, constants: Constants) -> tuple[StatedTrace, ...]:
+    """The traces that a spec states, those that name the fewest last."""
+    found: list[StatedTrace] = []
+    for name, formula in model.trace.items():
+        seconds, key = constants.scalar(formula), key_of(model.source, "trace", name)
+        if "->" in name:
+            message = f"'{shorten(name)}' is a connection; a trace is of neurons"
+            constants.findings.error("wrong-type", key.span, message, "lines show the traces of their sources")
+            continue
+        members = finder.neurons(key)
+        if seconds is not None and seconds < 0:
+            message = f"a trace lasts for 0 seconds or more, this is {seconds:g}"
+            constants.findings.error("out-of-range", formula.span, message)
+        elif seconds is not None and members is not None:
+            found.append(StatedTrace(seconds, tuple(members.tolist())))
+    return tuple(sorted(found, key=lambda one: -len(one.members)))
+
+
+def _changes(theme: ThemeModel) -> tuple[tuple[str, str], ...]:
+    """What a spec changes of a theme."""
+    result: list[tuple[str, str]] = []
+    for name in (*COLOURS, "ends"):
+        found: Located[str] | None = getattr(theme, name)
+        if found is not None:
+            result.append((name, found.value))
+    return tuple(result)
+
+
+def _side(formula: Formula, constants: Constants) -> int | None:
+    """The width or the height of a picture, in pixels."""
+    value = constants.scalar(formula)
+    if value is None:
+        return None
+    if not value.is_integer():
+        message = f"a side of a picture must be an integer, this is {value:g}"
+        constants.findings.error("not-an-integer", formula.span, message)
+        return None
+    if not 64 <= value <= 16384:
+        message = f"a side of a picture has 64 to 16384 pixels, this is {value:.15g}"
+        constants.findings.error("out-of-range", formula.span, message)
+        return None
+    return int(value)

@@ -1,0 +1,1 @@
+"""What can be set and what events change in a run."""

@@ -1,0 +1,109 @@
+"""Changes: what the events of a spec do to a network in a run, step by step (§9).
+
+In: nothing; these are values of a Network, which ``timeline`` makes of events and a run applies. A Change is a
+difference: how many there are costs no more than to keep them, and a step costs nothing for those that are past.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from neurovis_spec.arrays import FloatArray, IntArray, frozen
+from neurovis_spec.compiler.events.settable import ParameterFormula
+
+NO_INDICES: IntArray = np.zeros(0, dtype=np.int64)
+frozen(NO_INDICES)
+
+
+class Clamp(NamedTuple):
+    """Neurons held at a value, which follows the parameters. Of several clamps of a neuron the one of the highest
+    ``order`` holds: the one written last, or by hand after that. ``event`` is what ends it."""
+
+    order: int
+    event: int
+    neurons: IntArray
+    value: ParameterFormula
+
+
+class Change(NamedTuple):
+    """What changes at the beginning of step ``at``.
+
+    ``parameters`` are slots and what they are set to, by the values that the parameters have before this step;
+    ``clamps`` begin, those of the events ``released`` end; neurons and connections are lesioned or mended; the rules of
+    connections are switched on or off (``learning``).
+    """
+
+    at: int
+    parameters: tuple[tuple[int, ParameterFormula], ...] = ()
+    clamps: tuple[Clamp, ...] = ()
+    released: tuple[int, ...] = ()
+    mended_neurons: IntArray = NO_INDICES
+    mended_connections: IntArray = NO_INDICES
+    lesioned_neurons: IntArray = NO_INDICES
+    lesioned_connections: IntArray = NO_INDICES
+    learning: tuple[tuple[IntArray, bool], ...] = ()
+
+
+@dataclass
+class Held:
+    """The clamps that hold at a step: ``order`` (n,) is that of the clamp which holds a neuron, −1 where none does, and
+    ``value`` (n,) what it is held at. ``active`` are all that have not ended, by their order."""
+
+    order: IntArray
+    value: FloatArray
+    active: dict[int, Clamp]
+
+    @classmethod
+    def none(cls, count: int) -> Held:
+        """No clamp, for so many neurons."""
+        return cls(np.full(count, -1, dtype=np.int64), np.zeros(count), {})
+
+    def copy(self) -> Held:
+        """The same, of its own."""
+        return Held(self.order.copy(), self.value.copy(), dict(self.active))
+
+    def begin(self, clamp: Clamp, parameters: FloatArray) -> None:
+        """A clamp holds from now on, with these parameters."""
+        self.active[clamp.order] = clamp
+        self._hold(clamp, clamp.neurons, parameters)
+
+    def _hold(self, clamp: Clamp, neurons: IntArray, parameters: FloatArray) -> None:
+        own = neurons[self.order[neurons] < clamp.order]
+        self.order[own] = clamp.order
+        self.value[own] = clamp.value.values(parameters)
+
+    def end(self, events: Collection[int], parameters: FloatArray) -> None:
+        """The clamps of these events end; those of other events that they have covered hold again."""
+        self._end([order for order, clamp in self.active.items() if clamp.event in events], parameters)
+
+    def release(self, neurons: IntArray) -> None:
+        """No clamp that has begun holds these neurons any more."""
+        for order, clamp in list(self.active.items()):
+            rest = clamp.neurons[~np.isin(clamp.neurons, neurons)]
+            if not len(rest):
+                del self.active[order]
+            elif len(rest) < len(clamp.neurons):
+                self.active[order] = clamp._replace(neurons=rest)
+        self.order[neurons] = -1
+
+    def _end(self, orders: list[int], parameters: FloatArray) -> None:
+        for order in orders:
+            del self.active[order]
+        free = np.flatnonzero(np.isin(self.order, orders))
+        self.order[free] = -1
+        if len(free):
+            for order in sorted(self.active, reverse=True):
+                clamp = self.active[order]
+                self._hold(clamp, clamp.neurons[np.isin(clamp.neurons, free)], parameters)
+
+    def follow(self, changed: Collection[int], parameters: FloatArray) -> None:
+        """Parameters have other values now: what is held follows them."""
+        if not changed:
+            return
+        for order, clamp in self.active.items():
+            if not clamp.value.slots.isdisjoint(changed):
+                self.value[self.order == order] = clamp.value.values(parameters)

@@ -1,0 +1,156 @@
+"""Events: what changes during a run (§9).
+
+In: the ``events`` section, who finds what it names. Out: the events, resolved; those that name the same share one
+array. What they change in a run is for ``timeline``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from neurovis_spec.arrays import IntArray
+from neurovis_spec.compiler.names.connection_references import Finder
+from neurovis_spec.compiler.names.references import check_keys, key_of, other_parameter
+from neurovis_spec.compiler.values.constants import Constants
+from neurovis_spec.diagnostics import Findings, Span, shorten
+from neurovis_spec.language.located import Formula, Located
+from neurovis_spec.language.model import lost_names
+from neurovis_spec.language.sections import EventModel
+
+#: What an event may do.
+_ACTIONS = ("set", "clamp", "lesion", "mend", "learning")
+
+
+@dataclass(frozen=True)
+class Event:
+    """One event, resolved: it applies from step ``at`` on; a clamp ends before step ``to``. What is set and what is
+    clamped follow the parameters, as these are by then. Each reference is an array of ascending indices."""
+
+    at: int
+    to: int | None = None
+    set: Mapping[str, Formula] = field(default_factory=dict)
+    clamp: tuple[tuple[IntArray, Formula], ...] = ()
+    neurons: tuple[IntArray, ...] = ()
+    connections: tuple[IntArray, ...] = ()
+    mended_neurons: tuple[IntArray, ...] = ()
+    mended_connections: tuple[IntArray, ...] = ()
+    #: connections whose rules are switched on or off
+    learning: tuple[tuple[IntArray, bool], ...] = ()
+    #: where each parameter that is set is named
+    keys: Mapping[str, Span] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class EventReader:
+    """Reads the events of a spec; ``finder`` knows what references in them name."""
+
+    finder: Finder
+    constants: Constants
+
+    @property
+    def findings(self) -> Findings:
+        """Where findings go."""
+        return self.constants.findings
+
+    def read(self, models: tuple[EventModel, ...]) -> tuple[Event, ...]:
+        """All events, in the order written; those that are invalid are left out, and reported."""
+        events = [self._event(model) for model in models]
+        return tuple(event for event in events if event is not None)
+
+    def _event(self, model: EventModel) -> Event | None:
+        before = self.findings.errors
+        self._check_keys(model)
+        begin = model.at if model.at is not None else model.from_
+        at = None if begin is None else self.constants.integer(begin, "the step of an event", 0)
+        to = None if model.to is None else self.constants.integer(model.to, "the end of a clamp", 1)
+        if at is not None and to is not None and model.to is not None and to <= at:
+            message = f"the clamp ends before it begins: from {at} to {to}, which is exclusive"
+            self.findings.error("out-of-range", model.to.span, message)
+        for name in lost_names(model.source, "set", dict(model.set)):
+            self._check_set(model, name)
+        for name, formula in model.set.items():
+            self._check_set(model, name)
+            self.constants.scalar(formula)
+        check_keys(model.source, "clamp", model.clamp, self.finder.directory, self.findings)
+        clamps = [one for name, formula in model.clamp.items() for one in self._clamp(model, name, formula)]
+        neurons, connections = self._parts(model.lesion)
+        mended, joined = self._parts(model.mend)
+        learning = [
+            one
+            for name, on in model.learning.items()
+            for one in self._learning(key_of(model.source, "learning", name), on.value)
+        ]
+        if at is None or self.findings.errors > before:
+            return None
+        keys = {name: key_of(model.source, "set", name).span for name in model.set}
+        return Event(at, to, model.set, tuple(clamps), neurons, connections, mended, joined, tuple(learning), keys)
+
+    def _check_keys(self, model: EventModel) -> None:
+        """``set`` and ``lesion`` go with ``at``, ``clamp`` with ``from`` and perhaps ``to``."""
+        source = model.source
+
+        def wrong(key: str, message: str, hint: str | None = None) -> None:
+            entry = source.entry(key)
+            span = source.span if entry is None else entry.key.span
+            self.findings.error("bad-event", span, message, hint)
+
+        written = {entry.name for entry in source.entries}
+        actions = [name for name in _ACTIONS if name in written]
+        if not actions and not model.lost:
+            first = source.entries[0].key.span if source.entries else source.span
+            self.findings.error(
+                "bad-event", first, "this event does nothing", "give it set, clamp, lesion, mend or learning"
+            )
+        if not actions:
+            return
+        timed = written & {"at", "from", "to"}
+        perhaps = model.lost_keys - timed  # an unknown key may be meant for these
+        if "clamp" in actions:
+            if "at" in timed:
+                wrong("at", "a clamp lasts: it has 'from', and perhaps 'to'", "write from: instead of at:")
+            elif "from" not in timed | perhaps:
+                wrong("clamp", "a clamp needs 'from'")
+            if len(actions) > 1:
+                wrong("clamp", "a clamp is an event of its own", "make it an entry of its own")
+        elif timed & {"from", "to"}:
+            wrong(min(timed & {"from", "to"}), f"'{actions[0]}' takes 'at' alone", "write at: STEP")
+        elif "at" not in timed | perhaps:
+            wrong(actions[0], "at which step? 'at' is missing")
+
+    def _check_set(self, model: EventModel, name: str) -> None:
+        span = key_of(model.source, "set", name).span
+        constants = self.constants
+        if name not in constants.parameters and name not in constants.broken and not constants.incomplete:
+            message = f"there is no parameter '{shorten(name)}' to be set"
+            known = (*constants.parameters, *constants.broken)
+            self.findings.error("unknown-parameter", span, message, lambda: other_parameter(name, known))
+        elif name in self.constants.structural:
+            message = f"'{name}' cannot be set in a run: the structure of the network depends on it"
+            self.findings.error("structural-parameter", span, message)
+
+    def _clamp(self, model: EventModel, name: str, formula: Formula) -> list[tuple[IntArray, Formula]]:
+        neurons = self.finder.neurons(key_of(model.source, "clamp", name))
+        value = self.constants.scalar(formula)
+        return [] if neurons is None or value is None else [(neurons, formula)]
+
+    def _parts(self, texts: Iterable[Located[str]]) -> tuple[tuple[IntArray, ...], tuple[IntArray, ...]]:
+        """The neurons and the connections that are lesioned or mended."""
+        neurons: list[IntArray] = []
+        connections: list[IntArray] = []
+        for text in texts:
+            joined = "->" in text.value
+            found = self.finder.connections(text) if joined else self.finder.neurons(text)
+            if found is not None:
+                (connections if joined else neurons).append(found)
+        return tuple(neurons), tuple(connections)
+
+    def _learning(self, name: Located[str], on: bool) -> list[tuple[IntArray, bool]]:
+        """The connections whose rules are stopped or started."""
+        found = self.finder.connections(name)
+        if found is None or self.finder.wires is None:
+            return []
+        if not self.finder.wires.plastic[found].any():
+            message = f"nothing learns at '{shorten(name.value)}'"
+            self.findings.error("no-rule", name.span, message, "name a connection that has a 'plasticity'")
+        return [(found, on)]

@@ -1,0 +1,1 @@
+"""What the names of a spec mean: scopes, references, modules."""

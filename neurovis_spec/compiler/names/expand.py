@@ -1,0 +1,324 @@
+"""Scopes: the spec itself and every instance of a module, each with what the names in it mean.
+
+In: the root's Spec (or a module that is checked by itself), the Library, Constants. Out: Scopes in the order of their
+neurons: a scope before the instances within it, and all inputs of the network. An instance's parameters are worked out
+anew, with what ``set`` gives them; its inputs are those of the scope around it, or inputs of the network.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import NoReturn
+
+from neurovis_spec.compiler.events.settable import ParameterFormula
+from neurovis_spec.compiler.limits import DEEPEST, MOST_INSTANCES, Limits
+from neurovis_spec.compiler.names.input_bindings import Binding, bindings_of, check_sizes, shared_out
+from neurovis_spec.compiler.names.modules import Library, Module
+from neurovis_spec.compiler.names.references import Section, key_of, key_span
+from neurovis_spec.compiler.names.scope import Expansion, Scope
+from neurovis_spec.compiler.names.size_estimate import Excess, SizeEstimate
+from neurovis_spec.compiler.names.unresolved import Gaps
+from neurovis_spec.compiler.network import Input
+from neurovis_spec.compiler.neurons.inputs import make_input
+from neurovis_spec.compiler.values.constants import Constants
+from neurovis_spec.compiler.values.data_files import Files
+from neurovis_spec.compiler.values.parameters import make_parameters
+from neurovis_spec.diagnostics import Findings, shorten, suggest
+from neurovis_spec.language.expressions.tree import Number, names, substitute
+from neurovis_spec.language.located import NAME_RULE, too_long
+from neurovis_spec.language.model import lost_names
+from neurovis_spec.language.modules import INCLUDED, InstanceModel
+
+#: What ``set`` knows beside the parameters: the number of the instance, from 0, and how many its entry makes.
+COUNTED = ("i", "n")
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where an instance stands: its names, and how many there are of it."""
+
+    path: str
+    declared: str
+    number: int
+    position: int
+    count: int
+
+
+class _StoppedError(Exception):
+    """There are too many instances; the finding is reported."""
+
+
+@dataclass
+class Expander:
+    """Makes the scopes of a network."""
+
+    library: Library
+    root: Path
+    findings: Findings
+    dt: float
+    scopes: list[Scope | None] = field(default_factory=list)
+    inputs: list[Input] = field(default_factory=list)
+    #: one for each folder, so that each file is read once
+    files: dict[Path, Files] = field(default_factory=dict)
+    used: set[str] = field(default_factory=set)
+    #: how many scopes were made, and whether there would have been too many
+    made: int = 0
+    stopped: bool = False
+    gaps: dict[str | None, Gaps] = field(default_factory=dict)
+    limits: Limits = field(default_factory=Limits)
+
+    @cached_property
+    def _size_estimate(self) -> SizeEstimate:
+        return SizeEstimate(self.library.modules, self.dt, self.limits.neurons)
+
+    def expand(self, section: Section, constants: Constants, folder: Path, module: str | None = None) -> Expansion:
+        """The scopes of a section whose parameters are known, and the inputs of the network. ``module``: it is a module
+        that is checked by itself."""
+        path = module or ""
+        self.scopes, self.inputs = [], []
+        try:
+            self._unit(section, constants, folder, _Place(path, path, 0, 0, 1), (), module=module)
+        except _StoppedError:  # which instances there are is not known then
+            root = self._at(0)
+            gaps = root.gaps.with_section("instances")
+            self.scopes = [replace(root, definitions=replace(root.definitions, gaps=gaps))]
+        self.made += len(self.scopes)
+        return Expansion(tuple(map(self._at, range(len(self.scopes)))), tuple(self.inputs))
+
+    def files_in(self, folder: Path) -> Files:
+        """The data files that are named relative to a folder."""
+        if folder not in self.files:
+            self.files[folder] = Files(folder, self.root, self.findings)
+        return self.files[folder]
+
+    def _unit(
+        self,
+        section: Section,
+        constants: Constants,
+        folder: Path,
+        place: _Place,
+        way: tuple[int, ...],
+        bound: Mapping[str, Binding] | None = None,
+        module: str | None = None,
+        settings: Mapping[str, frozenset[str]] | None = None,
+    ) -> int:
+        """One scope and those within it; ``way`` are the scopes around it. The place of the scope."""
+        index = len(self.scopes)
+        self.scopes.append(None)
+        files = self.files_in(folder)
+        own = self._inputs(section, constants, files, place, bound or {})
+        lost = section.inputs.keys() - own.keys()
+        gaps = self._gaps(module)
+        if lost:
+            gaps = gaps.with_names("inputs", gaps.names["inputs"] | lost)
+        scope = Scope(
+            path=place.path,
+            section=section,
+            constants=constants,
+            definitions=replace(self.library.definitions, gaps=gaps),
+            files=files,
+            inputs=own,
+            module=module,
+            parent=way[-1] if way else -1,
+            declared=place.declared,
+            number=place.number,
+            settings=settings or {},
+        )
+        self.scopes[index] = scope
+        if not way:
+            self._count(scope)
+        if not section.instances:
+            return index
+        children: dict[str, tuple[int, ...]] = {}
+        absent: set[str] = set()
+        for name, model in section.instances.items():
+            made = self._instances(name, model, scope, (*way, index))
+            if made is None:
+                absent.add(name)
+            else:
+                children.update(made)
+        inner = {
+            f"{name}.{key}": found
+            for name, places in children.items()
+            if len(places) == 1
+            for key, found in self._at(places[0]).inputs.items()
+        }
+        gaps = gaps.with_names("instances", gaps.names["instances"] | absent)
+        self.scopes[index] = replace(
+            scope, children=children, inputs={**own, **inner}, definitions=replace(scope.definitions, gaps=gaps)
+        )
+        return index
+
+    def _gaps(self, module: str | None) -> Gaps:
+        """What could not be read of the spec or of a module, and of the definitions."""
+        if module not in self.gaps:
+            everywhere = self.library.definitions.gaps
+            own = everywhere if module is None else self.library.modules[module].gaps
+            if module is not None:
+                own = replace(own, sections=own.sections - {"modules"}).joined(everywhere.only(INCLUDED))
+            self.gaps[module] = own
+        return self.gaps[module]
+
+    def _count(self, scope: Scope) -> None:
+        """Refuse more instances, or neurons, than there may be before any of them is made. Modules that are checked
+        by themselves share what there may be: behind that, those within them are left out."""
+        if self.stopped:
+            raise _StoppedError
+        if scope.section.instances:
+            quiet = replace(scope.constants, findings=Findings(), structural=set())
+            found = self._size_estimate.check(scope.section, quiet)
+            if isinstance(found, Excess):
+                self._stop(found)
+            if self.made + found.instances > MOST_INSTANCES and scope.module is not None:
+                raise _StoppedError
+
+    def _stop(self, excess: Excess, code: str = "too-many") -> NoReturn:
+        self.stopped = True
+        if excess.span is not None:
+            self.findings.error(code, excess.span, excess.message, excess.hint)
+        raise _StoppedError
+
+    def _at(self, index: int) -> Scope:
+        scope = self.scopes[index]
+        assert scope is not None
+        return scope
+
+    def _inputs(
+        self,
+        section: Section,
+        constants: Constants,
+        files: Files,
+        place: _Place,
+        bound: Mapping[str, Binding],
+    ) -> dict[str, Input]:
+        """The inputs of a scope by their names in it; those that are not bound are inputs of the network."""
+        result: dict[str, Input] = {}
+        for name, model in section.inputs.items():
+            start = 0 if not self.inputs else self.inputs[-1].start + self.inputs[-1].size
+            made = make_input(name, model, start, section, constants, files)
+            if made is None:
+                continue
+            if name in bound:
+                shared = shared_out(made, bound[name], place.position, place.count)
+                if shared is not None:
+                    result[name] = shared
+                continue
+            if place.path:
+                tree = made.expression
+                if tree is not None:  # the network knows the parameters of the spec, and those that follow them
+                    values = {
+                        key: Number(value)
+                        for key, value in constants.parameters.items()
+                        if key not in constants.settable
+                    }
+                    tree = substitute(tree, values)
+                made = replace(made, name=f"{place.path}.{name}", expression=tree)
+            self.inputs.append(made)
+            result[name] = made
+        return result
+
+    def _instances(
+        self, name: str, model: InstanceModel, scope: Scope, way: tuple[int, ...]
+    ) -> dict[str, tuple[int, ...]] | None:
+        """The places of the instances that one entry makes, by name; None where it is not known which these are."""
+        module = self._module(model)
+        count = None
+        if model.count is not None:
+            count = scope.constants.integer(model.count, "'count'", 1)
+        if module is None or "count" in model.lost or (model.count is not None and count is None):
+            self._check(model, scope)
+            return None
+        if len(way) > DEEPEST:
+            span = key_span(scope.section, "instances", name)
+            self._stop(Excess(span, f"modules are nested at most {DEEPEST} deep"), "too-deep")
+        called = [name] if count is None else [f"{name}{number}" for number in range(1, count + 1)]
+        if len(called[-1]) > 64:
+            self.findings.error("bad-name", key_span(scope.section, "instances", name), too_long(called[-1]), NAME_RULE)
+            return None
+        self.used.add(module.name)
+        self._check_keys(model, module)
+        bound = bindings_of(model, scope.section, scope.inputs, scope.gaps, self.findings)
+        result: dict[str, tuple[int, ...]] = {}
+        for position, own in enumerate(called):
+            number = 0 if count is None else position + 1
+            place = _Place(scope.called(own), scope.called(name), number, position, len(called))
+            constants, settings = self._constants(model, module, scope, place)
+            index = self._unit(
+                module.model, constants, module.folder, place, way, bound, module=module.name, settings=settings
+            )
+            result[own] = (index,)
+        for binding in bound.values():
+            check_sizes(binding, called, self.findings)
+        if count is not None:
+            result[name] = tuple(result[own][0] for own in called)
+        return result
+
+    def _module(self, model: InstanceModel) -> Module | None:
+        name = model.module.value
+        found = self.library.modules.get(name)
+        if found is None and not self.library.definitions.gaps.cover("modules", name):
+            known = self.library.modules
+            self.findings.error(
+                "unknown-module",
+                model.module.span,
+                f"there is no module '{shorten(name)}'",
+                lambda: suggest(name, known, "modules") or "there are no modules; add it under 'modules'",
+            )
+        return found
+
+    def _check(self, model: InstanceModel, scope: Scope) -> None:
+        """What can be said of an instance whose module or count is not known."""
+        for formula in model.set.values():
+            scope.constants.tree(formula, COUNTED)
+        bindings_of(model, scope.section, scope.inputs, scope.gaps, self.findings)
+
+    def _check_keys(self, model: InstanceModel, module: Module) -> None:
+        """What ``set`` and ``inputs`` name must be the module's."""
+        gaps = module.gaps
+        parts: tuple[tuple[str, Mapping[str, object], str, Mapping[str, object]], ...] = (
+            ("set", model.set, "parameter", module.model.parameters),
+            ("inputs", model.inputs, "input", module.model.inputs),
+        )
+        for part, given, what, known in parts:
+            for name in given:
+                if name not in known and not gaps.cover(f"{what}s", name):
+                    message = f"the module '{module.name}' has no {what} '{shorten(name)}'"
+                    hint = suggest(name, known, f"{what}s of '{module.name}'")
+                    self.findings.error(f"unknown-{what}", key_of(model.source, part, name).span, message, hint)
+
+    def _constants(
+        self, model: InstanceModel, module: Module, scope: Scope, place: _Place
+    ) -> tuple[Constants, dict[str, frozenset[str]]]:
+        """The constants of one instance, and what its settings depend on."""
+        outer = scope.constants
+        constants = replace(constants_of(module, self.dt, self.findings), slots=outer.slots, path=place.path)
+        extra = dict(zip(COUNTED, (float(place.position), float(place.count)), strict=True))
+        given: dict[str, float] = {}
+        following: dict[str, ParameterFormula] = {}
+        settings: dict[str, frozenset[str]] = {}
+        for name, formula in model.set.items():
+            value = scope.constants.value(formula, extra)
+            if name not in module.model.parameters:
+                continue
+            if value is None:
+                constants.broken.add(name)
+                continue
+            given[name] = float(value)
+            tree = scope.constants.tree(formula, COUNTED) if isinstance(formula.value, str) else None
+            settings[name] = frozenset() if tree is None else names(tree)
+            if tree is not None and not names(tree).isdisjoint(outer.settable):
+                following[name] = outer.bound(tree, extra)
+        constants.settings = following
+        constants.broken.update(lost_names(model.source, "set", dict(model.set)))
+        places = {name: formula.span for name, formula in model.set.items()}
+        make_parameters(module.model, constants, given, places)
+        return constants, settings
+
+
+def constants_of(module: Module, dt: float, findings: Findings) -> Constants:
+    """Constants for the parameters of a module, before these are known."""
+    lost, incomplete = set(module.gaps.names["parameters"]), "parameters" in module.gaps.sections
+    return Constants({}, dt, findings, broken=lost, incomplete=incomplete)

@@ -1,0 +1,94 @@
+"""Bindings: which inputs around an instance are the inputs of its module.
+
+In: the entry of an instance, the scope around it. Out: Bindings by the names that the module knows, and the part of an
+input that one instance gets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+from neurovis_spec.compiler.limits import plural
+from neurovis_spec.compiler.names.references import Section, known_inputs
+from neurovis_spec.compiler.names.unresolved import Gaps
+from neurovis_spec.compiler.network import Input
+from neurovis_spec.diagnostics import Findings, Hint, Span, shorten
+from neurovis_spec.language.located import Located
+from neurovis_spec.language.model import lost_names
+from neurovis_spec.language.modules import InstanceModel
+
+#: Sizes that are told of.
+_FEW = 3
+
+
+@dataclass(frozen=True)
+class Binding:
+    """What an entry of instances says an input of its module is, where, and what it is; None where that is invalid.
+
+    ``wanted`` notes how many components the module's own input has, in each of the instances.
+    """
+
+    name: str
+    span: Span
+    input: Input | None
+    wanted: list[int] = field(default_factory=list)
+
+
+def bindings_of(
+    model: InstanceModel, section: Section, inputs: Mapping[str, Input], gaps: Gaps, findings: Findings
+) -> dict[str, Binding]:
+    """The inputs of the scope around that an instance names; None for one that is invalid."""
+    result: dict[str, Binding] = {}
+    for name, outer in model.inputs.items():
+        found = inputs.get(outer.value)
+        if found is None and not gaps.cover("inputs", outer.value):
+            _unknown(outer, section, findings)
+        result[name] = Binding(outer.value, outer.span, found)
+    for name in lost_names(model.source, "inputs", dict(model.inputs)):
+        result[name] = Binding("", model.source.span, None)
+    return result
+
+
+def _unknown(outer: Located[str], section: Section, findings: Findings) -> None:
+    hint: Hint = "connect it to the neurons of the instance"
+    message = f"'{shorten(outer.value)}' is a group of neurons, not an input"
+    if outer.value.partition(".")[0] not in section.neurons:
+        message = f"there is no input '{shorten(outer.value)}'"
+        hint = partial(known_inputs, outer.value, section.inputs)
+    findings.error("unknown-input", outer.span, message, hint)
+
+
+def shared_out(made: Input, bound: Binding, position: int, count: int) -> Input | None:
+    """What one of ``count`` instances gets of an input around it; None where the sizes do not fit (``check_sizes``)."""
+    outer = bound.input
+    bound.wanted.append(made.size)
+    if outer is None:
+        return None
+    if outer.size == made.size:
+        return Input(outer.name, outer.start, made.size)
+    if outer.size == count * made.size:
+        return Input(outer.name, outer.start + position * made.size, made.size)
+    return None
+
+
+def check_sizes(bound: Binding, called: Sequence[str], findings: Findings) -> None:
+    """A finding where an input does not fit the instances of an entry, which are ``called`` so: it goes to each of
+    them, or is shared out among them in equal parts."""
+    outer, count = bound.input, len(called)
+    if outer is None or len(bound.wanted) < count or set(bound.wanted) in ({outer.size}, {outer.size / count}):
+        return  # of an input that is invalid itself all is said
+    has = f"the input '{bound.name}' has {plural(outer.size, 'component')}"
+    sizes = dict.fromkeys(bound.wanted)
+    if len(sizes) > 1:
+        wants = [f"'{called[bound.wanted.index(size)]}' wants {size}" for size in list(sizes)[:_FEW]]
+        more = ", …" if len(sizes) > _FEW else ""
+        hint = "one input is the same for all of them, or shared out in equal parts; declare an entry for each size"
+        message = f"{has}, and the instances disagree: {', '.join(wants)}{more}"
+        findings.error("wrong-size", bound.span, message, hint)
+        return
+    size = bound.wanted[0]
+    wanted = f"{size}" if count == 1 else f"{size} or {count * size}"
+    share = "one of count × size is shared out, one of the module's size goes to each"
+    findings.error("wrong-size", bound.span, f"{has}; {wanted} are wanted here", None if count == 1 else share)

@@ -1,0 +1,306 @@
+"""References: from ``K``, ``K3``, ``K3..K5`` or ``K1 + O`` to neuron indices.
+
+In: the groups and neuron names of a network. Out: tuples of indices, or a finding with the nearest known names.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import islice
+from typing import TypeAlias
+
+from neurovis_spec.compiler.limits import PATIENCE
+from neurovis_spec.compiler.names.state_references import split_sum
+from neurovis_spec.compiler.names.unresolved import Gaps
+from neurovis_spec.compiler.network import Group
+from neurovis_spec.diagnostics import Findings, Span, did_you_mean, listed, meant, nearest, shorten, suggest
+from neurovis_spec.language.located import Located
+from neurovis_spec.language.modules import ModuleModel
+from neurovis_spec.language.spec import Spec
+from neurovis_spec.language.yaml.source import Mapping as SourceMapping
+from neurovis_spec.language.yaml.source import Scalar
+
+#: What declares neurons, inputs and connections: a spec, or a module.
+Section: TypeAlias = Spec | ModuleModel
+#: How many names are looked through for one that is like another: it takes a while.
+_MANY = 10_000
+#: A neuron's number as its name has it: without leading zeros.
+_NUMBER = re.compile(r"0|[1-9][0-9]{0,63}")
+_QUOTED = re.compile(r"'([^']*)'")
+_RANGE = re.compile(r"\s*(?P<low>\S+?)\s*\.\.\s*(?P<high>\S+)\s*")
+
+
+@dataclass(frozen=True)
+class Directory:
+    """Who is called what in a spec, or in an instance of a module: groups, neurons and instances by the names that they
+    have there."""
+
+    groups: Mapping[str, Group]
+    neurons: Mapping[str, int]
+    #: the number of the first neuron of each counted group
+    first: Mapping[str, int]
+    gaps: Gaps = field(default_factory=Gaps)
+    #: the instances of a name: all of a counted one, each also by its own name
+    instances: Mapping[str, tuple[Directory, ...]] = field(default_factory=dict)
+    #: all neurons, those of the instances behind its own
+    members: range = range(0)
+    #: the inputs that are declared there
+    inputs: Collection[str] = ()
+
+    @cached_property
+    def known(self) -> tuple[str, ...]:
+        """Every name that a reference may use; groups first."""
+        return tuple(dict.fromkeys([*self.groups, *self.neurons]))
+
+    def hint(self, name: str) -> str | None:
+        """What an unknown name may be meant for: the nearest names, and the numbers that its group has."""
+        head, dot, rest = name.partition(".")
+        if dot and head in self.instances:
+            hint = self.instances[head][0].hint(rest)
+            return None if hint is None else _QUOTED.sub(rf"'{head}.\1'", hint)
+        if dot:
+            return self._hint_of_instance(head, rest)
+        hint = suggest(name, few(name, self.known), "groups and neurons")
+        if self.instances and not nearest(name, few(name, self.known)):
+            inside = few(name, tuple(self.instances))
+            hint = suggest(name, inside, "instances") if not self.known or nearest(name, inside) else hint
+        stem = name.rstrip("0123456789")
+        if stem in self.first and stem != name:
+            first = self.first[stem]
+            numbers = f"'{stem}' has the numbers {first} to {first + self.groups[stem].count - 1}"
+            hint = numbers if hint is None else f"{hint} {numbers}"
+        return hint
+
+    def _hint_of_instance(self, head: str, rest: str) -> str:
+        """What ``head`` in ``head.rest`` may be meant for."""
+        if self.find(head) is not None:
+            return f"'{head}' is no instance, nothing is in it"
+        if not self.instances:
+            return "there are no instances here"
+        stem = head.rstrip("0123456789")
+        if stem in self.instances and f"{stem}1" in self.instances:
+            return f"'{stem}' has the numbers 1 to {len(self.instances[stem])}"
+        close = nearest(head, few(head, tuple(self.instances)))
+        whole = [f"{name}.{rest}" for name in close if self.find(f"{name}.{rest}") is not None]
+        return did_you_mean(whole) if whole else suggest(head, few(head, tuple(self.instances)), "instances") or ""
+
+    def find(self, name: str) -> tuple[int, ...] | None:
+        """The neurons of a group, or one neuron; ``left.K`` is K in all instances that ``left`` names."""
+        head, dot, rest = name.partition(".")
+        if dot:
+            found = [inner.find(rest) for inner in self.instances.get(head, ())]
+            if not found or any(one is None for one in found):
+                return None
+            return tuple(index for one in found if one is not None for index in one)
+        group = self.groups.get(name)
+        if group is not None:
+            return tuple(group.indices)
+        neuron = self.neurons.get(name)
+        return None if neuron is None else (neuron,)
+
+    def meant(self, name: str) -> str | None:
+        """The name that an unknown one can only be meant for."""
+        head, dot, rest = name.partition(".")
+        if not dot:
+            return meant(name, few(name, self.known))
+        if head not in self.instances:
+            right = meant(head, few(head, tuple(self.instances)))
+            return None if right is None or self.find(f"{right}.{rest}") is None else f"{right}.{rest}"
+        right = self.instances[head][0].meant(rest)
+        return None if right is None else f"{head}.{right}"
+
+    def instance(self, name: str) -> tuple[Directory, ...]:
+        """The instances that a name means; none where it means something else, or nothing."""
+        head, dot, rest = name.partition(".")
+        found = self.instances.get(head, ())
+        return tuple(one for inner in found for one in inner.instance(rest)) if dot else found
+
+    def feeds(self, name: str) -> bool:
+        """Whether a name is that of an input, of this place or of an instance within it."""
+        head, dot, rest = name.partition(".")
+        return any(inner.feeds(rest) for inner in self.instances.get(head, ())) if dot else name in self.inputs
+
+    def covers(self, name: str) -> bool:
+        """Whether an unknown name may be one whose declaration is invalid."""
+        head, dot, rest = name.partition(".")
+        if dot and head in self.instances:
+            return any(inner.covers(rest) for inner in self.instances[head])
+        return self.gaps.cover_reference(name)
+
+    def range(self, low: str, high: str) -> tuple[int, ...] | str:
+        """The neurons of a counted group from one of its numbers to another; a text says why not."""
+        head, dot, rest = low.partition(".")
+        if dot:
+            if head not in self.instances:
+                return f"there is no instance '{shorten(head)}'"
+            found = [inner.range(rest, high.removeprefix(f"{head}.")) for inner in self.instances[head]]
+            wrong = next((one for one in found if isinstance(one, str)), None)
+            return wrong or tuple(index for one in found if not isinstance(one, str) for index in one)
+        for name in sorted((g for g in self.first if low.startswith(g)), key=len, reverse=True):
+            start, stop = low[len(name) :], high[len(name) :]
+            if not (high.startswith(name) and _NUMBER.fullmatch(start) and _NUMBER.fullmatch(stop)):
+                continue
+            group, first = self.groups[name], self.first[name]
+            a, b = int(start) - first, int(stop) - first
+            if not (0 <= a < group.count and 0 <= b < group.count):
+                last = first + group.count - 1
+                return f"'{name}' has the numbers {first} to {last}"
+            if a > b:
+                return "the range runs backwards"
+            return tuple(range(group.start + a, group.start + b + 1))
+        return "both ends of a range must be neurons of one counted group"
+
+
+def few(name: str, known: Collection[str]) -> Collection[str]:
+    """The names among which to look for one like ``name``: of very many those that begin like it."""
+    if len(known) <= _MANY:
+        return known
+    begin = name[: max(1, len(name.rstrip("0123456789")) // 2)]
+    return tuple(islice((other for other in known if other.startswith(begin)), _MANY))
+
+
+def known_inputs(name: str, known: Collection[str]) -> str:
+    """A help line for an input that is not declared; ``known`` are those that are."""
+    return suggest(name, few(name, known), "inputs") or "no inputs are declared; add it under 'inputs'"
+
+
+def other_parameter(name: str, known: Collection[str]) -> str:
+    """A help line for a parameter that cannot be set as there is none of that name; ``known`` are the spec's own."""
+    there = "the spec has no parameters" if not known else f"parameters of the spec: {listed(known)}"
+    if "." in name:
+        instance, _, own = name.partition(".")
+        where = f"{instance}: {{set: {{{own}: …}}}}"
+        return f"parameters of a module are set at its instance, as in {where}; {there}"
+    return suggest(name, known, "parameters") or there
+
+
+def key_of(section: SourceMapping, part: str, name: str) -> Located[str]:
+    """The key ``name`` of the part ``part`` of a section, as a text with its place; the section's where it has none."""
+    node = section.get(part)
+    entry = node.entry(name) if isinstance(node, SourceMapping) else None
+    return Located(name, Scalar(name, section.span) if entry is None else entry.key)
+
+
+def key_span(section: Section, part: str, name: str) -> Span:
+    """Where an entry of a part of a section has its name."""
+    return key_of(section.source, part, name).span
+
+
+def check_keys(
+    section: SourceMapping, part: str, kept: Collection[str], directory: Directory, findings: Findings
+) -> None:
+    """The references that are keys of a part of a section and whose values are invalid, which ``kept`` are not."""
+    node = section.get(part)
+    for entry in node.entries if isinstance(node, SourceMapping) else ():
+        if entry.name not in kept and not directory.instance(entry.name):
+            resolve_end(Located(entry.name, entry.key), directory, findings)
+
+
+def piece(text: Located[str], start: int, end: int) -> Located[str]:
+    """Characters ``start`` to ``end`` of a text as a text of their own, with their place."""
+    return Located(text.value[start:end], text.node.part(start, end))
+
+
+def parts(text: Located[str]) -> Iterator[tuple[str, Span]]:
+    """The references that are joined with ``+``, each with its place.
+
+    >>> from neurovis_spec.language.yaml.source import Scalar
+    >>> node = Scalar("K1 + K3", Span("x", 1, 1, 1, 8))
+    >>> [(name, span.column) for name, span in parts(Located("K1 + K3", node))]
+    [('K1', 1), ('K3', 6)]
+    """
+    for start, piece in split_sum(text.value):
+        stripped = piece.strip()
+        offset = start + (len(piece) - len(piece.lstrip()))
+        yield stripped, text.node.at(offset, offset + len(stripped))
+
+
+def resolve_part(name: str, span: Span, directory: Directory, findings: Findings) -> tuple[int, ...] | None:
+    """One reference: a group, a neuron or a range."""
+    match = _RANGE.fullmatch(name)
+    if match:
+        found = directory.range(match["low"], match["high"])
+        if isinstance(found, str):
+            if not directory.covers(match["low"]):
+                findings.error("bad-range", span, f"'{shorten(name)}' is no range: {found}")
+            return None
+        return found
+    result = directory.find(name)
+    if result is None:
+        if not name:
+            findings.error("empty-reference", span, "a reference is missing here", "name a group, a neuron or a range")
+        elif not directory.covers(name):
+            right = None if findings.many else directory.meant(name)
+            _unknown(name, span, directory, findings)
+            return None if right is None else directory.find(right)
+    return result
+
+
+def _unknown(name: str, span: Span, directory: Directory, findings: Findings) -> None:
+    inside = directory.instance(name)
+    if inside:
+        some = next(iter((*inside[0].groups, *inside[0].instances)), None)
+        hint = None if some is None else f"name a group or a neuron in it, as in {name}.{some}"
+        findings.error("unknown-neuron", span, f"'{shorten(name)}' is an instance, not a neuron", hint)
+        return
+    if directory.feeds(name):
+        path, dot, own = name.rpartition(".")
+        hint = f"connect a neuron that takes it in: {{input: {own}}}{f' in the module of {path!r}' if dot else ''}"
+        findings.error("unknown-neuron", span, f"'{shorten(name)}' is an input, not a neuron", hint)
+        return
+    message = f"there is no neuron or group '{shorten(name)}'"
+    findings.error("unknown-neuron", span, message, lambda: directory.hint(name))
+
+
+def resolve(
+    texts: tuple[Located[str], ...], directory: Directory, findings: Findings, *, instances: bool = False
+) -> tuple[int, ...] | None:
+    """Several references, in the order written; a neuron named twice is a finding. With ``instances`` the name of an
+    instance stands for all of its neurons."""
+    result: list[int] = []
+    seen: set[int] = set()
+    before = findings.errors
+    failed = False
+    for text in texts:
+        for name, span in parts(text):
+            if findings.errors - before >= PATIENCE:
+                return None
+            inside = directory.instance(name) if instances else ()
+            found: tuple[int, ...] | None = tuple(index for one in inside for index in one.members)
+            if not inside:
+                found = resolve_part(name, span, directory, findings)
+            if found is None:
+                failed = True
+                continue
+            if not seen.isdisjoint(found):
+                findings.error("repeated-reference", span, f"'{shorten(name)}' names neurons that are named before it")
+                failed = True
+            seen.update(found)
+            result.extend(found)
+    return None if failed else tuple(result)
+
+
+def resolve_end(text: Located[str], directory: Directory, findings: Findings) -> tuple[int, ...] | None:
+    """One end of a connection: references joined with ``+``."""
+    return resolve((text,), directory, findings)
+
+
+def resolve_ends(
+    text: Located[str], directory: Directory, findings: Findings
+) -> tuple[tuple[int, ...], tuple[int, ...]] | None:
+    """Both ends of ``FROM -> TO``; None where one is invalid."""
+    sources, targets = resolve_each(text, directory, findings)
+    return None if sources is None or targets is None else (sources, targets)
+
+
+def resolve_each(
+    text: Located[str], directory: Directory, findings: Findings
+) -> tuple[tuple[int, ...] | None, tuple[int, ...] | None]:
+    """Each end of ``FROM -> TO``, split at its first arrow; both are checked even if one is invalid."""
+    arrow = text.value.index("->")
+    sources = resolve_end(piece(text, 0, arrow), directory, findings)
+    targets = resolve_end(piece(text, arrow + 2, len(text.value)), directory, findings)
+    return sources, targets

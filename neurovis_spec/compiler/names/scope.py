@@ -1,0 +1,69 @@
+"""A scope: the spec itself or an instance of a module, with what the names in it mean.
+
+In: nothing; these are the values that ``expand`` makes and that everything which resolves a name reads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from neurovis_spec.compiler.names.references import Section
+from neurovis_spec.compiler.names.unresolved import Gaps
+from neurovis_spec.compiler.network import Input
+from neurovis_spec.compiler.values.constants import Constants
+from neurovis_spec.compiler.values.data_files import Files
+from neurovis_spec.compiler.values.definitions import Definitions
+
+
+@dataclass(frozen=True)
+class Scope:
+    """The spec (its ``path`` is empty) or one instance (``left1``, ``left1.knee``).
+
+    ``inputs`` are those that its names may mean, those of instances within it by their dotted names. ``children`` are
+    the places of the instances within it, by name: ``left`` means all of a counted one, ``left1`` the first of them.
+    ``settings`` are the parameters that ``set`` gives, each with the names that its formula uses in the scope around.
+    """
+
+    path: str
+    section: Section
+    constants: Constants
+    definitions: Definitions
+    files: Files
+    inputs: Mapping[str, Input]
+    module: str | None = None
+    parent: int = -1
+    declared: str = ""
+    number: int = 0
+    children: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    settings: Mapping[str, frozenset[str]] = field(default_factory=dict)
+
+    def called(self, name: str) -> str:
+        """The name that something of this scope has in the whole network."""
+        return f"{self.path}.{name}" if self.path else name
+
+    def declares(self, entry: str) -> str:
+        """The name by which an entry of ``connections`` of this scope draws: ``left1/K -> O`` within the instance
+        left1. It is another one than that of the entry ``left1.K -> O`` around it, as no name and no path has a
+        slash."""
+        return f"{self.path}/{entry}" if self.path else entry
+
+    @property
+    def gaps(self) -> Gaps:
+        """What could not be read, in this scope and among the definitions."""
+        return self.definitions.gaps
+
+
+class Expansion(NamedTuple):
+    """All scopes, and the inputs of the network in the order of their places in the vector of all inputs."""
+
+    scopes: tuple[Scope, ...]
+    inputs: tuple[Input, ...]
+
+    def depend(self) -> None:
+        """What is structural in an instance is so for the parameters, of the scope around it, that it was set from."""
+        for scope in reversed(self.scopes):
+            for name, used in scope.settings.items():
+                if name in scope.constants.structural:
+                    self.scopes[scope.parent].constants.depend(used)

@@ -1,0 +1,1 @@
+"""Neurons: from groups to structures of arrays."""

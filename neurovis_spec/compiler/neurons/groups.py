@@ -1,0 +1,351 @@
+"""Groups: one group of neurons, from what is written of it to its values.
+
+In: a Scope and the model of a group. Out: its neurons' names, what they are (Kind), and their values, one a neuron.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple, cast
+
+import numpy as np
+
+from neurovis_spec.arrays import FloatArray, IntArray, frozen
+from neurovis_spec.compiler.events.settable import Part
+from neurovis_spec.compiler.limits import PATIENCE, Limits, amount, plural
+from neurovis_spec.compiler.names.references import key_span, known_inputs
+from neurovis_spec.compiler.names.scope import Scope
+from neurovis_spec.compiler.names.state_references import no_state
+from neurovis_spec.compiler.network import Group, Role
+from neurovis_spec.compiler.neurons.labels import labels_of
+from neurovis_spec.compiler.neurons.positions import positions_of
+from neurovis_spec.compiler.program import Activation, Combine, Model
+from neurovis_spec.compiler.values.arguments import check_initials, check_settings, choose, parameters, spread
+from neurovis_spec.compiler.values.constants import Constants
+from neurovis_spec.compiler.values.definitions import Defaults, Definitions
+from neurovis_spec.compiler.values.draws import Stream
+from neurovis_spec.diagnostics import meant, shorten
+from neurovis_spec.language.expressions.tree import Call, walk
+from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, too_long
+from neurovis_spec.language.sections import GroupModel
+from neurovis_spec.language.values import Choice, FormulaList, Initial
+from neurovis_spec.language.yaml.source import Scalar
+
+
+class Kind(NamedTuple):
+    """What the neurons of a group are: definitions with parameters, one value a neuron."""
+
+    activation: Activation
+    activation_parameters: Mapping[str, FloatArray]
+    model: Model
+    model_parameters: Mapping[str, FloatArray]
+    #: the parameters that follow those of a run (``activation``, ``model``)
+    parts: tuple[Part, ...] = ()
+
+
+class Built(NamedTuple):
+    """One group, before its values are joined with those of the others. ``name`` and ``names`` are those that it and
+    its neurons have in their scope."""
+
+    name: str
+    group: Group
+    kind: Kind
+    model: GroupModel
+    names: tuple[str, ...]
+    labels: tuple[str, ...]
+    bias: FloatArray
+    initial: FloatArray
+    input: IntArray
+    position: FloatArray | None
+    first: int | None
+    #: what states of its model begin with
+    starts: Mapping[str, FloatArray]
+    #: what of it follows parameters: ``bias``, ``position`` (x, then y), and those of its kind
+    parts: tuple[Part, ...] = ()
+
+
+class _Unsaid(NamedTuple):
+    """What n neurons have of which nothing is said."""
+
+    bias: FloatArray
+    initial: FloatArray
+    input: IntArray
+
+
+@lru_cache(maxsize=64)
+def _unsaid(n: int) -> _Unsaid:
+    """The same arrays, which nobody writes to, for all groups of a size: instances have many."""
+    result = _Unsaid(np.zeros(n), np.full(n, np.nan), np.full(n, -1, dtype=np.int64))
+    for array in result:
+        frozen(array)
+    return result
+
+
+@dataclass(frozen=True)
+class Builder:
+    """What makes the groups of one scope."""
+
+    scope: Scope
+    limits: Limits
+    seed: int
+    #: what groups are that are the same in all instances of a module, by the group's model and its count
+    kinds: dict[tuple[int, int], Kind]
+
+    @property
+    def constants(self) -> Constants:
+        """What the scope's expressions may use."""
+        return self.scope.constants
+
+    @property
+    def definitions(self) -> Definitions:
+        """The definitions that the scope sees."""
+        return self.scope.definitions
+
+    def group(self, name: str, model: GroupModel, start: int) -> Built | None:
+        """One group; None where it is not known which neurons it has."""
+        findings = self.constants.findings
+        if name in self.scope.section.inputs and IDENTIFIER.fullmatch(name):
+            first = key_span(self.scope.section, "inputs", name)
+            message = f"'{name}' is an input already (line {first.line}); groups and inputs share their names"
+            findings.error("duplicate-name", key_span(self.scope.section, "neurons", name), message)
+        names, first_number = None, None
+        if name not in self.definitions.gaps.names["neurons"]:
+            names, first_number = self._names(name, model, start)
+        if names is None:
+            self._check(name, model)
+            return None
+        n = len(names)
+        kind = self._kind(model, n)
+        with self.constants.following() as biased:
+            bias = None if model.bias is None else self._drawn(model.bias, n, "bias", name)
+        given = model.initial or Initial(None)
+        initial = None if given.activity is None else self._drawn(given.activity, n, "initial", name)
+        input_index = self._input(model, n)
+        with self.constants.following() as placed:
+            position = positions_of(model.position, n, self.constants, self.scope.files)
+        labels = self._labels(model, names)
+        group = Group(
+            name=self.scope.called(name),
+            start=start,
+            count=n,
+            activation=kind.activation.name,
+            model=kind.model.name,
+            combine=cast(Combine, model.combine.value if model.combine else "sum"),
+            activation_parameters={k: tuple(v.tolist()) for k, v in kind.activation_parameters.items()},
+            model_parameters={k: tuple(v.tolist()) for k, v in kind.model_parameters.items()},
+            input=self._fed(model),
+            box=None if model.box is None else self.scope.called(model.box.value),
+            role=None if model.role is None else cast(Role, model.role.value),
+            description=None if model.description is None else model.description.value,
+            module=self.scope.module,
+            spikes=_spikes(kind),
+        )
+        return Built(
+            name=name,
+            group=group,
+            kind=kind,
+            model=model,
+            names=names,
+            labels=labels or names,
+            bias=_unsaid(n).bias if bias is None else bias,
+            initial=_unsaid(n).initial if initial is None else initial,
+            input=_unsaid(n).input if input_index is None else input_index,
+            position=position,
+            first=first_number,
+            starts=self._starts(given, n, name, kind, model),
+            parts=(
+                *kind.parts,
+                *(part._replace(field="bias") for part in biased),
+                *(part._replace(field="position") for part in placed),
+            ),
+        )
+
+    def _check(self, name: str, model: GroupModel) -> None:
+        """What can be said of a group of which it is not known which neurons it has."""
+        kind = self._kind(model, None)
+        given = model.initial or Initial(None)
+        for formulas, purpose in ((model.bias, "bias"), (given.activity, "initial")):
+            if formulas is not None:
+                self._drawn(formulas, None, purpose, name)
+        self._starts(given, None, name, kind, model)
+        self._input(model, None)
+        positions_of(model.position, None, self.constants, self.scope.files)
+
+    def _starts(self, given: Initial, n: int | None, name: str, kind: Kind, model: GroupModel) -> dict[str, FloatArray]:
+        """What states of the model begin with."""
+        result: dict[str, FloatArray] = {}
+        sure = model.model is None or kind.model.name == model.model.name.value  # else it is invalid, and said so
+        states = tuple(state.name for state in kind.model.state)
+        for state, formulas in given.states:
+            if sure and state.value not in states:
+                found = no_state(f"the model '{kind.model.name}' of '{name}'", state.value, states)
+                self.constants.findings.error("unknown-state", state.span, *found)
+            values = self._drawn(formulas, n, "initial", name, state.value)
+            if values is not None:
+                result[state.value] = values
+        return result
+
+    def _fed(self, model: GroupModel) -> str | None:
+        """The network's name of the input of a group."""
+        if model.input is None:
+            return None
+        found = self.scope.inputs.get(model.input.value)
+        return model.input.value if found is None else found.name
+
+    def _names(self, name: str, model: GroupModel, start: int) -> tuple[tuple[str, ...] | None, int | None]:
+        findings = self.constants.findings
+        count = None
+        if model.count is not None:
+            count = self.constants.integer(model.count, "'count'", 1)
+            if count is None:
+                return None, None
+        span = key_span(self.scope.section, "neurons", name) if model.count is None else model.count.span
+        total = start + (count or len(model.names or ()) or 1)
+        if total > self.limits.neurons:
+            message = f"this makes {amount(total)} neurons; the limit is {self.limits.neurons:,}"
+            findings.error("too-many", span, message, "raise it with --limit")
+            return None, None
+        if model.names is not None:
+            return self._listed(model, count), None
+        if model.first is not None and count is None:
+            findings.error("first-without-count", model.first.span, "'first' needs 'count'")
+            return None, None
+        if count is None:
+            return (name,), None
+        first = 1 if model.first is None else self.constants.integer(model.first, "'first'", 0)
+        if first is None:
+            return None, None
+        names = tuple(f"{name}{number}" for number in range(first, first + count))
+        if len(names[-1]) > 64:
+            findings.error("bad-name", key_span(self.scope.section, "neurons", name), too_long(names[-1]), NAME_RULE)
+            return None, None
+        return names, first
+
+    def _listed(self, model: GroupModel, count: int | None) -> tuple[str, ...] | None:
+        findings = self.constants.findings
+        assert model.names is not None
+        seen: dict[str, Located[str]] = {}
+        before = findings.errors
+        for item in model.names:
+            if not IDENTIFIER.fullmatch(item.value):
+                findings.error("bad-name", item.span, bad_name(item.value), NAME_RULE)
+            elif item.value in seen:
+                line = seen[item.value].span.line
+                findings.error("duplicate-neuron", item.span, f"'{item.value}' is named before (line {line})")
+            seen[item.value] = item
+            if findings.errors - before >= PATIENCE:
+                break
+        if findings.errors > before:  # how many they are is known
+            return tuple(item.value for item in model.names)
+        if not seen or (count is not None and count != len(seen)):
+            wanted = "at least one is wanted" if count is None else f"'count' says {count}"
+            node = model.source.get("names")
+            span = model.names[0].span if model.names else model.source.span if node is None else node.span
+            findings.error("wrong-size", span, f"'names' has {plural(len(seen), 'name')}, {wanted}")
+            return None
+        return tuple(seen)
+
+    def _choices(self, model: GroupModel) -> tuple[tuple[Activation, Defaults] | None, tuple[Model, Defaults] | None]:
+        """The definitions that a group names."""
+        known, findings = self.definitions, self.constants.findings
+        activation = model.activation or _default("identity", model)
+        neuron = model.model or _default("static", model)
+        return (
+            choose(activation, known.activations, "activation", known, findings),
+            choose(neuron, known.models, "model", known, findings),
+        )
+
+    def _kind(self, model: GroupModel, n: int | None) -> Kind:
+        """What the neurons are; identity and static in the place of what is invalid."""
+        if n is None or not (_fixed(model.activation) and _fixed(model.model)):
+            return self._made(model, n)
+        key = id(model), n
+        if key not in self.kinds:
+            self.kinds[key] = self._made(model, n)
+        return self.kinds[key]
+
+    def _made(self, model: GroupModel, n: int | None) -> Kind:
+        activation, neuron = self._choices(model)
+        activity: dict[str, FloatArray] | None = None
+        settings: dict[str, FloatArray] | None = None
+        parts: list[Part] = []
+        if activation is not None:
+            with self.constants.following() as found:
+                activity = parameters(model.activation or _default("identity", model), activation[1], n, self.constants)
+            parts += (part._replace(field="activation") for part in found)
+        elif model.activation is not None:
+            check_settings(model.activation, self.constants, ("i", "n"))
+        if neuron is None and model.model is not None:
+            check_settings(model.model, self.constants, ("i", "n"))
+        if neuron is not None:
+            choice = model.model or _default("static", model)
+            with self.constants.following() as found:
+                settings = parameters(choice, neuron[1], n, self.constants)
+            parts += (part._replace(field="model") for part in found)
+            if settings is not None:
+                check_initials(neuron[0].state, settings, choice, self.constants)
+        if activation is None or activity is None:
+            activation, activity = self.definitions.activations["identity"], {}
+        if neuron is None or settings is None:
+            neuron, settings = self.definitions.models["static"], {}
+        return Kind(activation[0], activity, neuron[0], settings, tuple(parts))
+
+    def _drawn(
+        self, formulas: Formula | FormulaList, n: int | None, purpose: str, name: str, state: str | None = None
+    ) -> FloatArray | None:
+        """The values of a key, or those of a state in it, of the group's neurons."""
+        called, what = self.scope.called(name), purpose
+        if state is not None:
+            called, what = f"{called}.{state}", state
+        return spread(formulas, n, self.constants, f"'{what}'", Stream(self.seed, purpose, called))
+
+    def _input(self, model: GroupModel, n: int | None) -> IntArray | None:
+        if model.input is None:
+            return None
+        name = model.input.value
+        found = self.scope.inputs.get(name)
+        findings = self.constants.findings
+        if found is None:
+            known = tuple(self.scope.section.inputs)
+            if name not in known and not self.definitions.gaps.cover("inputs", name):
+                found = None if findings.many else self.scope.inputs.get(meant(name, known) or "")
+                message = f"there is no input '{shorten(name)}'"
+                findings.error("unknown-input", model.input.span, message, lambda: known_inputs(name, known))
+        if found is None or n is None:
+            return None
+        if found.size == 1:
+            return np.full(n, found.start, dtype=np.int64)
+        if found.size == n:
+            return np.arange(found.start, found.start + n, dtype=np.int64)
+        message = f"the input '{name}' has {found.size} components, the group has {plural(n, 'neuron')}"
+        findings.error("wrong-size", model.input.span, message, "an input has one component, or one for each neuron")
+        return None
+
+    def _labels(self, model: GroupModel, names: tuple[str, ...]) -> tuple[str, ...] | None:
+        if model.label is None:
+            return None
+        node = model.source.get("label")
+        if node is None or isinstance(node, Scalar) or len(model.label) == len(names):
+            return labels_of(model.label, len(names), self.scope)
+        message = f"'label' has {plural(len(model.label), 'text')} for {plural(len(names), 'neuron')}"
+        self.constants.findings.error("wrong-size", model.label[0].span if model.label else node.span, message)
+        return None
+
+
+def _spikes(kind: Kind) -> bool:
+    """Whether neurons spike: their model does, and what its activity is of is no graded activation."""
+    graded = any(isinstance(node, Call) and node.function == "f" for node in walk(kind.model.activity))
+    return kind.model.spikes and (kind.activation.name == "step" or not graded)
+
+
+def _default(name: str, model: GroupModel) -> Choice:
+    return Choice(Located(name, Scalar(name, model.source.span)), ())
+
+
+def _fixed(choice: Choice | None) -> bool:
+    """Whether a choice means the same wherever it stands: what is set in it are numbers."""
+    return choice is None or not any(
+        not isinstance(entry.value, Scalar) or isinstance(entry.value.value, str) for entry in choice.settings
+    )

@@ -1,0 +1,120 @@
+"""Inputs: signals from outside the network, from the ``inputs`` section.
+
+In: the section and Constants. Out: Inputs in the order written, each with its place in the vector of all inputs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from neurovis_spec.arrays import FloatArray, frozen
+from neurovis_spec.compiler.events.settable import places_of
+from neurovis_spec.compiler.limits import PATIENCE, amount, plural
+from neurovis_spec.compiler.names.references import Section, key_span
+from neurovis_spec.compiler.network import Input
+from neurovis_spec.compiler.values.cells import cells_of, values_of
+from neurovis_spec.compiler.values.constants import ALWAYS, Constants, is_constant
+from neurovis_spec.compiler.values.data_files import Files
+from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.expressions.tree import Tree
+from neurovis_spec.language.located import Formula, Located, formula_of
+from neurovis_spec.language.sections import InputModel
+from neurovis_spec.language.yaml.source import NULL, Packed, Sequence
+
+_SOURCES = ("expression", "file", "values", "size")
+
+
+def make_input(
+    name: str, model: InputModel, start: int, section: Section, constants: Constants, files: Files
+) -> Input | None:
+    """One input of a section, from ``start`` on in the vector of all inputs; None where it is invalid."""
+    findings = constants.findings
+    sources = {"expression": model.expression, "file": model.file, "values": model.values, "size": model.size}
+    given = [key for key in _SOURCES if sources[key] is not None]
+    made = [
+        None if model.expression is None else _by_expression(name, model.expression, start, constants),
+        None if model.file is None else _by_file(name, model.file, start, files, findings),
+        None if model.values is None else _by_values(name, model.values, start, constants),
+        None if given and model.size is None else _by_size(name, model, start, section, constants),
+    ]
+    if len(given) > 1:
+        entry = model.source.entry(given[1])
+        span = model.source.span if entry is None else entry.key.span
+        message = f"'{given[1]}' beside '{given[0]}': an input has one source"
+        findings.error("conflicting-keys", span, message, f"keep '{given[0]}' or '{given[1]}'")
+        return None
+    if not model.lost_keys.isdisjoint(_SOURCES):
+        return None
+    return next((one for one in made if one is not None), None)
+
+
+def _by_expression(name: str, formula: Formula, start: int, constants: Constants) -> Input | None:
+    tree = _expression(formula, constants)
+    return None if tree is None else Input(name, start, 1, expression=tree, slots=places_of(tree, constants.settable))
+
+
+def _by_file(name: str, path: Located[str], start: int, files: Files, findings: Findings) -> Input | None:
+    table = files.table_at(path)
+    if table is None:
+        return None
+    gap = next(table.gaps(), None)
+    if gap is not None:
+        message = f"row {gap[0]}, column {gap[1]} of the file is empty; an input needs a number everywhere"
+        findings.error("file-format", path.span, message)
+        return None
+    return _tabled(name, start, np.array(table.values, dtype=np.float64))
+
+
+def _by_values(name: str, node: Sequence | Packed, start: int, constants: Constants) -> Input | None:
+    with constants.following() as parts:
+        values = _inline(node, constants)
+    if values is None:
+        return None
+    return replace(_tabled(name, start, values), parts=tuple(part._replace(field="table") for part in parts))
+
+
+def _by_size(name: str, model: InputModel, start: int, section: Section, constants: Constants) -> Input | None:
+    size = 1 if model.size is None else constants.integer(model.size, "'size'", 1)
+    if size is not None and size > 1_000_000:
+        span = key_span(section, "inputs", name) if model.size is None else model.size.span
+        constants.findings.error("too-many", span, "an input has at most 1,000,000 components")
+        return None
+    return None if size is None else Input(name, start, size)
+
+
+def _expression(formula: Formula, constants: Constants) -> Tree | None:
+    tree = constants.tree(formula, ("k", "t"))
+    if tree is not None and is_constant(tree, (*ALWAYS, *constants.parameters)):
+        constants.value(formula)
+    return tree
+
+
+def _tabled(name: str, start: int, table: FloatArray) -> Input:
+    frozen(table)
+    return Input(name, start, table.shape[1], table=table)
+
+
+def _inline(node: Sequence | Packed, constants: Constants) -> FloatArray | None:
+    """Rows of numbers; a bare number is a row of one."""
+    findings = constants.findings
+    cells = cells_of(node, findings, "")
+    if cells is None:
+        return None
+    widths = cells.widths
+    if not len(widths):
+        findings.error("wrong-size", node.span, "an input needs at least one row")
+        return None
+    missing = np.flatnonzero(cells.kinds == NULL)
+    for cell in missing[:PATIENCE].tolist():
+        formula_of(cells.node(cell), findings)  # once more where it is no cell: a finding counts once
+    uneven = np.flatnonzero((widths != widths[0]) if widths[0] else widths == 0)
+    for row in () if len(missing) or cells.failed else uneven[:PATIENCE].tolist():
+        wanted = f"{amount(int(widths[0]))}, as in the first row" if widths[0] else "at least one"
+        message = f"a row of {plural(int(widths[row]), 'number')}; expected {wanted}"
+        findings.error("wrong-size", cells.row_span(row), message)
+    values = values_of(cells, np.arange(len(cells.kinds)), constants)
+    if len(uneven) or len(missing) or cells.failed:
+        return None
+    return None if values is None else values.reshape(len(widths), int(widths[0]))

@@ -1,0 +1,64 @@
+"""Labels: what the neurons of a group are called in a picture.
+
+In: the texts as written, with expressions in braces. Out: a text for each neuron, or findings at the very character.
+An expression knows the parameters, ``i`` and ``n`` (as in ``bias``) and, in a module, the ``number`` of the instance:
+1 for ``left1``, and for an instance that is not counted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiler.names.scope import Scope
+from neurovis_spec.compiler.values.constants import Value
+from neurovis_spec.language.located import Formula, Located
+from neurovis_spec.language.templates import Hole, pieces
+
+
+def labels_of(texts: Sequence[Located[str]], n: int, scope: Scope) -> tuple[str, ...] | None:
+    """The labels of n neurons: of one text, or of one each; None where an expression has none."""
+    parts = [pieces(text.value) for text in texts]
+    if all(isinstance(piece, str) for part in parts for piece in part):
+        plain = tuple("".join(map(str, part)) for part in parts)
+        return plain * n if len(plain) == 1 else plain
+    each = np.arange(n, dtype=np.float64)
+    if len(texts) == 1:
+        return _filled(texts[0], parts[0], each, n, scope)
+    found = [
+        _filled(*both, each[place : place + 1], n, scope) for place, both in enumerate(zip(texts, parts, strict=True))
+    ]
+    return None if None in found else tuple(label for labels in found if labels is not None for label in labels)
+
+
+def _filled(
+    text: Located[str], parts: Sequence[str | Hole], i: FloatArray, n: int, scope: Scope
+) -> tuple[str, ...] | None:
+    """A text for each of the neurons ``i``."""
+    columns: list[list[str] | None] = [
+        [piece] * len(i) if isinstance(piece, str) else _values(text, piece, i, n, scope) for piece in parts
+    ]
+    known = [column for column in columns if column is not None]
+    return tuple(map("".join, zip(*known, strict=True))) if len(known) == len(columns) else None
+
+
+def _values(text: Located[str], hole: Hole, i: FloatArray, n: int, scope: Scope) -> list[str] | None:
+    """What an expression gives for each of the neurons ``i``, as a text."""
+    constants = scope.constants
+    if not hole.closed:
+        place = text.node.at(hole.start - 1, hole.start)
+        constants.findings.error("unbalanced-parenthesis", place, "'{' is not closed", "write {{ for a brace")
+        return None
+    extra: dict[str, Value] = {"i": i, "n": float(n)}
+    if scope.module is not None and "number" not in constants.parameters:
+        extra["number"] = float(scope.number or 1)
+    formula: Formula = Located(text.value[hole.start : hole.end], text.node.part(hole.start, hole.end))
+    value = constants.value(formula, extra)
+    return None if value is None else [_written(one) for one in np.broadcast_to(value, i.shape).tolist()]
+
+
+def _written(value: float) -> str:
+    """A number in a label: integers in full, others to six digits."""
+    return str(int(value)) if value.is_integer() and abs(value) < 1e15 else f"{value:.6g}"

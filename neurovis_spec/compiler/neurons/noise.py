@@ -1,0 +1,84 @@
+"""Noise: what a group's neurons are given at random, anew at each step.
+
+In: the ``noise`` of the groups. Out: Noises, each with its place in the vector that a step is given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from neurovis_spec.arrays import frozen
+from neurovis_spec.compiler.events.settable import ParameterFormula, places_of
+from neurovis_spec.compiler.names.scope import Scope
+from neurovis_spec.compiler.network import Noise
+from neurovis_spec.compiler.neurons.populate import Population
+from neurovis_spec.compiler.values.constants import Constants, Value, width_of
+from neurovis_spec.language.expressions.arrays import evaluate_array
+from neurovis_spec.language.expressions.functions import CONSTANTS
+from neurovis_spec.language.expressions.tree import Chain, Conditional, Draw, Tree, children, draws, names
+from neurovis_spec.language.located import Formula
+
+
+def make_noises(scopes: tuple[Scope, ...], population: Population, inputs: int) -> tuple[Noise, ...]:
+    """The noise of every group that has some; ``inputs`` is the length of the vector of all inputs."""
+    result: list[Noise] = []
+    start = inputs
+    for group, model, owner in zip(population.neurons.groups, population.models, population.owners, strict=True):
+        formula, constants = model.noise, scopes[owner].constants
+        if formula is None:
+            continue
+        tree = _tree(formula, constants)
+        if tree is None:
+            continue
+        widths = _check_deviations(tree, formula, group.count, constants)
+        members = np.arange(group.start, group.start + group.count, dtype=np.int64)
+        frozen(members)
+        slots = places_of(tree, constants.settable)
+        result.append(Noise(group.name, members, start, tree, dict(constants.parameters), slots, widths))
+        start += group.count
+    for model, owner in population.lost:
+        if model.noise is not None:
+            _tree(model.noise, scopes[owner].constants)
+    return tuple(result)
+
+
+def _tree(formula: Formula, constants: Constants) -> Tree | None:
+    tree = constants.tree(formula, ("k", "t", "i", "n"), random=True)
+    if tree is None or draws(tree):
+        return tree
+    message = "this noise draws nothing: it is the same at each run"
+    hint = "use normal(mean, deviation) or uniform(low, high); a constant belongs to 'bias'"
+    constants.findings.error("no-draw", formula.span, message, hint)
+    return None
+
+
+def _check_deviations(tree: Tree, formula: Formula, count: int, constants: Constants) -> tuple[ParameterFormula, ...]:
+    """A finding where a deviation, or what ``uniform`` draws from, is known before the run and negative for any neuron.
+    A deviation that depends on the step, or a draw in a branch, which may not be taken, gives NaN in the run, and its
+    warning. Gives those of them that follow parameters of the run."""
+    following = []
+    known: dict[str, Value] = {**constants.parameters, **CONSTANTS, "dt": constants.dt}
+    known |= {"i": np.arange(count, dtype=np.float64), "n": float(count)}
+    for draw in _always_drawn(tree):
+        parts = (draw.first, draw.second) if draw.kind == "uniform" else (draw.second,)
+        if all(names(part) <= known.keys() and not draws(part) for part in parts):
+            width = width_of(draw, *(evaluate_array(part, known) for part in (parts[0], draw.second)))
+            if np.less(width, 0).any():
+                constants.refuse_draw(formula, draw, float(np.min(width)))
+            tree = draw.second if draw.kind == "normal" else Chain(("-",), (draw.second, draw.first))
+            bound = constants.bound(tree, {name: known[name] for name in ("i", "n")})
+            if bound.slots:
+                following.append(bound)
+    return tuple(following)
+
+
+def _always_drawn(tree: Tree) -> Iterator[Draw]:
+    """The draws of a formula that are in no branch of it."""
+    waiting = [tree]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, Draw):
+            yield node
+        waiting.extend((node.condition,) if isinstance(node, Conditional) else children(node))

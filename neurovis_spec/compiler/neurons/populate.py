@@ -1,0 +1,260 @@
+"""Neurons: from the groups of a spec to structures of arrays.
+
+In: Scopes. Out: a Population: Neurons, a Directory of names for each scope, and for each group what its activation and
+its model are (``groups`` makes each).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import chain
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.arrays import FloatArray, IntArray, frozen
+from neurovis_spec.compiler.events.settable import Assembled, Part
+from neurovis_spec.compiler.limits import Limits
+from neurovis_spec.compiler.names.references import Directory, key_span
+from neurovis_spec.compiler.names.scope import Scope
+from neurovis_spec.compiler.names.unresolved import Gaps
+from neurovis_spec.compiler.network import Neurons
+from neurovis_spec.compiler.neurons.groups import Builder, Built, Kind
+from neurovis_spec.compiler.neurons.positions import depend_on_positions
+from neurovis_spec.compiler.values.constants import Constants
+from neurovis_spec.language.located import IDENTIFIER
+from neurovis_spec.language.sections import GroupModel
+
+#: Characters that no name has.
+_NO_LETTERS = re.compile(r"[^A-Za-z0-9_]+")
+
+
+@dataclass(frozen=True)
+class Population:
+    """All neurons, what each group is and how it is written, and how everything is called in each scope
+    (``directories`` are in the order of the scopes, the network's own first)."""
+
+    neurons: Neurons
+    directories: tuple[Directory, ...]
+    kinds: tuple[Kind, ...]
+    models: tuple[GroupModel, ...]
+    #: the place of each group's scope
+    owners: tuple[int, ...]
+    #: for each neuron whether what the spec says of its position is invalid
+    misplaced: npt.NDArray[np.bool_]
+    #: what each scope's expressions may use
+    constants: tuple[Constants, ...]
+    #: groups of which it is not known which neurons they have, each with the place of its scope
+    lost: tuple[tuple[GroupModel, int], ...] = ()
+    #: what of each group follows parameters
+    parts: tuple[tuple[Part, ...], ...] = ()
+
+    @cached_property
+    def moving(self) -> Assembled:
+        """The positions, x and y in turn, of which some may follow parameters."""
+        parts = [
+            part._replace(places=2 * group.start + part.within(2 * group.count))
+            for group, own in zip(self.neurons.groups, self.parts, strict=True)
+            for part in own
+            if part.field == "position"
+        ]
+        return Assembled(self.neurons.position.ravel(), tuple(parts))
+
+    @cached_property
+    def by_distance(self) -> npt.NDArray[np.bool_]:
+        """For each neuron whether it combines by distance, or may, where what the spec says of that is invalid."""
+        result = np.zeros(len(self.neurons), dtype=np.bool_)
+        for group, model in zip(self.neurons.groups, self.models, strict=True):
+            result[group.start : group.start + group.count] = group.combine == "distance" or "combine" in model.lost
+        return result
+
+    def go_by_position(self, neurons: IntArray) -> None:
+        """Report that connections are there, or not, by where these neurons are."""
+        for number in np.unique(np.searchsorted(self._starts, neurons, side="right") - 1).tolist():
+            depend_on_positions(self.models[number].position, self.constants[self.owners[number]])
+
+    @cached_property
+    def _starts(self) -> IntArray:
+        return np.array([group.start for group in self.neurons.groups], dtype=np.int64)
+
+    @property
+    def directory(self) -> Directory:
+        """How everything is called in the spec itself."""
+        return self.directories[0]
+
+
+class _Settled(NamedTuple):
+    """A scope with its groups: the neurons from ``start`` on, and what of their names could not be read."""
+
+    scope: Scope
+    built: tuple[Built, ...]
+    start: int
+    gaps: Gaps
+    lost: tuple[GroupModel, ...]
+
+
+def populate(scopes: tuple[Scope, ...], limits: Limits, seed: int) -> Population:
+    """Make every neuron, scope by scope. A group that is invalid is made as far as its names are known, so that what
+    refers to it can be checked."""
+    settled: list[_Settled] = []
+    kinds: dict[tuple[int, int], Kind] = {}
+    start = 0
+    for scope in scopes:
+        made = _settle(scope, start, limits, seed, kinds)
+        settled.append(made)
+        start += sum(item.group.count for item in made.built)
+        _owners(scope, made.built)
+    return _join(settled)
+
+
+def without_neurons(population: Population) -> Population:
+    """A population without any neuron, in which nobody complains of a name: that there are none is said already."""
+    first, *others = population.directories
+    return replace(population, directories=(replace(first, gaps=first.gaps.with_section("neurons")), *others))
+
+
+def _settle(scope: Scope, start: int, limits: Limits, seed: int, kinds: dict[tuple[int, int], Kind]) -> _Settled:
+    builder = Builder(scope, limits, seed, kinds)
+    built: list[Built] = []
+    gaps = scope.gaps
+    lost = set(gaps.names["neurons"])
+    models: list[GroupModel] = []
+    at = start
+    for name, model in scope.section.neurons.items():
+        group = builder.group(name, model, at)
+        if group is None:
+            lost.update((name, *(item.value for item in model.names or ())))
+            models.append(model)
+            continue
+        built.append(group)
+        for neuron in group.names if model.names is not None or not IDENTIFIER.fullmatch(name) else ():
+            if not IDENTIFIER.fullmatch(neuron):
+                lost.update(_mended(neuron))
+        at += group.group.count
+    return _Settled(scope, tuple(built), start, gaps.with_names("neurons", lost), tuple(models))
+
+
+def _mended(name: str) -> tuple[str, str]:
+    """What a name that is none may be called elsewhere, where its author had it right."""
+    return _NO_LETTERS.sub("", name), _NO_LETTERS.sub("_", name)
+
+
+def _owners(scope: Scope, built: tuple[Built, ...]) -> None:
+    """Two declarations of one name are a finding: of two groups, a neuron and an input, an instance and others."""
+    section, findings = scope.section, scope.constants.findings
+    owners: dict[str, str] = {}
+    for item in built:
+        name = item.name
+        # A group of several may not be called like a neuron of another one either: what would the name refer to?
+        own = dict.fromkeys((*item.names, name), name)
+        if owners.keys().isdisjoint(own) and section.inputs.keys().isdisjoint(own):
+            owners.update(own)
+            continue
+        for neuron in own:
+            other = owners.setdefault(neuron, name)
+            if other != name:
+                first = key_span(section, "neurons", other)
+                message = f"'{name}' and '{other}' (line {first.line}) both make the name '{neuron}'"
+                hint = "rename one of them, or count it from another number (first)"
+                findings.error("duplicate-neuron", key_span(section, "neurons", name), message, hint)
+                break
+            if neuron in section.inputs and neuron != name:
+                first = key_span(section, "inputs", neuron)
+                message = f"the neuron '{neuron}' of '{name}' is called like an input (line {first.line})"
+                findings.error("duplicate-name", key_span(section, "neurons", name), message)
+                break
+    _instances(scope, owners)
+
+
+def _instances(scope: Scope, owners: Mapping[str, str]) -> None:
+    """An instance may be called like nothing else in its scope."""
+    section, findings = scope.section, scope.constants.findings
+    taken: dict[str, str] = {}
+    for name, model in section.instances.items():
+        count = 0 if model.count is None else len(scope.children.get(name, ()))
+        for called in (name, *(f"{name}{number}" for number in range(1, count + 1))):
+            other = taken.setdefault(called, name)
+            what = None
+            if other != name:
+                what = f"instance '{other}' (line {key_span(section, 'instances', other).line})"
+            elif called in owners:
+                what = f"group '{owners[called]}' (line {key_span(section, 'neurons', owners[called]).line})"
+            elif called in section.inputs:
+                what = f"input '{called}' (line {key_span(section, 'inputs', called).line})"
+            if what is not None:
+                whose = "" if called == name else f" of '{name}'"
+                message = f"the instance '{called}'{whose} is called like the {what}"
+                hint = "groups, inputs and instances share their names"
+                findings.error("duplicate-name", key_span(section, "instances", name), message, hint)
+                break
+
+
+def _join(settled: list[_Settled]) -> Population:
+    built = [item for one in settled for item in one.built]
+    names: list[str] = []
+    for one in settled:
+        own = chain.from_iterable(item.names for item in one.built)
+        names.extend(map(one.scope.called, own) if one.scope.path else own)
+    empty = np.zeros(0)
+    neurons = Neurons(
+        names=tuple(names),
+        labels=tuple(chain.from_iterable(item.labels for item in built)),
+        groups=tuple(item.group for item in built),
+        bias=np.concatenate([item.bias for item in built] or [empty]),
+        initial=np.concatenate([item.initial for item in built] or [empty]),
+        input=np.concatenate([item.input for item in built] or [empty.astype(np.int64)]),
+        position=np.concatenate([_placed(item) for item in built] or [np.zeros((0, 2))]),
+        starts=_starts(built, len(names)),
+    )
+    for array in (neurons.bias, neurons.initial, neurons.input, neurons.position, *neurons.starts.values()):
+        frozen(array)
+    directories = _directories(settled, len(names))
+    kinds, models = tuple(item.kind for item in built), tuple(item.model for item in built)
+    owners = tuple(place for place, one in enumerate(settled) for _ in one.built)
+    sizes = [item.group.count for item in built]
+    wrong = [item.position is None or "position" in item.model.lost for item in built]
+    misplaced = np.repeat(np.array(wrong, dtype=np.bool_), sizes)
+    lost = tuple((model, place) for place, one in enumerate(settled) for model in one.lost)
+    constants = tuple(one.scope.constants for one in settled)
+    parts = tuple(item.parts for item in built)
+    return Population(neurons, directories, kinds, models, owners, misplaced, constants, lost, parts)
+
+
+def _starts(built: list[Built], total: int) -> dict[str, FloatArray]:
+    """By states of models, what they begin with in all neurons, NaN where no group says it."""
+    result: dict[str, FloatArray] = {}
+    for item in built:
+        for state, values in item.starts.items():
+            array = result.setdefault(state, np.full(total, np.nan))
+            array[item.group.start : item.group.start + item.group.count] = values
+    return result
+
+
+def _placed(item: Built) -> FloatArray:
+    """The positions of a group's neurons, NaN where there is none."""
+    return np.full((item.group.count, 2), np.nan) if item.position is None else item.position
+
+
+def _directories(settled: list[_Settled], total: int) -> tuple[Directory, ...]:
+    """The Directory of each scope; those of the instances within a scope are made before its own."""
+    made: dict[int, Directory] = {}
+    ends: dict[int, int] = {}
+    for index in range(len(settled) - 1, -1, -1):
+        one = settled[index]
+        after = max([index + 1, *(ends[place] for places in one.scope.children.values() for place in places)])
+        ends[index] = after
+        stop = settled[after].start if after < len(settled) else total
+        made[index] = Directory(
+            {item.name: item.group for item in one.built},
+            dict(chain.from_iterable(zip(item.names, item.group.indices, strict=True) for item in one.built)),
+            {item.name: item.first for item in one.built if item.first is not None},
+            one.gaps,
+            {name: tuple(made[place] for place in places) for name, places in one.scope.children.items()},
+            range(one.start, stop),
+            one.scope.section.inputs,
+        )
+    return tuple(made[index] for index in range(len(settled)))

@@ -1,0 +1,1 @@
+"""Numbers of a spec: formulas, parameters, definitions, draws, tables."""

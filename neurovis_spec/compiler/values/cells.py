@@ -1,0 +1,183 @@
+"""Cells: lists of rows as arrays, however they were read.
+
+In: rows as written, from the reader's packed arrays or as nodes. Out: Cells, structure of arrays; and their values,
+each distinct formula parsed and evaluated once, for all places where it stands. So a matrix of a million cells ``w``
+costs hardly more than one of numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.limits import PATIENCE
+from neurovis_spec.compiler.values.constants import Constants, Randomness, Value, check_finite
+from neurovis_spec.compiler.values.draws import Stream
+from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.language.located import Located, formula_of
+from neurovis_spec.language.yaml.source import NULL, NUMBER, TEXT, Node, Packed, Scalar, Sequence
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Row ``r`` holds the cells ``starts[r]`` to ``starts[r + 1]``. A cell is NULL, a NUMBER or a TEXT (then its number
+    is an index into ``texts``); ``node`` and ``row_span`` say where things stand. ``failed``: some were no cells, which
+    is reported; they are left as NULL, so that the others can be checked."""
+
+    starts: IntArray
+    kinds: npt.NDArray[np.int8]
+    numbers: FloatArray
+    texts: tuple[str, ...]
+    node: Callable[[int], Node]
+    row_span: Callable[[int], Span]
+    failed: bool = False
+
+    @property
+    def widths(self) -> IntArray:
+        """How many cells each row has."""
+        return np.diff(self.starts)
+
+    def rows(self) -> IntArray:
+        """The row of each cell."""
+        return np.repeat(np.arange(len(self.starts) - 1), self.widths)
+
+    def columns(self) -> IntArray:
+        """The column of each cell."""
+        return np.arange(len(self.kinds)) - np.repeat(self.starts[:-1], self.widths)
+
+
+def cells_of(node: Sequence | Packed, findings: Findings, row: str, *, named: bool = False) -> Cells | None:
+    """The cells of a list of rows; findings where one is no number, text or null, or a row is no list. None where there
+    are many such.
+
+    ``row`` is what a row is, for a finding; with "" a bare cell is a row of one. ``named``: some cells are names, so
+    that the caller has to say what an empty text is.
+    """
+    cells = _packed(node, row) if isinstance(node, Packed) else None
+    cells = cells or _written(node, findings, row, named)
+    if cells is None:
+        return None
+    wild = np.flatnonzero((cells.kinds == NUMBER) & ~np.isfinite(cells.numbers))
+    for cell in wild[:PATIENCE].tolist():
+        formula_of(cells.node(cell), findings)
+    return replace(cells, failed=True) if len(wild) else cells
+
+
+def _packed(node: Packed, row: str) -> Cells | None:
+    if node.rows is None and row:
+        return None
+    starts = np.arange(len(node.kinds) + 1) if node.rows is None else np.array(node.rows, dtype=np.int64)
+    kinds = np.array(node.kinds, dtype=np.int8)
+    numbers = np.array(node.numbers, dtype=np.float64)
+    return Cells(starts, kinds, numbers, node.texts, node.cell, lambda r: _row_span(node, r))
+
+
+def _row_span(node: Packed, row: int) -> Span:
+    return node.cell(row).span if node.rows is None else node.row(row).span
+
+
+def _written(node: Sequence | Packed, findings: Findings, row: str, named: bool) -> Cells | None:
+    before = findings.errors
+    nodes: list[Node] = []
+    starts = [0]
+    items = node.items
+    for item in items:
+        if isinstance(item, (Sequence, Packed)):
+            nodes += item.items
+        elif row:
+            findings.error("wrong-type", item.span, row)
+        else:
+            nodes.append(item)
+        starts.append(len(nodes))
+        if findings.errors - before >= PATIENCE:
+            return None
+    texts: dict[str, int] = {}
+    kinds = np.zeros(len(nodes), dtype=np.int8)
+    numbers = np.full(len(nodes), np.nan)
+    for place, cell in enumerate(nodes):
+        if isinstance(cell, Scalar) and cell.value is None:
+            continue
+        if not isinstance(cell, Scalar) or isinstance(cell.value, bool) or (cell.value == "" and not named):
+            formula_of(cell, findings)
+            if findings.errors - before >= PATIENCE:
+                return None
+        elif isinstance(cell.value, str):
+            kinds[place], numbers[place] = TEXT, texts.setdefault(cell.value, len(texts))
+        elif cell.value is not None:
+            kinds[place], numbers[place] = NUMBER, cell.value
+    return Cells(
+        np.array(starts, dtype=np.int64),
+        kinds,
+        numbers,
+        tuple(texts),
+        nodes.__getitem__,
+        lambda r: items[r].span,
+        findings.errors > before,
+    )
+
+
+class Pairs(NamedTuple):
+    """What the formulas of cells see: source ``i`` and target ``j``, which also count the numbers drawn, and more.
+    ``vague``: what these are is not known, as an end is invalid; a formula that depends on them has no value then."""
+
+    i: IntArray
+    j: IntArray
+    known: Mapping[str, float]
+    stream: Stream
+    vague: bool = False
+
+
+def values_of(cells: Cells, which: IntArray, constants: Constants, pairs: Pairs | None = None) -> FloatArray | None:
+    """The values of the cells ``which``; NaN where null. ``pairs`` are as long as ``which``; without them a formula
+    sees parameters alone."""
+    result = cells.numbers[which]
+    kinds = cells.kinds[which]
+    result[kinds == NULL] = np.nan
+    written = np.flatnonzero(kinds == TEXT)
+    if not len(written):
+        return result
+    numbers = result[written].astype(np.int64)
+    order = np.argsort(numbers, kind="stable")
+    groups = np.split(written[order], np.flatnonzero(np.diff(numbers[order])) + 1)
+    before = constants.findings.errors
+    failed = False
+    for places in sorted(groups, key=lambda places: int(places[0])):
+        values = _evaluated(cells, which, places, constants, pairs)
+        failed = failed or values is None
+        if values is not None:
+            result[places] = values
+        elif constants.findings.errors - before >= PATIENCE:
+            return None
+    return None if failed else result
+
+
+def _evaluated(
+    cells: Cells, which: IntArray, places: IntArray, constants: Constants, pairs: Pairs | None
+) -> Value | None:
+    """The values of one formula at all its places; a finding stands at the first place invalid."""
+    formula = formula_of(cells.node(int(which[places[0]])), constants.findings)
+    if formula is None:
+        return None
+    extra: dict[str, Value] = {}
+    randomness = None
+    if pairs is not None and pairs.vague:
+        constants.look(formula, ("i", "j", *pairs.known), random=True)
+        return None
+    if pairs is not None:
+        i, j = pairs.i[places], pairs.j[places]
+        extra = {"i": i.astype(np.float64), "j": j.astype(np.float64), **pairs.known}
+        randomness = Randomness(pairs.stream, i, j)
+    values = constants.unchecked(formula, extra, randomness, places=places)
+    if values is None or np.isfinite(values).all():
+        return values
+    everywhere = np.broadcast_to(values, places.shape)
+    wild = int(np.flatnonzero(~np.isfinite(everywhere))[0])
+    node = cells.node(int(which[places[wild]]))
+    assert isinstance(node, Scalar)
+    check_finite(float(everywhere[wild]), Located(formula.value, node), constants.findings)
+    return None

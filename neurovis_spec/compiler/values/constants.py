@@ -1,0 +1,364 @@
+"""Constants: formulas evaluated while a network is compiled.
+
+In: formulas (with their places), parameters, and what else a place makes known (``i``, ``n``, …). Out: floats or
+arrays, or findings at the very character. ``used`` notes on which parameters something of the structure depends.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import lru_cache
+from itertools import chain
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.compiler.events.settable import Dependent, ParameterFormula, Part, Slot, places_of
+from neurovis_spec.compiler.values.draws import Stream
+from neurovis_spec.diagnostics import Findings, shorten, suggest
+from neurovis_spec.language.expressions.arrays import evaluate_array
+from neurovis_spec.language.expressions.functions import CONSTANTS, FUNCTIONS
+from neurovis_spec.language.expressions.parser import DRAWS, ExpressionError, parse, unknown_names
+from neurovis_spec.language.expressions.tree import Draw, Number, Tree, draws, names
+from neurovis_spec.language.located import Formula
+
+Value: TypeAlias = float | FloatArray
+
+#: Names that an expression may always use.
+ALWAYS = (*CONSTANTS, "dt")
+#: A number this close to an integer is that integer.
+NEAR_INTEGER = 1e-9
+#: Names that mean something elsewhere, and why not here.
+_ELSEWHERE: Mapping[str, str] = {
+    "k": "the step is known in a run; this value is worked out once, before it",
+    "t": "the time is known in a run; this value is worked out once, before it",
+    "dt": "this is 'dt' itself",
+    "i": "'i' is known within a group (the neuron's index) and in a connection's weight, centre, rule (the source's)",
+    "j": "'j' is known in a connection's weight, centre, rule (the target's index)",
+    "n": "'n' is known within a group (its count); a connection has n_from and n_to",
+    "n_from": "'n_from' is known in the weight, the centre and the rule of a connection",
+    "n_to": "'n_to' is known in the weight, the centre and the rule of a connection",
+    "distance": "'distance' is known in the weight and the centre of a connection",
+}
+_NOT_FINITE = "look for a division by zero, an overflow, or a root or logarithm of a negative number"
+
+
+@dataclass(frozen=True, slots=True)
+class Scope(Collection[str]):
+    """Names from several places, as one collection that nobody copies: there may be many of them, and many formulas."""
+
+    parts: tuple[Collection[str], ...]
+
+    def __contains__(self, name: object) -> bool:
+        return any(name in part for part in self.parts)
+
+    def __iter__(self) -> Iterator[str]:
+        return chain(*self.parts)
+
+    def __len__(self) -> int:
+        return sum(map(len, self.parts))
+
+
+@lru_cache(maxsize=4096)
+def _parsed(text: str, random: bool, functions: tuple[tuple[str, int], ...]) -> Tree:
+    """The tree of a text. A list may hold the same one a hundred thousand times."""
+    return parse(text, random=random, extra_functions=dict(functions))
+
+
+def parse_formula(
+    formula: Formula,
+    known: Collection[str],
+    findings: Findings,
+    *,
+    random: bool = False,
+    functions: Mapping[str, int] | None = None,
+    what: str = "known here",
+    incomplete: bool = False,
+    later: Collection[str] = (),
+) -> Tree | None:
+    """The tree of a formula whose names are all known; else findings at the invalid characters.
+
+    ``incomplete``: not all known names could be read, so that an unknown one is no finding; the tree is None. ``later``
+    are names that are declared behind the formula.
+    """
+    if not isinstance(formula.value, str):
+        return Number(float(formula.value))
+    try:
+        tree = _parsed(formula.value, random, tuple((functions or {}).items()))
+    except ExpressionError as error:
+        for one in (error, *error.others):
+            if one.code == "draw-not-allowed" and findings.is_invalid(formula.span):
+                continue  # a comma has cut it: what it was meant to be is not sure
+            findings.error(one.code, formula.node.at(one.start, one.end), one.message, one.hint)
+        used = [one for one in error.used if one[0] not in known]
+    else:
+        unused = [name for name in names(tree) if name not in known]
+        if not unused:
+            return tree
+        unknown = unknown_names(tree, names(tree).difference(unused))
+        used = [(node.name, node.start, node.end) for node in unknown]
+    for name, start, end in () if incomplete else used:
+        few = () if findings.many else known
+        message, hint = _unknown(name, few, functions or {}, what)
+        if name in later:
+            message, hint = f"'{name}' comes later", "a parameter sees those that are declared before it"
+        findings.error("unknown-name", formula.node.at(start, end), message, hint)
+    return None
+
+
+def _unknown(name: str, known: Collection[str], functions: Mapping[str, int], what: str) -> tuple[str, str | None]:
+    """The message and the hint for a name that means nothing here."""
+    usage = FUNCTIONS[name].usage if name in FUNCTIONS else DRAWS.get(name)
+    if name in functions:
+        usage = f"{name}(x)"
+    if usage is not None:
+        return f"'{name}' is a function, not a value", f"write {usage}"
+    message = f"unknown name '{shorten(name)}'"
+    if name in _ELSEWHERE:
+        return message, _ELSEWHERE[name]
+    return message, suggest(name, known, what)
+
+
+def is_constant(tree: Tree, constants: Collection[str] = ALWAYS) -> bool:
+    """Whether a tree holds no name but constants, and draws nothing: its value is known before a run."""
+    return names(tree) <= frozenset(constants) and not draws(tree)
+
+
+def check_finite(value: Value, formula: Formula, findings: Findings) -> bool:
+    """Whether a value is finite everywhere; a finding where it is not."""
+    if math.isfinite(value) if isinstance(value, float) else np.isfinite(value).all():
+        return True
+    what = "not finite everywhere" if np.ndim(value) else "undefined" if np.isnan(value) else "infinite"
+    findings.error("not-finite", formula.span, f"the value of this expression is {what}", _NOT_FINITE)
+    return False
+
+
+class Randomness(NamedTuple):
+    """Where the numbers of a formula are drawn from: a stream and the counters i, j of each value."""
+
+    stream: Stream
+    i: int | IntArray
+    j: int | IntArray = 0
+
+
+@dataclass
+class Constants:
+    """Evaluates formulas over the parameters of one spec."""
+
+    parameters: dict[str, float]
+    dt: float
+    findings: Findings
+    #: parameter → the parameters that its own formula uses
+    uses: dict[str, frozenset[str]] = field(default_factory=dict)
+    structural: set[str] = field(default_factory=set)
+    #: names that formulas read, whatever became of these
+    read: set[str] = field(default_factory=set)
+    #: parameters whose own formulas are invalid: no follow-up findings about these
+    broken: set[str] = field(default_factory=set)
+    #: whether there may be parameters that could not be read at all
+    incomplete: bool = False
+    #: the slots of the whole network, and for each parameter that can be set in a run, or follows one, its slot
+    slots: list[Slot] = field(default_factory=list)
+    settable: dict[str, int] = field(default_factory=dict)
+    #: the path of the instance whose parameters these are, and those that it is given as formulas over others
+    path: str = ""
+    settings: Mapping[str, ParameterFormula] = field(default_factory=dict)
+    #: what follows parameters, of all that is evaluated while somebody asks for it
+    _parts: list[Part] | None = None
+
+    def declare(
+        self,
+        name: str,
+        tree: Tree | None,
+        value: float,
+        low: float | Dependent | None,
+        high: float | Dependent | None,
+        given: bool,
+    ) -> None:
+        """Give a parameter a slot, if it can be set or follows one that can. ``tree`` is its formula, which it follows
+        unless its value is ``given`` from outside or it is given another one (``settings``)."""
+        own = None if tree is None or not given or self.path else self.bound(tree)
+        tree = None if given else tree
+        followed = None if tree is None or names(tree).isdisjoint(self.settable) else self.bound(tree)
+        if self.path and name not in self.settings and followed is None:
+            return
+        formula = self.settings.get(name, followed)
+        least, most = -math.inf if low is None else low, math.inf if high is None else high
+        self.settable[name] = len(self.slots)
+        called = f"{self.path}.{name}" if self.path else name
+        self.slots.append(Slot(called, value, formula, least, most, given and not self.path, own))
+
+    @contextmanager
+    def following(self) -> Iterator[list[Part]]:
+        """Collect what follows parameters, of all that is evaluated within."""
+        outer, self._parts = self._parts, []
+        try:
+            yield self._parts
+        finally:
+            self._parts = outer
+
+    def follow(self, parts: Iterable[Part]) -> None:
+        """Add to what is being collected."""
+        if self._parts is not None:
+            self._parts.extend(parts)
+
+    def bound(
+        self,
+        tree: Tree,
+        extra: Mapping[str, Value | Dependent] | None = None,
+        randomness: Randomness | None = None,
+    ) -> ParameterFormula:
+        """An expression with what its names mean: slots of parameters that can be set, and values."""
+        used = names(tree)
+        extra = extra or {}
+        places = {name: slot for name, slot in places_of(tree, self.settable).items() if name not in extra}
+        known = {name: extra[name] if name in extra else self._known(name, {}) for name in sorted(used - places.keys())}
+        draw = None if randomness is None or not draws(tree) else _Drawing(randomness)
+        return ParameterFormula(tree, places, known, draw)
+
+    def tree(
+        self,
+        formula: Formula,
+        extra: Iterable[str] = (),
+        random: bool = False,
+        what: str = "known here",
+        later: Collection[str] = (),
+    ) -> Tree | None:
+        """The tree of a formula over the parameters and ``extra``, for a caller that evaluates it; else findings.
+        ``later`` are parameters that it does not see."""
+        known = Scope((tuple(extra), self.parameters, self.broken, ALWAYS))
+        tree = parse_formula(
+            formula, known, self.findings, random=random, what=what, incomplete=self.incomplete, later=later
+        )
+        if tree is None:
+            return None
+        self.read |= names(tree)
+        return None if names(tree) & self.broken else tree
+
+    def unchecked(
+        self,
+        formula: Formula,
+        extra: Mapping[str, Value] | None = None,
+        randomness: Randomness | None = None,
+        structural: bool = False,
+        places: IntArray | None = None,
+    ) -> Value | None:
+        """The value of a formula, finite or not: a float, or an array where ``extra`` or the draws hold arrays.
+        ``places`` is where it is to stand, for who collects what follows parameters."""
+        extra = extra or {}
+        if not isinstance(formula.value, str):
+            return float(formula.value)
+        tree = self.tree(formula, extra, randomness is not None)
+        if tree is None:
+            return None
+        if structural:
+            self.depend(names(tree))
+        values = {name: self._known(name, extra) for name in names(tree)}
+        drawing = None if randomness is None else _Drawing(randomness)
+        result = evaluate_array(tree, values, draw=drawing)
+        if drawing is not None and drawing.wrong is not None and np.isnan(result).any():
+            self.refuse_draw(formula, *drawing.wrong)
+            return None
+        if self._parts is not None and not structural and not names(tree).isdisjoint(self.settable):
+            self._parts.append(Part(self.bound(tree, extra, randomness), places))
+        return float(result) if np.ndim(result) == 0 else np.asarray(result, dtype=np.float64)
+
+    def _known(self, name: str, extra: Mapping[str, Value]) -> Value:
+        if name in CONSTANTS:
+            return CONSTANTS[name]
+        if name == "dt":
+            return self.dt
+        return extra[name] if name in extra else self.parameters[name]
+
+    def refuse_draw(self, formula: Formula, draw: Draw, second: float) -> None:
+        """The finding about a draw from ``normal`` whose deviation is negative, or from ``uniform`` whose upper end is
+        below the lower one by ``second``."""
+        place = formula.node.at(draw.second.start, draw.second.end)
+        message = f"the deviation of a normal distribution must be at least 0, this is {second:.15g}"
+        hint = "normal(mean, deviation): the mean comes first"
+        if draw.kind == "uniform":
+            below = f"{-second:.15g}" if second > -math.inf else "far"
+            message = f"the upper end of a uniform distribution is {below} below the lower one"
+            hint = "uniform(low, high): the lower end comes first"
+        self.findings.error("out-of-range", place, message, hint)
+
+    def value(
+        self,
+        formula: Formula,
+        extra: Mapping[str, Value] | None = None,
+        randomness: Randomness | None = None,
+        structural: bool = False,
+        places: IntArray | None = None,
+    ) -> Value | None:
+        """The value of a formula, which must be finite everywhere."""
+        result = self.unchecked(formula, extra, randomness, structural, places)
+        return result if result is not None and check_finite(result, formula, self.findings) else None
+
+    def look(self, formula: Formula, extra: Collection[str] = (), random: bool = False) -> float | None:
+        """The value of a formula where it is not known what ``extra`` are; None where it depends on these, or draws."""
+        tree = self.tree(formula, extra, random)
+        if tree is None or not names(tree).isdisjoint(extra) or draws(tree):
+            return None
+        return self.scalar(formula)
+
+    def scalar(self, formula: Formula, structural: bool = False) -> float | None:
+        """The value of a formula that is one number."""
+        value = self.value(formula, structural=structural)
+        return None if value is None else float(value)
+
+    def integer(
+        self, formula: Formula, what: str, least: int, most: int = 2**53, structural: bool = True
+    ) -> int | None:
+        """The value of a formula that must be an integer from ``least`` to ``most``."""
+        value = self.scalar(formula, structural=structural)
+        if value is None:
+            return None
+        nearest = round(value)
+        if abs(value - nearest) > NEAR_INTEGER:  # 0.0003/dt is an integer up to rounding
+            self.findings.error("not-an-integer", formula.span, f"{what} must be an integer, this is {value:.15g}")
+            return None
+        value = nearest
+        if not least <= value <= most:
+            bound = f"at least {least}" if value < least else f"at most {most:,}"
+            self.findings.error("out-of-range", formula.span, f"{what} must be {bound}, this is {value:.15g}")
+            return None
+        return int(value)
+
+    def depend(self, used: Iterable[str]) -> None:
+        """Something of the structure depends on these parameters, and so on those behind them."""
+        waiting = list(used)
+        while waiting:
+            name = waiting.pop()
+            if name in self.parameters and name not in self.structural:
+                self.structural.add(name)
+                waiting += self.uses.get(name, ())
+
+
+class _Drawing:
+    """Draws the numbers of one formula, and keeps the first draw of which no number can be drawn, and by how much.
+
+    What is drawn so is NaN, so that it counts only where the formula's value depends on it: a branch that is not taken
+    may have such a draw.
+    """
+
+    def __init__(self, randomness: Randomness) -> None:
+        self.randomness = randomness
+        self.wrong: tuple[Draw, float] | None = None
+
+    def __call__(self, node: Draw, first: Value, second: Value) -> Value:
+        width = width_of(node, first, second)
+        wrong = np.less(width, 0)
+        if self.wrong is None and wrong.any():
+            self.wrong = node, float(np.nanmin(width))
+        at = self.randomness
+        drawn = at.stream.drawn(node.kind, first, second, at.i, at.j, 0, node.index)
+        return np.where(wrong, np.nan, drawn) if wrong.any() else drawn
+
+
+def width_of(draw: Draw, first: Value, second: Value) -> Value:
+    """How wide a distribution is, which must not be negative: the deviation, or from the lower end to the upper."""
+    return second if draw.kind == "normal" else second - first

@@ -1,0 +1,72 @@
+"""Parameters: the named constants of a spec, or of an instance of a module.
+
+In: a section's ``parameters``, in the order written, and what is set from outside. Out: their values, in Constants.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+
+from neurovis_spec.compiler.names.references import Section, key_span
+from neurovis_spec.compiler.names.reserved_names import MEANINGS
+from neurovis_spec.compiler.values.constants import Constants
+from neurovis_spec.diagnostics import Span
+from neurovis_spec.language.expressions.tree import names
+from neurovis_spec.language.model import RESERVED
+from neurovis_spec.language.values import Parameter
+
+
+def make_parameters(
+    section: Section, constants: Constants, given: Mapping[str, float], places: Mapping[str, Span] | None = None
+) -> None:
+    """The parameters in the order written; what is given replaces the value, within its bounds. ``places`` say where
+    it is given."""
+    later = dict.fromkeys(section.parameters)
+    for name, parameter in section.parameters.items():
+        del later[name]
+        span = key_span(section, "parameters", name)
+        _parameter(name, parameter, (span, (places or {}).get(name, span)), constants, given, later)
+
+
+def _parameter(
+    name: str,
+    parameter: Parameter,
+    spans: tuple[Span, Span],
+    constants: Constants,
+    given: Mapping[str, float],
+    later: Collection[str],
+) -> None:
+    """One parameter; ``spans`` are where it is declared and where its value is given, ``later`` those behind."""
+    (span, place), findings = spans, constants.findings
+    if name in RESERVED:
+        message = f"a parameter may not be called '{name}': the language gives this name a meaning of its own"
+        hint = f"'{name}' is {MEANINGS[name]}; take another name, such as '{name}_0'"
+        findings.error("reserved-name", span, message, hint)
+    at_fault = name in constants.broken or parameter.failed  # or what is set is invalid
+    tree = constants.tree(parameter.value, what="parameters before this one, and constants", later=later)
+    constants.uses[name] = frozenset() if tree is None or name in given else names(tree)
+    value = None if tree is None else constants.scalar(parameter.value)
+    with constants.following() as lower:
+        low = None if parameter.minimum is None else constants.scalar(parameter.minimum)
+    with constants.following() as upper:
+        high = None if parameter.maximum is None else constants.scalar(parameter.maximum)
+    if name in given:
+        value = float(given[name])
+        if not math.isfinite(value):
+            findings.error("not-finite", place, f"the parameter '{name}' is set to {value}")
+            value = None
+    if value is None or at_fault:
+        constants.broken.add(name)
+        return
+    constants.parameters[name] = value
+    least, most = lower[0].formula if lower else low, upper[0].formula if upper else high
+    constants.declare(name, tree, value, least, most, name in given)
+    if low is not None and high is not None and low > high and parameter.minimum is not None:
+        message = f"the least value of '{name}', {low:g}, is above the greatest, {high:g}"
+        findings.error("out-of-range", parameter.minimum.span, message, "swap min and max")
+        return
+    if (low is not None and value < low) or (high is not None and value > high):
+        bounds = f"{'-∞' if low is None else f'{low:g}'} to {'∞' if high is None else f'{high:g}'}"
+        where = place if name in given else parameter.value.span
+        findings.error("out-of-range", where, f"'{name}' is {value:g}; its bounds are {bounds}")

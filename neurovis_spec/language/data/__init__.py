@@ -1,0 +1,1 @@
+"""Data files: tables of numbers and lists of edges."""

@@ -1,0 +1,230 @@
+"""Data files that a spec names: tables of numbers and lists of edges.
+
+In: a path as the author wrote it, the folders it may lie in, and its place in the spec. Out: arrays, or findings at
+that place. Files are opened only inside the root, only if they are regular ones, and never run or unpickled. What
+reads a kind of file is imported with the first file of that kind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import islice
+from pathlib import Path, PureWindowsPath
+from typing import TYPE_CHECKING, Final
+
+from neurovis_spec.diagnostics import Findings, Span, suggest
+from neurovis_spec.language.data.table import EMPTY_CELL, MOST_FAULTS, CellError, Faults, Room, Table, full
+from neurovis_spec.language.located import Located
+from neurovis_spec.language.yaml.opening import FileFault, read_bytes
+
+if TYPE_CHECKING:
+    from neurovis_spec.language.data.edge_list import EdgeTable
+
+__all__ = ["KINDS", "CellError", "Room", "Table", "locate", "read_data", "read_edges", "read_table"]
+
+LARGEST: Final = 256 << 20  # bytes; ten million connections in double precision are 80 MB
+#: characters of a path: what common systems take
+LONGEST_PATH: Final = 4096
+#: what is said of NaN and infinity where no cell may be empty
+NO_GAP: Final = "a finite number is needed in every cell"
+#: bytes of a file of text that is shown with what is wrong in it
+_SHOWN: Final = 1 << 20
+_FROM: Final = "paths are relative to the file that names them"
+#: files that hold a table of numbers
+KINDS: Final = (".csv", ".npy", ".npz", ".mtx")
+
+
+def locate(path_text: str, root: Path, base: Path, span: Span, findings: Findings) -> Path | None:
+    """The file that an author means by a path: relative to ``base``, inside ``root`` also behind symbolic links.
+
+    Codes: ``path-outside``, ``file-missing``. Whether there is such a file is not asked here.
+    """
+    shown = _short(path_text)
+    if not path_text or "\0" in path_text:
+        findings.error("file-missing", span, "this is no path of a file")
+        return None
+    if len(path_text) > LONGEST_PATH:
+        message = f"a path of {len(path_text):,} characters is no path of a file; {LONGEST_PATH:,} are the most"
+        findings.error("file-missing", span, message)
+        return None
+    if Path(path_text).is_absolute() or PureWindowsPath(path_text).drive or path_text.startswith(("/", "\\")):
+        findings.error("path-outside", span, f"the path '{shown}' is absolute", _FROM)
+        return None
+    try:
+        inside = root.resolve()
+        path = (base / path_text).resolve()
+    except (OSError, RuntimeError, ValueError):  # loops of links, names too long
+        findings.error("file-missing", span, f"the file '{shown}' does not exist")
+        return None
+    if not path.is_relative_to(inside):
+        hint = "data lies in the folder of the main spec or below it (--root names another folder)"
+        findings.error("path-outside", span, f"the path '{shown}' leaves the folder of the spec", hint)
+        return None
+    findings.files.add(path)
+    return path
+
+
+def read_data(path_text: str, root: Path, base: Path, span: Span, findings: Findings) -> bytes | None:
+    """The bytes of a file that an author named; None, and a finding, where it must not or cannot be read."""
+    path = locate(path_text, root, base, span, findings)
+    if path is None:
+        return None
+    data = read_bytes(path, LARGEST)
+    if isinstance(data, FileFault):
+        hint = (_neighbours(path) or _FROM) if data.code == "file-missing" else None
+        findings.error(data.code, span, f"the file '{_short(path_text)}' {data.reason}", hint)
+        return None
+    return data
+
+
+def read_table(
+    path_text: str,
+    root: Path,
+    base: Path,
+    span: Span,
+    findings: Findings,
+    key: Located[str] | None = None,
+    *,
+    keyed: bool = True,
+    gaps: bool = True,
+    inside: bool = False,
+    kinds: Iterable[str] = KINDS,
+    room: Room | None = None,
+) -> Table | None:
+    """A table of numbers from a file of one of these ``kinds``; an array of one dimension is a column.
+
+    A ``.csv`` may begin with a row of texts, the header; its empty cells are absent, and so is what an ``.mtx`` and a
+    sparse ``.npz`` leave out. ``key`` names an array of an ``.npz``; ``keyed`` says whether the author can give one at
+    this place, ``gaps`` whether cells may be empty there. ``inside``: none may, and findings stand at the cells of a
+    ``.csv``, not where it is named. ``room`` may refuse a table for its size before it is made. Codes: those of
+    ``read_data`` and ``room``, and ``file-format``, ``invalid-utf8``, ``not-finite``, ``cell-empty``, ``missing-key``,
+    ``unknown-array``, ``useless-key``.
+    """
+    suffix = Path(path_text).suffix.lower()
+    if suffix not in kinds:
+        message = f"'{_short(path_text)}' is no kind of file that holds numbers"
+        findings.error("file-format", span, message, "known: " + ", ".join(kinds))
+        return None
+    if key is not None and suffix != ".npz":
+        _refuse_key(key, findings)
+        return None
+    data = read_data(path_text, root, base, span, findings)
+    if data is None:
+        return None
+    try:
+        table = _parsed(suffix, data, None if key is None else key.value, room)
+        if inside:
+            _check_full(table)
+        return table
+    except CellError as error:
+        if error.code == "missing-key" and not keyed:
+            error = CellError("file-format", str(error), "keep the one that is meant in a file of its own")
+        if inside and suffix == ".csv":
+            _refuse_inside(error, data, span, findings)
+            return None
+        place = key.span if key is not None and error.code == "unknown-array" else span
+        _refuse(error, path_text, place, findings, gaps)
+        return None
+
+
+def _check_full(table: Table) -> None:
+    """Refuse empty cells. Raises CellError."""
+    faults = Faults()
+    for row, column in islice(table.gaps(), MOST_FAULTS):
+        faults.note(row, CellError("cell-empty", f"row {row}, column {column}: a cell is empty", NO_GAP, (row, column)))
+    faults.check()
+
+
+def _parsed(suffix: str, data: bytes, key: str | None, room: Room | None) -> Table:
+    """The table in a file of one of KINDS. Raises CellError."""
+    if suffix == ".csv":
+        from neurovis_spec.language.data.csv_table import parse_numbers
+
+        return parse_numbers(data, room)
+    if suffix == ".npy":
+        from neurovis_spec.language.data.npy import parse_npy
+
+        return full(parse_npy(data, room))
+    if suffix == ".mtx":
+        from neurovis_spec.language.data.mtx import parse_mtx
+
+        return parse_mtx(data, room)
+    from neurovis_spec.language.data.npz import parse_npz
+
+    return parse_npz(data, key, room)
+
+
+def read_edges(
+    path_text: str,
+    root: Path,
+    base: Path,
+    span: Span,
+    findings: Findings,
+    key: Located[str] | None = None,
+    *,
+    room: Room | None = None,
+) -> EdgeTable | None:
+    """A list of edges from a ``.csv`` file whose header names the columns from, to, weight and perhaps delay.
+
+    An empty weight is 1, an empty delay −1; a ``key`` is refused; ``room`` may refuse so many edges before they are
+    made. Where rows are invalid, these are reported, and the table has a ``fault``. Codes: those of ``read_data`` and
+    of ``room``, and ``file-format``, ``invalid-utf8``, ``not-finite``, ``useless-key``.
+    """
+    if Path(path_text).suffix.lower() != ".csv":
+        findings.error("file-format", span, f"edges are read from a .csv file, not from '{_short(path_text)}'")
+        return None
+    if key is not None:
+        _refuse_key(key, findings)
+        return None
+    data = read_data(path_text, root, base, span, findings)
+    if data is None:
+        return None
+    from neurovis_spec.language.data.edge_list import parse_edges
+
+    try:
+        table = parse_edges(data, room)
+    except CellError as error:
+        _refuse(error, path_text, span, findings)
+        return None
+    if table.fault is not None:
+        _refuse(table.fault, path_text, span, findings)
+    return table
+
+
+def _refuse_key(key: Located[str], findings: Findings) -> None:
+    findings.error("useless-key", key.span, "'key' names an array of an .npz file, and this file is none")
+
+
+def _refuse(error: CellError, path_text: str, span: Span, findings: Findings, gaps: bool = True) -> None:
+    for one in (error, *error.others):
+        message = f"the file '{_short(path_text)}': {one}"
+        findings.error(one.code, span, message, _hint(one, gaps), several=True)
+
+
+def _hint(error: CellError, gaps: bool) -> str | None:
+    return NO_GAP if error.hint == EMPTY_CELL and not gaps else error.hint
+
+
+def _refuse_inside(error: CellError, data: bytes, span: Span, findings: Findings) -> None:
+    """The same at the cells of a file of text, whose lines are then shown."""
+    from neurovis_spec.language.data.csv_table import cell_at
+
+    for one in (error, *error.others):
+        place = span if one.at is None else cell_at(data, span.file, one.at)
+        findings.error(one.code, place, str(one), _hint(one, False))
+    if len(data) <= _SHOWN:
+        findings.sources[span.file] = data.decode("utf-8-sig", "replace")
+
+
+def _neighbours(path: Path) -> str | None:
+    """A help line that names the files beside a missing one, where one of the same kind is alike."""
+    try:
+        beside = [entry for _, entry in zip(range(1000), path.parent.iterdir(), strict=False)]
+    except OSError:
+        return None
+    hint = suggest(path.name, sorted(entry.name for entry in beside if entry.suffix == path.suffix))
+    return hint if hint is not None and hint.startswith("did you mean") else None
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 80 else text[:78] + "…"

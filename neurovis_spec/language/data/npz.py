@@ -1,0 +1,158 @@
+"""One array, or one sparse matrix, from the bytes of an ``.npz`` file.
+
+In: bytes, and perhaps the name of an array. Out: Table. An array's header is read and held against the archive's
+directory before the rest is unpacked, so an archive takes no more memory than the table that it holds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from neurovis_spec.diagnostics import suggest
+from neurovis_spec.language.data.archive import Member, beginning, members, unpack
+from neurovis_spec.language.data.npy import LONGEST_HEADER, REAL, parse_array, parse_npy, read_header
+from neurovis_spec.language.data.table import (
+    SPARSER,
+    CellError,
+    Room,
+    Table,
+    check_cells,
+    full,
+    not_finite,
+    printable,
+    quoted,
+    repeated,
+    scattered,
+)
+
+_SUFFIX = ".npy"
+#: names that are listed, and compared with one that is unknown
+_SHOWN, _COMPARED = 8, 200
+#: what an archive holds that scipy.sparse.save_npz wrote, beside the places of its entries
+_SPARSE = frozenset({"format", "shape", "data"})
+
+
+class Archive:
+    """The arrays of an archive by name, unpacked when they are asked for."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        found = members(data)
+        self._members: Mapping[str, Member] = {
+            name.removesuffix(_SUFFIX): member for name, member in found.items() if name.endswith(_SUFFIX)
+        }
+        self.names = tuple(self._members)
+
+    def numbers(self, name: str, room: Room | None = None) -> NDArray[np.float64]:
+        """An array of one or two dimensions, rows × columns. Raises CellError."""
+        return parse_npy(self._content(name, REAL, (1, 2), room))
+
+    def vector(self, name: str, kinds: str, dimensions: int = 1) -> NDArray[np.generic]:
+        """An array of one dimension, as it stands. Raises CellError."""
+        if name not in self._members:
+            raise CellError("file-format", f"there is no array {quoted(name)}, which a sparse matrix has")
+        try:
+            return parse_array(self._content(name, kinds, (dimensions,)), kinds, (dimensions,))
+        except CellError as error:
+            raise CellError(error.code, f"{quoted(name)}: {error}", error.hint) from error
+
+    def _content(self, name: str, kinds: str, dimensions: tuple[int, ...], room: Room | None = None) -> bytes:
+        member = self._members[name]
+        header = read_header(beginning(self._data, member, LONGEST_HEADER), member.size, kinds, dimensions)
+        if room is not None:
+            room(math.prod(header.shape))
+        return unpack(self._data, member)
+
+
+def parse_npz(data: bytes, key: str | None = None, room: Room | None = None) -> Table:
+    """The array that ``key`` names; without it the only one, or a matrix of scipy.sparse. Raises CellError.
+
+    The codes ``unknown-array`` and ``missing-key`` are about ``key``, not about the file.
+    """
+    archive = Archive(data)
+    names = archive.names
+    if key is not None:
+        if key not in names:
+            known = [printable(name) for name in names[:_COMPARED]]
+            hint = suggest(key, known, "its arrays") if known else "it holds none"
+            raise CellError("unknown-array", f"there is no array {quoted(key)} in the file", hint)
+        return full(archive.numbers(key, room))
+    if _SPARSE.issubset(names):
+        return _sparse(archive, room)
+    if not names:
+        raise CellError("file-format", "the archive holds no array")
+    if len(names) > 1:
+        listed = ", ".join(printable(name) for name in names[:_SHOWN]) + (", …" if len(names) > _SHOWN else "")
+        raise CellError("missing-key", f"it holds {len(names)} arrays: {listed}", "name one of them with 'key'")
+    return full(archive.numbers(names[0], room))
+
+
+def _sparse(archive: Archive, room: Room | None) -> Table:
+    """A matrix as scipy.sparse.save_npz writes it; an entry that is stored is there, also if it is 0."""
+    kind = _text(archive.vector("format", "SU", 0))
+    if kind not in ("csr", "csc", "coo"):
+        message = f"a sparse matrix of the format {quoted(kind)} is not read"
+        raise CellError("file-format", message, "save it as csr, csc or coo")
+    sizes = _integers(archive, "shape")
+    if len(sizes) != 2 or sizes.min() < 1:
+        raise CellError("file-format", "'shape': a matrix has two sizes of at least 1")
+    rows, columns = (int(size) for size in sizes)
+    check_cells(rows * columns, hint=SPARSER)
+    if room is not None:
+        room(rows * columns)
+    with np.errstate(over="ignore", invalid="ignore"):
+        values = archive.vector("data", REAL).astype(np.float64)
+    if kind == "coo":
+        i = _places(archive, "row", rows, len(values))
+        j = _places(archive, "col", columns, len(values))
+    elif kind == "csr":
+        i = _lines(archive, rows, len(values))
+        j = _places(archive, "indices", columns, len(values))
+    else:
+        j = _lines(archive, columns, len(values))
+        i = _places(archive, "indices", rows, len(values))
+    twice = repeated(i, j, columns)
+    if twice is not None:
+        place = f"row {i[twice[0]] + 1}, column {j[twice[0]] + 1}"
+        raise CellError("file-format", f"{place} has two values", "sum_duplicates() adds them up")
+    finite = np.isfinite(values)
+    if not finite.all():
+        at = int(np.argmin(finite))
+        raise CellError("not-finite", f"row {i[at] + 1}, column {j[at] + 1} is {not_finite(values[at])}")
+    return scattered((rows, columns), i, j, values)
+
+
+def _text(array: NDArray[np.generic]) -> str:
+    value = array.item()
+    return value.decode("ascii", "replace") if isinstance(value, bytes) else str(value)
+
+
+def _integers(archive: Archive, name: str) -> NDArray[np.int64]:
+    """An array of integers; what is beyond 64 bits becomes negative, and is refused as such."""
+    return archive.vector(name, "iu").astype(np.int64)
+
+
+def _places(archive: Archive, name: str, size: int, count: int) -> NDArray[np.int64]:
+    """One index below ``size`` for each of ``count`` entries. Raises CellError."""
+    places = _integers(archive, name)
+    if len(places) != count:
+        raise CellError("file-format", f"'{name}' has {len(places)} indices for {count} values")
+    if count and (places.min() < 0 or places.max() >= size):
+        wrong = int(places[(places < 0) | (places >= size)][0])
+        raise CellError("file-format", f"'{name}' holds the index {wrong}, outside 0 … {size - 1}")
+    return places
+
+
+def _lines(archive: Archive, size: int, count: int) -> NDArray[np.int64]:
+    """For each of ``count`` entries the row (csc: column) in which it stands, from where these begin."""
+    starts = _integers(archive, "indptr")
+    if len(starts) != size + 1:
+        raise CellError("file-format", f"'indptr' has {len(starts)} numbers; {size + 1} are wanted")
+    steps = np.diff(starts)
+    if starts[0] != 0 or starts[-1] != count or steps.min() < 0:
+        raise CellError("file-format", f"'indptr' does not ascend from 0 to the number of values, {count}")
+    return np.repeat(np.arange(size), steps)

@@ -1,0 +1,1 @@
+"""Canonical formatting, and editing that keeps every comment."""

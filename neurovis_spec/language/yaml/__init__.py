@@ -1,0 +1,1 @@
+"""YAML with spans: from a text to a SourceDocument."""

@@ -1,0 +1,67 @@
+"""Opening files that somebody else named: regular files only, bounded in size, never waiting.
+
+In: a path and the most bytes wanted. Out: the bytes, or a FileFault that says in an author's words why not. A device,
+a pipe or a socket is told from a file before it is opened (opening one may have effects, reading one may never end).
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+from typing import NamedTuple
+
+_FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
+_CHUNK = 1 << 24
+
+
+class FileFault(NamedTuple):
+    """Why a file could not be read: the finding's code and what completes the sentence 'FILE …'."""
+
+    code: str
+    reason: str
+
+
+def read_bytes(path: Path, most: int) -> bytes | FileFault:
+    """The bytes of a regular file of at most ``most`` bytes; symbolic links are followed (see ``data.files``)."""
+    try:
+        fault = _fault(path.stat(), most)
+        if fault is not None:
+            return fault
+        handle = os.open(path, _FLAGS)
+    except (FileNotFoundError, NotADirectoryError):
+        return FileFault("file-missing", "does not exist")
+    except (OSError, ValueError) as error:
+        return _unreadable(error)
+    try:
+        return _fault(os.fstat(handle), most) or _read(handle, most)
+    except OSError as error:
+        return _unreadable(error)
+    finally:
+        os.close(handle)
+
+
+def _fault(status: os.stat_result, most: int) -> FileFault | None:
+    if stat.S_ISDIR(status.st_mode):
+        return FileFault("file-kind", "is a folder, not a file")
+    if not stat.S_ISREG(status.st_mode):
+        return FileFault("file-kind", "is no regular file (a device, a pipe or a socket)")
+    return _too_large(most) if status.st_size > most else None
+
+
+def _read(handle: int, most: int) -> bytes | FileFault:
+    parts: list[bytes] = []
+    room = most + 1  # one more: a file may grow, and some systems' files claim to be empty
+    while room and (part := os.read(handle, min(room, _CHUNK))):
+        parts.append(part)
+        room -= len(part)
+    return b"".join(parts) if room else _too_large(most)
+
+
+def _too_large(most: int) -> FileFault:
+    return FileFault("too-large", f"is larger than {most >> 20} MiB")
+
+
+def _unreadable(error: Exception) -> FileFault:
+    reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+    return FileFault("file-unreadable", f"cannot be read: {reason}")

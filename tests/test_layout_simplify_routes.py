@@ -1,0 +1,364 @@
+"""Routes that wind are drawn anew, gently; what is measured of many lines at once is what plain Python says of each."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import layout_conformance as suite
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from neurovis_layouts.routing.corners import corners, smooth
+from neurovis_layouts.routing.polylines import polylines
+from neurovis_layouts.routing.route_cost import Judge, Pen
+from neurovis_layouts.routing.simplify_routes import eased
+from neurovis_layouts.routing.walls import Frame
+
+import neurovis_spec as nv
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.layout.geometry import distance, sampled, segment_distance, straight
+from neurovis_spec.layout.model import LayoutEdge, Point, Route
+from neurovis_spec.layout.problem import problem_of
+
+number = st.integers(-40, 40).map(lambda at: at / 4)
+point = st.tuples(number, number)
+
+
+@st.composite
+def routes(draw: st.DrawFn) -> Route:
+    """A route of straight pieces and curves."""
+    line = draw(st.lists(point, min_size=2, max_size=5, unique=True))
+    found: list[Point] = [line[0]]
+    for a, b in pairwise(line):
+        curved = draw(st.booleans())
+        found += [draw(point), draw(point), b] if curved else straight(a, b)[1:]
+    return tuple(found)
+
+
+def kink(*line: Point) -> Route:
+    """A route with sharp corners."""
+    return line[0], *(p for a, b in pairwise(line) for p in straight(a, b)[1:])
+
+
+def edge(source: int, target: int) -> LayoutEdge:
+    return LayoutEdge(f"{source} -> {target}", source, target, 1)
+
+
+def points_of(route: Route) -> list[Point]:
+    lines = polylines([route])
+    return [(x, y) for x, y in lines.points.tolist()]
+
+
+@given(st.lists(routes(), min_size=1, max_size=6))
+@settings(deadline=None)
+def test_lines_are_measured_at_once_as_one_by_one(drawn: list[Route]) -> None:
+    lines = polylines(drawn)
+    bends, tight = lines.bends()
+    low, high = lines.extents()
+    for k, route in enumerate(drawn):
+        line = points_of(route)
+        steps = [distance(a, b) for a, b in pairwise(line)]
+        assert line[0] == route[0]
+        assert line[-1] == pytest.approx(route[-1])
+        assert lines.lengths()[k] == pytest.approx(math.fsum(steps))
+        ways = [
+            ((b[0] - a[0]) / far, (b[1] - a[1]) / far, far)
+            for (a, b), far in zip(pairwise(line), steps, strict=True)
+            if far > 1e-9
+        ]
+        chords = [math.hypot(v[0] - u[0], v[1] - u[1]) for u, v in pairwise(ways)]
+        assert bends[k] == pytest.approx(math.fsum(chords), abs=1e-9)
+        near = [max(min(u[2], v[2]), 0.05) for u, v in pairwise(ways)]
+        assert tight[k] == pytest.approx(
+            math.fsum(chord * min(chord / by, 4.0) for chord, by in zip(chords, near, strict=True)), abs=1e-9
+        )
+        assert tuple(low[k]) == (min(x for x, _ in line), min(y for _, y in line))
+        assert tuple(high[k]) == (max(x for x, _ in line), max(y for _, y in line))
+        back = (math.fsum(abs(b[1] - a[1]) for a, b in pairwise(line)) - abs(line[-1][1] - line[0][1])) / 2
+        assert lines.backward()[k] == pytest.approx(back, abs=1e-9)
+        # a line of few points follows its route
+        ends = list(pairwise(line))
+        assert all(min(segment_distance(p, a, b) for a, b in ends) < 0.6 for p in sampled(route))
+
+
+@given(st.lists(routes(), min_size=1, max_size=5), st.lists(routes(), min_size=1, max_size=5))
+@settings(deadline=None)
+def test_crossings_are_counted_as_metrics_count_them(drawn: list[Route], others: list[Route]) -> None:
+    lines, rest = polylines(drawn), polylines(others)
+    found = lines.crossed(rest.a, rest.b)
+    for k in range(len(drawn)):
+        points = lines.points[lines.starts[k] : lines.starts[k + 1]].tolist()
+        ends = [points[0], points[-1]]
+        count = 0
+        for a, b in pairwise(points):
+            for c, d in zip(rest.a.tolist(), rest.b.tolist(), strict=True):
+                where = meeting(a, b, c, d)
+                count += where is not None and all(math.dist(where, end) >= 0.4 for end in ends)
+        assert found[k] == count
+
+
+def meeting(a: list[float], b: list[float], c: list[float], d: list[float]) -> Point | None:
+    """Where two segments cross, their last points left out."""
+    ux, uy, vx, vy, wx, wy = b[0] - a[0], b[1] - a[1], d[0] - c[0], d[1] - c[1], c[0] - a[0], c[1] - a[1]
+    cross = ux * vy - uy * vx
+    if cross == 0:
+        return None
+    sign = math.copysign(1.0, cross)
+    t, s, whole = (wx * vy - wy * vx) * sign, (wx * uy - wy * ux) * sign, abs(cross)
+    return (a[0] + t / whole * ux, a[1] + t / whole * uy) if 0 <= t < whole and 0 <= s < whole else None
+
+
+@given(st.lists(routes(), min_size=1, max_size=5), st.lists(point, max_size=6), st.tuples(point, point))
+@settings(deadline=None)
+def test_what_is_in_the_way_of_lines_is_found(
+    drawn: list[Route], centres: list[Point], corner: tuple[Point, Point]
+) -> None:
+    lines = polylines(drawn)
+    clear = lines.clearances(np.array(centres, dtype=np.float64).reshape(-1, 2), 0.45)
+    (x0, y0), (x1, y1) = corner[0], (corner[0][0] + abs(corner[1][0]), corner[0][1] + abs(corner[1][1]))
+    entering = lines.enter(np.array([(x0, y0, x1, y1)]))
+    for k in range(len(drawn)):
+        line = list(pairwise(lines.points[lines.starts[k] : lines.starts[k + 1]].tolist()))
+        far = [segment_distance(centre, (a[0], a[1]), (b[0], b[1])) for centre in centres for a, b in line]
+        assert clear[k] == pytest.approx(min([0.45, *far]))
+        dense = [(a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1])) for a, b in line for s in np.linspace(0, 1, 60)]
+        if any(x0 < x < x1 and y0 < y < y1 for x, y in dense):
+            assert entering[k]
+        elif all(max(x0 - x, x - x1, y0 - y, y - y1) > 0.5 for x, y in dense):
+            assert not entering[k]
+
+
+@given(st.lists(routes(), min_size=2, max_size=5), st.data())
+@settings(deadline=None)
+def test_some_lines_are_those(drawn: list[Route], data: st.DataObject) -> None:
+    chosen = data.draw(st.lists(st.integers(0, len(drawn) - 1), max_size=4))
+    some, alone = polylines(drawn).some(np.array(chosen, dtype=np.int64)), polylines([drawn[k] for k in chosen])
+    assert some.points.tolist() == alone.points.tolist()
+    assert some.starts.tolist() == alone.starts.tolist()
+
+
+def test_lines_are_seen_where_they_leave_a_ring_and_where_they_enter_one() -> None:
+    lines = polylines([straight((0, 0), (4, 0)), kink((0, 0), (0, 2), (4, 2)), straight((1, 1), (1.1, 1))])
+    assert lines.leave(0.5).tolist() == [[0.5, 0], [0, 0.5], [1.1, 1]]
+    assert lines.arrive(0.5).tolist() == [[3.5, 0], [3.5, 2], [1, 1]]
+
+
+def test_cells_are_those_that_a_line_runs_through_but_near_its_ends() -> None:
+    cells, owner = polylines([straight((0, 0), (0.5, 0)), straight((0, 0.01), (3, 0.01))]).cells()
+    assert set(owner.tolist()) == {1}
+    again, _ = polylines([straight((0.05, 0.02), (3.05, 0.02))]).cells()
+    other, _ = polylines([straight((0, 0.5), (3, 0.5))]).cells()
+    assert len(set(cells.tolist()) & set(again.tolist())) > 10
+    assert not set(cells.tolist()) & set(other.tolist())
+
+
+def test_borders_are_counted_beyond_those_that_have_to_be_passed() -> None:
+    rects = np.array([(2.0, -1.0, 4.0, 1.0), (6.0, -1.0, 12.0, 1.0)])
+    line = polylines([straight((0, 0), (10, 0)), kink((0, 0), (1, 3), (10, 3), (10, 0))])
+    assert line.passed(rects, np.array([0, 1]))[1] == 0
+    fine = polylines([kink((0, 0), (3, 0), (5, 0), (7, 0), (10, 0))])
+    assert fine.passed(rects, np.array([0, 1])).tolist() == [2]
+
+
+@given(st.lists(point, min_size=2, max_size=8, unique=True), st.sampled_from([0.2, 1.0, 4.0]))
+@settings(deadline=None)
+def test_a_smooth_line_stays_beside_its_corners(line: list[Point], cut: float) -> None:
+    route = smooth(line, cut)
+    assert route[0] == line[0]
+    assert route[-1] == line[-1]
+    assert len(route) % 3 == 1
+    assert len(route) >= 4
+    assert all(x * 1024 == round(x * 1024) and y * 1024 == round(y * 1024) for x, y in route[1:-1])
+    # within what a round corner can be off a sharp one
+    assert all(min(segment_distance(p, a, b) for a, b in pairwise(line)) <= cut + 0.01 for p in sampled(route))
+
+
+@given(routes())
+@settings(deadline=None)
+def test_corners_are_few_and_on_the_route(route: Route) -> None:
+    line = corners(route)
+    assert line[0] == route[0]
+    assert line[-1] == route[-1]
+    assert len(line) <= 11
+    samples = sampled(route, 0.02)
+    assert all(min(distance(p, q) for q in samples) < 0.3 for p in line)
+
+
+def segments(route: Route) -> tuple[FloatArray, FloatArray]:
+    line = polylines([route])
+    return line.a, line.b
+
+
+HOOKED = kink((0, 0), (0, 3), (2, 3), (2, 1), (4, 1), (4, 6))
+
+
+def judge(frames: list[Frame], *more: tuple[Point, Point], first: Route = HOOKED) -> Judge:
+    """A winding route among others, all straight."""
+    centres = [first[0], first[-1], *(p for ends in more for p in ends)]
+    edges = [edge(k, k + 1) for k in range(0, len(centres), 2)]
+    return Judge(edges, centres, {0: first, **{k + 1: straight(*ends) for k, ends in enumerate(more)}}, frames)
+
+
+def test_a_hook_becomes_a_straight_line() -> None:
+    found = eased(judge([]), {0})
+    assert found.keys() == {0}
+    assert corners(found[0]) == ((0, 0), (4, 6))
+
+
+def test_what_is_not_free_stays_and_what_does_not_wind() -> None:
+    assert eased(judge([]), set()) == {}
+    assert eased(judge([], ((9, 0), (9, 6))), {1}) == {}
+
+
+def test_an_eased_route_keeps_off_frames_and_discs() -> None:
+    walled = judge([(frozenset({2, 3}), (1.0, 2.0, 3.0, 4.0))], ((1.5, 3.0), (2.5, 3.0)))
+    route = eased(walled, {0})[0]
+    assert not walled.walls.entered([route], [(0, 1)])[0]
+    assert walled.obstacles.clearance(route, (0, 1)) >= 0.4
+    assert polylines([route]).lengths()[0] < 9
+
+
+def test_a_route_that_only_grazes_a_frame_is_not_led_through_it() -> None:
+    # along the frame, closer than it should be, and back and forth; through it would be shorter and cross nothing
+    grazing = kink((0, 0), (0.98, 0), (0.98, 5), (5, 5), (5, 6.5), (2, 6.5), (2, 8))
+    fence = [((-0.5 - 0.5 * k, 2.5), (0.99, 2.5 + 0.2 * k)) for k in range(4)]
+    frames: list[Frame] = [(frozenset({2}), (1.0, 1.0, 4.0, 4.0)), (frozenset({4}), (-9.0, 1.0, -7.0, 4.0))]
+    walled = judge(frames, *fence, first=grazing)
+    route = eased(walled, {0}).get(0, grazing)
+    lines = polylines([grazing, route])
+    assert lines.enter(np.array([(1.0, 1.0, 4.0, 4.0)])).tolist() == [False, False]
+
+
+def test_two_lines_from_one_neuron_do_not_cross_for_a_shorter_way() -> None:
+    centres: list[Point] = [(0, 0), (4, 8), (0.5, 8)]
+    known = {0: kink((0, 0), (-3, 2), (-3, 4), (4, 4), (4, 8)), 1: straight((0, 0), (0.5, 8))}
+    route = eased(Judge([edge(0, 1), edge(0, 2)], centres, known), {0})[0]
+    assert polylines([known[0], route]).crossed(*segments(known[1])).tolist() == [1, 0]
+
+
+def test_an_eased_route_crosses_less_even_if_it_is_longer() -> None:
+    # a fence of lines, open at one end
+    fence = [((1.5 + 0.5 * k, -1.0), (1.5 + 0.5 * k, 9.0)) for k in range(6)]
+    through = judge([], *fence, first=kink((0, 0), (0, 3), (-1, 3), (-1, 5), (6, 5), (6, 0)))
+    route = eased(through, {0})[0]
+    lines = polylines([straight(*ends) for ends in fence])
+    assert polylines([route]).crossed(lines.a, lines.b).sum() == 0
+
+
+def test_a_line_that_runs_along_does_not_run_back_for_a_crossing() -> None:
+    fence = [((1.6 + 0.3 * k, -0.8), (1.6 + 0.3 * k, 9.0)) for k in range(4)]
+    winding = kink((0, 0), (3, 0.5), (0, 1), (3, 1.5), (4, 2))
+    route = eased(judge([], *fence, first=winding), {0})[0]
+    assert polylines([route]).backward()[0] < 0.05
+    # what runs to and fro already may go round the fence
+    wandering = kink((0, 0), (3, 1.5), (0, 1), (3, 0.5), (4, 2))
+    route = eased(judge([], *fence, first=wandering), {0})[0]
+    assert polylines([route]).backward()[0] > 0.5
+
+
+def test_the_image_of_an_eased_route_is_its_reflection() -> None:
+    left: Route = tuple((x - 10, y) for x, y in HOOKED)
+    right: Route = tuple((10 - x, y) for x, y in HOOKED)
+    centres = [left[0], left[-1], right[0], right[-1]]
+    both = Judge([edge(0, 1), edge(2, 3)], centres, {0: left, 1: right}, image={0: 1, 1: 0}, twice=0.0)
+    found = eased(both, {0})
+    assert found.keys() == {0, 1}
+    assert found[1] == tuple((0.0 - x, y) for x, y in found[0])
+
+
+def test_a_route_that_meets_its_own_image_pays_for_it() -> None:
+    over: Route = straight((-3, 0), (3, 4))
+    apart: Route = straight((-3, 0), (-1, 4))
+    for route, crossings in ((over, 1), (apart, 0)):
+        image: Route = tuple((0.0 - x, y) for x, y in route)
+        centres = [route[0], route[-1], image[0], image[-1]]
+        known = {0: route, 1: image}
+        alone = Judge([edge(0, 1), edge(2, 3)], centres, {0: route, 1: straight((9, 9), (9, 12))})
+        paired = Judge([edge(0, 1), edge(2, 3)], centres, known, image={0: 1, 1: 0}, twice=0.0)
+        assert Pen(paired, 0).cost() - Pen(alone, 0).cost() == pytest.approx(1.2 * crossings, abs=1e-6)
+
+
+#: the way of `r2.y -> l1.x` is only just clear of the frame of `l2`
+ASIDE = """
+neurovis: 1
+name: aside
+modules:
+  leaf: {neurons: {s: {}, t: {}, u: {}}, connections: {s -> t: 1, u -> s: {weight: -1, delay: 3}}}
+  mid:
+    neurons: {x: {}, y: {}}
+    instances: {p: {module: leaf}, q: {module: leaf}}
+    connections: {x -> q.s: 1, p.s -> q.u: 1, q.u -> p.s: 1, q.u -> y: 1}
+    layout: {mirror: [[p, q]]}
+instances: {l: {module: mid, count: 2}, r: {module: mid, count: 2}}
+neurons: {A: {bias: 0.1}, B: {count: 2}, O: {}}
+layout: {mirror: [[l, r]]}
+connections:
+  A -> B2: 1
+  B1 -> l2.y: 1
+  r1.x -> A: {weight: -1, delay: 3}
+  l2.p.s -> B2: 1
+  l2.y -> O: 1
+  r2.y -> B1: 1
+  r2.y -> l1.x: 1
+"""
+
+
+def test_no_route_is_eased_into_a_frame() -> None:
+    network = nv.compile_text(ASIDE)
+    assert suite.through_frames(network.layout("layered").value, problem_of(network.network)) == []
+
+
+SPEC = """
+neurovis: 1
+name: around
+modules: {{leg: {{neurons: {{s: {{}}, t: {{}}, u: {{}}}}, connections: {{s -> t: 1, t -> u: 1}}}}}}
+instances: {{l: {{module: leg, count: 3}}, r: {{module: leg, count: 3}}}}
+neurons: {{A: {{bias: 1}}, B: {{}}, O: {{}}}}
+connections:
+  A -> l1.s + l3.t + r1.s + r3.t + B: 1
+  B -> l2.u + r2.u: 1
+  l1.u -> l3.s: 1
+  r1.u -> r3.s: 1
+  l2.t -> r1.s + O: 1
+  r2.t -> l1.s + O: 1
+  l3.u -> l1.t: 1
+  r3.u -> r1.t: 1
+layout: {{direction: {direction}{mirror}}}
+"""
+
+
+@pytest.mark.parametrize("mirror", ["", ", mirror: [[l, r]]"])
+@pytest.mark.parametrize("direction", ["down", "right"])
+def test_a_layout_has_no_route_left_that_easing_would_change_much(direction: str, mirror: str) -> None:
+    laid = nv.compile_text(SPEC.format(direction=direction, mirror=mirror)).layout("layered")
+    measures = laid.metrics()
+    assert measures["edges_over_neurons"] == 0
+    assert measures["symmetry"] == 1
+    lines = polylines([route for route in laid.routes.values() if route[0] != route[-1]])
+    ends = lines.points[lines.starts[1:] - 1] - lines.points[lines.starts[:-1]]
+    straightest = np.sqrt((ends**2).sum(axis=1))
+    # nothing goes round all of it
+    assert float((lines.lengths() / straightest).max()) < 3.0
+    assert float(lines.bends()[0].max()) < 6.5
+
+
+@pytest.mark.parametrize("engine", ["layered", "circular", "grid"])
+def test_routes_between_pins_far_apart_are_looked_at_within_memory(engine: str) -> None:
+    text = (
+        "neurovis: 1\nname: far\nneurons: {A: {bias: 1, count: 3}, B: {}}\n"
+        "connections: {A -> B: {pattern: all_to_all, weight: 1}, B -> A1: 1}\n"
+        f"layout: {{engine: {engine}, positions: {{A1: [-1000000, 0], B: [1000000, 5]}}}}\n"
+    )
+    measures = nv.compile_text(text).layout().metrics()
+    assert measures["pins_moved"] == 0
+    assert measures["overlaps"] == 0
+
+
+def test_in_a_fan_of_many_each_stays_where_it_is() -> None:
+    fan = [straight((0, 0), (0, 8)), *(kink((0, 0), (k, 1), (k, 7), (0, 8)) for k in (2, 4, -3))]
+    edges = [LayoutEdge(f"fan ({k})", 0, 1, 1) for k in range(4)]
+    judge_of_all = Judge(edges, [(0, 0), (0, 8)], dict(enumerate(fan)))
+    assert eased(judge_of_all, {0, 1, 2, 3}) == {}
+    assert eased(Judge(edges[:2], [(0, 0), (0, 8)], dict(enumerate(fan[:2]))), {0, 1}).keys() == {1}
