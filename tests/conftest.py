@@ -4,9 +4,14 @@ committed."""
 from __future__ import annotations
 
 import signal
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
+
+if TYPE_CHECKING:
+    from ros_worlds import World
 
 # A shell that starts the tests in the background has them ignore Ctrl-C, and so all that they start; some test it.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -26,3 +31,21 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 @pytest.fixture
 def update_golden(request: pytest.FixtureRequest) -> bool:
     return bool(request.config.getoption("--update-golden"))
+
+
+@pytest.fixture(params=("kilted", "jazzy", "one"))
+def ros(request: pytest.FixtureRequest) -> Iterator[World]:
+    """Each ROS that there is for the tests; ``ros_worlds`` is for Linux alone."""
+    from ros_worlds import world
+
+    with world(request.param) as made:
+        yield made
+
+
+@pytest.fixture
+def one() -> Iterator[World]:
+    """ROS 1."""
+    from ros_worlds import world
+
+    with world("one") as made:
+        yield made

@@ -29,6 +29,14 @@ _OURS = ("LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE", "PYTHONPATH")
 #: domains of ROS 2 whose ports are below those that systems give away
 _DOMAINS = 100
 _next = itertools.count(os.getpid())
+#: a network of 150 neurons, and where its activities are published
+BIG = """
+neurovis: 1
+name: big
+time: {dt: 0.001}
+neurons: {A: {count: 150, initial: 0}}
+"""
+BIG_ACTIVITY = "/neurovis/big/activity"
 #: seconds for what takes one: machines of tests are slow
 PATIENCE = 60.0
 

@@ -8,7 +8,6 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -202,12 +201,6 @@ def built(folder: Path) -> Path:
 @pytest.fixture(scope="module")
 def node(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return built(exported(tmp_path_factory.mktemp("made") / "arm", compiled(), "cpp"))
-
-
-@pytest.fixture
-def one() -> Iterator[World]:
-    with world("one") as made:
-        yield made
 
 
 def start(ros: World, node: Path, *words: str) -> Process:

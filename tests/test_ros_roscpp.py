@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ros_worlds import PATIENCE, world
+from ros_worlds import BIG, BIG_ACTIVITY, PATIENCE, world
 
 import neurovis_spec as nv
 from neurovis_spec.ros.accept import ARRAY, arrays
@@ -20,14 +20,7 @@ from neurovis_spec.runtime.ros_messages import label_of
 
 pytestmark = pytest.mark.ros
 
-SPEC = """
-neurovis: 1
-name: big
-time: {dt: 0.001}
-neurons: {A: {count: 150, initial: 0}}
-"""
-TOPIC = "/neurovis/big/activity"
-HASH = nv.compile_text(SPEC).hash
+HASH = nv.compile_text(BIG).hash
 SOURCE = Path(__file__).parent / "ros_controller.cpp"
 
 
@@ -42,18 +35,18 @@ def built(folder: Path) -> Path:
 
 
 def messages(path: Path) -> list[bytes]:
-    return [one.data for one in read_bag(path).messages() if one.topic.name == TOPIC]
+    return [one.data for one in read_bag(path).messages() if one.topic.name == BIG_ACTIVITY]
 
 
 def test_a_controller_in_cpp_is_recorded_whole_at_a_kilohertz_beside_rosbag(tmp_path: Path) -> None:
     spec, ours, theirs = tmp_path / "big.yaml", tmp_path / "ours.bag", tmp_path / "theirs.bag"
-    spec.write_text(SPEC)
+    spec.write_text(BIG)
     program = built(tmp_path)
     with world("one") as ros:
         view = ros.neurovis("ros", "view", spec, "--record", ours, "--live", "0", "--format", "json")
-        record = ros.program("rosbag", "record", "-O", theirs, TOPIC)
+        record = ros.program("rosbag", "record", "-O", theirs, BIG_ACTIVITY)
         view.wait_for("ready")
-        controller = ros.program(program, TOPIC, label_of(HASH), "150", "8000", "1000", "2")
+        controller = ros.program(program, BIG_ACTIVITY, label_of(HASH), "150", "8000", "1000", "2")
         assert controller.end() == 0
         deadline = time.monotonic() + PATIENCE
         while ours.stat().st_size < 8000 * 1200:
@@ -67,13 +60,13 @@ def test_a_controller_in_cpp_is_recorded_whole_at_a_kilohertz_beside_rosbag(tmp_
         info = ros.program("rosbag", "info", "-y", "-k", "topics", ours)
         assert info.end() == 0
         told = " ".join(" ".join(info.out).split())
-        assert f"topic: {TOPIC} type: std_msgs/Float64MultiArray messages: 8000" in told
+        assert f"topic: {BIG_ACTIVITY} type: std_msgs/Float64MultiArray messages: 8000" in told
     with world("kilted") as ros:  # and now into the other ROS
         view = ros.neurovis("ros", "view", spec, "--record", tmp_path / "two", "--format", "json")
         view.wait_for("ready")
         play = ros.neurovis("ros", "play", theirs, "--speed", "2", "--wait", "20", "--format", "json")
         assert play.end() == 0
-        assert play.json()["topics"][TOPIC]["received"] == len(messages(theirs))
+        assert play.json()["topics"][BIG_ACTIVITY]["received"] == len(messages(theirs))
         time.sleep(1)
         assert view.stop() == 0
     converter = Converter(ARRAY, str(definition(ARRAY, 1)), "ros1")

@@ -6,7 +6,7 @@ import asyncio
 import json
 import signal
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -15,7 +15,7 @@ import aiohttp
 import numpy as np
 import pytest
 from mcap.reader import make_reader
-from ros_worlds import NAMES, PATIENCE, World, world
+from ros_worlds import PATIENCE, World, world
 
 import neurovis_spec
 
@@ -46,12 +46,6 @@ ros:
     signal: {topic: /cmd_vel, type: geometry_msgs/Twist, field: linear.x, safe: -1}
     motors: {topic: ~/motors, type: std_msgs/Float64MultiArray, safe: 0}
 """
-
-
-@pytest.fixture(params=NAMES)
-def ros(request: pytest.FixtureRequest) -> Iterator[World]:
-    with world(request.param) as made:
-        yield made
 
 
 @pytest.fixture

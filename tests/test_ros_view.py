@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
-from ros_worlds import NAMES, PATIENCE, World, world
+from ros_worlds import BIG, BIG_ACTIVITY, PATIENCE, World, world
 
 import neurovis_spec as nv
 from neurovis_spec.ros.accept import ARRAY
@@ -23,28 +23,15 @@ from neurovis_spec.runtime.wire import ArrayForm, text_message
 
 pytestmark = pytest.mark.ros
 
-SPEC = """
-neurovis: 1
-name: big
-time: {dt: 0.001}
-neurons: {A: {count: 150, initial: 0}}
-"""
-TOPIC = "/neurovis/big/activity"
-NETWORK = nv.compile_text(SPEC).network
+NETWORK = nv.compile_text(BIG).network
 FORM = ArrayForm.of(label_of(NETWORK.hash), 150, "cdr")
 START = 1_700_000_000_000_000_000
-
-
-@pytest.fixture(params=NAMES)
-def ros(request: pytest.FixtureRequest) -> Iterator[World]:
-    with world(request.param) as made:
-        yield made
 
 
 @pytest.fixture
 def spec(tmp_path: Path) -> Path:
     path = tmp_path / "big.yaml"
-    path.write_text(SPEC)
+    path.write_text(BIG)
     return path
 
 
@@ -54,8 +41,8 @@ def step(number: float) -> bytes:
 
 def recording(path: Path, messages: Sequence[bytes], rate: int = 1000) -> Path:
     """A recording of ROS 2 of these messages, with their spec."""
-    spec, text = topic_of("/neurovis/big/spec", "std_msgs/String", "string data\n", 2), text_message(SPEC, "cdr")
-    activity = topic_of(TOPIC, ARRAY, str(definition(ARRAY, 2)), 2)
+    spec, text = topic_of("/neurovis/big/spec", "std_msgs/String", "string data\n", 2), text_message(BIG, "cdr")
+    activity = topic_of(BIG_ACTIVITY, ARRAY, str(definition(ARRAY, 2)), 2)
     files = Files(path, 2, {"network": "big", "hash": NETWORK.hash}, [(spec, text)])
     for number, data in enumerate(messages):
         time_ = START + number * 10**9 // rate
@@ -69,7 +56,7 @@ def arrays_in(path: Path) -> list[bytes]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         bag = read_bag(path)
-    found = [one.data for one in bag.messages() if one.topic.name == TOPIC]
+    found = [one.data for one in bag.messages() if one.topic.name == BIG_ACTIVITY]
     if bag.ros == 2:
         return found
     converter = Converter(ARRAY, str(definition(ARRAY, 1)), "ros1")
@@ -99,7 +86,7 @@ def test_a_kilohertz_of_150_neurons_is_recorded_whole_beside_a_page(ros: World, 
     view.wait_for("ready")
     play = ros.neurovis("ros", "play", file, "--wait", "20", "--format", "json")
     assert play.end() == 0
-    assert play.json()["topics"][TOPIC]["received"] == 8000
+    assert play.json()["topics"][BIG_ACTIVITY]["received"] == 8000
     time.sleep(1)
     assert view.stop() == 0
     counts = view.json()["topics"]["activity"]
@@ -153,8 +140,10 @@ def test_messages_of_another_type_and_quality_of_ros_2_are_told(spec: Path) -> N
         announced = ros.neurovis("ros", "view", "--live", "0")
         announced.wait_for("waiting")
         activity = {"topic": "/neurovis/other/activity", "type": ARRAY, "values": {}, "count": 1}
-        ros.peer(send=[{"topic": TOPIC, **words}, {"topic": "/neurovis/other/spec", **words}, activity], wait=1)
-        assert view.wait_for("a publisher sends").startswith(f"{TOPIC}: a publisher sends std_msgs/String, not {ARRAY}")
+        ros.peer(send=[{"topic": BIG_ACTIVITY, **words}, {"topic": "/neurovis/other/spec", **words}, activity], wait=1)
+        assert view.wait_for("a publisher sends").startswith(
+            f"{BIG_ACTIVITY}: a publisher sends std_msgs/String, not {ARRAY}"
+        )
         line = announced.wait_for("another quality of service")
         assert line.startswith("/neurovis/other/spec: a publisher offers")
         assert "DURABILITY" in line
@@ -166,7 +155,7 @@ def test_messages_of_another_type_of_ros_1_are_counted(spec: Path) -> None:
     with world("one") as ros:
         view = ros.neurovis("ros", "view", spec, "--live", "0", "--format", "json")
         view.wait_for("ready")
-        sender = {"topic": TOPIC, "type": "std_msgs/String", "values": {"data": "x"}, "count": 20}
+        sender = {"topic": BIG_ACTIVITY, "type": "std_msgs/String", "values": {"data": "x"}, "count": 20}
         assert ros.peer(send=[sender], seconds=1).end() == 0
         view.wait_for("of another type")
         assert view.stop() == 0
