@@ -13,7 +13,7 @@ from rosbags.interfaces.typing import FieldDesc
 from rosbags.typesys import Stores, get_typestore
 
 from neurovis_spec.language.ros_types import all_types
-from neurovis_spec.ros.convert import ConversionError, Converter, shape_of
+from neurovis_spec.ros.convert import ConversionError, Converter
 from neurovis_spec.ros.definitions import written
 from neurovis_spec.runtime.wire import WireError
 
@@ -84,16 +84,16 @@ def test_what_is_not_the_same_in_both_is_refused() -> None:
         Converter("sensor_msgs/Range", text_of("sensor_msgs/Range", 1), "ros1", text_of("sensor_msgs/Range", 2))
     with pytest.raises(ConversionError, match="wide characters"):
         Converter("my_msgs/Mine", "wstring text\n", "cdr")
-    with pytest.raises(ConversionError, match="the definition of my_msgs/Other is not known"):
+    with pytest.raises(ConversionError, match="does not say what my_msgs/Other is"):
         Converter("my_msgs/Mine", "Other other\n", "cdr")
 
 
 def test_definitions_without_an_end_are_refused() -> None:
     with pytest.raises(ConversionError):
-        shape_of("a/A", "A a\n")
+        Converter("a/A", "A a\n", "ros1")
     doubled = "".join(f"{'=' * 80}\nMSG: a/A{k}\nA{k + 1} x\nA{k + 1} y\n" for k in range(40))
     with pytest.raises(ConversionError):
-        shape_of("a/A", f"A0 a\n{doubled}")
+        Converter("a/A", f"A0 a\n{doubled}", "ros1")
 
 
 def test_a_count_that_lies_is_refused() -> None:

@@ -16,7 +16,7 @@ from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiler.ros_settings import Subscription
 from neurovis_spec.ros import middleware
 from neurovis_spec.ros.counts import Teller
-from neurovis_spec.ros.fields import Definition
+from neurovis_spec.ros.definitions import Definition
 from neurovis_spec.ros.inputs import Inputs
 from neurovis_spec.ros.middleware import Arrival, MiddlewareError, Wish, choose, confine
 from neurovis_spec.ros.pace import Pace

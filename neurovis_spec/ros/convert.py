@@ -6,79 +6,44 @@ have a number in ROS 1 that ROS 2 has not; an empty message takes a byte in ROS 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import struct
 from dataclasses import dataclass, field
-from typing import Final, TypeAlias
 
 import numpy as np
 
-from neurovis_spec.ros.definitions import PRIMITIVES, fields_of_text, inner_name, sections
+from neurovis_spec.ros.definitions import DEEPEST, HEADER, MOST, NUMBERS, Definition, Field
 from neurovis_spec.runtime.wire import Cursor, Encoding, WireError
-
-_SIZES: Final = {
-    **{f"{kind}{bits}": bits // 8 for kind in ("int", "uint", "float") for bits in (8, 16, 32, 64)},
-    **dict.fromkeys(("bool", "byte", "char"), 1),
-}
-_TIMES: Final = ("time", "duration")
-#: messages within messages, and fields of a type with all that is in it
-_DEEPEST, _MOST_FIELDS = 32, 10_000
-_HEADER: Final = "std_msgs/Header"
 
 
 class ConversionError(ValueError):
     """A type that cannot be converted."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Field:
-    """``count`` is None for a single value, −1 for as many as the message says; ``inner`` is the size of a number, None
-    for a string, or the fields of a message."""
-
-    inner: _Inner
-    count: int | None
-
-
-_Fields: TypeAlias = tuple[_Field, ...]
-_Inner: TypeAlias = int | _Fields | str | None
-#: what stands in place of the fields of a Header: both ROS know what is in it
-_HEADED: Final = "header"
-
-
-def _fields(type_: str, texts: Mapping[str, str], depth: int, room: list[int]) -> _Inner:
-    if type_ == _HEADER:
-        return _HEADED
-    if depth > _DEEPEST or type_ not in texts:
-        raise ConversionError(f"the definition of {type_} is not known")
-    result = list[_Field]()
-    for base, behind, _, value in fields_of_text(texts[type_]):
-        if value is not None:
-            continue
-        room[0] -= 1
-        if room[0] < 0:
-            raise ConversionError(f"{type_} has too many fields")
-        bracket = behind.partition("[")[2].removesuffix("]")
-        count = None if "[" not in behind else int(bracket) if bracket.isdigit() else -1
-        if base in _TIMES:
-            inner: _Inner = (_Field(4, None), _Field(4, None))
-        elif base == "wstring":
-            raise ConversionError(f"{type_} holds text of wide characters, which ROS 1 does not know")
-        elif base in PRIMITIVES:
-            inner = _SIZES.get(base)
-        else:
-            inner = _fields(inner_name(base, type_.partition("/")[0], texts), texts, depth + 1, room)
-        result.append(_Field(inner, count))
-    return tuple(result)
+def _alike(one: Definition, other: Definition, types: tuple[str, str], seen: set[tuple[str, str]]) -> bool:
+    """Whether messages of two types hold the same values; ``seen`` are pairs that have been compared."""
+    first, second = types
+    if types in seen or first == second == "string" or first == second == HEADER:
+        return True
+    if first in NUMBERS or second in NUMBERS:
+        return first in NUMBERS and second in NUMBERS and _size(first) == _size(second)
+    if "string" in types or HEADER in types:
+        return False
+    seen.add(types)
+    pairs = list(zip(one.types[first], other.types[second], strict=False))
+    return len(one.types[first]) == len(other.types[second]) and all(
+        a.array == b.array and _alike(one, other, (a.type, b.type), seen) for a, b in pairs
+    )
 
 
-def shape_of(type_: str, text: str) -> object:
-    """What the values of a type are, in order: equal where messages of both ROS hold the same. Raises
-    ConversionError."""
-    return _fields(type_, sections(type_, text), 0, [_MOST_FIELDS])
+def _size(type_: str) -> int:
+    return struct.calcsize(NUMBERS[type_])
 
 
 @dataclass
 class _Writer:
     encoding: Encoding
+    #: values that may still be written: each has bytes, or is among those that a definition holds, or around them
+    room: int
     parts: bytearray = field(default_factory=bytearray)
 
     def align(self, size: int) -> None:
@@ -105,51 +70,59 @@ class Converter:
     def __init__(self, type_: str, text: str, source: Encoding, other: str = "") -> None:
         self.source: Encoding = source
         self.target: Encoding = "cdr" if source == "ros1" else "ros1"
-        self._shape = _fields(type_, sections(type_, text), 0, [_MOST_FIELDS])
-        if other and shape_of(type_, other) != self._shape:
+        try:
+            self._definition = Definition.parse(type_, text)
+            there = Definition.parse(type_, other) if other else self._definition
+        except WireError as error:
+            raise ConversionError(str(error)) from None
+        if not _alike(self._definition, there, (self._definition.type, there.type), set()):
             raise ConversionError(f"{type_} is not the same in ROS 1 and ROS 2")
 
     def convert(self, data: bytes) -> bytes:
         """The same message in the other encoding. Raises WireError."""
-        cursor, writer = Cursor(data, self.source), _Writer(self.target)
-        self._value(self._shape, cursor, writer)
+        cursor, writer = Cursor(data, self.source), _Writer(self.target, MOST + DEEPEST * len(data))
+        self._value(self._definition.type, cursor, writer)
         cursor.end()
         return writer.message()
 
-    def _value(self, inner: _Inner, cursor: Cursor, writer: _Writer) -> None:
-        if isinstance(inner, tuple):
-            if not inner:  # an empty message takes a byte in ROS 2
-                cursor.take(self.source == "cdr")
-                writer.parts += bytes(self.target == "cdr")
-            for one in inner:
-                self._field(one, cursor, writer)
-        elif isinstance(inner, int):
-            self._numbers(inner, 1, cursor, writer)
-        elif inner is None:
+    def _value(self, type_: str, cursor: Cursor, writer: _Writer) -> None:
+        writer.room -= 1
+        if writer.room < 0:
+            raise WireError("it has more values than bytes")
+        if type_ in NUMBERS:
+            self._numbers(_size(type_), 1, cursor, writer)
+        elif type_ == "string":
             writer.string(cursor.string())
-        else:
+        elif type_ == HEADER:
             if self.source == "ros1":
                 cursor.integer()
             else:
                 writer.integer(0)
             self._numbers(4, 2, cursor, writer)
             writer.string(cursor.string())
+        else:
+            fields = self._definition.types[type_]
+            if not fields:  # an empty message takes a byte in ROS 2
+                cursor.take(self.source == "cdr")
+                writer.parts += bytes(self.target == "cdr")
+            for one in fields:
+                self._field(one, cursor, writer)
 
-    def _field(self, one: _Field, cursor: Cursor, writer: _Writer) -> None:
-        if one.count is None:
-            self._value(one.inner, cursor, writer)
+    def _field(self, one: Field, cursor: Cursor, writer: _Writer) -> None:
+        count = one.array
+        if count is None:
+            self._value(one.type, cursor, writer)
             return
-        count = one.count
         if count < 0:
             count = cursor.integer()
             writer.integer(count)
         if count > len(cursor.data):
             raise WireError("it breaks off")
-        if isinstance(one.inner, int):
-            self._numbers(one.inner, count, cursor, writer)
+        if one.type in NUMBERS:
+            self._numbers(_size(one.type), count, cursor, writer)
         else:
             for _ in range(count):
-                self._value(one.inner, cursor, writer)
+                self._value(one.type, cursor, writer)
 
     @staticmethod
     def _numbers(size: int, count: int, cursor: Cursor, writer: _Writer) -> None:

@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from neurovis_spec.ros.fields import Definition, Value, encode
+from neurovis_spec.ros.definitions import Definition
+from neurovis_spec.ros.fields import Value, encode
 from neurovis_spec.ros.middleware import MiddlewareError, Node, Publisher, Quality
 from neurovis_spec.ros.summary import Summary, numbers
 

@@ -8,128 +8,16 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Final, TypeAlias, cast
+from typing import TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.language.ros_types import plain
-from neurovis_spec.ros.definitions import fields_of_text, inner_name, sections
+from neurovis_spec.ros.definitions import HEADER, NUMBERS, Definition, Field
 from neurovis_spec.runtime.wire import Cursor, Encoding, WireError
 
 #: what a message is made of: numbers, texts, lists of values, fields by name; what is left out is 0 or empty
 Value: TypeAlias = "float | int | str | Sequence[Value] | Mapping[str, Value]"
-
-#: the characters of ``struct`` for primitive types
-_NUMBERS: Final[Mapping[str, str]] = {
-    "bool": "B", "byte": "B", "char": "B", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i",
-    "uint32": "I", "int64": "q", "uint64": "Q", "float32": "f", "float64": "d",
-}  # fmt: skip
-_DEEPEST: Final = 32
-_HEADER: Final = "std_msgs/Header"
-
-
-@dataclass(frozen=True, slots=True)
-class Field:
-    """A field: ``array`` is None for one value, −1 for a list of any length, else the length."""
-
-    name: str
-    type: str
-    array: int | None = None
-
-
-#: what ROS 1 has as primitives; ROS 2 defines them, of as many bytes
-_TIMES: Final[Mapping[str, tuple[Field, ...]]] = {
-    name: (Field("sec", "int32"), Field("nanosec", "uint32")) for name in ("time", "duration")
-}
-
-
-@dataclass(frozen=True)
-class Definition:
-    """A type, and the fields of each type that it refers to (``package/Name``)."""
-
-    type: str
-    types: Mapping[str, tuple[Field, ...]]
-
-    @classmethod
-    def parse(cls, type_: str, text: str) -> Definition:
-        """The definition that recordings hold. Raises WireError.
-
-        >>> text = "float64[] x  # m\\nuint8 K=3\\nC c\\n" + "=" * 80 + "\\nMSG: a/C\\nstring<=9 s"
-        >>> Definition.parse("a/B", text).types["a/B"]
-        (Field(name='x', type='float64', array=-1), Field(name='c', type='a/C', array=None))
-        """
-        texts = sections(type_, text)
-        types = dict(_TIMES)
-        for name, inner in texts.items():
-            package = name.partition("/")[0]
-            types[name] = tuple(
-                Field(field, base if _simple(base) else inner_name(base, package, texts), _length(behind))
-                for base, behind, field, value in fields_of_text(inner)
-                if value is None
-            )
-        made = cls(plain(type_), types)
-        made._check(made.type, 0)
-        return made
-
-    def _check(self, type_: str, depth: int) -> None:
-        if depth > _DEEPEST:
-            raise WireError(f"the definition of {self.type} refers to itself")
-        for field in self.types[type_]:
-            if field.type not in _NUMBERS and field.type != "string":
-                if field.type not in self.types:
-                    raise WireError(f"the definition of {self.type} does not say what {field.type} is")
-                self._check(field.type, depth + 1)
-
-    @cached_property
-    def least(self) -> Mapping[str, int]:
-        """The fewest bytes that a value of each type takes."""
-        found = {name: struct.calcsize(code) for name, code in _NUMBERS.items()} | {"string": 4}
-
-        def size(type_: str) -> int:
-            if type_ not in found:
-                found[type_] = sum(
-                    size(field.type) * field.array if field.array is not None and field.array >= 0
-                    else 4 if field.array is not None
-                    else size(field.type)
-                    for field in self.types[type_]
-                )  # fmt: skip
-            return found[type_]
-
-        for name in self.types:
-            size(name)
-        return found
-
-    def field(self, path: str) -> Field | None:
-        """The field at a dotted path."""
-        type_, found = self.type, None
-        for name in path.split("."):
-            if found is not None and found.array is not None:
-                return None
-            found = next((field for field in self.types.get(type_, ()) if field.name == name), None)
-            if found is None:
-                return None
-            type_ = found.type
-        return found
-
-    @property
-    def stamped(self) -> bool:
-        """Whether it begins with a header."""
-        return self.types[self.type][:1] == (Field("header", _HEADER),)
-
-
-def _simple(base: str) -> bool:
-    return base in _NUMBERS or base == "string" or base in _TIMES
-
-
-def _length(behind: str) -> int | None:
-    """How many values a field has, by what is behind its type."""
-    if "[" not in behind:
-        return None
-    length = behind.partition("[")[2].removesuffix("]")
-    return int(length) if length.isdigit() else -1
 
 
 class _Reader:
@@ -161,16 +49,16 @@ class _Reader:
         count = self.several(field)
         if field.type == "string":
             return [self._cursor.string().decode(errors="replace") for _ in range(count)]
-        return self.numbers(_NUMBERS[field.type], count)
+        return self.numbers(NUMBERS[field.type], count)
 
     def skip(self, field: Field) -> None:
-        if field.type in _NUMBERS or field.type == "string":
+        if field.type in NUMBERS or field.type == "string":
             self.values(field)
             return
-        count, fields = self.several(field), self.definition.types[field.type]
-        if not fields and self._cursor.origin is not None:  # ROS 2 gives an empty message a byte
+        count, fields, cdr = self.several(field), self.definition.types[field.type], self._cursor.origin is not None
+        if not fields and cdr:  # ROS 2 gives an empty message a byte
             self._cursor.take(count)
-        elif self.definition.least[field.type]:
+        elif cdr or self.definition.least[field.type]:
             for _ in range(count):
                 for inner in fields:
                     self.skip(inner)
@@ -191,7 +79,7 @@ def numbers_at(definition: Definition, path: str, encoding: Encoding) -> Callabl
     """What reads the numbers at a path. Raises WireError where there are none; the reader raises it for bytes that are
     no such message."""
     field = definition.field(path)
-    if field is None or field.type not in _NUMBERS:
+    if field is None or field.type not in NUMBERS:
         raise WireError(f"messages of type {definition.type} have no numbers at '{path}'")
     parts = path.split(".")
     return lambda data: cast("Sequence[float]", _Reader(definition, data, encoding).find(definition.type, parts))
@@ -236,8 +124,8 @@ class _Writer:
     def value(self, type_: str, value: Value | None, path: str) -> None:
         if type_ == "string":
             self.text("" if value is None else str(value))
-        elif type_ in _NUMBERS:
-            self.numbers(_NUMBERS[type_], [cast(float, 0 if value is None else value)])
+        elif type_ in NUMBERS:
+            self.numbers(NUMBERS[type_], [cast(float, 0 if value is None else value)])
         else:
             given = cast("Mapping[str, Value]", value or {})
             if unknown := [name for name in given if all(name != field.name for field in self.definition.types[type_])]:
@@ -249,8 +137,8 @@ class _Writer:
 
     def field(self, field: Field, value: Value | None, path: str) -> None:
         if field.array is None:
-            if path == self.path and field.type in _NUMBERS:
-                self.align(struct.calcsize(_NUMBERS[field.type]))
+            if path == self.path and field.type in NUMBERS:
+                self.align(struct.calcsize(NUMBERS[field.type]))
                 self.found = len(self.data)
             self.value(field.type, value, path)
             return
@@ -260,14 +148,14 @@ class _Writer:
         elif len(values) > field.array:
             raise WireError(f"'{path}' holds {field.array} values, not {len(values)}")
         else:
-            zero: Value = "" if field.type == "string" else 0 if field.type in _NUMBERS else {}
+            zero: Value = "" if field.type == "string" else 0 if field.type in NUMBERS else {}
             values += [zero] * (field.array - len(values))
-        if field.type in _NUMBERS:
+        if field.type in NUMBERS:
             if values:
-                self.align(struct.calcsize(_NUMBERS[field.type]))
+                self.align(struct.calcsize(NUMBERS[field.type]))
             if path == self.path:
                 self.found = len(self.data)
-            self.numbers(_NUMBERS[field.type], cast("Sequence[float]", values))
+            self.numbers(NUMBERS[field.type], cast("Sequence[float]", values))
         else:
             for one in values:
                 self.value(field.type, one, path)
@@ -290,8 +178,8 @@ def encode(definition: Definition, value: Mapping[str, Value], encoding: Encodin
 class Form:
     """A message in which nothing but the numbers at a path changes, and the time of its header, if it has one.
 
-    Numbers for a field of integers are rounded and kept within what it holds. Raises WireError where the field is none
-    of numbers, or holds another number of them.
+    Numbers are kept within what the field holds; for one of integers they are rounded. Raises WireError where the field
+    is none of numbers, or holds another number of them.
     """
 
     def __init__(
@@ -302,7 +190,7 @@ class Form:
         encoding: Encoding,
     ) -> None:
         field = definition.field(path)
-        if field is None or field.type not in _NUMBERS:
+        if field is None or field.type not in NUMBERS:
             raise WireError(f"messages of type {definition.type} have no numbers at '{path}'")
         if field.array is None and size != 1:
             raise WireError(f"'{path}' of {definition.type} is one number, not {size}")
@@ -313,23 +201,23 @@ class Form:
         writer.value(definition.type, value, "")
         shift = 4 if encoding == "cdr" else 0
         self._data, at = bytearray(writer.bytes()), writer.found + shift
-        code = _NUMBERS[field.type]
+        code = NUMBERS[field.type]
         self._numbers = np.frombuffer(self._data, dtype=f"<{code}", count=size, offset=at)
-        self._bounds = None if code in "fd" else _bounds(field.type, code)
+        self._whole = code not in "fd"
+        self._bounds = _bounds(field.type, code)
         self._stamp: int | None = None
         if definition.stamped:
-            numbered = definition.types[_HEADER][0].name == "seq"
+            numbered = definition.types[HEADER][0].name == "seq"
             self._stamp = shift + (4 if numbered else 0)
 
     def fill(self, numbers: npt.ArrayLike, nanoseconds: int) -> bytes:
         """The message with these numbers, at this time. Raises WireError for a number that the field cannot hold."""
         given = np.asarray(numbers, dtype=np.float64)
-        if self._bounds is not None:
+        if self._whole:
             if not np.isfinite(given).all():
                 raise WireError("a field of integers cannot hold what is not finite")
-            given = np.clip(np.round(given), *self._bounds)
-        with np.errstate(all="ignore"):
-            self._numbers[:] = given
+            given = np.round(given)
+        self._numbers[:] = np.clip(given, *self._bounds)
         if self._stamp is not None:
             seconds, rest = divmod(nanoseconds, 1_000_000_000)
             struct.pack_into("<II", self._data, self._stamp, seconds & 0xFFFFFFFF, rest)
@@ -337,9 +225,12 @@ class Form:
 
 
 def _bounds(type_: str, code: str) -> tuple[float, float]:
-    """The least and the most that integers of a type can be, as far as a double can say it."""
+    """The least and the most that numbers of a type can be, as far as a double can say it."""
     if type_ == "bool":
         return 0.0, 1.0
+    if code in "fd":
+        most = float(np.finfo(np.float32).max) if code == "f" else np.inf
+        return -most, most
     about = np.iinfo(np.dtype(code))
     high = float(about.max)
     return float(about.min), high if int(high) <= about.max else float(np.nextafter(high, 0))

@@ -21,8 +21,9 @@ from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.ros.accept import ARRAY, STRING
 from neurovis_spec.ros.counts import Counts, Teller
+from neurovis_spec.ros.definitions import Definition
 from neurovis_spec.ros.diagnostics import Diagnostics
-from neurovis_spec.ros.fields import Definition, Form
+from neurovis_spec.ros.fields import Form
 from neurovis_spec.ros.inputs import Inputs
 from neurovis_spec.ros.listening import ACTIVITY, SPEC, WEIGHTS, Listening, base_of
 from neurovis_spec.ros.middleware import LATCHED, Arrival, MiddlewareError, Node, Parameter, Publisher, Quality, Tell
