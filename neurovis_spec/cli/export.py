@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 
 from neurovis_spec.cli.completion import paths
-from neurovis_spec.cli.failure import fault
-from neurovis_spec.cli.files import network_of, recording_of, writing
+from neurovis_spec.cli.files import network_of, recording_of
+from neurovis_spec.cli.folders import folder_option, write_folder
 from neurovis_spec.cli.options import examples, set_option, spec_argument
 
 
@@ -21,14 +21,7 @@ from neurovis_spec.cli.options import examples, set_option, spec_argument
 )
 @spec_argument
 @click.option("--to", "form", type=click.Choice(["c"]), required=True, help="The format: c, C99 that is C++17, too.")
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path, file_okay=False),
-    metavar="DIR",
-    required=True,
-    help="The folder for the files, made if it is not there.",
-)
+@folder_option
 @click.option("--float", "single", is_flag=True, help="Numbers of 32 bits instead of 64.")
 @click.option(
     "--from",
@@ -45,14 +38,4 @@ def command(spec: str, form: str, output: Path, single: bool, start: str | None,
     beside them says what a step takes; main.c and CMakeLists.txt are an example, and stay if they are there.
     """
     network, before = network_of(spec, settings), recording_of(start)
-    from neurovis_spec.runtime.c_settable import ExportError
-
-    with writing(output):
-        try:
-            written, kept = network.export(output, form, start=before, real="float" if single else "double")
-        except ExportError as error:
-            raise fault(str(error)) from error
-    for path in written:
-        click.echo(path)
-    for path in kept:
-        click.echo(f"{path} stays as it is", err=True)
+    write_folder(output, lambda: network.export(output, form, start=before, real="float" if single else "double"))

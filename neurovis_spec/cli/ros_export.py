@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from neurovis_spec.cli.failure import fault
-from neurovis_spec.cli.files import network_of, writing
+from neurovis_spec.cli.files import network_of
+from neurovis_spec.cli.folders import folder_option, write_folder
 from neurovis_spec.cli.options import examples, set_option, spec_argument
 
 if TYPE_CHECKING:
@@ -25,14 +26,7 @@ if TYPE_CHECKING:
     )
 )
 @spec_argument
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path, file_okay=False),
-    metavar="DIR",
-    required=True,
-    help="The folder for the files, made if it is not there.",
-)
+@folder_option
 @click.option("--ros", type=click.Choice(["1", "2"]), help="For which ROS; default: 2, with --to cpp 1.")
 @click.option(
     "--to",
@@ -62,15 +56,6 @@ def command(
         raise fault("ros export needs jinja2", "pip install 'neurovis-spec[ros]'; in a clone: pip install '.[ros]'")
     compiled = network_of(spec, settings)
     from neurovis_spec.ros.export import save, texts
-    from neurovis_spec.runtime.c_settable import ExportError
 
     version: Ros = 1 if ros == "1" or form == "cpp" else 2
-    with writing(output):
-        try:
-            written, kept = save(output, texts(compiled, form, version))
-        except ExportError as error:
-            raise fault(str(error)) from error
-    for path in written:
-        click.echo(path)
-    for path in kept:
-        click.echo(f"{path} stays as it is", err=True)
+    write_folder(output, lambda: save(output, texts(compiled, form, version)))
