@@ -7,13 +7,10 @@ place where it stands; so what it holds is checked as well, and nothing that it 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from neurovis_spec.diagnostics import Findings, did_you_mean, meant, nearest, shorten, slips, suggest
 from neurovis_spec.language.yaml.source import Entry, Mapping
-
-#: Errors after which unknown keys are no longer compared with the known ones.
-_MOST_HINTS: Final = 200  # as in the compiler
 
 
 class Keys(NamedTuple):
@@ -52,7 +49,7 @@ def _read(
         if foreign is not None:
             findings.error("unknown-key", span, *foreign)
             perhaps.update({name.partition(":")[0]} & set(known))
-        elif name not in known and findings.errors >= _MOST_HINTS:
+        elif name not in known and findings.many:
             findings.error("unknown-key", span, _unknown(name))
         elif name not in known:
             close = nearest(name, known)
