@@ -37,6 +37,37 @@ time: {dt: 0.001}
 neurons: {A: {count: 150, initial: 0}}
 """
 BIG_ACTIVITY = "/neurovis/big/activity"
+#: a node of ROS 1 that comes when a new master does: seconds from then to the stamps of the first step that it hears
+#: of, and of the first whose neuron SEEN (counted from 2) has the value that it sends to ``/target``
+NEWCOMER = """
+import json, os, socket, time
+from urllib.parse import urlsplit
+import rospy
+from std_msgs.msg import Float64, Float64MultiArray
+address = urlsplit(os.environ["ROS_MASTER_URI"])
+def there():
+    try:
+        socket.create_connection((address.hostname, address.port), 1).close()
+    except OSError:
+        return False
+    return True
+print("here", flush=True)
+while there():
+    time.sleep(0.01)
+while not there():
+    time.sleep(0.01)
+back = time.time()
+rospy.init_node("newcomer", disable_signals=True)
+target = rospy.Publisher("/target", Float64, queue_size=1, latch=True)
+target.publish(1.5)
+came = []
+rospy.Subscriber("/neurovis/arm/activity", Float64MultiArray, lambda message: came.append(message.data))
+while not came or came[-1][SEEN] != 1.5:  # the neuron A is what comes in
+    time.sleep(0.01)
+stamps = [[one[1] for one in came], [one[1] for one in came if one[SEEN] == 1.5]]
+print(json.dumps([times[0] - back for times in stamps]), flush=True)
+os._exit(0)
+"""
 #: seconds for what takes one: machines of tests are slow
 PATIENCE = 60.0
 

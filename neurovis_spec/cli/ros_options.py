@@ -68,7 +68,8 @@ class Meeting:
 
         context = click.get_current_context(silent=True)
         given: tuple[str, ...] = () if context is None else context.meta.get(_ARGUMENTS, ())
-        opened = open_node(Wish(name, namespace, self.ros, self.remote, self.sim_time, anonymous, given), tell)
+        wish = Wish(name, namespace, self.ros, self.remote, self.sim_time, anonymous, given, self.seconds)
+        opened = open_node(wish, tell)
         try:
             yield opened
         finally:

@@ -44,8 +44,8 @@ class Diagnostics:
         wrong = summary.late + sum(sum(one.rejected.values()) + one.not_finite + one.lost for one in counts)
         news, self._wrong = wrong - self._wrong, wrong
         said = [f"no messages for {name}" for name in silent] + ([f"{news} late or not usable"] if news else [])
-        values: dict[str, object] = {"rate": f"{rate:g}", "steps": summary.steps, "late": summary.late}
-        values["reconnects"] = summary.reconnects
+        values: dict[str, object] = {"rate": f"{rate:g}", "seconds": f"{summary.seconds:.1f}"}
+        values |= {name: getattr(summary, name) for name in ("steps", "late", "reconnects", "shown", "skipped")}
         for topic, one in summary.topics.items():
             values |= {f"{topic}: {key}": count for key, count in numbers(one).items()}
         seconds, rest = divmod(self.node.now(), 1_000_000_000)

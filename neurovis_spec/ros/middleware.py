@@ -52,7 +52,7 @@ SetParameters: TypeAlias = Callable[[Mapping[str, float]], str | None]
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """Quality of service. Of a subscription ``offered`` takes the reliability and durability that publishers have.
+    """Quality of service. Of a subscription ``offered`` takes the reliability that publishers have.
 
     ROS 1 knows depth (as the length of queues) and ``transient_local`` (latched) alone.
     """
@@ -152,6 +152,10 @@ class Node(Protocol):
         MiddlewareError where the type's package is missing."""
         ...
 
+    def resolved(self, topic: str) -> str:
+        """The name that a topic has with ROS, which may have been told another one (``/from:=/to``)."""
+        ...
+
     def topics(self) -> Mapping[str, tuple[str, ...]]:
         """The topics that have publishers, and their types (``package/Name``), as far as they are known by now."""
         ...
@@ -183,8 +187,9 @@ class Node(Protocol):
 @dataclass(frozen=True, slots=True)
 class Wish:
     """How a node is to be opened: its name and namespace, ``ros`` (None: what is there), whether it meets other
-    machines, whether its time is that of ``/clock``, whether another of its name may be there (``anonymous``), and
-    ``arguments`` for ROS itself: ``--ros-args -r a:=b -p name:=1``, in ROS 1 ``a:=b _name:=1``."""
+    machines, whether its time is that of ``/clock``, whether another of its name may be there (``anonymous``),
+    ``arguments`` for ROS itself: ``--ros-args -r a:=b -p name:=1``, in ROS 1 ``a:=b _name:=1``; and for how many
+    ``seconds`` it waits for a master (None: until there is one)."""
 
     name: str
     namespace: str = "/"
@@ -193,6 +198,7 @@ class Wish:
     sim_time: bool = False
     anonymous: bool = False
     arguments: tuple[str, ...] = ()
+    seconds: float | None = None
     environment: Mapping[str, str] = field(default_factory=lambda: os.environ)
 
 

@@ -13,6 +13,7 @@ from contextlib import suppress
 from http.client import HTTPConnection
 from threading import Event, Lock, Thread
 from typing import IO, Final, cast
+from urllib.parse import urlsplit
 from xmlrpc.client import ServerProxy, Transport
 
 import genpy
@@ -93,6 +94,10 @@ class Ros1Publisher:
         latched = quality.durability == "transient_local"
         queue = quality.depth if quality.reliability == "best_effort" else max(_QUEUE, quality.depth)
         self.handle = rospy.Publisher(topic, self._class, queue_size=queue, latch=latched, tcp_nodelay=True)
+        there = self.handle.impl.data_class._type  # rospy would send one type in the name of the other
+        if there != type_:
+            self.handle.unregister()
+            raise MiddlewareError(f"{topic} cannot be a topic of {type_}: this node publishes {there} on it")
         self.topic = str(self.handle.resolved_name)
 
     @property
@@ -165,8 +170,10 @@ class Ros1Node:
         uri = os.environ.setdefault("ROS_MASTER_URI", "http://localhost:11311")
         os.environ["ROS_NAMESPACE"] = wish.namespace
         rospy.names._set_caller_id(rosgraph.names.make_global_ns(wish.namespace) + wish.name)
+        if urlsplit(uri).scheme not in ("http", "https") or not urlsplit(uri).hostname:
+            raise MiddlewareError(f"ROS_MASTER_URI is no address: '{uri}'", "such as http://localhost:11311")
         self._uri = uri
-        self._wait_for_master()
+        self._wait_for_master(wish.seconds)
         try:
             remaps = ["neurovis", f"__ns:={wish.namespace}", *wish.arguments]
             rospy.init_node(wish.name, remaps, anonymous=wish.anonymous, disable_signals=True, disable_rostime=True)
@@ -182,12 +189,15 @@ class Ros1Node:
     def _master(self) -> ServerProxy:
         return ServerProxy(self._uri, transport=_Timely())
 
-    def _wait_for_master(self) -> None:
-        told = False
+    def _wait_for_master(self, seconds: float | None) -> None:
+        """Wait until the master answers, so many seconds at most. Raises MiddlewareError."""
+        told, begun = False, time.monotonic()
         while True:
             with suppress(OSError):
-                self._master().getPid("/neurovis")
+                self._ask(lambda master: master.getPid("/neurovis"))
                 return
+            if seconds is not None and time.monotonic() - begun >= seconds:
+                raise MiddlewareError(f"there is no master of ROS 1 at {self._uri}", "roscore starts one")
             if not told:
                 self.tell(f"waiting for the master of ROS 1 at {self._uri}")
                 told = True
@@ -229,6 +239,10 @@ class Ros1Node:
     def definition(self, type_: str) -> str:
         """The fields of a type, and of those that it refers to."""
         return str(_class_of(type_)._full_text)  # type: ignore[attr-defined]
+
+    def resolved(self, topic: str) -> str:
+        """The name that a topic has with ROS."""
+        return str(rospy.resolve_name(topic))
 
     def topics(self) -> Mapping[str, tuple[str, ...]]:
         """The topics that have publishers, and their types; none while the master is away."""
@@ -289,16 +303,23 @@ class Ros1Node:
         """Set what others have set on the server."""
         if self._set is None:
             return
-        now = cast("dict[str, object]", dict(self._cache().get(self._prefix)))
+        now = self._on_server()
         changed = {name: value for name, value in now.items() if self._seen.get(name) != value}
         self._seen = now
         changed = {name: value for name, value in changed.items() if value != self._values.get(name)}
-        if not changed:
-            return
-        why = self._refusal(changed, self._set)
+        why = self._refusal(changed, self._set) if changed else None
         if why is not None:
             self.tell(f"{self._prefix}: {why}")
-            self._put({name: self._values[name] for name in changed if name in self._values})
+        back = {*changed, *self._values.keys() - now.keys()} if why is not None else self._values.keys() - now.keys()
+        self._put({name: self._values[name] for name in back if name in self._values})
+
+    def _on_server(self) -> dict[str, object]:
+        """The parameters as the server has them, which is what anybody may have made of them."""
+        try:
+            found = self._cache().get(self._prefix)
+        except KeyError:
+            return {}
+        return dict(found) if isinstance(found, dict) else {}
 
     def _refusal(self, changed: Mapping[str, object], set_: SetParameters) -> str | None:
         given: dict[str, float] = {}
@@ -316,9 +337,9 @@ class Ros1Node:
     def _put(self, values: Mapping[str, float]) -> None:
         for name, value in values.items():
             key = f"{self._prefix}/{name}"
-            with suppress(OSError, KeyError):
+            with suppress(OSError):
                 self._ask(lambda master, key=key, value=value: master.setParam(self.name, key, value))  # type: ignore[misc]
-                self._cache().update(key, value)
+                self._cache().set(key, value)
                 self._seen[name] = value
 
     def follow(self, values: Mapping[str, float]) -> None:

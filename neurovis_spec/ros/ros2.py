@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from threading import Event, Lock, Thread
 from typing import Final, cast
@@ -66,6 +66,15 @@ def _message(type_: str) -> type:
     return found
 
 
+@contextmanager
+def _refused(topic: str, type_: str) -> Iterator[None]:
+    """A block that makes a publisher or a subscription. Raises MiddlewareError where ROS does not."""
+    try:
+        yield
+    except Exception as error:
+        raise MiddlewareError(f"{topic} cannot be a topic of {type_}: {error}") from None
+
+
 def _profile(quality: Quality, reliable: bool) -> QoSProfile:
     return QoSProfile(
         reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
@@ -86,12 +95,10 @@ class Ros2Publisher:
         def incompatible(event: object) -> None:
             node.tell(f"{topic}: a subscriber asks for another quality of service ({_policy(event)}) and gets nothing")
 
-        self._handle = node.rcl.create_publisher(
-            _message(type_),
-            topic,
-            _profile(quality, quality.reliability != "best_effort"),
-            event_callbacks=PublisherEventCallbacks(incompatible_qos=incompatible),
-        )
+        class_, profile = _message(type_), _profile(quality, quality.reliability != "best_effort")
+        events = PublisherEventCallbacks(incompatible_qos=incompatible)
+        with _refused(topic, type_):
+            self._handle = node.rcl.create_publisher(class_, topic, profile, event_callbacks=events)
 
     @property
     def subscribers(self) -> int:
@@ -126,14 +133,12 @@ class Ros2Subscription:
 
     def _make(self, reliable: bool) -> None:
         self._is_reliable = reliable
-        self._handle = self._node.rcl.create_subscription(
-            self._class,
-            self.topic,
-            self._take,
-            _profile(self._quality, reliable),
-            raw=True,
-            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=self._incompatible),
-        )
+        profile = _profile(self._quality, reliable)
+        events = SubscriptionEventCallbacks(incompatible_qos=self._incompatible)
+        with _refused(self.topic, self._type):
+            self._handle = self._node.rcl.create_subscription(
+                self._class, self.topic, self._take, profile, raw=True, event_callbacks=events
+            )
 
     def _incompatible(self, event: object) -> None:
         policy = _policy(event)
@@ -285,6 +290,10 @@ class Ros2Node:
         separator = "=" * 80
         return f"{separator}\n".join(text if name == type_ else f"MSG: {name}\n{text}" for name, text in parts.items())
 
+    def resolved(self, topic: str) -> str:
+        """The name that a topic has with ROS."""
+        return str(self.rcl.resolve_topic_name(topic))
+
     def topics(self) -> Mapping[str, tuple[str, ...]]:
         """The topics that have publishers, and their types."""
         return {
@@ -307,12 +316,16 @@ class Ros2Node:
                 self.tell(f"the parameter '{one.name}' is one of ROS itself: it cannot be set from outside")
                 continue
             try:
-                self.rcl.declare_parameter(one.name, float(one.value), about)
+                # what it was started with may be of another type, or out of its bounds
+                anything = ParameterDescriptor(dynamic_typing=True)
+                given = self.rcl.declare_parameter(one.name, float(one.value), anything).value
+                self.rcl.undeclare_parameter(one.name)
+                self.rcl.declare_parameter(one.name, float(one.value), about, ignore_override=True)
             except Exception as error:
                 self.tell(f"the parameter '{one.name}' is not offered: {error}")
                 continue
             self._declared.add(one.name)
-            self._start(one, float(self.rcl.get_parameter(one.name).value), set_)
+            self._start(one, given, set_)
 
         def asked(given: Sequence[Given]) -> SetParametersResult:
             values = {one.name: float(one.value) for one in given if one.name in self._declared}
@@ -321,12 +334,18 @@ class Ros2Node:
 
         self.rcl.add_on_set_parameters_callback(asked)
 
-    def _start(self, one: Parameter, value: float, set_: SetParameters) -> None:
+    def _start(self, one: Parameter, given: object, set_: SetParameters) -> None:
         """Set a parameter that the node was started with."""
-        why = set_({one.name: value}) if value != one.value else None
+        if given == one.value:
+            return
+        if isinstance(given, bool) or not isinstance(given, int | float):
+            why: str | None = f"'{one.name}' takes a number"
+        else:
+            why = set_({one.name: float(given)})
         if why is not None:
             self.tell(f"the parameter '{one.name}' stays {one.value:g}: {why}")
-            self.later(lambda: self._show({one.name: one.value}))
+        elif isinstance(given, int | float):
+            self._show({one.name: float(given)})
 
     def follow(self, values: Mapping[str, float]) -> None:
         """Have parameters show what they are by now."""

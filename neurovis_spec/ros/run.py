@@ -79,14 +79,16 @@ def absolute(topic: str, node: str) -> str:
 
 
 @dataclass
-class _Sender:
-    """A publisher; who listens in this process gets its messages, too."""
+class _Array:
+    """An array of the network's, with its prelude; who listens in this process gets it, too."""
 
     publisher: Publisher
     listening: Listening | None
+    form: ArrayForm
 
-    def send(self, data: bytes, nanoseconds: int) -> None:
-        """Send a message."""
+    def step(self, step: int, nanoseconds: int, values: FloatArray) -> None:
+        """Send the array of a step."""
+        data = self.form.message(step, nanoseconds / 1e9, values)
         self.publisher.publish(data)
         if self.listening is not None:
             arrival = Arrival(data, time.time_ns(), nanoseconds, self.publisher.type)
@@ -94,20 +96,10 @@ class _Sender:
 
 
 @dataclass
-class _Array(_Sender):
-    """An array of the network's, with its prelude."""
-
-    form: ArrayForm
-
-    def step(self, step: int, nanoseconds: int, values: FloatArray) -> None:
-        """The array of a step."""
-        self.send(self.form.message(step, nanoseconds / 1e9, values), nanoseconds)
-
-
-@dataclass
-class _Output(_Sender):
+class _Output:
     """An output. What is not finite is not sent: its safe value is, where it has one."""
 
+    publisher: Publisher
     form: Form
     name: str
     safe: FloatArray | None
@@ -116,7 +108,7 @@ class _Output(_Sender):
     def put(self, values: FloatArray, nanoseconds: int) -> None:
         """The output of a step."""
         if np.isfinite(values).all():
-            self.send(self.form.fill(values, nanoseconds), nanoseconds)
+            self.publisher.publish(self.form.fill(values, nanoseconds))
         else:
             self.withheld += 1
             self.end(nanoseconds)
@@ -124,7 +116,7 @@ class _Output(_Sender):
     def end(self, nanoseconds: int) -> None:
         """The safe values, where there are some."""
         if self.safe is not None:
-            self.send(self.form.fill(self.safe, nanoseconds), nanoseconds)
+            self.publisher.publish(self.form.fill(self.safe, nanoseconds))
 
 
 class NodeRun:
@@ -161,7 +153,7 @@ class NodeRun:
 
     def _subscribe(self) -> Inputs:
         node, settings = self.node, self.network.ros
-        wanted = [replace(one, topic=absolute(one.topic, node.name)) for one in settings.subscribe]
+        wanted = [replace(one, topic=node.resolved(absolute(one.topic, node.name))) for one in settings.subscribe]
         definitions = {one.type: Definition.parse(one.type, node.definition(one.type)) for one in wanted}
         sizes = {entry.name: entry.size for entry in self.network.inputs}
         inputs = Inputs.of(wanted, sizes, definitions, node.encoding, self._clock.now, self._teller)
@@ -188,7 +180,7 @@ class NodeRun:
             form = Form(Definition.parse(one.type, node.definition(one.type)), one.field, size, node.encoding)
             publisher = node.publisher(absolute(one.topic, node.name), one.type, quality)
             safe = None if one.safe is None else np.full(size, one.safe)
-            self._outputs.append(_Output(publisher, self._listening, form, one.output, safe))
+            self._outputs.append(_Output(publisher, form, one.output, safe))
         self._spec = node.publisher(f"{base}/{SPEC}", STRING, LATCHED)
         self._spec.publish(text_message(self._compiled.text(), node.encoding))
 
@@ -220,10 +212,11 @@ class NodeRun:
 
     def wait(self, stopped: Callable[[], bool]) -> None:
         """Wait for subscribers, as long as the course says."""
-        senders = [self._activity, *([self._weights] if self._weights else []), *self._outputs]
+        arrays = [self._activity, *([self._weights] if self._weights else [])]
+        publishers = [*(one.publisher for one in arrays), *(one.publisher for one in self._outputs)]
         deadline = time.monotonic() + self._course.wait
-        while time.monotonic() < deadline and not stopped():
-            if all(sender.publisher.subscribers for sender in senders):
+        while time.monotonic() < deadline and not stopped() and not self.node.ended:
+            if all(publisher.subscribers for publisher in publishers):
                 return
             time.sleep(0.01)
 
@@ -302,7 +295,8 @@ class NodeRun:
             kept = heard.get(topic.topic, Counts())
             topics[topic.topic] = replace(topic.counts, recorded=kept.recorded, lost=kept.lost)
         for output in self._outputs:
-            topics[output.publisher.topic] = Counts(not_finite=output.withheld)
+            counts = topics.get(output.publisher.topic, Counts())
+            topics[output.publisher.topic] = replace(counts, not_finite=counts.not_finite + output.withheld)
         shown, skipped = (0, 0) if listening is None else listening.shown
         return Summary(
             network=self.network.name,
