@@ -101,7 +101,7 @@ page-check: $(VENV)/tested node_modules/made
 
 ROS_1 := python3-roslaunch python3-rosmaster python3-rospy python3-rostopic python3-rosbag python3-rosparam \
   python3-std-msgs python3-sensor-msgs ros-std-msgs ros-sensor-msgs rosout
-CPP_1 := libroscpp-dev libsensor-msgs-dev libgeometry-msgs-dev libstd-msgs-dev g++ pkg-config python3-rosnode
+CPP_1 := libroscpp-dev libsensor-msgs-dev libgeometry-msgs-dev libstd-msgs-dev libdiagnostic-msgs-dev g++ pkg-config python3-rosnode
 
 needs-ros:
 	@/usr/bin/python3 -c 'import rosmaster, rospy, std_msgs.msg, sensor_msgs.msg' 2>/dev/null \
@@ -110,6 +110,7 @@ needs-ros:
 	  || { echo "make test-ros needs what is not here: ROS 1 (apt-get install $(ROS_1))" >&2; exit 1; }
 	@command -v g++ >/dev/null && command -v rosnode >/dev/null && pkg-config --exists roscpp 2>/dev/null \
 	  && test -e /usr/include/sensor_msgs/JointState.h -a -e /usr/include/geometry_msgs/TwistStamped.h \
+	    -a -e /usr/include/diagnostic_msgs/DiagnosticArray.h \
 	  || { echo "make test-ros needs what is not here: ROS 1 for C++ (apt-get install $(CPP_1))" >&2; exit 1; }
 	@test "$$(uname -sm)" = "Linux x86_64" || { echo "make test-ros needs Linux on x86_64: there are no wheels of ROS 2 for others" >&2; exit 1; }
 

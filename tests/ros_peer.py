@@ -2,10 +2,10 @@
 
     PYTHON tests/ros_peer.py PLAN        PLAN: a JSON object
 
-``listen``: [{topic, type, fields, latched, reliable}]; ``send``: [{topic, type, values, rate, count, latched}], where
-values are {path: value} or a list of these, taken in turn; ``raw`` messages are bytes in hex; ``until``: {topic: how
-many} ends it early; ``seconds``: after that it ends at the latest. It prints a line "ready", and at the end what came,
-by topic.
+``listen``: [{topic, type, fields, latched, reliable}], in ROS 1 with ``raw`` in place of ``fields`` for all the bytes;
+``send``: [{topic, type, values, rate, count, latched}], where values are {path: value} or a list of these, taken in
+turn; ``raw`` messages are bytes in hex; ``until``: {topic: how many} ends it early; ``seconds``: after that it ends at
+the latest. It prints a line "ready", and at the end what came, by topic.
 """
 
 from __future__ import annotations
@@ -90,7 +90,8 @@ class Ros1:
         rospy.init_node(name, anonymous=True, disable_signals=True)
 
     def listen(self, wish: Wish, heard: Callable[[object], None]) -> None:
-        self.rospy.Subscriber(wish["topic"], message_class(wish["type"]), heard, buff_size=1 << 20, tcp_nodelay=True)
+        class_ = self.rospy.AnyMsg if wish.get("raw") else message_class(wish["type"])
+        self.rospy.Subscriber(wish["topic"], class_, heard, buff_size=1 << 20, tcp_nodelay=True)
 
     def sender(self, wish: Wish) -> tuple[Callable[[object], None], Callable[[], int]]:
         made = self.rospy.Publisher(
@@ -116,7 +117,8 @@ def main(plan: Wish) -> None:
     came: dict[str, list[object]] = {wish["topic"]: [] for wish in plan.get("listen", ())}
 
     def listener(wish: Wish) -> Callable[[object], None]:
-        return lambda message: came[wish["topic"]].append([get(message, path) for path in wish["fields"]])
+        fields = ["_buff"] if wish.get("raw") else wish["fields"]
+        return lambda message: came[wish["topic"]].append([get(message, path) for path in fields])
 
     for wish in plan.get("listen", ()):
         peer.listen(wish, listener(wish))

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from ros_worlds import NAMES, Process, World, world
+from ros_worlds import NAMES, NEWCOMER, Process, World, world
+from rosbags.typesys import Stores, get_typestore
 
 import neurovis_spec as nv
 from neurovis_spec.ros.bags import read_bag
@@ -32,12 +36,13 @@ name: arm
 seed: 3
 time: {dt: 0.01, steps: 100}
 parameters: {gain: {value: 0.5, min: 0, max: 2}, turn: 0.3}
-inputs: {target: {expression: sin(3*t)}, torque: {size: 2}, own: {expression: 0.1*cos(t)}}
+inputs: {target: {expression: sin(3*t)}, torque: {size: 2}, alive: {}, own: {expression: 0.1*cos(t)}}
 neurons:
   C: {count: 2, activation: tanh, bias: 0.01, noise: "normal(0, 0.01)"}
   A: {input: target, activation: identity}
   M: {count: 2, input: torque, activation: identity}
   B: {input: own, activation: tanh}
+  L: {input: alive, activation: identity}
 connections:
   C -> C: {matrix: [[1.4, turn], ["-turn", 1.4]]}
   C1 -> B: {weight: 0.3, plasticity: {oja: {rate: 0.05}}}
@@ -48,8 +53,10 @@ ros:
   rate: 100
   qos: {depth: 2000}
   subscribe:
-    target: {topic: /target, type: std_msgs/Float64, timeout: 0.4, on_timeout: ON_TIMEOUT}
-    torque: {topic: joints, type: sensor_msgs/JointState, field: effort, names: [hip, knee], timeout: 0.4}
+    target: {topic: /target, type: std_msgs/Float64, timeout: 0.4}
+    torque:
+      {topic: joints, type: sensor_msgs/JointState, field: effort, names: [hip, knee], timeout: 0.4, on_timeout: hold}
+    alive: {topic: /alive, timeout: 0.4, on_timeout: stop}
   publish:
     signal: {topic: /cmd_vel, type: geometry_msgs/TwistStamped, field: twist.linear.x, safe: -1}
     motors: {topic: ~/motors, type: std_msgs/Float64MultiArray, safe: 0}
@@ -64,9 +71,8 @@ MOTORS = {"topic": f"{BASE}/motors", "type": ARRAY, "fields": ["data"]}
 ON = {"topic": "/neurovis/on", "type": "std_msgs/Bool", "fields": ["data"]}
 
 
-def compiled(on_timeout: str = "zero", published: bool = True) -> nv.CompiledNetwork:
-    text = ARM.replace("ON_TIMEOUT", on_timeout)
-    return nv.compile_text(text if published else re.sub(r"(?s)  subscribe:.*", "", text))
+def compiled(published: bool = True) -> nv.CompiledNetwork:
+    return nv.compile_text(ARM if published else re.sub(r"(?s)  subscribe:.*", "", ARM))
 
 
 def exported(folder: Path, network: nv.CompiledNetwork, form: Form, ros: Ros = 1) -> Path:
@@ -194,7 +200,7 @@ def built(folder: Path) -> Path:
         strict = command.replace(" -O2 ", " -O1 -Wall -Wextra ")
         done = subprocess.run(strict, shell=True, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
         assert done.returncode == 0, done.stderr
-        assert f"{folder.name}_node.cpp" not in done.stderr, done.stderr
+        assert "_node." not in done.stderr, done.stderr
     return folder / "arm_node"
 
 
@@ -215,7 +221,7 @@ def test_a_node_in_cpp_publishes_the_offline_run_bit_for_bit(one: World, node: P
     peer = one.peer(listen=[ACTIVITY, WEIGHTS, SPEC, COMMANDS, MOTORS, ON], until=wanted)
     run = start(one, node, "--steps", str(STEPS), "--wait", "60")
     assert run.end() == 0
-    assert re.fullmatch(rf"arm: {STEPS} steps, \d+ late", run.out[0])
+    assert re.fullmatch(rf"arm: \d+\.\d s, {STEPS} steps, \d+ late", run.out[0])
     assert peer.end() == 0
     came = peer.json()
     check_bits(came, network)
@@ -243,8 +249,8 @@ def test_inputs_become_outputs_of_a_node_in_cpp_and_its_end_is_safe(one: World, 
     assert 0.5 < max(one[0] for one in came["/cmd_vel"]) <= 1.0
     assert [one[0] for one in came["/neurovis/on"]][-1] is False
     assert True in [one[0] for one in came["/neurovis/on"]]
-    assert "/neurovis/joints: 49 received, 6 of another length, 3 not finite" in run.out
-    assert "/target: 50 received, 0 of another length, 0 not finite" in run.out
+    assert "/neurovis/joints: 49 received, 3 not finite, 6 rejected for their length" in run.out
+    assert "/target: 50 received" in run.out
 
 
 def test_parameters_of_a_node_in_cpp_are_set_within_their_bounds(one: World, node: Path) -> None:
@@ -285,6 +291,96 @@ def test_rosnode_kill_ends_a_node_in_cpp_safely(one: World, node: Path) -> None:
     assert peer.json()["/cmd_vel"][-1] == [-1.0, 0.0]
 
 
+def test_an_input_of_a_node_in_cpp_falls_silent(one: World, node: Path) -> None:
+    """``target`` is to fall to zero, ``torque`` to stay, and the run to end without ``alive``."""
+    run = start(one, node)
+    joints = {"topic": "/neurovis/joints", "type": "sensor_msgs/JointState", "count": 10}
+    joints["values"] = {"name": ["hip", "knee"], "effort": [3.0, 4.0]}
+    target = {"topic": "/target", "type": "std_msgs/Float64", "values": {"data": 1.5}, "count": 10}
+    alive = {"topic": "/alive", "type": "std_msgs/Float64", "values": {"data": 1.0}, "count": 75}
+    peer = one.peer(listen=[COMMANDS, MOTORS, ON], send=[joints, target, alive], seconds=3.0)
+    assert run.end() == 1
+    assert peer.end() == 0
+    came = peer.json()
+    on = [one[0] for one in came["/neurovis/on"]]
+    motors = [tuple(one[0]) for one in came[f"{BASE}/motors"]]
+    silent = len(on) - on[::-1].index(True)  # the first step with zero
+    assert on[silent - 1 :] == [True, *[False] * (len(on) - silent)]
+    assert len(on) - silent > 50
+    assert set(motors[-len(on) + silent : -1]) == {(3.0, 4.0)}
+    assert motors[-1] == (0.0, 0.0)
+    assert came["/cmd_vel"][-1] == [-1.0, 0.0]
+    assert run.err[-1] == "the input 'alive' has fallen silent: no message on /alive for 0.4 s"
+
+
+def test_a_node_in_cpp_says_once_a_second_how_it_goes(one: World, node: Path) -> None:
+    run = start(one, node, "--rate", "50")
+    wish = {"topic": "/diagnostics", "type": "diagnostic_msgs/DiagnosticArray", "raw": True}
+    target = {"topic": "/target", "type": "std_msgs/Float64", "values": {"data": 1.5}, "count": 5, "rate": 50}
+    peer = one.peer(listen=[wish], send=[target], until={"/diagnostics": 3})
+    assert peer.end() == 0
+    assert run.stop() == 0
+    store = get_typestore(Stores.ROS1_NOETIC)
+    came: list[Any] = [
+        store.deserialize_ros1(bytes.fromhex(one[0]), "diagnostic_msgs/msg/DiagnosticArray")
+        for one in peer.json()["/diagnostics"]
+    ]
+    values = [{pair.key: pair.value for pair in one.status[0].values} for one in came]
+    steps = [int(one["steps"]) for one in values]
+    assert steps == sorted(set(steps))
+    assert values[-1]["rate"] == "50"
+    assert values[-1]["/target: received"] == "5"
+    last = came[-1]
+    assert (last.status[0].name, last.status[0].hardware_id) == ("neurovis/arm: network", "arm")
+    assert last.status[0].level == 1
+    assert "no messages for target" in last.status[0].message
+    assert abs(last.header.stamp.sec - time.time()) < 600
+
+
+def test_a_node_in_cpp_ends_while_it_waits(one: World, node: Path) -> None:
+    """For who listens, to all of it; and for a master."""
+    run = start(one, node, "--wait", "1000")
+    peer = one.peer(listen=[ACTIVITY, COMMANDS, MOTORS, ON], seconds=1.0)
+    assert peer.end() == 0
+    assert peer.json()[f"{BASE}/activity"] == []  # nobody listened to the weights
+    assert run.stop() == 0
+    for number in (signal.SIGINT, signal.SIGTERM):
+        run = start(one, node, "--wait", "1000")
+        run.signal(number)
+        assert run.end() == 0
+    one.stop_core()
+    run = one.started([node], ROS_IP="127.0.0.1")
+    run.wait_for("waiting for the master of ROS 1 at http://127.0.0.1:")
+    run.signal(signal.SIGINT)
+    assert run.end() == 1
+
+
+def test_a_node_in_cpp_outlives_its_master(one: World, node: Path) -> None:
+    run = start(one, node)
+    newcomer = one.python(NEWCOMER.replace("SEEN", "4"))
+    newcomer.wait_for("here")
+    one.stop_core()
+    time.sleep(1.5)
+    one.start_core()
+    assert newcomer.end() == 0, newcomer.err
+    out, into = json.loads(newcomer.out[-1])
+    assert out <= into <= 5
+    asked = one.python("""
+import rosgraph, time
+end = time.monotonic() + 20
+master = rosgraph.Master("/asker")
+while not master.hasParam("/neurovis/arm/parameters/gain") and time.monotonic() < end:
+    time.sleep(0.05)
+master.setParam("/neurovis/arm/parameters/gain", 9.0)
+while master.getParam("/neurovis/arm/parameters/gain") != 0.5 and time.monotonic() < end:
+    time.sleep(0.05)
+assert time.monotonic() < end
+""")
+    assert asked.end() == 0, asked.err
+    assert run.stop() == 0
+    assert ", 1 reconnects" in run.out[0]
+
+
 # ---- publishers ----------------------------------------------------------------------------------------------------
 
 CONTROLLER = """
@@ -296,7 +392,7 @@ while not shown.subscribers:
     time.sleep(0.01)
 for step in range(200):
     time.sleep(0.002)
-    shown.publish([step + number for number in range(6)], [step / 10, 1, 2])
+    shown.publish([step + number for number in range(7)], [step / 10, 1, 2])
 try:
     shown.publish([1.0])
 except ValueError as error:
@@ -311,10 +407,10 @@ int main(int argc, char **argv) {
   ros::NodeHandle node;
   neurovis::Publisher shown(node, neurovis::arm_network());
   while (shown.subscribers() == 0) ros::Duration(0.01).sleep();
-  std::vector<double> activity(6), weights(3);
+  std::vector<double> activity(7), weights(3);
   for (int step = 0; step < 200; ++step) {
     ros::Duration(0.002).sleep();
-    for (int number = 0; number < 6; ++number) activity[number] = step + number;
+    for (int number = 0; number < 7; ++number) activity[number] = step + number;
     weights[0] = step / 10.0, weights[1] = 1, weights[2] = 2;
     shown.publish(activity, weights);
   }
@@ -331,7 +427,7 @@ int main(int argc, char **argv) {
 def check_shown(ros: World, view: Process, controller: Process, recording: Path) -> None:
     """What ``neurovis ros view`` has seen and recorded of a controller."""
     assert controller.end() == 0, controller.err
-    assert controller.out[-1] == "arm has 6 activities, not 1"
+    assert controller.out[-1] == "arm has 7 activities, not 1"
     assert view.stop() == 0
     counts = view.json()["topics"]
     for topic in ("activity", "weights"):
@@ -344,11 +440,11 @@ def check_shown(ros: World, view: Process, controller: Process, recording: Path)
         topic = one.topic.name.rpartition("/")[2]
         if topic in messages:
             messages[topic].append(array_of(one.data, ENCODINGS[ros.ros]).data.tolist())
-    for topic, size in (("activity", 6), ("weights", 3)):
+    for topic, size in (("activity", 7), ("weights", 3)):
         assert [one[0] for one in messages[topic]] == list(range(200))
         assert all(0 < one[1] - messages[topic][0][1] < 60 for one in messages[topic][1:])
         assert {len(one) for one in messages[topic]} == {size + 2}
-    assert [one[2:] for one in messages["activity"]] == [[k + i for i in range(6)] for k in range(200)]
+    assert [one[2:] for one in messages["activity"]] == [[k + i for i in range(7)] for k in range(200)]
     assert [one[2:] for one in messages["weights"]] == [[k / 10, 1, 2] for k in range(200)]
 
 

@@ -91,7 +91,8 @@ def _package(compiled: CompiledNetwork, ros: Ros) -> dict[str, str]:
 
 def _node(compiled: CompiledNetwork) -> dict[str, str]:
     values = _values(compiled)
-    values |= {"node": True, "executable": f"{values['c']}_node"}
+    messages = [*packages_of(compiled.network.ros), "diagnostic_msgs"]
+    values |= {"node": True, "executable": f"{values['c']}_node", "messages": sorted(set(messages))}
     made = {name: render(f"ros1/{name}", values) for name in ("package.xml",)}
     made["launch/network.launch"] = render("ros1/network.launch", values)
     header = f"{values['c']}_publisher.hpp"

@@ -79,6 +79,9 @@ class Publisher {
   // How many listen to the activities.
   std::uint32_t subscribers() const { return activity_.getNumSubscribers(); }
 
+  // Whether somebody listens to all that is published.
+  bool heard() const { return subscribers() > 0 && (network_.weights == 0 || weights_.getNumSubscribers() > 0); }
+
  private:
   void prepare(std_msgs::Float64MultiArray &message, std::size_t size) const {
     message.layout.dim.resize(1);
