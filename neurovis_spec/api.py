@@ -82,11 +82,12 @@ def compile_text(
     return _compile_text(text, arguments.text("file", file), request)
 
 
-def load(path: str | Path) -> Recording:
-    """Read a recording. Raises RecordingError for a file that is none, or that cannot be read."""
+def load(path: str | Path, *, run: int | None = None) -> Recording:
+    """Read a recording; of one in which the network began anew the run with this number, from 1, by default the last.
+    Raises RecordingError for a file that is none, or that cannot be read."""
     from neurovis_spec.runtime import formats
 
-    return formats.load(arguments.path("path", path))
+    return formats.load(arguments.path("path", path), None if run is None else arguments.integer("run", run, 1))
 
 
 def schema(*, included: bool = False) -> dict[str, object]:

@@ -20,9 +20,11 @@ from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.live.access import Access
 from neurovis_spec.live.hub import Hub
 from neurovis_spec.live.live import listen
+from neurovis_spec.live.requests import REQUESTS
 from neurovis_spec.live.run import Run
 from neurovis_spec.live.server import Server
 from neurovis_spec.live.simulated import SimulatedSource
+from neurovis_spec.live.source import Capabilities
 from neurovis_spec.live.view import view_of
 
 pytestmark = pytest.mark.browser
@@ -40,13 +42,17 @@ async def fit(opened: Page, width: int, height: int, density: float = 1.0) -> No
 
 @asynccontextmanager
 async def shown(
-    spec: str, folder: Path, theme: str | None = None
+    spec: str, folder: Path, theme: str | None = None, takes: frozenset[str] | None = None
 ) -> AsyncIterator[tuple[Page, nv.CompiledNetwork, Access]]:
-    """A live view of an example, opened in a window that shows its picture a pixel a pixel."""
+    """A live view of an example, opened in a window that shows its picture a pixel a pixel; of what its source takes
+    only these messages count, where they are given."""
     compiled = nv.compile(SPECS / spec)
     view = view_of(compiled, compiled.gains, theme)
-    hub = Hub(asyncio.get_running_loop())
-    run = Run(SimulatedSource(compiled.simulator()), view, hub.show, lambda: hub.watched)
+    hub = Hub(asyncio.get_running_loop(), REQUESTS if takes is None else frozenset())
+    source = SimulatedSource(compiled.simulator())
+    if takes is not None:
+        source.capabilities = Capabilities(takes)
+    run = Run(source, view, hub.show, lambda: hub.watched)
     sock = listen("127.0.0.1", 0)
     access = Access("127.0.0.1", sock.getsockname()[1], viewers=True)
     server = Server(access, hub, run)

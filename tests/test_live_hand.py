@@ -24,6 +24,7 @@ from neurovis_spec.live.access import Access
 from neurovis_spec.live.desk import Desk, Written
 from neurovis_spec.live.hub import Hub
 from neurovis_spec.live.live import listen
+from neurovis_spec.live.requests import REQUESTS
 from neurovis_spec.live.run import Run
 from neurovis_spec.live.server import Server
 from neurovis_spec.live.show import Show
@@ -45,7 +46,7 @@ async def at_hand(
         spec.write_text(spec.read_text().replace("direction: down}", f"direction: down, {pins}}}"))
     compiled = nv.compile(spec)
     show = Show()
-    hub, loop = Hub(asyncio.get_running_loop()), asyncio.get_running_loop()
+    hub, loop = Hub(asyncio.get_running_loop(), REQUESTS), asyncio.get_running_loop()
     run = Run(*show.stage(compiled), hub.show, lambda: hub.watched)
     written = Written(spec, lambda text: nv.compile_text(text, file=str(spec), folder=spec.parent))
     desk = Desk(

@@ -5,7 +5,9 @@ from __future__ import annotations
 import gzip
 import math
 import time
+import warnings
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,7 +21,7 @@ from neurovis_spec.live.run import Run, Shown
 from neurovis_spec.live.simulated import SimulatedSource
 from neurovis_spec.live.source import Reach, Source
 from neurovis_spec.live.turns import Lesion, Set
-from neurovis_spec.live.view import BAR, FAINT, FINENESS, LEVELS, view_of
+from neurovis_spec.live.view import BAR, FAINT, FINENESS, LEVELS, UNDEFINED, View, view_of
 from neurovis_spec.scene.encode import looks
 
 SPEC = """neurovis: 1
@@ -44,10 +46,10 @@ VIEW = view_of(COMPILED, COMPILED.gains)
 class Driven:
     """A run that stands still at first; all that it shows is kept."""
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: Source, view: View = VIEW) -> None:
         self.shown: list[Shown] = []
         self.refused: list[str] = []
-        self.run = Run(source, VIEW, self.shown.append)
+        self.run = Run(source, view, self.shown.append)
         self.run.ask(Pause())
         self.run.start()
 
@@ -162,7 +164,7 @@ def test_a_recording_ends() -> None:
     assert shown.look.step == 49
     assert not shown.status.playing
     assert made.ask(Step(-9)).look.step == 40
-    assert not made.ask(Set({"pull": 0.1})).status.capabilities.turns
+    assert not made.ask(Set({"pull": 0.1})).status.capabilities.takes
     assert made.refused == ["a recording cannot be changed: run the spec"]
     made.run.end()
 
@@ -226,3 +228,37 @@ def test_it_is_drawn_otherwise_beside_the_run_which_goes_on(driven: Driven) -> N
     plain = driven.until(lambda shown: shown.view.appearance == Appearance())
     assert plain.view.content == VIEW.content
     assert np.array_equal(plain.look.discs, before.look.discs)
+
+
+def test_a_picture_that_cannot_be_drawn_is_refused_and_the_next_one_is_drawn() -> None:
+    def otherwise(appearance: Appearance) -> View:
+        if appearance.theme == "dark":
+            raise ValueError("an engine has failed")
+        return VIEW.otherwise(appearance)
+
+    driven = Driven(SimulatedSource(COMPILED.simulator()), replace(VIEW, otherwise=otherwise))
+    try:
+        driven.run.ask(Draw(Appearance("dark")), driven.refused.append)
+        shown = driven.until(lambda shown: shown.status.appearance == Appearance())
+        assert driven.refused == ["the picture cannot be drawn so: an engine has failed"]
+        assert shown.view.appearance == Appearance(), "what is shown stays"
+        driven.run.ask(Draw(Appearance("dark")), driven.refused.append)
+        driven.run.ask(Draw(Appearance("print")), driven.refused.append)
+        driven.until(lambda shown: shown.view.appearance == Appearance("print"))
+        assert len(driven.refused) == 1, "by then it is not wanted any more"
+    finally:
+        driven.run.end()
+    assert driven.run.failure is None
+
+
+def test_neurons_without_a_finite_activity_are_marked() -> None:
+    spec = "neurovis: 1\nname: x\nneurons: {A: {initial: 1e300}, B: {}}\nconnections: {A -> A: 1e300, A -> B: 0}\n"
+    compiled = nv.compile_text(spec)
+    source, view = SimulatedSource(compiled.simulator()), view_of(compiled, compiled.gains)
+    marked = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for _ in range(4):
+            marked.append((view.look(source.seen()).kinds[-2:] & UNDEFINED > 0).tolist())
+            source.advance()
+    assert marked == [[False, False], [True, False], [True, True], [True, True]]

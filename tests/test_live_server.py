@@ -31,6 +31,7 @@ from neurovis_spec.live.desk import Desk
 from neurovis_spec.live.hub import AHEAD, Hub
 from neurovis_spec.live.live import listen
 from neurovis_spec.live.protocol import FRAME, LARGEST, MESSAGES, SCENE, TRACE
+from neurovis_spec.live.requests import REQUESTS
 from neurovis_spec.live.run import Run
 from neurovis_spec.live.server import BURST, MOST_CLIENTS, MOST_CONNECTIONS, Server
 from neurovis_spec.live.simulated import SimulatedSource
@@ -79,7 +80,7 @@ class Live:
 
 @asynccontextmanager
 async def serving() -> AsyncIterator[Live]:
-    hub, call = Hub(asyncio.get_running_loop()), asyncio.get_running_loop().call_soon_threadsafe
+    hub, call = Hub(asyncio.get_running_loop(), REQUESTS), asyncio.get_running_loop().call_soon_threadsafe
     run = Run(SimulatedSource(COMPILED.simulator()), VIEW, hub.show, lambda: hub.watched)
     sock = listen("127.0.0.1", 0)
     access = Access("127.0.0.1", sock.getsockname()[1], viewers=True)

@@ -385,6 +385,56 @@ def test_what_is_lesioned_is_crossed_out(tmp_path: Path) -> None:
     asyncio.run(main())
 
 
+@pytest.mark.filterwarnings("ignore:the activity of A is inf")
+def test_a_neuron_whose_activity_is_no_finite_number_has_a_question_mark(tmp_path: Path) -> None:
+    spec = tmp_path / "x.yaml"
+    spec.write_text(
+        "neurovis: 1\nname: x\nneurons: {A: {initial: 1e300}, B: {}}\nconnections: {A -> A: 1e300, A -> B: 0}\n"
+    )
+
+    async def main() -> None:
+        async with shown(str(spec), tmp_path) as (opened, compiled, _):
+            await opened.until(f"{STEP} > 3")
+            await pause(opened)
+            scene = json.loads(gzip.decompress(view_of(compiled, compiled.gains).content))
+            (disc,) = (group["shapes"][0] for group in scene["groups"] if group["data"].get("neuron") == "B")
+
+            async def dark() -> int:
+                """Dark pixels on the right above the disc."""
+                await opened.ask("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+                taken = np.array(Image.open(io.BytesIO(await opened.shot())).convert("L"))
+                x, y = (np.array(disc["at"]) + 0.85 * disc["radius"] * np.array([1, -1])) * scene["density"]
+                reach = disc["radius"] * scene["density"]
+                return int((taken[int(y - reach) : int(y), int(x) : int(x + reach)] < 60).sum())
+
+            assert await dark() > 10
+            await opened.click(*places(compiled)["B"])
+            await opened.until(f"{TIP}.textContent.includes('activity not finite')")
+            await opened.ask("document.querySelector('#restart').click()")
+            await opened.until(f"{STEP} == 0")
+            assert await dark() == 0
+
+    asyncio.run(main())
+
+
+def test_the_page_offers_what_is_taken_and_nothing_else(tmp_path: Path) -> None:
+    offered = (
+        "[...document.querySelectorAll('[data-asks]')].filter((one) => !one.hidden).map((one) => one.dataset.asks)"
+    )
+
+    async def main() -> None:
+        async with shown("cpg_rbf.yaml", tmp_path, takes=frozenset({"set"})) as (opened, compiled, _):
+            await opened.click(*places(compiled)["K5"])
+            await opened.until(f"{TIP}.textContent.startsWith('K5')")
+            await opened.key("t")
+            assert await opened.ask(offered) == ["set"]
+            assert await opened.ask("document.querySelector('#part').hidden")
+            buttons = "[...document.querySelectorAll('#turning button')].filter((one) => one.checkVisibility())"
+            assert await opened.ask(f"{buttons}.map((one) => one.textContent)") == ["copy as events", "PNG"]
+
+    asyncio.run(main())
+
+
 def test_the_theme_and_the_gains_are_chosen_while_it_runs(tmp_path: Path) -> None:
     async def main() -> None:
         async with shown("cpg_rbf.yaml", tmp_path) as (opened, compiled, _):

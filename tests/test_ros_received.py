@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import struct
 import time
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 import pytest
+from click.testing import CliRunner, Result
 
 import neurovis_spec as nv
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.live.commands import Pause, Play, Seek, Step
 from neurovis_spec.live.history import Bins, Members
 from neurovis_spec.live.run import Run, Shown
@@ -19,9 +23,12 @@ from neurovis_spec.live.source import Reach, SourceError
 from neurovis_spec.live.view import view_of
 from neurovis_spec.ros.accept import ARRAY
 from neurovis_spec.ros.bags import read_bag
+from neurovis_spec.ros.files import Files, Rotation
 from neurovis_spec.ros.listening import Listening, Wanted
+from neurovis_spec.ros.logs import Stored
 from neurovis_spec.ros.middleware import Arrival
 from neurovis_spec.ros.received import ReceivedSource
+from neurovis_spec.runtime.recording import Recording, RecordingError
 from neurovis_spec.runtime.ros_messages import label_of
 from neurovis_spec.runtime.wire import ENCODINGS, ArrayForm, text_message
 
@@ -258,3 +265,131 @@ def test_a_live_run_follows_pauses_and_goes_back(compiled: nv.CompiledNetwork, s
     assert run.failure is None
     assert source.came == 95
     assert 5 <= source.shown <= 95
+
+
+#: topic, step, values
+Sent = tuple[str, int, FloatArray]
+
+
+def rows_of(made: Recording, steps: range) -> list[Sent]:
+    kinds = (("activity", made.activity), ("weights", made.weights))
+    return [(name, step, of[step]) for step in steps for name, of in kinds]
+
+
+def heard(listening: Listening, rows: Sequence[Sent]) -> None:
+    """Messages come, a millisecond after each other, and are recorded."""
+    listening.start()
+    for number, (name, step, values) in enumerate(rows):
+        form = ArrayForm.of(label_of(listening.compiled.hash), len(values), ENCODINGS[listening.ros])
+        data = form.message(step, 1e9 + step, values)
+        listening.put(f"/neurovis/x/{name}", Arrival(data, number * 10**6, None, ARRAY))
+    listening.end()
+    assert sum(one.recorded for one in listening.counts.values()) == len(rows)
+
+
+def invoke(*arguments: object) -> Result:
+    return CliRunner().invoke(neurovis, [str(one) for one in arguments])
+
+
+def test_of_a_controller_that_began_anew_each_run_is_a_recording(compiled: nv.CompiledNetwork, tmp_path: Path) -> None:
+    """Topics come each in its own time: the last weights of a run may come when the next one has begun."""
+    made, path = compiled.run(60), tmp_path / "x.mcap"
+    first, second = rows_of(made, range(40)), rows_of(made, range(60))
+    heard(
+        Listening(compiled, 2, Wanted(path), print),
+        [*first[:-1], second[0], first[-1], *second[1:], *rows_of(made, range(20))],
+    )
+    told = r"holds 3 runs.*\(run 1: steps 0 to 39, run 2: steps 0 to 59, run 3: steps 0 to 19\): the last is read"
+    with pytest.warns(UserWarning, match=told):
+        assert len(nv.load(path)) == 20
+    for number, steps in ((1, 40), (2, 60), (3, 20)):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            read = nv.load(path, run=number)
+        assert read.step.tolist() == list(range(steps))
+        assert np.array_equal(read.activity, made.activity[:steps])
+        assert np.array_equal(read.weights, made.weights[:steps])
+    with pytest.raises(RecordingError, match=r"x\.mcap: there is no run 4: it holds 3 runs"):
+        nv.load(path, run=4)
+    made.save(tmp_path / "x.npz")
+    assert len(nv.load(tmp_path / "x.npz", run=1)) == 60
+    with pytest.raises(RecordingError, match="there is no run 2: it holds one run"):
+        nv.load(tmp_path / "x.npz", run=2)
+
+
+def test_commands_take_the_last_run_and_say_so_or_the_one_that_is_named(
+    compiled: nv.CompiledNetwork, tmp_path: Path
+) -> None:
+    made, path, spec = compiled.run(60), tmp_path / "x.mcap", tmp_path / "x.yaml"
+    spec.write_text(SPEC)
+    heard(Listening(compiled, 2, Wanted(path), print), [*rows_of(made, range(60)), *rows_of(made, range(20))])
+    done = invoke("render", spec, "--recording", path, "--run", 1, "-o", tmp_path / "x.svg")
+    assert (done.exit_code, done.stderr) == (0, "")
+    assert "step 59" in (tmp_path / "x.svg").read_text()
+    done = invoke("render", spec, "--recording", path, "-o", tmp_path / "y.svg")
+    assert done.exit_code == 0
+    assert "holds 2 runs" in done.stderr
+    assert "--run N" in done.stderr
+    assert "step 19" in (tmp_path / "y.svg").read_text()
+    done = invoke("analyze", spec, "--recording", path, "--run", 3, "-o", tmp_path / "readings")
+    assert (done.exit_code, "there is no run 3" in done.stderr) == (1, True)
+    done = invoke("render", spec, "--run", 2, "-o", tmp_path / "z.svg")
+    assert (done.exit_code, "--recording" in done.stderr) == (2, True)
+
+
+@pytest.mark.parametrize(("name", "ros"), [("x.mcap", 2), ("x.bag", 1), ("x", 2)])
+def test_the_files_of_a_recording_are_read_as_one(
+    compiled: nv.CompiledNetwork, tmp_path: Path, name: str, ros: Literal[1, 2]
+) -> None:
+    made, path = compiled.run(1000), tmp_path / name
+    listening = Listening(compiled, ros, Wanted(path, Rotation(size=60_000)), print)
+    heard(listening, rows_of(made, range(1000)))
+    assert len(listening.paths) > 2
+    read = nv.load(path)
+    assert read.step.tolist() == list(range(1000))
+    assert np.array_equal(read.activity, made.activity)
+    assert np.array_equal(read.weights, made.weights)
+    assert (read.spec, read.hash, read.dt) == (compiled.text(), made.hash, made.dt)
+    assert compiled.run(5, start=read).reached > 1000
+    spec = tmp_path / "x.yaml"
+    spec.write_text(SPEC)
+    done = invoke("render", spec, "--recording", path, "--step", 999, "-o", tmp_path / "x.svg")
+    assert (done.exit_code, done.stderr) == (0, "")
+
+
+def test_a_bag_of_other_messages_is_read_without_them_or_refused(compiled: nv.CompiledNetwork, tmp_path: Path) -> None:
+    made, path = compiled.run(10), tmp_path / "x.bag"
+    other = nv.compile_text(SPEC.replace("0.25", "0.5"))
+    listening = Listening(compiled, 1, Wanted(path), print)
+    heard(listening, rows_of(made, range(10)))
+    bag = read_bag(path)
+    (spec, *_), topic = bag.messages(), bag.topics[1]
+    foreign = ArrayForm.of(label_of(other.hash), 3, "ros1").message(5, 5.0, np.zeros(3))
+    files = Files(tmp_path / "y.bag", 1, {})
+    files.write([spec, *(one for one in bag.messages() if one != spec), Stored(topic, 0, 10**9, 10**9, foreign)])
+    files.close()
+    with pytest.warns(UserWarning, match="1 messages are left out"):
+        assert np.array_equal(nv.load(tmp_path / "y.bag").activity, made.activity)
+    files = Files(tmp_path / "z.bag", 1, {})
+    files.write([one for one in bag.messages() if one.topic == topic])
+    files.close()
+    with pytest.raises(RecordingError, match="no topic 'spec' is in it"):
+        nv.load(tmp_path / "z.bag")
+    with pytest.raises(RecordingError, match="there is no such file"):
+        nv.load(tmp_path / "nothing")
+    with pytest.raises(RecordingError, match=r"no format has the suffix '\.bag'"):
+        made.save(tmp_path / "w.bag")
+
+
+def test_the_last_steps_are_recalled_and_it_goes_on_with_the_newest(source: ReceivedSource) -> None:
+    come(source, [0, 1, 2, 5, 6, 7])
+    source.advance()
+    come(source, [8], 6)
+    seen = source.recall(4)
+    assert [one.snapshot.step for one in seen] == [2, 5, 6, 7]
+    assert (source.step, source.shown) == (7, 1)
+    assert source.advance()
+    assert source.step == 8
+    assert [one.snapshot.step for one in source.recall(100)] == [0, 1, 2, 5, 6, 7, 8]
+    source.go(5)
+    assert [one.snapshot.step for one in source.recall(2)] == [2, 5]

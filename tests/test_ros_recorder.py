@@ -176,7 +176,9 @@ def test_an_existing_file_is_an_error_unless_forced(name: str, ros: Ros, tmp_pat
     made(tmp_path / name, ros, 3000, Rotation(size=150_000))
     with pytest.raises(FileExistsError):
         files(tmp_path / name, ros)
-    files(tmp_path / name, ros, force=True).write(
+    forced = files(tmp_path / name, ros, force=True)
+    assert len(arrays_in(tmp_path / name)) == 3000, "it stays until something comes in its place"
+    forced.write(
         [Stored(topic_of(TOPIC, ARRAY, text_of_type(ARRAY, ros), ros), 0, START, START, sent(ros, range(1))[0])]
     )
     left = [one for one in tmp_path.rglob("*") if one.suffix in (".mcap", ".bag")]

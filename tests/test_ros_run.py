@@ -589,7 +589,7 @@ def test_the_live_page_of_who_views_sets_the_parameters_of_the_run(ros: World, t
     view = ros.neurovis("ros", "view", "--live", "0")
     page = view.wait_for("live: ")
     view.wait_for("ready")
-    ask(page, {"type": "play"}, lambda told: gain_is(0.5)(told) and told["can"]["turns"])
+    ask(page, {"type": "play"}, lambda told: gain_is(0.5)(told) and "set" in told["can"]["takes"])
     ask(page, {"type": "set", "values": {"gain": 1.5}}, gain_is(1.5))
     for asked, why in (
         ({"type": "set", "values": {"gain": 3.0}}, "gain"),

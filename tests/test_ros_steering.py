@@ -11,7 +11,7 @@ import pytest
 
 import neurovis_spec
 from neurovis_spec.live.source import SourceError, Turned
-from neurovis_spec.live.turns import Feed, Hold, Learn, Lesion, Mend, Set
+from neurovis_spec.live.turns import TURNS, Feed, Hold, Learn, Lesion, Mend, Set
 from neurovis_spec.ros.middleware import Node
 from neurovis_spec.ros.received import ReceivedSource
 from neurovis_spec.ros.steering import RunSteering
@@ -37,7 +37,7 @@ def steering() -> tuple[RunSteering, ReceivedSource]:
 
 def test_what_arrives_takes_no_turns_by_itself() -> None:
     source = ReceivedSource(NETWORK)
-    assert not source.capabilities.turns
+    assert not source.capabilities.takes
     assert (source.parameters, source.fed, source.learning, source.turned) == ({}, {}, {}, ())
     with pytest.raises(SourceError, match="takes no turns"):
         source.turn(Set({"gain": 1.0}))
@@ -45,7 +45,7 @@ def test_what_arrives_takes_no_turns_by_itself() -> None:
 
 def test_parameters_are_set_within_their_bounds() -> None:
     made, source = steering()
-    assert source.capabilities.turns
+    assert source.capabilities.takes == TURNS
     assert source.capabilities.arrives
     assert source.parameters == {"gain": 0.5}
     source.turn(Set({"gain": 1.5}))

@@ -10,7 +10,16 @@ import click
 from neurovis_spec.cli.completion import paths
 from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.files import count, network_of, recording_of, tables, writing
-from neurovis_spec.cli.options import examples, finite, input_option, need_run, set_option, spec_argument, theme_option
+from neurovis_spec.cli.options import (
+    examples,
+    finite,
+    input_option,
+    need_run,
+    run_option,
+    set_option,
+    spec_argument,
+    theme_option,
+)
 from neurovis_spec.cli.progress import progress
 from neurovis_spec.cli.targets import check_files, check_folder, check_target, files_of
 
@@ -33,6 +42,7 @@ from neurovis_spec.cli.targets import check_files, check_folder, check_target, f
     help="The folder for the tables, the pictures and the page (index.html); it is made if it is not there.",
 )
 @click.option("--recording", metavar="FILE", shell_complete=paths, help="Measure this; without it the network is run.")
+@run_option
 @click.option("--of", metavar="REFS", multiple=True, help="The neurons to measure, such as K or 'C + K'; default: all.")
 @click.option("--from", "start", type=click.IntRange(0, 2**53), metavar="STEP", help="The first step to measure.")
 @click.option("--to", "stop", type=click.IntRange(1, 2**53), metavar="STEP", help="The step to end before.")
@@ -59,6 +69,7 @@ def command(
     spec: str,
     output: Path,
     recording: str | None,
+    run: int | None,
     of: tuple[str, ...],
     start: int | None,
     stop: int | None,
@@ -90,7 +101,7 @@ def command(
     network = network_of(spec, settings)
     for name in file_names():
         check_files(output / name, network)
-    record, arrays = recording_of(recording), tables(inputs, network.network)
+    record, arrays = recording_of(recording, run), tables(inputs, network.network)
     wish = Wish(of or None, start, stop, threshold, bins, trials, theme, arrays)
     with progress("measuring") as bar, writing(output):
         files = analyze(network, output, record, wish, bar)

@@ -16,6 +16,7 @@ from neurovis_spec.cli.options import (
     need_run,
     output_option,
     recording_option,
+    run_option,
     set_option,
     spec_argument,
     theme_option,
@@ -53,6 +54,7 @@ from neurovis_spec.cli.targets import check_files, check_target, files_of
     help="Frames a second; default 1/dt, at most 60, and 25 where the spec writes no dt.",
 )
 @recording_option
+@run_option
 @input_option
 @theme_option
 @view_option
@@ -68,6 +70,7 @@ def command(
     frames: int | None,
     fps: float | None,
     recording: str | None,
+    run: int | None,
     inputs: dict[str, str],
     theme: str | None,
     views: tuple[str, ...],
@@ -91,7 +94,7 @@ def command(
     check_target(output, [("the spec itself", spec), *read])
     network = network_of(spec, settings)
     check_files(output, network)
-    record, arrays, view = recording_of(recording), tables(inputs, network.network) or None, views or None
+    record, arrays, view = recording_of(recording, run), tables(inputs, network.network) or None, views or None
     with progress("drawing") as bar, writing(output):
         network.animate(
             output,

@@ -122,13 +122,16 @@ def earlier_layout(path: Path) -> Layout | None:
     return layout
 
 
-def recording_of(path: str | None) -> Recording | None:
-    """A recording, if one is named. Raises RecordingError."""
+def recording_of(path: str | None, run: int | None = None) -> Recording | None:
+    """A recording, if one is named, and of several runs in it the one with this number. Raises RecordingError,
+    UsageError."""
     if path is None:
+        if run is not None:
+            raise click.UsageError("--run says which run of a recording is meant: name one by --recording")
         return None
     from neurovis_spec import api
 
-    return api.load(path)
+    return api.load(path, run=run)
 
 
 def tables(named: Mapping[str, str], network: Network) -> dict[str, FloatArray]:

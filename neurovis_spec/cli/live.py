@@ -13,7 +13,15 @@ import click
 from neurovis_spec.cli.completion import paths
 from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.files import compiled, compiler_in_place, network_of, recording_of
-from neurovis_spec.cli.options import backend_option, compile_options, engine_option, examples, set_option, theme_option
+from neurovis_spec.cli.options import (
+    backend_option,
+    compile_options,
+    engine_option,
+    examples,
+    run_option,
+    set_option,
+    theme_option,
+)
 
 if TYPE_CHECKING:
     import socket
@@ -25,7 +33,7 @@ if TYPE_CHECKING:
     from neurovis_spec.runtime.recording import Recording
 
 #: what tells a recording from a spec where one is given in its place
-_RECORDINGS = (".npz", ".csv", ".mcap")
+_RECORDINGS = (".npz", ".csv", ".mcap", ".bag")
 
 
 @click.command(
@@ -40,6 +48,7 @@ _RECORDINGS = (".npz", ".csv", ".mcap")
 @click.option(
     "--recording", metavar="FILE", shell_complete=paths, help="Play this recording; without it the network is run."
 )
+@run_option
 @click.option(
     "--from",
     "start",
@@ -62,6 +71,7 @@ _RECORDINGS = (".npz", ".csv", ".mcap")
 def command(
     specs: tuple[str, ...],
     recording: str | None,
+    run: int | None,
     start: str | None,
     watch: bool,
     host: str,
@@ -91,32 +101,33 @@ def command(
         raise fault(
             "the live view needs aiohttp", "pip install 'neurovis-spec[live]'; in a clone: pip install '.[live]'"
         )
-    network, played = _network(spec, recording_of(recording), settings, watch or start is not None)
+    network, played = _network(spec, recording, run, settings, watch or start is not None)
     compile = None if spec == "-" or _is_recording(spec) else compiler_in_place(spec, settings)
     _show(network, played, recording_of(start), partial(compiled, spec, settings) if watch else None,
           compile, spec, host, port, viewers, browse, theme, engine, backend)  # fmt: skip
 
 
 def _network(
-    spec: str, recording: Recording | None, settings: dict[str, float], runs: bool
+    spec: str, recording: str | None, run: int | None, settings: dict[str, float], runs: bool
 ) -> tuple[CompiledNetwork, Recording | None]:
     """The network, and the recording of it that is played, if one is."""
     if not _is_recording(spec):
-        return network_of(spec, settings), recording
+        played = recording_of(recording, run)
+        return network_of(spec, settings), played
     if recording is not None or runs:
         raise click.UsageError(f"'{spec}' is a recording: SPEC is the spec that it was made of")
     from neurovis_spec import api
 
-    played = recording_of(spec)
+    played = recording_of(spec, run)
     assert played is not None
     if not played.spec:
-        hint = f"name it: neurovis live SPEC --recording {spec}; a .mcap holds its spec"
+        hint = f"name it: neurovis live SPEC --recording {spec}; a .mcap or .bag holds its spec"
         raise fault(f"{spec} is a recording that does not hold its spec", hint)
     return api.compile_text(played.spec, file=f"{spec} (spec)", parameters=settings), played
 
 
 def _is_recording(spec: str) -> bool:
-    return Path(spec).suffix.lower() in _RECORDINGS
+    return Path(spec).suffix.lower() in _RECORDINGS or Path(spec).is_dir()
 
 
 def _show(

@@ -193,6 +193,12 @@ recording_option = click.option(
     shell_complete=paths,
     help="Show steps of this recording; without it the network is run.",
 )
+run_option = click.option(
+    "--run",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Of a recording in which the network began anew, its N-th run; default: the last.",
+)
 
 
 def excerpt_options(command: F) -> F:

@@ -17,6 +17,7 @@ from neurovis_spec.cli.options import (
     need_run,
     output_option,
     recording_option,
+    run_option,
     set_option,
     spec_argument,
     theme_option,
@@ -48,6 +49,7 @@ def _why(network: CompiledNetwork, step: int | None, steps: int) -> str:
 @output_option("The picture; the suffix says what kind: .svg, .pdf, .png, .webp or .gif.", required=True)
 @click.option("--step", type=click.IntRange(min=0), metavar="N", help="The step to show; default: the last.")
 @recording_option
+@run_option
 @input_option
 @theme_option
 @view_option
@@ -72,6 +74,7 @@ def command(
     output: Path,
     step: int | None,
     recording: str | None,
+    run: int | None,
     inputs: dict[str, str],
     theme: str | None,
     views: tuple[str, ...],
@@ -95,7 +98,7 @@ def command(
     check_target(output, [("the spec itself", spec), *read])
     network = network_of(spec, settings)
     check_files(output, network)
-    record, arrays, view = recording_of(recording), tables(inputs, network.network) or None, views or None
+    record, arrays, view = recording_of(recording, run), tables(inputs, network.network) or None, views or None
     steps = network.steps_to_draw(step, record, arrays, view)
     if steps and on_terminal():
         why = "" if view or network.network.render.figure else _why(network, step, steps)

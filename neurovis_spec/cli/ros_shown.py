@@ -50,6 +50,16 @@ class Desk:
         """The same, shown at a port that is free."""
         return replace(self, live=0)
 
+    def check(self) -> None:
+        """Raise what says that nothing can be recorded or filmed where it is wanted, before anything is waited for."""
+        from neurovis_spec.ros.files import in_the_way
+
+        if self.record is not None:
+            with _told_of_files():
+                in_the_way(Path(self.record), self.force)
+        if self.video:
+            self._check_film(Path(self.video))
+
     @contextmanager
     def open(self, compiled: CompiledNetwork, node: Node) -> Iterator[Listening]:
         """A network's topics, heard for a block, and shown in the page where that is wanted."""
@@ -61,10 +71,8 @@ class Desk:
             raise fault(f"{path}: {why}")
         film = self._film(compiled)
         wanted = Wanted(path, self.rotation, self.force, self.live is not None or film is not None)
-        try:
+        with _told_of_files():
             listening = Listening(compiled, node.ros, wanted, tell, node.definition)
-        except FileExistsError as error:
-            raise fault(f"{error.filename} exists", "--force overwrites it") from None
         with self._page(listening), self._filmed(listening, film):
             listening.start()
             try:
@@ -76,15 +84,18 @@ class Desk:
         """Where the film goes; raises what says that there can be none."""
         if self.video is None:
             return None
+        path = Path(self.video or f"{compiled.name}-{datetime.now():%Y%m%d-%H%M%S}.mp4")
+        self._check_film(path)
+        return path
+
+    def _check_film(self, path: Path) -> None:
         from neurovis_spec.cli.targets import check_target
         from neurovis_spec.scene.renderers import renderer_for
 
-        path = Path(self.video or f"{compiled.name}-{datetime.now():%Y%m%d-%H%M%S}.mp4")
         renderer_for(path.suffix, moving=True)
         check_target(path, option="--video")
         if path.exists() and not self.force:
             raise fault(f"{path} exists", "--force overwrites it")
-        return path
 
     @contextmanager
     def _filmed(self, listening: Listening, path: Path | None) -> Iterator[None]:
@@ -111,12 +122,21 @@ class Desk:
                 "the live view needs aiohttp", "pip install 'neurovis-spec[live]'; in a clone: pip install '.[live]'"
             )
         from neurovis_spec.cli.live import bound
-        from neurovis_spec.ros.page import Page, stage_of
+        from neurovis_spec.live.show import Show
+        from neurovis_spec.ros.page import Page
 
-        stage = stage_of(listening.compiled, listening.source, self.theme, self.engine)
-        with Page(stage, bound("127.0.0.1", self.live)).served() as url:
+        show, sock = Show(theme=self.theme, engine=self.engine), bound("127.0.0.1", self.live)
+        with Page(listening.compiled, listening.source, show, sock, tell).served() as url:
             tell(f"live: {url}")
             yield
+
+
+@contextmanager
+def _told_of_files() -> Iterator[None]:
+    try:
+        yield
+    except FileExistsError as error:
+        raise fault(f"{error.filename} exists", "--force overwrites it") from None
 
 
 def shown_options(always: bool) -> Callable[[F], F]:

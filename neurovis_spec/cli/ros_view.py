@@ -16,7 +16,7 @@ from neurovis_spec.cli.ros_options import Meeting, meeting_options, tell
 from neurovis_spec.cli.ros_shown import Desk, shown_options
 from neurovis_spec.interrupts import heeded
 
-#: seconds between two looks at the parameters of the other node
+#: seconds between two looks at the parameters of the other node, and at who else announces itself
 _LOOK = 1.0
 
 
@@ -39,12 +39,13 @@ def command(spec: str | None, network: str | None, settings: dict[str, float], d
     came; the recording has every message. Where the network's node takes parameters, the page sets them. Ctrl-C ends
     it.
     """
-    from neurovis_spec.ros.announced import find
-    from neurovis_spec.ros.listening import ACTIVITY, base_of
+    from neurovis_spec.ros.announced import Others, find
+    from neurovis_spec.ros.listening import ACTIVITY, SPEC, base_of
     from neurovis_spec.ros.middleware import DISPLAY, RECORDER
     from neurovis_spec.ros.summary import Summary
     from neurovis_spec.ros.view_steering import ViewSteering
 
+    desk.check()
     begun = time.monotonic()
     compiled = None if spec is None else network_of(spec, settings)
     sys.setswitchinterval(0.0005)
@@ -70,15 +71,18 @@ def command(spec: str | None, network: str | None, settings: dict[str, float], d
             tell(f"ready: {compiled.name}, ROS {node.ros}, {subscriptions[0].topic.removesuffix(ACTIVITY)}")
             begun = time.monotonic()
             steering = ViewSteering(compiled.network, node, base_of(compiled))
+            others = Others(node, f"{base_of(compiled)}/{SPEC}", tell)
             due = begun
             while not stopped():
                 if node.reconnects != reconnects:
                     reconnects = node.reconnects
                     listening.anew()
                 source = listening.source
-                if source is not None and source.begun and time.monotonic() >= due:
+                if time.monotonic() >= due:
                     due = time.monotonic() + _LOOK
-                    if steering.look() and not source.capabilities.turns:
+                    if spec is None and network is None:
+                        others.look()
+                    if source is not None and source.begun and steering.look() and not source.capabilities.takes:
                         source.steer(steering)
                 time.sleep(0.02)
             for subscription in subscriptions:

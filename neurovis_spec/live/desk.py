@@ -24,7 +24,7 @@ from neurovis_spec.live.placing import Placed, placed
 from neurovis_spec.live.protocol import file_message, moved_message, placed_message, refused_message, saving_message
 from neurovis_spec.live.requests import Fetch, Place, Request, Save, Unplace, Write
 from neurovis_spec.live.run import Run, Stage
-from neurovis_spec.live.saving import film, picture, recall, recording, steps_for
+from neurovis_spec.live.saving import film, picture, recording, steps_for
 from neurovis_spec.live.source import Seen, Source, SourceError
 from neurovis_spec.live.view import View
 
@@ -153,7 +153,7 @@ class Desk:
 
         def look(source: Source) -> None:
             if source.network.hash == network.hash:
-                found.put((recall(source, steps), source.parameters))
+                found.put((source.recall(steps), source.parameters))
 
         self._run.inquire(look)
         try:

@@ -64,10 +64,11 @@ class Client:
 
 
 class Hub:
-    """The clients of a run. All methods but ``show``, ``watched`` and ``refuse`` are called on the event loop."""
+    """The clients of a run. ``takes`` are the messages that are taken besides those that its source takes. All methods
+    but ``show``, ``watched`` and ``refuse`` are called on the event loop."""
 
-    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
-        self._loop = loop
+    def __init__(self, loop: asyncio.AbstractEventLoop, takes: frozenset[str] = frozenset()) -> None:
+        self._loop, self._takes = loop, takes
         self._clients: set[Client] = set()
         self._slot: Shown | None = None
         self._scheduled = False
@@ -206,7 +207,7 @@ class Hub:
         else:
             self._changed_at[_changed(before, shown)] = self._serial
         if before is None or before.status != shown.status or not self._statuses:
-            self._statuses = {owner: status_message(shown.status, owner) for owner in (True, False)}
+            self._statuses = {owner: status_message(shown.status, owner, self._takes) for owner in (True, False)}
         self._shown = shown
         self._frames.clear()
         for client in self._clients:

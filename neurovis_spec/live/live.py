@@ -23,6 +23,7 @@ from neurovis_spec.live.access import Access
 from neurovis_spec.live.desk import Desk
 from neurovis_spec.live.hub import Hub
 from neurovis_spec.live.protocol import findings_message
+from neurovis_spec.live.requests import REQUESTS
 from neurovis_spec.live.run import Run, Stage
 from neurovis_spec.live.server import Server
 from neurovis_spec.live.show import Show
@@ -112,36 +113,31 @@ async def serve_until(
     sock: socket.socket,
     access: Access,
     announce: Callable[[], None],
-    desk: Callable[[Run, Tell], Desk] | None = None,
+    desk: Callable[[Run, Tell], Desk],
     edits: Callable[[Run, Tell, Desk], Watch] | None = None,
 ) -> None:
-    """Serve until it is at its end; without a ``desk`` nothing is put elsewhere or saved. Where the run cannot go
-    on that is now, and what has happened is raised."""
+    """Serve until it is at its end. Where the run cannot go on that is now, and what has happened is raised."""
     loop = asyncio.get_running_loop()
-    hub = Hub(loop)
+    hub = Hub(loop, REQUESTS)
     run = Run(*stage, hub.show, lambda: hub.watched, lambda: loop.call_soon_threadsafe(_fail, ended))
 
     def told(kind: str) -> Tell:
         return lambda text: _call(loop, hub.tell, text, kind)
 
-    at_desk = None if desk is None else desk(run, told("placed"))
+    at_desk = desk(run, told("placed"))
     server = Server(access, hub, run, at_desk)
-    watch = None if edits is None or at_desk is None else edits(run, told("findings"), at_desk)
+    threads: list[Run | Desk | Watch] = [run, at_desk]
+    if edits is not None:
+        threads.append(edits(run, told("findings"), at_desk))
     await server.start(sock)
     try:
-        run.start()
-        if at_desk is not None:
-            at_desk.start()
-        if watch is not None:
-            watch.start()
+        for thread in threads:
+            thread.start()
         announce()
         await ended
     finally:
-        if watch is not None:
-            watch.end()
-        if at_desk is not None:
-            at_desk.end()
-        run.end()
+        for thread in reversed(threads):
+            thread.end()
         await server.stop()
     if run.failure is not None:
         raise run.failure

@@ -86,15 +86,16 @@ def frame_message(look: Look, reach: Reach, version: int, serial: int, changed: 
     return b"".join(parts)
 
 
-def status_message(status: Status, owner: bool) -> str:
-    """How the run stands."""
+def status_message(status: Status, owner: bool, takes: frozenset[str] = frozenset()) -> str:
+    """How the run stands. ``takes`` are the messages that are taken besides those that its source takes."""
+    able = status.capabilities
     return _text(
         "status",
         playing=status.playing,
         speed="max" if math.isinf(status.speed) else f"{status.speed:g}",
         ended=status.ended,
         owner=owner,
-        can=asdict(status.capabilities),
+        can={"takes": sorted(able.takes | takes), "ends": able.ends, "arrives": able.arrives},
         parameters={name: value for name, value in status.parameters.items() if math.isfinite(value)},
         fed={name: list(values) for name, values in status.fed.items()},
         learning=dict(status.learning),

@@ -12,7 +12,7 @@ import numpy as np
 from neurovis_spec.compiler.events.changes import Clamp
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.history import Recorded
-from neurovis_spec.live.source import Capabilities, Mask, Reach, Seen, SourceError, Turned
+from neurovis_spec.live.source import Capabilities, Mask, Reach, Seen, SourceError, Turned, recalled
 from neurovis_spec.live.turns import Turn
 from neurovis_spec.runtime.recording import Recording, RecordingError
 from neurovis_spec.scene.fading import snapshots_of
@@ -24,7 +24,7 @@ class RecordedSource:
     """The steps of a recording; it stands at the first. Raises RecordingError for one of another network, a partial or
     an empty one."""
 
-    capabilities = Capabilities(turns=False, ends=True)
+    capabilities = Capabilities(ends=True)
 
     def __init__(self, network: Network, recording: Recording) -> None:
         recording.check_whole("a live view cannot show")
@@ -108,6 +108,10 @@ class RecordedSource:
     def restart(self) -> None:
         """Back to its first step."""
         self._row = 0
+
+    def recall(self, steps: int) -> list[Seen]:
+        """What was seen of the last steps."""
+        return recalled(self, steps)
 
     def branch(self) -> None:
         """Raises SourceError: a recording stays as it is."""

@@ -6,7 +6,7 @@ In: what ``protocol`` has checked. Out: frozen values that ``desk`` carries out.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Final, Literal, TypeAlias
 
 from neurovis_spec.layout.model import Point
 from neurovis_spec.live.pins import Into
@@ -50,3 +50,5 @@ class Fetch:
 
 
 Request: TypeAlias = Place | Unplace | Save | Write | Fetch
+#: the messages that ask for them
+REQUESTS: Final = frozenset(("place", "unplace", "save", "write", "fetch"))

@@ -65,10 +65,12 @@ Change: TypeAlias = Callable[[Source], Stage]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Drawn:
-    """A view that was drawn otherwise."""
+    """A view that was drawn otherwise; None: it cannot be, and why."""
 
     instead_of: View
-    view: View
+    wanted: Appearance
+    view: View | None
+    why: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,7 +166,7 @@ class Run:
             if asked is None:
                 return False
             try:
-                self._carry_out(asked)
+                self._carry_out(asked, refuse)
             except SourceError as error:
                 self._present()
                 refuse(str(error))
@@ -172,7 +174,7 @@ class Run:
                 self._present()
                 done()
 
-    def _carry_out(self, asked: Command | Change | _Drawn | _Inquiry) -> None:
+    def _carry_out(self, asked: Command | Change | _Drawn | _Inquiry, refuse: Refuse) -> None:
         source, now = self._source, time.perf_counter()
         match asked:
             case Play():
@@ -198,35 +200,48 @@ class Run:
                 source.branch()
             case Draw():
                 self.appearance = asked.appearance
-                self._redraw()
+                self._redraw(refuse)
             case _Drawn():
-                self._drawing = False
-                if asked.instead_of is self._view:
-                    self._view = asked.view
-                self._redraw()
+                self._take(asked, refuse)
             case _Inquiry():
                 asked.what(source)
             case Present():
                 pass
             case _ if callable(asked):
                 self._source, self._view = asked(source)
-                self._redraw()
+                self._redraw(refuse)
                 self._clock = self._clock_of(self._source, self._clock.speed)
                 self._clock.start(now)
                 self._ended, self._target = False, None
             case _:
                 source.turn(asked)
 
-    def _redraw(self) -> None:
+    def _redraw(self, refuse: Refuse) -> None:
         """Have the picture drawn as it is wanted, beside the run, which goes on."""
         view, wanted = self._view, self.appearance
         if not self._drawing and view.appearance != wanted:
             self._drawing = True
 
             def draw() -> None:
-                self._asked.put((_Drawn(view, view.otherwise(wanted)), _ignore, _nothing))
+                try:
+                    drawn = _Drawn(view, wanted, view.otherwise(wanted))
+                except Exception as error:  # a layout engine, ours or anybody's, may fail
+                    drawn = _Drawn(view, wanted, None, str(error))
+                self._asked.put((drawn, refuse, _nothing))
 
             Thread(target=draw, name="live view", daemon=True).start()
+
+    def _take(self, drawn: _Drawn, refuse: Refuse) -> None:
+        """Show what was drawn otherwise. Raises SourceError where it could not be, and is still wanted."""
+        self._drawing = False
+        failed = drawn.view is None and drawn.instead_of is self._view and drawn.wanted == self.appearance
+        if failed:
+            self.appearance = self._view.appearance
+        elif drawn.view is not None and drawn.instead_of is self._view:
+            self._view = drawn.view
+        self._redraw(refuse)
+        if failed:
+            raise SourceError(f"the picture cannot be drawn so: {drawn.why}")
 
     def _step(self, step: int) -> None:
         """To a step nearby, at once, so that of several steps asked for each is made."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from neurovis_spec import pipeline
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.live.source import Mask, Seen, Source
+from neurovis_spec.live.source import Mask, Seen
 from neurovis_spec.live.view import View
 from neurovis_spec.runtime.columns import columns_of
 from neurovis_spec.runtime.recording import After, Numbers, Recording, recording_of
@@ -31,16 +31,6 @@ def steps_for(network: Network, seconds: float | None) -> int:
     room = max(1, _NUMBERS // max(1, len(network.neurons) + len(network.connections)))
     wanted = MOST_STEPS if seconds is None else round(seconds * frames_a_second(network))
     return max(1, min(wanted, room, MOST_STEPS))
-
-
-def recall(source: Source, steps: int) -> list[Seen]:
-    """What was seen of the last steps, as many as are within reach. The source stands afterwards where it stood."""
-    here = source.step
-    source.go(max(source.reach.first, here - steps + 1))
-    found = [source.seen()]
-    while source.step < here and source.advance():
-        found.append(source.seen())
-    return found
 
 
 def picture(view: View, seen: Seen) -> bytes:

@@ -18,8 +18,8 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.history import Ring
 from neurovis_spec.live.past import EVERY, ROOM, Kept, Past
 from neurovis_spec.live.rules import carried_out, rules
-from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned
-from neurovis_spec.live.turns import Feed, Hold, Set, Turn, fed_by, same_value, turn
+from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned, recalled
+from neurovis_spec.live.turns import TURNS, Feed, Hold, Set, Turn, fed_by, same_value, turn
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.runtime.simulation import ParameterError, Simulation
 from neurovis_spec.runtime.state import State
@@ -30,7 +30,7 @@ class SimulatedSource:
     """A network that runs; it stands at the first step to be computed: step 0, or that of ``begin``, a state in which
     ``turned`` has had its effect and inputs are ``fed``. ``origin`` is where it begins anew."""
 
-    capabilities = Capabilities(turns=True, ends=False)
+    capabilities = Capabilities(TURNS | {"branch"})
 
     def __init__(
         self,
@@ -149,6 +149,10 @@ class SimulatedSource:
     def restart(self) -> None:
         """Begin anew, at step 0."""
         self._begin(self._origin, (), {})
+
+    def recall(self, steps: int) -> list[Seen]:
+        """What was seen of the last steps."""
+        return recalled(self, steps)
 
     def branch(self) -> None:
         """Forget what came after the step that it stands at."""

@@ -35,12 +35,12 @@ class Reach:
 
 @dataclass(frozen=True, slots=True)
 class Capabilities:
-    """What a source can do besides showing and going on: ``turns`` (set, clamp, lesion, stop learning, feed an input),
-    ``ends`` (there is a last step) and ``arrives`` (its steps come from elsewhere: it goes on by the time of a frame,
-    and waits at the last that there is)."""
+    """What a source can do besides showing and going on: ``takes``, the messages that change it which it takes (turns
+    and ``branch``); ``ends`` (there is a last step) and ``arrives`` (its steps come from elsewhere: it goes on by the
+    time of a frame, and waits at the last that there is)."""
 
-    turns: bool
-    ends: bool
+    takes: frozenset[str] = frozenset()
+    ends: bool = False
     arrives: bool = False
 
 
@@ -125,6 +125,11 @@ class Source(Protocol):
         """Begin anew: nothing was turned, and the past is forgotten."""
         ...
 
+    def recall(self, steps: int) -> list[Seen]:
+        """What was seen of the last steps up to the one that it stands at, of those within reach; it stands afterwards
+        where it stood."""
+        ...
+
     def branch(self) -> None:
         """From here on differently: forget what came after the step that it stands at."""
         ...
@@ -132,3 +137,13 @@ class Source(Protocol):
     def turn(self, turn: Turn) -> None:
         """Take a turn; what came after the step that it stands at is forgotten. Raises SourceError."""
         ...
+
+
+def recalled(source: Source, steps: int) -> list[Seen]:
+    """What was seen of the last steps, of a source that makes its steps one after the other."""
+    here = source.step
+    source.go(max(source.reach.first, here - steps + 1))
+    found = [source.seen()]
+    while source.step < here and source.advance():
+        found.append(source.seen())
+    return found

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.simulation import Simulation
@@ -70,6 +70,8 @@ class Learn:
 
 
 Turn: TypeAlias = Set | Feed | Hold | Release | Lesion | Mend | Learn
+#: the messages that ask for them
+TURNS: Final = frozenset(("set", "feed", "hold", "release", "lesion", "mend", "learn"))
 
 
 def same_value(one: Turn, other: Turn) -> bool:

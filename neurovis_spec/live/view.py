@@ -37,8 +37,9 @@ from neurovis_spec.themes import THEMES
 LEVELS = 127
 #: Widths are counted in these parts of a user unit, up to what 16 bits hold.
 FINENESS, _WIDEST = 16, (1 << 16) - 1
-#: Bits of a kind: a line that ends in a bar, what is lesioned, a connection whose weight is negative, a clamped neuron.
-BAR, FAINT, NEGATIVE, CLAMPED = 1, 2, 4, 4
+#: Bits of a kind: a line that ends in a bar, what is lesioned, a connection whose weight is negative, a clamped neuron,
+#: a neuron whose activity is no finite number.
+BAR, FAINT, NEGATIVE, CLAMPED, UNDEFINED = 1, 2, 4, 4, 8
 #: What the kind of a line has besides in its higher bits: the size of a weight, from 0 to the largest of its scale.
 SHARES, _SHARE = 31, 8
 
@@ -47,7 +48,8 @@ SHARES, _SHARE = 31, 8
 class Look:
     """What a step looks like: colour values of discs (n,) and lines (m,); widths and glow widths (m,); and ``kinds``
     (m + n,): of each connection, then of each neuron, BAR where its line ends in a bar, FAINT where it is lesioned,
-    of a line NEGATIVE where its weight is, and in the higher bits how large it is; of a neuron CLAMPED where it is."""
+    of a line NEGATIVE where its weight is, and in the higher bits how large it is; of a neuron CLAMPED where it is, and
+    UNDEFINED where its activity is no finite number."""
 
     step: int
     caption: str
@@ -83,6 +85,8 @@ class View:
         neurons, lines = self.lesioned(seen)
         bars = shown.bars & (self.plan.theme.ends == "signs")
         of_lines = bars * BAR + lines * FAINT + shown.bars * NEGATIVE + self._shares(snapshot.weights) * _SHARE
+        clamped, undefined = self._all(seen.clamped), ~np.isfinite(snapshot.activity)
+        of_neurons = neurons * FAINT + clamped * CLAMPED + undefined * UNDEFINED
         return Look(
             step=snapshot.step,
             caption="" if words is None else words.text,
@@ -90,7 +94,7 @@ class View:
             lines=_levels(shown.lines),
             widths=_parts(shown.widths),
             glows=_parts(shown.glows),
-            kinds=np.concatenate([of_lines, neurons * FAINT + self._all(seen.clamped) * CLAMPED]).astype(np.uint8),
+            kinds=np.concatenate([of_lines, of_neurons]).astype(np.uint8),
         )
 
     def _shares(self, weights: FloatArray) -> npt.NDArray[np.int64]:
@@ -158,7 +162,7 @@ def view_of(
     for scale in seen.thickness_scales:
         largest[seen.thickness == scale.gain] = scale.reaches or 1.0
     frame = planned.frame
-    kinds = {"isBar": BAR, "isFaint": FAINT, "isNegative": NEGATIVE, "isClamped": CLAMPED}
+    kinds = {"isBar": BAR, "isFaint": FAINT, "isNegative": NEGATIVE, "isClamped": CLAMPED, "isUndefined": UNDEFINED}
     # of a picture in which something is collapsed nothing can be put elsewhere
     where = {"scale": 0.0 if drawn.any else frame.scale, "left": frame.left, "top": frame.top}
     constants = {"levels": LEVELS, "fineness": FINENESS, "shares": SHARES, "share": _SHARE, **kinds, **where}

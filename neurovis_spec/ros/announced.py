@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 from neurovis_spec import api
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.ros.accept import ARRAY, STRING
-from neurovis_spec.ros.middleware import LATCHED, Arrival, MiddlewareError, Node
+from neurovis_spec.ros.middleware import LATCHED, Arrival, MiddlewareError, Node, Tell
 from neurovis_spec.runtime.wire import WireError, text_of
 
 #: seconds in which others may announce themselves, too
@@ -36,6 +36,21 @@ def specs_of(node: Node) -> tuple[str, ...]:
         and STRING in types
         and ARRAY in there.get(f"{topic.removesuffix('/spec')}/activity", ())
     )
+
+
+class Others:
+    """Tells of networks that announce themselves later than the one that is ``shown``."""
+
+    def __init__(self, node: Node, shown: str, tell: Tell) -> None:
+        self._node, self._tell, self._known = node, tell, {shown}
+
+    def look(self) -> None:
+        """Tell of those that have come."""
+        for topic in specs_of(self._node):
+            if topic not in self._known:
+                self._known.add(topic)
+                name = topic.split("/")[-2]
+                self._tell(f"another network announces itself, on {topic}: --network {name} shows it")
 
 
 def find(node: Node, network: str | None, stopped: Callable[[], bool]) -> CompiledNetwork | None:

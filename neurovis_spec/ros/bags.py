@@ -22,11 +22,12 @@ import yaml
 from neurovis_spec.language.ros_types import plain
 from neurovis_spec.ros import bag1
 from neurovis_spec.ros.definitions import definition
-from neurovis_spec.ros.files import METADATA, place
+from neurovis_spec.ros.files import METADATA
 from neurovis_spec.ros.logs import ABOUT, BAG_MAGIC, Stored, Topic
 from neurovis_spec.ros.middleware import Ros
 from neurovis_spec.runtime import mcap_records as records
 from neurovis_spec.runtime.recording import RecordingError
+from neurovis_spec.runtime.rotated import following
 from neurovis_spec.runtime.wire import Encoding
 
 _SQLITE: Final = b"SQLite format 3\0"
@@ -96,16 +97,8 @@ def read_bag(path: Path) -> Bag:
 def _files(path: Path) -> Iterator[Part]:
     first = _part(path)
     yield first
-    number = 1
-    while "recording" in first.about and place(path, number).is_file():
-        try:
-            part = _part(place(path, number))
-        except RecordingError:
-            return
-        if part.about.get("recording") != first.about["recording"]:
-            return
-        yield part
-        number += 1
+    for further in following(path, first.about, lambda one: _part(one).about):
+        yield _part(further)
 
 
 def _folder(path: Path) -> Iterator[Part]:

@@ -22,6 +22,7 @@ import yaml
 from neurovis_spec.ros.definitions import written
 from neurovis_spec.ros.logs import BagLog, Log, McapLog, Stored, Topic
 from neurovis_spec.ros.middleware import Ros
+from neurovis_spec.runtime.rotated import place
 
 _FORMATS: Final[Mapping[str, tuple[type[McapLog | BagLog], Ros | None]]] = {
     ".mcap": (McapLog, None),
@@ -66,11 +67,27 @@ def refusal(path: Path, ros: Ros) -> str | None:
     return None
 
 
-def place(path: Path, number: int) -> Path:
-    """The path of the file with a number, from 0."""
-    if not path.suffix:
-        return path / f"{path.name}_{number}.mcap"
-    return path if not number else path.with_name(f"{path.stem}-{number}{path.suffix}")
+def in_the_way(path: Path, force: bool) -> list[Path]:
+    """The files of an earlier recording at a path. Raises OSError where there can be no recording, FileExistsError also
+    where there is one, unless by ``force``."""
+    folder = path.parent
+    if not folder.is_dir():
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(folder))
+    if not os.access(folder, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
+    if not path.suffix and path.exists() and not path.is_dir():
+        raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
+    old = [place(path, 0)] if path.suffix else [path / METADATA]
+    number = 0
+    while place(path, number).exists():
+        old.append(place(path, number))
+        number += 1
+    if path.suffix and place(path, 1).exists() and not place(path, 0).exists():
+        old.append(place(path, 1))
+    there = [one for one in dict.fromkeys(old) if one.exists()]
+    if there and not force:
+        raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(there[0]))
+    return there
 
 
 @dataclass(eq=False)
@@ -88,36 +105,15 @@ class Files:
     clock: Callable[[], float] = monotonic
 
     def __post_init__(self) -> None:
+        #: the files of an earlier recording, which stay until this one has something in their place
+        self._old = in_the_way(self.path, self.force)
         self._id = uuid4().hex
         self._number, self._since = 0, 0.0
         self._log: Log | None = None
         #: of the closed files and the open one: the messages of each topic, and the first and last times
         self._held: list[_Held] = []
-        self._clear()
-
-    def _clear(self) -> None:
-        """See that it can be written, and that nothing is in the way. Raises OSError."""
-        folder = self.path.parent
-        if not folder.is_dir():
-            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(folder))
-        if not os.access(folder, os.W_OK):
-            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
-        old = [place(self.path, 0)] if self.path.suffix else [self.path / METADATA]
-        number = 0
-        while place(self.path, number).exists():
-            old.append(place(self.path, number))
-            number += 1
-        if self.path.suffix and place(self.path, 1).exists() and not place(self.path, 0).exists():
-            old.append(place(self.path, 1))
-        there = [path for path in dict.fromkeys(old) if path.exists()]
-        if there and not self.force:
-            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(there[0]))
         if not self.path.suffix:
-            if self.path.exists() and not self.path.is_dir():
-                raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(self.path))
             self.path.mkdir(exist_ok=True)
-        for path in there:
-            path.unlink()
 
     @property
     def paths(self) -> list[Path]:
@@ -141,6 +137,8 @@ class Files:
     def _begin(self, message: Stored) -> None:
         format_, _ = _FORMATS[self.path.suffix.lower()]
         path = place(self.path, self._number)
+        while self._old:
+            self._old.pop().unlink(missing_ok=True)
         log: Log = format_(path, self.ros, {**self.about, "recording": self._id, "part": str(self._number)}, self.frame)
         held = _Held(path)
         first = [Stored(topic, 0, message.log_time, message.publish_time, data) for topic, data in self.first]

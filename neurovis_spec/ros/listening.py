@@ -23,6 +23,7 @@ from neurovis_spec.ros.recorder import Recorder
 from neurovis_spec.ros.video import Video
 from neurovis_spec.runtime.columns import Probe, columns_of
 from neurovis_spec.runtime.npz_file import frame_bytes
+from neurovis_spec.runtime.recording import Recording
 from neurovis_spec.runtime.stream import frame_of
 from neurovis_spec.runtime.wire import ENCODINGS, text_message
 from neurovis_spec.version import __version__
@@ -47,11 +48,11 @@ def base_of(compiled: CompiledNetwork) -> str:
     return f"{compiled.network.ros.namespace.rstrip('/')}/{compiled.network.name}"
 
 
-def _frame(compiled: CompiledNetwork) -> bytes:
+def frame(compiled: CompiledNetwork) -> Recording:
     """What makes of activities and weights a recording that can be drawn and gone on from."""
     network = compiled.network
     columns = replace(columns_of(network), probe=Probe((), ()), outputs={})
-    return frame_bytes(frame_of(network, columns, compiled.simulator("reference").state()))
+    return frame_of(network, columns, compiled.simulator("reference").state())
 
 
 class Listening:
@@ -88,7 +89,7 @@ class Listening:
         about = {"network": network.name, "hash": network.hash, "dt": repr(network.dt), "version": __version__}
         topic = topic_of(f"{self._base}/{SPEC}", STRING, self._definition(STRING), self.ros)
         first = [(topic, text_message(self.compiled.text(), ENCODINGS[self.ros]))]
-        return Files(path, self.ros, about, first, wanted.rotation, wanted.force, _frame(self.compiled))
+        return Files(path, self.ros, about, first, wanted.rotation, wanted.force, frame_bytes(frame(self.compiled)))
 
     def _definition(self, type_: str) -> str:
         return definition(type_, self.ros) or self._definitions_of(type_)

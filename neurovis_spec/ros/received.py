@@ -39,7 +39,9 @@ _FRAME_TIME: Final = 10**9 // FRAMES
 
 
 class Steering(Protocol):
-    """What turns the network whose steps arrive; any thread may call it."""
+    """What turns the network whose steps arrive; any thread may call it. ``takes`` are the turns that it takes."""
+
+    takes: frozenset[str]
 
     @property
     def parameters(self) -> Mapping[str, float]:
@@ -85,7 +87,7 @@ class ReceivedSource:
 
     def __init__(self, network: Network, room: int = ROOM) -> None:
         self.network, self._room = network, room
-        self.capabilities = Capabilities(turns=False, ends=False, arrives=True)
+        self.capabilities = Capabilities(arrives=True)
         self._steering: Steering | None = None
         self._turned: tuple[Turned, ...] = ()
         self._changing = network.changing
@@ -103,7 +105,7 @@ class ReceivedSource:
 
     def steer(self, steering: Steering) -> None:
         """The network takes turns, by this."""
-        self._steering, self.capabilities = steering, Capabilities(turns=True, ends=False, arrives=True)
+        self._steering, self.capabilities = steering, Capabilities(steering.takes, arrives=True)
 
     # ---- what arrives, in the thread that receives it ----------------------------------------------------------
 
@@ -200,20 +202,27 @@ class ReceivedSource:
 
     def seen(self) -> Seen:
         """What is seen of the step that it stands at."""
-        network, snapshot = self.network, self._show(self._at)
         if self._steering is not None and self._following:
-            return Seen(snapshot, *self._steering.touched)
-        neurons, connections = np.zeros(len(network.neurons), bool), np.zeros(len(network.connections), bool)
+            return Seen(self._show(self._at), *self._steering.touched)
+        return self._untouched(self._show(self._at))
+
+    def _untouched(self, snapshot: Snapshot) -> Seen:
+        """A step of which nobody knows what was lesioned and clamped."""
+        neurons, connections = (np.zeros(len(of), bool) for of in (self.network.neurons, self.network.connections))
         return Seen(snapshot, neurons, connections, neurons)
 
     def _show(self, row: _Row) -> Snapshot:
         """What is shown of a step."""
         with self._lock:
-            place = bisect_left(self._rows, row.step, key=attrgetter("step"))
-            before = self._rows[place - 1] if place else None
             if not row.shown:
                 row.shown = True
                 self.shown += 1
+        return self._snapshot(row)
+
+    def _snapshot(self, row: _Row) -> Snapshot:
+        with self._lock:
+            place = bisect_left(self._rows, row.step, key=attrgetter("step"))
+            before = self._rows[place - 1] if place else None
         previous = None
         if before is not None and before.step == row.step - 1:
             previous = self._all_weights(before)
@@ -263,6 +272,13 @@ class ReceivedSource:
         with self._lock:
             del self._rows[:-1]
             self._at, self._following = self._rows[-1], True
+
+    def recall(self, steps: int) -> list[Seen]:
+        """What was seen of the last steps that have come."""
+        with self._lock:
+            place = bisect_left(self._rows, self._at.step, key=attrgetter("step"))
+            rows = self._rows[max(0, place - steps + 1) : place]
+        return [*(self._untouched(self._snapshot(row)) for row in rows), self.seen()]
 
     def branch(self) -> None:
         """Raises SourceError: what arrives goes on by itself."""

@@ -10,12 +10,14 @@ from threading import Lock
 
 from neurovis_spec.live.rules import carried_out, rules
 from neurovis_spec.live.source import Mask, SourceError
-from neurovis_spec.live.turns import Feed, Turn, fed_by, turn
+from neurovis_spec.live.turns import TURNS, Feed, Turn, fed_by, turn
 from neurovis_spec.runtime.simulation import Simulation
 
 
 class RunSteering:
     """Turns a run; ``lock`` is held while a step is made."""
+
+    takes = TURNS
 
     def __init__(self, simulation: Simulation, lock: Lock) -> None:
         self._simulation, self._lock = simulation, lock

@@ -23,6 +23,8 @@ from neurovis_spec.runtime.simulation import ParameterError, Simulation
 class ViewSteering:
     """Sets the parameters of a network that a node of this ``name`` runs."""
 
+    takes = frozenset(("set",))
+
     def __init__(self, network: Network, node: Node, name: str) -> None:
         self._node, self._name = node, name
         #: knows which values can be

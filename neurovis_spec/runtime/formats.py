@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager, suppress
 from io import FileIO
 from pathlib import Path
-from typing import Protocol, runtime_checkable
+from typing import Protocol, TypeVar, runtime_checkable
 
 from neurovis_spec import plugins
 from neurovis_spec.runtime.csv_file import csv_size, finish_csv, held_csv, read_csv, recover_csv, stream_csv, write_csv
@@ -40,18 +40,33 @@ from neurovis_spec.runtime.rows import RowWriter, Steps
 
 
 @runtime_checkable
-class Format(Protocol):
-    """A file format: ``save`` writes all or nothing, ``load`` raises RecordingError for what is no such recording."""
+class Readable(Protocol):
+    """What can be read: ``load`` raises RecordingError for what is no such recording. The suffix of a folder is ''."""
 
     name: str
     suffixes: frozenset[str]
+
+    def load(self, path: Path) -> Recording:
+        """Read a recording."""
+        ...
+
+
+@runtime_checkable
+class Format(Readable, Protocol):
+    """A file format: ``save`` writes all or nothing."""
 
     def save(self, recording: Recording, path: Path) -> None:
         """Write a recording."""
         ...
 
-    def load(self, path: Path) -> Recording:
-        """Read a recording."""
+
+@runtime_checkable
+class RepeatingFormat(Readable, Protocol):
+    """A format whose files may hold several runs: of a network that began anew while it was recorded."""
+
+    def load_run(self, path: Path, run: int | None) -> Recording:
+        """Read the run with this number, from 1; None: the last, with a warning where there are several. Raises
+        RecordingError."""
         ...
 
 
@@ -187,16 +202,26 @@ class McapFormat:
         """Read the messages, of a file that breaks off as far as it is whole."""
         return read_mcap(path)
 
+    def load_run(self, path: Path, run: int | None) -> Recording:
+        """Read those of one run."""
+        return read_mcap(path, run)
+
+
+_F = TypeVar("_F", bound=Readable)
+
 
 def for_path(path: str | os.PathLike[str]) -> Format:
-    """The format that the suffix names. Raises RecordingError where there is none."""
+    """The format to write that the suffix names. Raises RecordingError where there is none."""
+    return _named(path, (made for made in plugins.working(plugins.FORMATS) if isinstance(made, Format)))
+
+
+def _named(path: str | os.PathLike[str], formats: Iterable[_F]) -> _F:
     suffix = Path(path).suffix.lower()
     known: set[str] = set()
-    for made in plugins.working(plugins.FORMATS):
-        if isinstance(made, Format):
-            if suffix in made.suffixes:
-                return made
-            known |= made.suffixes
+    for made in formats:
+        if suffix in made.suffixes:
+            return made
+        known |= made.suffixes - {""}
     raise RecordingError(f"{os.fspath(path)}: no format has the suffix '{suffix}'; known: {', '.join(sorted(known))}")
 
 
@@ -205,8 +230,9 @@ def save(recording: Recording, path: str | os.PathLike[str]) -> None:
     for_path(path).save(recording, Path(path))
 
 
-def load(path: str | os.PathLike[str]) -> Recording:
-    """Read a recording in the format of the suffix, or a part of one, whose run has not come to its end.
+def load(path: str | os.PathLike[str], run: int | None = None) -> Recording:
+    """Read a recording in the format of the suffix, or a part of one, whose run has not come to its end; of several
+    runs in one file the one with this number, from 1, by default the last.
 
     Where the file is not there, but a part of it, this is read, and a warning says so. Raises RecordingError for
     anything that cannot be read."""
@@ -216,14 +242,18 @@ def load(path: str | os.PathLike[str]) -> Recording:
         format_ = for_path(target)
         if isinstance(format_, StreamingFormat):
             return format_.recover(path)
-    format_ = for_path(path)
-    if isinstance(format_, StreamingFormat):
+    found = _named(path, (made for made in plugins.working(plugins.FORMATS) if isinstance(made, Readable)))
+    if isinstance(found, StreamingFormat):
         parts = beside(Path(os.path.realpath(path)), "part")
         if path.exists():
-            _tell(path, parts, format_)
+            _tell(path, parts, found)
         elif parts:
-            return _in_place(path, parts[0], format_)
-    return format_.load(path)
+            return _in_place(path, parts[0], found)
+    if isinstance(found, RepeatingFormat):
+        return found.load_run(path, run)
+    if run not in (None, 1):
+        raise RecordingError(f"{path}: there is no run {run}: it holds one run")
+    return found.load(path)
 
 
 def _in_place(path: Path, part: Path, format_: StreamingFormat) -> Recording:

@@ -14,21 +14,22 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial, reduce
 from io import FileIO
+from itertools import chain
 from pathlib import Path
 from time import monotonic
-from typing import BinaryIO
 
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.runtime import mcap_records as records
+from neurovis_spec.runtime.arrived import KINDS, Arrived
 from neurovis_spec.runtime.files import regular_size
 from neurovis_spec.runtime.mcap_records import Channel, DamagedError, Found, Message, Schema, Topic
 from neurovis_spec.runtime.npz_file import frame_bytes, frame_of, suspicion
 from neurovis_spec.runtime.recording import After, Recording, RecordingError, after_rows, ended
-from neurovis_spec.runtime.ros_messages import ARRAY, STRING, label_of, step_of
+from neurovis_spec.runtime.ros_messages import ARRAY, STRING, label_of
+from neurovis_spec.runtime.rotated import following
 from neurovis_spec.runtime.rows import RowWriter, Steps
 from neurovis_spec.runtime.unfinished import Part, move, part_of
 from neurovis_spec.runtime.wire import ENCODINGS, ArrayForm, Encoding, text_message, text_of
@@ -37,11 +38,11 @@ from neurovis_spec.version import __version__
 #: the attachment that holds what does not grow with the steps
 FRAME = "neurovis/frame.npz"
 _ABOUT, _AFTER = "neurovis", "neurovis/after"
-#: topics of arrays, by what they hold
-_ARRAYS = ("activity", "weights", "states")
 _LAST_TIME = (1 << 64) - 1
 #: bytes that the frame may take
 _MOST_FRAME = 1 << 30
+#: bytes of what a file says of itself
+_MOST_ABOUT = 8 << 20
 #: the chunks of a file may always grow to this many bytes, and beyond that to so many times its size
 _ROOM, _RATIO = 32 << 20, 20
 
@@ -87,12 +88,12 @@ class _McapRows:
         self._file, self._dt, self._part, self._steps = file, frame.dt, part, steps
         self._rows, self._synced, self._after = 0, monotonic(), ""
         base = f"{frame.namespace.rstrip('/')}/{frame.network or 'network'}"
-        held = [name for name, width in zip(_ARRAYS, frame.widths, strict=True) if width or name == "activity"]
+        held = [name for name, width in zip(KINDS, frame.widths, strict=True) if width or name == "activity"]
         channels = [Channel(2, f"{base}/spec"), *(Channel(1, f"{base}/{name}") for name in held)]
-        sizes = dict(zip(_ARRAYS, frame.widths, strict=True))
+        sizes = dict(zip(KINDS, frame.widths, strict=True))
         label = label_of(frame.hash)
         self._channels = [
-            (_ARRAYS.index(name), n, ArrayForm.of(label, sizes[name], "cdr")) for n, name in enumerate(held, 2)
+            (KINDS.index(name), n, ArrayForm.of(label, sizes[name], "cdr")) for n, name in enumerate(held, 2)
         ]
         about = {"network": frame.network, "hash": frame.hash, "dt": repr(frame.dt), "version": __version__}
         start = records.head("ros2", f"neurovis {__version__}") + records.metadata(_ABOUT, about)
@@ -167,69 +168,95 @@ def finish_mcap(file: FileIO, part: Path, path: Path) -> None:
 
 def recover_mcap(part: Path) -> Recording:
     """Read a part up to its last whole chunk. Raises RecordingError."""
-    return _read(part)[0]
+    reading = _Reading()
+    with suspicion(part):
+        reading.read(part)
+        return reading.recording(part, None)
 
 
-def read_mcap(path: Path) -> Recording:
-    """Read a recording; of one that breaks off what is whole, with a warning. Raises RecordingError."""
-    recording, whole = _read(path)
-    if not whole:
+def read_mcap(path: Path, run: int | None = None) -> Recording:
+    """Read a recording, with the files that go on where it ends; of what breaks off what is whole, with a warning. Of
+    several runs the one with this number, by default the last. Raises RecordingError."""
+    reading, broken = _Reading(), list[Path]()
+    for file in chain([path], following(path, reading.about, _about)):
+        with suspicion(file):
+            if not reading.read(file):
+                broken.append(file)
+    with suspicion(path):
+        recording = reading.recording(path, run)
+    for file in broken:
         last = f"up to step {recording.step[-1]}" if len(recording) else "no step"
-        warnings.warn(f"{path} breaks off: it is read to its last whole chunk, {last}", stacklevel=4)
+        warnings.warn(f"{file} breaks off: it is read to its last whole chunk, {last}", stacklevel=4)
     return recording
 
 
-def _read(path: Path) -> tuple[Recording, bool]:
+def _about(path: Path) -> dict[str, str]:
+    """What a file says of itself. Raises RecordingError."""
     with suspicion(path):
         regular_size(path)
         with path.open("rb", buffering=1 << 16) as file:
-            return _Reading(file).recording()
+            for found in records.scan(file):
+                if found.opcode == records.METADATA:
+                    reader = records.content_of(file, found, _MOST_ABOUT)
+                    if reader.text() == _ABOUT:
+                        return reader.mapping()
+                elif found.opcode == records.CHUNK:
+                    break
+    return {}
 
 
 class _Reading:
-    """Reads the records of a file one after the other."""
+    """Reads the records of files one after the other."""
 
-    def __init__(self, file: BinaryIO) -> None:
-        self._file = file
-        self._frame: Recording | None = None
+    def __init__(self) -> None:
+        #: what the first file says of itself
+        self.about: dict[str, str] = {}
         self._after: dict[str, str] = {}
-        #: of each channel of ours what it holds and how
-        self._channels: dict[int, tuple[int, Encoding]] = {}
-        self._known: set[int] = set()
-        self._specs: dict[int, Encoding] = {}
+        self._rows: Arrived | None = None
         self._spec = ""
-        self._named = 0
-        self._room = max(_ROOM, _RATIO * file.seek(0, io.SEEK_END))
-        self._steps: tuple[list[int], ...] = ([], [], [])
-        self._rows: tuple[list[FloatArray], ...] = ([], [], [])
 
-    def recording(self) -> tuple[Recording, bool]:
-        """What the file holds, and whether it has come to its end."""
-        whole = False
-        for found in records.scan(self._file):
-            if found.opcode in (records.DATA_END, records.FOOTER):
-                whole = True
-                break
-            try:
-                self._take(found)
-            except DamagedError:
-                break
-        if self._frame is None:
+    def read(self, path: Path) -> bool:
+        """Read a file; whether it has come to its end. Raises RecordingError."""
+        regular_size(path)
+        with path.open("rb", buffering=1 << 16) as file:
+            self._file = file
+            #: of each channel of ours what it holds and how
+            self._channels: dict[int, tuple[int, Encoding]] = {}
+            self._known: set[int] = set()
+            self._specs: dict[int, Encoding] = {}
+            self._named = 0
+            self._room = max(_ROOM, _RATIO * file.seek(0, io.SEEK_END))
+            for found in records.scan(file):
+                if found.opcode in (records.DATA_END, records.FOOTER):
+                    return True
+                try:
+                    self._take(found)
+                except DamagedError:
+                    break
+        return False
+
+    def recording(self, path: Path, run: int | None) -> Recording:
+        """What was read. Raises RecordingError."""
+        if self._rows is None:
             raise RecordingError("not a recording: it does not say of which network it is")
-        return self._made(self._frame), whole
+        recording = replace(self._rows.recording(path, run), spec=self._spec)
+        return ended(recording, self._ended(recording))
 
     def _take(self, found: Found) -> None:
-        if found.opcode == records.ATTACHMENT and found.length <= _MOST_FRAME and self._frame is None:
+        if found.opcode == records.ATTACHMENT and found.length <= _MOST_FRAME and self._rows is None:
             reader = records.content_of(self._file, found)
             reader.take(16)
             name = reader.text()
             reader.text()
             if name == FRAME:
-                self._frame = frame_of(reader.take(reader.number(8)))
+                self._rows = Arrived(frame_of(reader.take(reader.number(8))))
         elif found.opcode == records.METADATA:
             reader = records.content_of(self._file, found)
-            if reader.text() == _AFTER:
+            name = reader.text()
+            if name == _AFTER:
                 self._after = reader.mapping()
+            elif name == _ABOUT and not self.about:
+                self.about.update(reader.mapping())
         elif found.opcode == records.CHANNEL:
             self._named += 1
             if self._named > records.MOST_NAMED:
@@ -254,8 +281,8 @@ class _Reading:
             return
         if kind == "spec":
             self._specs[topic.channel] = encoding
-        elif kind in _ARRAYS:
-            self._channels[topic.channel] = _ARRAYS.index(kind), encoding
+        elif kind in KINDS:
+            self._channels[topic.channel] = KINDS.index(kind), encoding
 
     def _message(self, message: Message) -> None:
         if message.channel in self._specs:
@@ -266,27 +293,9 @@ class _Reading:
                 raise RecordingError("a message is of a channel that there is not")
             return
         kind, encoding = self._channels[message.channel]
-        if self._frame is None:
+        if self._rows is None:
             raise RecordingError("not a recording: messages come before the network that they are of")
-        said, numbers = step_of(message.data, encoding, label_of(self._frame.hash), self._frame.widths[kind])
-        steps = self._steps[kind]
-        step = said if said is not None else steps[-1] + 1 if steps else 0
-        if steps and step <= steps[-1]:
-            raise RecordingError("the steps of its messages do not ascend")
-        steps.append(step)
-        self._rows[kind].append(numbers)
-
-    def _made(self, frame: Recording) -> Recording:
-        used = [kind for kind, width in enumerate(frame.widths) if width or kind == 0]
-        held = {kind: np.array(self._steps[kind], dtype=np.int64) for kind in used}
-        step = reduce(partial(np.intersect1d, assume_unique=True), held.values())  # lost of one, left out of all
-        activity, weights, states = (
-            np.array([self._rows[kind][row] for row in np.searchsorted(held[kind], step)] if kind in held else [])
-            .reshape(len(step), width)
-            for kind, width in enumerate(frame.widths)
-        )  # fmt: skip
-        recording = replace(frame, step=step, activity=activity, weights=weights, states=states, spec=self._spec)
-        return ended(recording, self._ended(recording))
+        self._rows.take(kind, message.log_time, message.data, encoding)
 
     def _ended(self, recording: Recording) -> After:
         changing = len(recording.plastic)

@@ -19,7 +19,7 @@ export class Controls {
   constructor(link) {
     this.link = link;
     this.playing = true;
-    this.turns = false;
+    this.owner = false;
     /** @type {HTMLButtonElement} */
     this.play = part('play');
     /** @type {HTMLSelectElement} */
@@ -62,7 +62,7 @@ export class Controls {
     this.play.textContent = status.playing ? '❚❚' : '▶';
     this.play.setAttribute('aria-label', status.playing ? 'pause' : 'play');
     this.speed.value = status.speed;
-    this.turns = status.owner && status.can.turns;
+    this.owner = status.owner;
     for (const id of ['restart', 'back', 'play', 'step', 'speed', 'before', 'next', 'svg', 'npz', 'film']) {
       const isEvent = id === 'before' || id === 'next';
       /** @type {HTMLButtonElement} */ (part(id)).disabled = !status.owner || (isEvent && !status.events.length);
@@ -71,7 +71,7 @@ export class Controls {
 
   /** @param {Look} look */
   frame(look) {
-    /** @type {HTMLButtonElement} */ (part('branch')).disabled = !this.turns || look.step === look.last;
+    /** @type {HTMLButtonElement} */ (part('branch')).disabled = !this.owner || look.step === look.last;
     this.tell(`step ${look.step}`);
   }
 

@@ -138,6 +138,9 @@ const link = new Link({
   },
   text(message) {
     if (message.type === 'status') {
+      link.takes = new Set(message.can.takes);
+      const asking = /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll('[data-asks]'));
+      for (const one of asking) one.hidden = !link.takes.has(one.dataset.asks ?? '');
       controls.status(message);
       scrubber.status(message);
       turning.status(message);

@@ -1,5 +1,6 @@
 /**
- * Marks: what is lesioned is crossed out, so that it is not told by how faint it is alone.
+ * Marks: what is lesioned is crossed out, so that it is not told by how faint it is alone; a neuron whose activity is no
+ * finite number, which no colour tells, has a question mark.
  */
 
 /** @typedef {import('./camera.js').Camera} Camera */
@@ -8,9 +9,11 @@
 /** @typedef {import('./protocol.js').Group} Group */
 /** @typedef {{group: Group, item: number, ends: number[]}} Mark */
 
-/** How far the arms of a cross reach: in a disc, as a share of its radius; on a line, in pixels of a page. */
+/** How far the arms of a cross reach: in a disc, as a share of its radius; on a line, in pixels of a page; and how high a
+ * question mark is at least, in these. */
 const IN_DISC = 0.6,
-  ON_LINE = 5;
+  ON_LINE = 5,
+  HIGH = 14;
 
 /** The middle of a cubic spline. @param {number[]} points @returns {number[]} */
 function halfway(points) {
@@ -22,7 +25,7 @@ function halfway(points) {
   });
 }
 
-/** The crosses of a network. */
+/** The marks of a network. */
 export class Marks {
   /** @param {Scene} scene */
   constructor(scene) {
@@ -49,15 +52,25 @@ export class Marks {
     const gone = (/** @type {number} */ item) => (look.kinds[item] & constants.isFaint) !== 0;
     context.setTransform(1, 0, 0, 1, 0, 0);
     for (const { group, item, ends } of this.marks) {
-      if (!gone(item) || ends.some(gone)) continue;
       const { id, shapes } = group,
-        [{ at: middle, points, radius }] = shapes;
+        [{ at: middle, points, radius }] = shapes,
+        isUndefined = !points && (look.kinds[item] & constants.isUndefined) !== 0;
+      if (!(gone(item) || isUndefined) || ends.some(gone)) continue;
       const at = points ? halfway(points) : middle,
         reach = points ? 0 : IN_DISC * radius;
       const x = left + at[0] * camera.scale,
         y = top + at[1] * camera.scale;
       const arm = reach * camera.scale || ON_LINE * devicePixelRatio;
       context.globalAlpha = near.size && !near.has(id) ? 0.3 : 1;
+      if (isUndefined) {
+        const [across, down] = [x + 0.7 * radius * camera.scale, y - 0.7 * radius * camera.scale];
+        context.font = `bold ${Math.max(HIGH * devicePixelRatio, radius * camera.scale)}px sans-serif`;
+        [context.strokeStyle, context.fillStyle] = [theme.background, theme.ink];
+        context.lineWidth = 5 * devicePixelRatio;
+        context.strokeText('?', across, down);
+        context.fillText('?', across, down);
+      }
+      if (!gone(item)) continue;
       context.beginPath();
       for (const [across, down] of [
         [-1, -1],

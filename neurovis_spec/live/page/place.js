@@ -75,9 +75,9 @@ export class Placing {
     this.waiting = false;
   }
 
-  /** Whether this can be dragged. @param {string} id @returns {boolean} */
-  can(id) {
-    return this.owner && /^n\d/.test(id) && this.constants.scale > 0 && this.drawn();
+  /** Whether this can be dragged, to ask for that. @param {string} id @param {string} [asks] @returns {boolean} */
+  can(id, asks = 'place') {
+    return this.owner && this.link.takes.has(asks) && /^n\d/.test(id) && this.constants.scale > 0 && this.drawn();
   }
 
   /** Where layout units lie. @returns {{scale: number, left: number, top: number}} */

@@ -56,11 +56,14 @@ export class Pointer {
   down(event) {
     const [x, y] = pixel(event),
       id = this.ground.pointed(x, y),
-      { placing } = this;
+      { placing } = this,
+      asks = event.shiftKey ? 'hold' : 'place';
     this.cancel();
     this.dragged = 0;
     this.on =
-      event.button === 0 && placing.can(id) && (event.pointerType === 'mouse' || id === this.attention.held) ? id : '';
+      event.button === 0 && placing.can(id, asks) && (event.pointerType === 'mouse' || id === this.attention.held)
+        ? id
+        : '';
     if (!this.on) return;
     this.canvas.setPointerCapture(event.pointerId);
     this.clamp = event.shiftKey ? { y: event.offsetY, from: this.attention.values[id] ?? 0, last: 0 } : null;

@@ -18,7 +18,7 @@ import { isStill } from './camera.js';
 /** @typedef {{families: string[], halo: number, subscriptDrop: number, subscriptSize: number, headOfLength: number,
  *   headOfWidth: number, headMore: number, notch: number, bar: number, lap: number, faint: number, levels: number,
  *   fineness: number, shares: number, share: number, isBar: number, isFaint: number, isNegative: number,
- *   isClamped: number, scale: number, left: number, top: number}} Constants */
+ *   isClamped: number, isUndefined: number, scale: number, left: number, top: number}} Constants */
 /** @typedef {{version: number, name: string, title: string, width: number, height: number, density: number,
  *   theme: Theme, dt: number | null, discs: number, lines: number, parameters: Declared[],
  *   inputs: {name: string, size: number, description: string}[], rules: {connections: string, rule: string}[], themes: string[],
@@ -28,7 +28,7 @@ import { isStill } from './camera.js';
 /** @typedef {{serial: number, step: number, first: number, last: number, caption: string, discs: Int8Array,
  *   lines: Int8Array, widths: Uint16Array, glows: Uint16Array, kinds: Uint8Array}} Look */
 /** @typedef {{type: 'status', playing: boolean, speed: string, ended: boolean, owner: boolean,
- *   can: {turns: boolean, ends: boolean, arrives: boolean}, parameters: Object<string, number>, fed: Object<string, number[]>,
+ *   can: {takes: string[], ends: boolean, arrives: boolean}, parameters: Object<string, number>, fed: Object<string, number[]>,
  *   learning: Object<string, boolean | null>, turned: Turned[], events: number[], appearance: Gains}} Status */
 /** @typedef {Status | {type: 'values', step: number, values: Object<string, number | null>}
  *   | {type: 'findings', text: string, errors: boolean}
@@ -140,6 +140,8 @@ export class Link {
     this.scene = null;
     /** @type {Look | null} */
     this.look = null;
+    /** the messages that change something and are taken @type {Set<string>} */
+    this.takes = new Set();
     /** @type {WebSocket | Handed | null} */
     this.socket = null;
     this.wait = 250;

@@ -89,7 +89,7 @@ export class Turning {
 
   /** A neuron or a connection is held, or nothing. @param {Group | undefined} group */
   hold(group) {
-    this.find('part').hidden = !group;
+    this.find('part').hidden = !group || !['hold', 'lesion'].some((type) => this.link.takes.has(type));
     if (!group) return;
     const { neuron, connection, index } = group.data;
     this.ref = neuron ?? (Number(index) > 1 ? `${connection} (${index})` : connection);
@@ -99,7 +99,7 @@ export class Turning {
 
   /** @param {Status} status */
   status(status) {
-    /** @type {HTMLFieldSetElement} */ (this.find('turns')).disabled = !status.owner || !status.can.turns;
+    /** @type {HTMLFieldSetElement} */ (this.find('turns')).disabled = !status.owner;
     /** @type {HTMLFieldSetElement} */ (this.find('drawn')).disabled = !status.owner;
     this.appearance.show(status.appearance, status.owner);
     this.sliders.show(status.parameters);

@@ -1,0 +1,58 @@
+"""Bags as recordings: a bag of ROS 1, or the folder of ``ros2 bag``, that holds a network's topics.
+
+In: a path. Out: a Recording, as of the MCAP files that NeuroVis writes: the network is that of the spec in the bag.
+"""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from neurovis_spec.runtime.recording import Recording
+
+
+class BagFormat:
+    """Bags, to be read."""
+
+    name = "bag"
+    suffixes = frozenset({".bag", ""})
+
+    def load(self, path: Path) -> Recording:
+        """Read a bag; of several runs the last."""
+        return self.load_run(path, None)
+
+    def load_run(self, path: Path, run: int | None) -> Recording:
+        """Read a run of a bag. Messages that are none of its network's arrays are left out, with a warning."""
+        from dataclasses import replace
+
+        from neurovis_spec.ros.announced import compiled_from
+        from neurovis_spec.ros.bags import read_bag
+        from neurovis_spec.ros.listening import base_of, frame
+        from neurovis_spec.ros.play import spec_of
+        from neurovis_spec.runtime.arrived import KINDS, Arrived
+        from neurovis_spec.runtime.npz_file import suspicion
+        from neurovis_spec.runtime.recording import RecordingError, after_rows, ended
+        from neurovis_spec.runtime.wire import WireError
+
+        bag = read_bag(path)
+        text = spec_of(bag)
+        if text is None:
+            raise RecordingError(f"{path}: it does not say of which network it is: no topic 'spec' is in it")
+        compiled = compiled_from(text, str(path))
+        kinds = {f"{base_of(compiled)}/{kind}": place for place, kind in enumerate(KINDS)}
+        arrived, left_out = Arrived(frame(compiled)), 0
+        for message in bag.messages():
+            kind = kinds.get(message.topic.name)
+            if kind is not None:
+                try:
+                    arrived.take(kind, message.log_time, message.data, message.topic.encoding)
+                except (RecordingError, WireError):
+                    left_out += 1
+        if left_out:
+            warnings.warn(f"{path}: {left_out} messages are left out: none of this network's arrays", stacklevel=4)
+        with suspicion(path):
+            recording = replace(arrived.recording(path, run), spec=text)
+        rows = after_rows(recording.step, recording.weights, len(recording.plastic))
+        return ended(recording, replace(rows, set_parameters=recording.set_parameters))

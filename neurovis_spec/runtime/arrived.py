@@ -1,0 +1,91 @@
+"""Rows as messages bring them: activities, weights and states, each in messages of their own, of one run or of several.
+
+In: arrays in the order of a file, with the step that they say. Out: a Recording of one of the runs: a network that
+began anew counts its steps anew. A step that one of the kinds lacks is left out of all.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial, reduce
+from pathlib import Path
+
+import numpy as np
+
+from neurovis_spec.arrays import FloatArray
+from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.ros_messages import label_of, step_of
+from neurovis_spec.runtime.wire import Encoding
+
+#: what arrays hold: the last part of their topics, in the order of ``Recording.widths``
+KINDS = ("activity", "weights", "states")
+#: runs that are listed
+_LISTED = 5
+
+
+@dataclass
+class _Rows:
+    """The rows of one kind in one run, and when the first and the last came."""
+
+    first: int
+    last: int = 0
+    steps: list[int] = field(default_factory=list)
+    rows: list[FloatArray] = field(default_factory=list)
+
+    def shared(self, other: _Rows) -> int:
+        """How much of their time two have in common; negative: how far they are apart."""
+        return min(self.last, other.last) - max(self.first, other.first)
+
+
+class Arrived:
+    """The rows of a network; ``frame`` is its recording without them."""
+
+    def __init__(self, frame: Recording) -> None:
+        self._frame, self._label = frame, label_of(frame.hash)
+        #: of each kind the runs, in their order
+        self._runs: tuple[list[_Rows], ...] = tuple([] for _ in KINDS)
+
+    def take(self, kind: int, time: int, data: bytes, encoding: Encoding) -> None:
+        """A message. Raises RecordingError where it is none of this network's arrays, and WireError."""
+        said, numbers = step_of(data, encoding, self._label, self._frame.widths[kind])
+        runs = self._runs[kind]
+        if not runs or (said is not None and said <= runs[-1].steps[-1]):
+            runs.append(_Rows(time))
+        run = runs[-1]
+        run.steps.append(said if said is not None else run.steps[-1] + 1 if run.steps else 0)
+        run.rows.append(numbers)
+        run.last = time
+
+    def recording(self, path: Path, number: int | None = None) -> Recording:
+        """The run with a number, from 1, by default the last; where there are more, a warning says so. Raises
+        RecordingError."""
+        runs = self._runs[0]
+        if number is None:
+            number = max(1, len(runs))
+            if len(runs) > 1:
+                warnings.warn(f"{path} holds {_told(runs)}: the last is read, --run N reads another", stacklevel=5)
+        elif not 1 <= number <= max(1, len(runs)):
+            raise RecordingError(f"there is no run {number}: it holds {_told(runs)}")
+        chosen = runs[number - 1] if runs else _Rows(0)
+        used = [kind for kind, width in enumerate(self._frame.widths) if width or kind == 0]
+        # each topic comes in its own time: the rows of the other kinds are those that came beside these
+        beside = [chosen, *(max(others, key=chosen.shared, default=_Rows(0)) for others in self._runs[1:])]
+        held = {kind: np.array(beside[kind].steps, dtype=np.int64) for kind in used}
+        step = reduce(partial(np.intersect1d, assume_unique=True), held.values())
+        activity, weights, states = (
+            np.array([beside[kind].rows[row] for row in np.searchsorted(held[kind], step)] if kind in held else [])
+            .reshape(len(step), width)
+            for kind, width in enumerate(self._frame.widths)
+        )  # fmt: skip
+        return replace(self._frame, step=step, activity=activity, weights=weights, states=states)
+
+
+def _told(runs: Sequence[_Rows]) -> str:
+    """Which runs there are, in words."""
+    if len(runs) <= 1:
+        return "one run"
+    shown = range(max(0, len(runs) - _LISTED), len(runs))
+    words = [f"run {at + 1}: steps {runs[at].steps[0]} to {runs[at].steps[-1]}" for at in shown]
+    return f"{len(runs)} runs, for the network began anew ({'' if shown[0] == 0 else '…, '}{', '.join(words)})"
