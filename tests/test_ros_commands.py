@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
+from typing import cast
 
 import pytest
 from click.testing import CliRunner
@@ -14,7 +15,10 @@ from click.testing import CliRunner
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.ros import middleware
+from neurovis_spec.ros.accept import ARRAY
+from neurovis_spec.ros.announced import Others
 from neurovis_spec.ros.definitions import definition
+from neurovis_spec.ros.middleware import Node
 
 OPENING = 0.5
 
@@ -77,3 +81,32 @@ def test_the_summary_in_json_is_one_object_on_one_line(quiet: Quiet, tmp_path: P
         **{"shown": 0, "skipped": 0, "files": [], "topics": {"activity": nothing}},
     }
     assert not out.exists()
+
+
+@pytest.mark.parametrize("command", ["view", "legacy"])
+def test_files_that_are_in_the_way_are_told_before_anything_is_waited_for(
+    quiet: Quiet, tmp_path: Path, command: str
+) -> None:
+    recording, film = tmp_path / "a.mcap", tmp_path / "a.mp4"
+    for option, path in (("--record", recording), ("--video", film)):
+        path.write_text("mine")
+        found = CliRunner().invoke(neurovis, ["ros", command, option, str(path), "--seconds", "0.1"])
+        assert found.exit_code == 1
+        assert f"{path} exists" in found.stderr
+        assert "ready" not in found.stderr
+        assert "waiting" not in found.stderr
+        path.unlink()
+    found = CliRunner().invoke(neurovis, ["ros", command, "--record", str(tmp_path / "no" / "a.mcap")])
+    assert (found.exit_code, "No such file or directory" in found.stderr) == (1, True)
+
+
+def test_networks_that_announce_themselves_later_are_told_of_once() -> None:
+    there, told = {"/a/one/spec": ("std_msgs/String",), "/a/one/activity": (ARRAY,)}, list[str]()
+    node = SimpleNamespace(topics=lambda: there)
+    others = Others(cast(Node, node), "/a/one/spec", told.append)
+    others.look()
+    assert told == []
+    there |= {"/a/two/spec": ("std_msgs/String",), "/a/two/activity": (ARRAY,), "/a/three/spec": ("std_msgs/String",)}
+    others.look()
+    others.look()
+    assert told == ["another network announces itself, on /a/two/spec: --network two shows it"]

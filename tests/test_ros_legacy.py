@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import struct
 import warnings
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -11,7 +15,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import neurovis_spec as nv
+from neurovis_spec.ros import legacy_listener
 from neurovis_spec.ros.legacy import FLOATS, KINDS, TEXT, Kind, Legacy, layer_pairs, numbers_of, positions, types_of
+from neurovis_spec.ros.legacy_listener import LegacyListener
+from neurovis_spec.ros.listening import Listening, Wanted
+from neurovis_spec.ros.middleware import Arrival, Arrived, Node
 from neurovis_spec.runtime.wire import Encoding, WireError, text_message
 
 
@@ -150,3 +158,94 @@ def test_hostile_messages_are_survived(sent: list[tuple[Kind, str | bytes]]) -> 
             continue
     if legacy.names:
         nv.compile_text(legacy.spec("legacy"))
+
+
+class Controller:
+    """A node that the topics of a controller of the first NeuroVis come to, as texts."""
+
+    ros, encoding = 2, "cdr"
+
+    def __init__(self) -> None:
+        self._arrived: dict[str, Arrived] = {}
+        self._time = 0
+
+    def topics(self) -> Mapping[str, tuple[str, ...]]:
+        return {f"/neurovis/{kind}": (TEXT,) for kind in KINDS}
+
+    def subscription(self, topic: str, type_: str, quality: object, arrived: Arrived) -> SimpleNamespace:
+        self._arrived[topic] = arrived
+        return SimpleNamespace(topic=topic)
+
+    def send(self, kind: Kind, *texts: str) -> None:
+        for text in texts:
+            self._time += 10**6
+            self._arrived[f"/neurovis/{kind}"](Arrival(text_message(text, "cdr"), self._time, None, TEXT))
+
+
+def listening_to(told: Callable[[str], None] = print, wanted: bool = True) -> tuple[Controller, LegacyListener]:
+    node = Controller()
+    listener = LegacyListener(cast(Node, node), "/neurovis", "old", told, wanted)
+    listener.look()
+    return node, listener
+
+
+def test_what_comes_before_the_network_is_known_is_recorded_with_it(tmp_path: Path) -> None:
+    node, listener = listening_to()
+    node.send("activity", *(f"{number},0" for number in range(5)), "1,2,3")
+    node.send("weightsAll", "1", "2")
+    listener.hear(0.05)
+    assert not listener.known
+    node.send("neuronName", "A/B/")
+    node.send("connections", "0,0.5,0,0")
+    node.send("activity", "5,0")
+    listener.hear(0.05)
+    listener.know()
+    compiled = listener.compiled()
+    assert len(compiled.network.changing) == 1, "weights have come, so they change"
+    listening = Listening(compiled, 2, Wanted(tmp_path / "x.mcap"), print)
+    listening.start()
+    listener.to(listening)
+    node.send("activity", "6,0", "x")
+    listener.hear(0.05)
+    listening.end()
+    listener.end()
+    read = nv.load(tmp_path / "x.mcap")
+    assert read.activity[:, 0].tolist() == [0, 1]
+    assert read.weights.tolist() == [[1], [2]]
+    counts = listener.counts["activity"]
+    assert (counts.received, counts.recorded, counts.rejected["length"], counts.rejected["parse"]) == (9, 7, 1, 1)
+    assert listener.counts["weightsAll"].recorded == 2
+
+
+def test_no_more_waits_for_a_network_than_there_is_room_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(legacy_listener, "_WAITING", 10_000)
+    node, listener = listening_to()
+    node.send("activity", *["1,2"] * 1000)
+    listener.hear(0.2)
+    assert listener.counts["activity"].received == 1000
+    assert 900 < listener.counts["activity"].lost < 1000
+    listener.end()
+    assert sum(listener.counts["activity"].rejected.values()) == 1000 - listener.counts["activity"].lost
+
+
+def test_weights_that_come_late_are_rejected_and_told_of(tmp_path: Path) -> None:
+    """What is recorded is of a network whose weights stay."""
+    told = list[str]()
+    node, listener = listening_to(told.append)
+    node.send("neuronName", "A/B/")
+    node.send("connections", "0,0.5,0,0")
+    listener.hear(0.05)
+    listener.know()
+    listening = Listening(listener.compiled(), 2, Wanted(tmp_path / "x.mcap"), print)
+    listening.start()
+    listener.to(listening)
+    node.send("weightsAll", "0.5", "0.25")
+    node.send("neuronName", "A/B/C/")
+    node.send("activity", "1,2,3")
+    listener.hear(0.05)
+    listening.end()
+    listener.end()
+    for kind, count in (("weightsAll", 2), ("activity", 1)):
+        counts = listener.counts[kind]
+        assert (counts.received, counts.recorded, counts.rejected["length"]) == (count, 0, count)
+    assert sum("the network has changed" in line for line in told) == 1

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from contextlib import ExitStack
+from typing import TYPE_CHECKING
 
 import click
 
@@ -14,6 +15,9 @@ from neurovis_spec.cli.options import examples
 from neurovis_spec.cli.ros_options import Meeting, meeting_options, tell
 from neurovis_spec.cli.ros_shown import Desk, shown_options
 from neurovis_spec.interrupts import heeded
+
+if TYPE_CHECKING:
+    from neurovis_spec.ros.listening import Listening
 
 
 @click.command(
@@ -39,9 +43,17 @@ def command(output: str | None, namespace: str, network: str, desk: Desk, meetin
 
     if not desk and output is None:
         desk = desk.in_the_browser()
+    desk.check()
     sys.setswitchinterval(0.0005)
     with meeting.node("neurovis_legacy", anonymous=True) as node, ExitStack() as stack, heeded() as asked:
-        listener, listening = LegacyListener(node, namespace, network, tell), None
+        listener, listening = LegacyListener(node, namespace, network, tell, bool(desk)), None
+
+        def shown() -> Listening:
+            opened = stack.enter_context(desk.open(listener.compiled(), node))
+            listener.to(opened)
+            tell(f"{len(listener.legacy.names)} neurons, {len(listener.legacy.edges)} connections")
+            return opened
+
         listener.look()
         tell(f"ready: {namespace}, ROS {node.ros}")
         begun = time.monotonic()
@@ -49,10 +61,12 @@ def command(output: str | None, namespace: str, network: str, desk: Desk, meetin
             asked or node.ended or (meeting.seconds is not None and time.monotonic() - begun >= meeting.seconds)
         ):
             listener.hear(0.05)
-            if desk and listening is None and listener.settled:
-                listening = stack.enter_context(desk.open(listener.compiled(), node))
-                listener.to(listening)
-                tell(f"{len(listener.legacy.names)} neurons, {len(listener.legacy.edges)} connections")
+            if not listener.known and listener.settled:
+                listener.know()
+                listening = shown() if desk else None
+        if not listener.known and desk.record is not None and listener.legacy.described:
+            listener.know()
+            listening = shown()
         if listening is not None:
             listening.end()
         listener.end()
@@ -62,11 +76,11 @@ def command(output: str | None, namespace: str, network: str, desk: Desk, meetin
         if output is not None:
             with replacing(output) as file:
                 file.write(listener.legacy.spec(network).encode())
-        shown, skipped = (0, 0) if listening is None else listening.shown
+        seen, skipped = (0, 0) if listening is None else listening.shown
         files = () if listening is None else listening.paths
         summary = Summary(
             network=compiled.name, hash=compiled.hash, ros=node.ros, seconds=time.monotonic() - begun,
-            reconnects=node.reconnects, shown=shown, skipped=skipped,
+            reconnects=node.reconnects, shown=seen, skipped=skipped,
             files=(*files, *(() if output is None else (output,))), topics=listener.counts,
         )  # fmt: skip
     meeting.show(summary)

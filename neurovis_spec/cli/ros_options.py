@@ -108,7 +108,11 @@ def meeting_options(wait: float) -> Callable[[F], F]:
         positive = click.FloatRange(min=0)
         options = (
             click.option("--ros", type=click.Choice(["1", "2"]), help="Which ROS; default: the one that is there."),
-            click.option("--seconds", type=positive, callback=finite, metavar="S", help="End after S seconds."),
+            click.option(
+                "--seconds", type=positive, callback=finite, metavar="S",
+                help="End after S seconds; what is waited for before (a master, a network that announces itself) has S "
+                "seconds to come.",
+            ),
             click.option(
                 "--wait", type=positive, callback=finite, default=wait, show_default=True, metavar="S",
                 help="Begin when every topic has a subscriber, at the latest after S seconds.",

@@ -53,6 +53,7 @@ def command(
     """
     if backend == "list":
         raise click.UsageError("'neurovis run --backend list' lists the backends")
+    desk.check()
     compiled = network_of(spec, settings)
     from neurovis_spec.ros.run import Course, NodeRun
 

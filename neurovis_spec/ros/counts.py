@@ -15,7 +15,7 @@ Reason: TypeAlias = Literal["type", "parse", "hash", "length"]
 REASONS: Final[Mapping[Reason, str]] = {
     "type": "of another type",
     "parse": "that cannot be read",
-    "hash": "of another network",
+    "hash": "of another network, or another version of its spec,",
     "length": "of another length",
 }
 

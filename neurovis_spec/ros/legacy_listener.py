@@ -5,6 +5,8 @@ In: a Node. Out: a Legacy that learns; once it knows a network, its activities a
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Mapping
 from functools import partial
 from queue import Empty, SimpleQueue
 from time import monotonic
@@ -27,15 +29,23 @@ from neurovis_spec.runtime.wire import ArrayForm, WireError
 _QUALITY: Final = Quality("offered", "volatile", 4000)
 #: messages that wait to be read
 _ROOM: Final = 100_000
+#: bytes of activities and weights that wait for their network, and what each takes besides its own
+_WAITING: Final = 64 << 20
+_EACH: Final = 300
 #: a description is taken when it has stayed as it is for so many seconds
 _SETTLED: Final = 0.5
 _LOOK: Final = 0.2
 
 
-class LegacyListener:
-    """Listens to the topics under a namespace. ``counts`` are those of the topics, under their names."""
+#: what activities and weights are called in this version
+_NAMES: Final[Mapping[Kind, str]] = {"activity": ACTIVITY, "weightsAll": WEIGHTS}
 
-    def __init__(self, node: Node, namespace: str, network: str, tell: Tell) -> None:
+
+class LegacyListener:
+    """Listens to the topics under a namespace. ``counts`` are those of the topics, under their names. What comes before
+    its network is known waits, and goes on with it; ``wanted`` is whether it goes anywhere."""
+
+    def __init__(self, node: Node, namespace: str, network: str, tell: Tell, wanted: bool = True) -> None:
         self._node, self._network, self._tell, self._teller = node, network, tell, Teller(tell)
         self.legacy = Legacy()
         self.counts: dict[str, Counts] = {kind: Counts() for kind in KINDS}
@@ -46,6 +56,15 @@ class LegacyListener:
         self._described: tuple[object, ...] = ()
         self._to: Listening | None = None
         self._forms: dict[str, tuple[str, ArrayForm]] = {}
+        self._sizes, self._told = {ACTIVITY: 0, WEIGHTS: 0}, False
+        #: activities and weights whose network is not known yet, and the bytes that they take
+        self._waiting: deque[tuple[Kind, Arrival]] = deque()
+        self._held = 0
+        #: whether it counts as known
+        self.known = False
+        #: those that have been judged, and go on as soon as it is known where to
+        self._ready: list[tuple[str, FloatArray, int]] = []
+        self._wanted = wanted
         #: how many messages of each topic of this version there were
         self._made = {ACTIVITY: 0, WEIGHTS: 0}
 
@@ -84,11 +103,22 @@ class LegacyListener:
         self._teller.look()
 
     def _take(self, kind: Kind, arrival: Arrival) -> None:
-        counts = self.counts[kind]
-        counts.received += 1
+        self.counts[kind].received += 1
+        if self.known or kind not in _NAMES:
+            self._judge(kind, arrival)
+            return
+        self._waiting.append((kind, arrival))
+        self._held += len(arrival.data) + _EACH
+        while self._held > _WAITING:
+            oldest, gone = self._waiting.popleft()
+            self._held -= len(gone.data) + _EACH
+            self.counts[oldest].lost += 1
+            self._teller.note(f"lost on {oldest}, for its network is not known yet")
+
+    def _judge(self, kind: Kind, arrival: Arrival) -> None:
         why = self._judged(kind, arrival)
         if why is not None:
-            counts.rejected[why] += 1
+            self.counts[kind].rejected[why] += 1
             self._teller.note(f"{REASONS[why]} on {kind}")
 
     def _judged(self, kind: Kind, arrival: Arrival) -> Reason | None:
@@ -102,21 +132,36 @@ class LegacyListener:
             return "parse"
         if isinstance(found, str):
             return found
-        if kind in ("activity", "weightsAll"):
-            self.counts[kind].not_finite += not np.isfinite(found).all()
-            self._hand_on(ACTIVITY if kind == "activity" else WEIGHTS, found, arrival.received)
-        else:
+        if kind not in _NAMES:
             described = (legacy.names, dict(legacy.positions), dict(legacy.edges))
             if described != self._described:
-                if self._to is not None:
-                    self._tell("the network has changed: what is shown and recorded is as it was; begin anew")
                 self._described, self._changed = described, monotonic()
+                self._tell_of_change()
+            return None
+        name = _NAMES[kind]
+        if self._to is not None and len(found) != self._sizes[name]:
+            if name == WEIGHTS and not self._sizes[name]:  # nobody knew that they change
+                self._tell_of_change()
+            return "length"
+        self.counts[kind].not_finite += not np.isfinite(found).all()
+        self._hand_on(name, found, arrival.received)
         return None
+
+    def _tell_of_change(self) -> None:
+        if self._to is not None and not self._told:
+            self._told = True
+            self._tell("the network has changed: what is shown and recorded is as it was; begin anew")
 
     @property
     def settled(self) -> bool:
         """Whether there is a network that has stayed as it is."""
         return self.legacy.described and monotonic() - self._changed >= _SETTLED
+
+    def know(self) -> None:
+        """From now on the network counts as known: what has waited for it is judged."""
+        self.known = True
+        while self._waiting:
+            self._judge(*self._waiting.popleft())
 
     def compiled(self) -> CompiledNetwork:
         """The network as it is known. Raises SpecError."""
@@ -126,13 +171,18 @@ class LegacyListener:
         """From now on activities and weights go there, as messages of this version."""
         self._to = listening
         network, encoding = listening.compiled.network, self._node.encoding
-        sizes = {ACTIVITY: len(network.neurons), WEIGHTS: len(network.changing)}
+        self._sizes = {ACTIVITY: len(network.neurons), WEIGHTS: len(network.changing)}
         for topic, stream in listening.streams.items():
-            form = ArrayForm.of(label_of(network.hash), sizes[stream.name], encoding)
+            form = ArrayForm.of(label_of(network.hash), self._sizes[stream.name], encoding)
             self._forms[stream.name] = topic, form
+        for one in self._ready:
+            self._hand_on(*one)
+        self._ready.clear()
 
     def _hand_on(self, name: str, numbers: FloatArray, received: int) -> None:
-        if self._to is None or name not in self._forms:
+        if self._to is None:
+            if self._wanted:
+                self._ready.append((name, numbers, received))
             return
         topic, form = self._forms[name]
         data = form.message(self._made[name], received / 1e9, numbers)
@@ -141,6 +191,7 @@ class LegacyListener:
 
     def end(self) -> None:
         """What was recorded, and entries that were left out, which count as not to be read."""
+        self.know()
         if self._to is not None:
             recorded = {stream.name: stream.counts.recorded for stream in self._to.streams.values()}
             self.counts["activity"].recorded = recorded[ACTIVITY]
