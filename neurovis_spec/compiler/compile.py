@@ -26,11 +26,11 @@ from neurovis_spec.compiler.drawing.sections import layout_settings, render_sett
 from neurovis_spec.compiler.events.bound import make_settable, own_weights
 from neurovis_spec.compiler.limits import MOST_SIGNALS, Limits, amount
 from neurovis_spec.compiler.lower import make_blocks, make_plasticity, make_program
-from neurovis_spec.compiler.names.connection_references import Finder, wires_of
 from neurovis_spec.compiler.names.expand import Expander, constants_of
+from neurovis_spec.compiler.names.finder import Finder, finder_of
 from neurovis_spec.compiler.names.modules import library_of
 from neurovis_spec.compiler.names.outputs import make_outputs
-from neurovis_spec.compiler.names.references import Directory, other_parameter
+from neurovis_spec.compiler.names.references import other_parameter
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.names.state_references import singles
 from neurovis_spec.compiler.names.unresolved import Gaps, gaps_of
@@ -93,29 +93,29 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
     if not len(population.neurons):
         _report_no_neurons(spec, population, findings)
         population = without_neurons(population)
-    directory = population.directory
     layout = layout_settings(spec.layout, scopes, population, findings)
     made = connect(scopes, population, request.limits, seed)
     bundles = made.bundles
-    render = render_settings(spec.render, Finder(wires_of(made), directory, findings), constants, directory)
-    outputs = make_outputs(spec, population, made, findings)
+    finder = finder_of(population, made, findings)
+    render = render_settings(spec.render, finder, constants)
+    outputs = make_outputs(spec, finder)
     if spec.render is not None and spec.render.figure:
         from neurovis_spec.compiler.drawing.figure import figure_of
 
-        render = replace(render, figure=figure_of(spec, population, made, outputs, findings))
+        render = replace(render, figure=figure_of(spec, population, outputs, finder))
     ros = _ros(spec, inputs, outputs, scopes[0].gaps, constants)
     noises = make_noises(scopes, population, sum(entry.size for entry in inputs))
     expansion.depend()
     if not made.complete or findings.errors > before or not _under_way(bundles, findings):
         _check_cycles(made, population, findings)
-        _read_events(spec, made, directory, constants)
+        _read_events(spec, finder, constants)
         return None
     plasticity, rules = make_plasticity(bundles)
     connections = join(bundles, rules)
     level = levels(len(population.neurons), connections.sources, connections.targets, connections.delays)
     if isinstance(level, Cycle):
         _report_cycle(level, population, connections.entry, bundles, findings)
-        _read_events(spec, made, directory, constants)
+        _read_events(spec, finder, constants)
         return None
     blocks = make_blocks(population, connections.sources, connections.targets, level)
     program = make_program(blocks, plasticity)
@@ -162,7 +162,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         settable=make_settable(slots, population, bundles, connections, inputs, blocks, plasticity, noises),
         ros=ros,
     )
-    eventful = _eventful(spec, network, directory, constants, made)
+    eventful = _eventful(spec, network, finder, constants)
     if eventful is not None and not findings.failed:  # the shape may have been invalid
         files = tuple(file.model for file in includes.files)
         warn(Compiled(spec, scopes, library, expander.used, eventful, bundles, population, files), findings)
@@ -209,29 +209,26 @@ def _instances(scopes: tuple[Scope, ...], population: Population) -> tuple[Insta
     )
 
 
-def _eventful(
-    spec: Spec, network: Network, directory: Directory, constants: Constants, connected: Connected
-) -> Network | None:
+def _eventful(spec: Spec, network: Network, finder: Finder, constants: Constants) -> Network | None:
     """The network with what its events change; its hash says that they are there."""
     if not spec.events:
         return network
     from neurovis_spec.compiler.events.timeline import with_changes
 
     before = constants.findings.errors
-    events = _read_events(spec, connected, directory, constants)
+    events = _read_events(spec, finder, constants)
     if constants.findings.errors > before:
         return None
     made = with_changes(network, events, constants)
     return None if constants.findings.errors > before else made
 
 
-def _read_events(spec: Spec, connected: Connected, directory: Directory, constants: Constants) -> tuple[Event, ...]:
+def _read_events(spec: Spec, finder: Finder, constants: Constants) -> tuple[Event, ...]:
     """The events of a spec. Most specs have none: nothing that reads them is imported then."""
     if not spec.events:
         return ()
     from neurovis_spec.compiler.events.events import EventReader
 
-    finder = Finder(wires_of(connected), directory, constants.findings)
     return EventReader(finder, constants).read(spec.events)
 
 

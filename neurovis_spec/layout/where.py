@@ -16,6 +16,7 @@ from neurovis_spec.compiler.names.modules import library_of
 from neurovis_spec.compiler.names.references import Section, key_of, key_span
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.language.references import NeuronRange, parse_sum
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.layout.clashes import Clash
 from neurovis_spec.layout.model import LayoutRefusalError
@@ -44,7 +45,7 @@ _PARTS: Final[Mapping[str, Sequence[str]]] = {
 #: These speak of all of a part, not of neurons.
 _WHOLE: Final = "-unsupported"
 _APART: Final = "move one of them, where a pin or the layout file says where it is, or let it go"
-_NUMBER: Final = re.compile(r"(?P<stem>.*?)(?P<number>\d+)")
+_NUMBER: Final = re.compile(r"(?P<stem>.*\D)(?P<number>\d+)", re.ASCII)
 
 
 class _Entry(NamedTuple):
@@ -170,19 +171,22 @@ def _names(text: str, name: str) -> bool:
     >>> _names("left", "left2.K1"), _names("left.K", "left2.K1"), _names("K1..K3", "K2"), _names("K1", "K12")
     (True, True, True, False)
     """
-    for one in text.replace("'", "").split("+"):
-        low, _, high = (side.strip() for side in one.partition(".."))
-        if high:
-            ends = [_NUMBER.fullmatch(side) for side in (low, high, name)]
-            if all(ends) and len({end["stem"] for end in ends if end}) == 1:
-                first, last, number = (int(end["number"]) for end in ends if end)
-                if first <= number <= last:
+    steps = name.split(".")
+    for part in parse_sum(text):
+        if isinstance(part, NeuronRange):
+            numbered, own = part.numbers, _NUMBER.fullmatch(steps[-1])
+            if numbered is not None and own is not None and int(own["number"]) in numbered[1]:
+                group = numbered[0].split(".")
+                if group[-1] == own["stem"] and len(group) == len(steps) and _lead(group[:-1], steps[:-1]):
                     return True
-            continue
-        steps, own = low.split("."), name.split(".")
-        if len(steps) <= len(own) and all(
-            step == mine or (not step[-1:].isdigit() and step == mine.rstrip("0123456789"))
-            for step, mine in zip(steps, own, strict=False)
-        ):
+        elif _lead(part.text.split("."), steps):
             return True
     return False
+
+
+def _lead(written: Sequence[str], steps: Sequence[str]) -> bool:
+    """Whether the instances, the group or the neuron of a reference are, or hold, these: ``left`` is ``left2``, too."""
+    return len(written) <= len(steps) and all(
+        step == own or (not step[-1:].isdigit() and step == own.rstrip("0123456789"))
+        for step, own in zip(written, steps, strict=False)
+    )

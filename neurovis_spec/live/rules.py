@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import IntArray
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.language.references import Arrow, parse
 from neurovis_spec.runtime.names import Found, names_of
 
 
@@ -48,10 +49,12 @@ def carried_out(rules: Sequence[Rule], stopped: npt.NDArray[np.bool_]) -> dict[s
 def _reference(network: Network, name: str, members: IntArray) -> str:
     """What names the connections of an entry; one of a module says the instance of its source alone."""
     plain = name.partition(" (")[0]
-    source, _, target = (part.strip() for part in plain.partition("->"))
+    arrow = parse(plain)
+    assert isinstance(arrow, Arrow)
+    source, target = arrow.sources.text, arrow.targets
     inside, _, _ = source.rpartition(".")
     known, wanted = names_of(network), set(network.connections.targets[members].tolist())
-    for one in (target, " + ".join(f"{inside}.{part.strip()}" for part in target.split("+"))):
+    for one in (target.text, " + ".join(f"{inside}.{part.text}" for part in target.parts)):
         ends = known.find(one)
         if isinstance(ends, Found) and wanted <= set(ends.neurons):
             return f"{source} -> {one}"

@@ -13,13 +13,12 @@ from functools import partial
 
 from neurovis_spec.compiler.values.constants import ALWAYS
 from neurovis_spec.diagnostics import Span
+from neurovis_spec.language.references import Arrow, DottedName, NeuronRange, Part, RuleState, Sum, parse
 from neurovis_spec.language.templates import Hole, pieces
 from neurovis_spec.lsp.outline import Item
 from neurovis_spec.lsp.roles import SECTIONS, Kind, Role, Scope, role_of
 from neurovis_spec.lsp.text import Text
 
-#: A name in a reference, with those of the instances in front of it.
-_REFERENCE = re.compile(r"[A-Za-z_]\w*(?:\.(?!\.)[A-Za-z_]\w*)*", re.ASCII)
 #: A name in an expression, and the parenthesis behind the name of a function.
 _IN_FORMULA = re.compile(r"(?<![\w.])([A-Za-z_]\w*)(\s*\()?", re.ASCII)
 _WORDS = frozenset({"and", "or", "not", "if", "else"})
@@ -108,48 +107,47 @@ def _formula(item: Item, role: Role, scope: Scope, text: Text) -> Iterator[Name]
 
 
 def _references(item: Item, scope: Scope, text: Text, lookup: Lookup) -> Iterator[Name]:
-    found = list(_REFERENCE.finditer(item.text))
-    parts: list[tuple[int, int]] = []
-    for match in found:
-        at = match.start()
-        for part in match[0].split("."):
-            parts.append((at, at + len(part)))
-            at += len(part) + 1
-    places = iter(_inside(item, text, parts))
+    written = list(_dotted(parse(item.text)))
+    steps = [(step.start, step.end) for name, _ in written for step in name.steps]
+    places = iter(_inside(item, text, steps))
     stately = item.path[:1] == ("outputs",)
-    low: list[tuple[str, Scope | None, Name | None]] = []  # the instances of the name before, with where they lead
-    end = 0
-    for match in found:
-        *instances, last = match[0].split(".")
-        if item.text[: match.start()].rstrip().endswith(")."):  # the state of a rule: (K -> O).eligibility
-            for _ in (*instances, last):
-                next(places)
-            continue
-        # the second end of a range may leave out what it has in common with the first: left1.K1..K3
-        common = low[: len(low) - len(instances)] if item.text[end : match.start()].strip() == ".." else []
-        if [part for part, _, _ in low[len(common) :]] != instances:
-            common = []
-        here, via = common[-1][1:] if common else (Scope(scope.module), None)
-        low, end = list(common), match.end()
-        for number, part in enumerate(instances, 1):
+    way: list[tuple[Scope | None, Name | None]] = []  # where the instances of the name before lead
+    for name, shared in written:
+        way = way[:shared]
+        here, via = way[-1] if way else (Scope(scope.module), None)
+        *instances, last = name.steps
+        for number, step in enumerate(instances, 1):
             span, exact = next(places)
-            if (
-                here is not None
-                and stately
-                and number == len(instances)
-                and lookup.module_of(part, here.module) is None
-            ):
-                yield Name("neuron", part, span, here, item, False, exact, via)  # K.v is the state v of K
-                here = None
+            module = None if here is None else lookup.module_of(step.text, here.module)
+            if here is not None and stately and number == len(instances) and module is None:
+                yield Name("neuron", step.text, span, here, item, False, exact, via)  # K.v is the state v of K
             elif here is not None:
-                via = Name("instance", part, span, here, item, False, exact, via)
+                via = Name("instance", step.text, span, here, item, False, exact, via)
                 yield via
-                module = lookup.module_of(part, here.module)
-                here = None if module is None else Scope(module)
-            low.append((part, here, via))
+            here = None if module is None else Scope(module)
+            way.append((here, via))
         span, exact = next(places)
-        if here is not None:
-            yield Name("neuron", last, span, here, item, False, exact, via)
+        if here is not None and last.text:
+            yield Name("neuron", last.text, span, here, item, False, exact, via)
+
+
+def _dotted(written: Sum | Arrow | Part) -> Iterator[tuple[DottedName, int]]:
+    """The names of a reference, in order, each with how many of the instances of the name before lead to it as well:
+    those that the second end of a range leaves out, as in left1.K1..K3."""
+    match written:
+        case Arrow():
+            yield from (*_dotted(written.sources), *_dotted(written.targets))
+        case Sum():
+            for part in written.parts:
+                yield from _dotted(part)
+        case RuleState():
+            yield from _dotted(written.ends)
+        case NeuronRange():
+            yield written.low, 0
+            again = len(written.high.steps) - len(written.last.steps)
+            yield written.high, len(written.low.steps) - 1 - again
+        case DottedName():
+            yield written, 0
 
 
 def _inside(item: Item, text: Text, parts: list[tuple[int, int]]) -> list[tuple[Span, bool]]:

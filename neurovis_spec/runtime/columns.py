@@ -11,22 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
-from neurovis_spec.compiler.names.state_references import (
-    Refusal,
-    StateOf,
-    connections_state,
-    holders_of,
-    model_state,
-    names_of_states,
-    rule_state,
-    singles,
-    split_state,
-    split_sum,
-    wiring_of,
-)
+from neurovis_spec.compiler.names.state_references import StateOf, names_of_states, singles
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.runtime.names import Names, names_of
-from neurovis_spec.runtime.recording import UnknownNameError
+from neurovis_spec.runtime.references import find_neurons, find_states
 from neurovis_spec.runtime.state import State
 
 
@@ -120,46 +108,8 @@ def columns_of(network: Network, keep: Keep = ALL) -> Columns:
 def _neurons(references: Sequence[str], names: Names | None, count: int) -> IntArray | None:
     if not references or names is None:
         return None
-    found = names.find(" + ".join(references))
-    if isinstance(found, str):
-        raise UnknownNameError(found)
-    chosen = np.array(sorted(found.neurons), dtype=np.int64)
+    chosen = np.array(sorted(find_neurons(" + ".join(references), names)), dtype=np.int64)
     return None if len(chosen) == count else chosen
-
-
-def find_states(network: Network, reference: str, names: Names | None = None) -> tuple[StateOf, ...]:
-    """The states of a reference (``K.v``, ``(K -> O).eligibility``, several joined with ``+``). Raises KeyError with
-    the nearest names."""
-    names = names_of(network) if names is None else names
-    return tuple(_state(network, part.strip(), names) for _, part in split_sum(reference))
-
-
-def _state(network: Network, text: str, names: Names) -> StateOf:
-    if not isinstance(names.find(text), str):
-        raise UnknownNameError(f"'{text}' is no state: its activity is recorded as that of a neuron, group or output")
-    name = split_state(text)
-    if name is None:
-        raise UnknownNameError(f"'{text}' is no state: write K.v for v of K's model, (K -> O).v for that of a rule")
-    one: StateOf | Refusal | None
-    if not name.of_rule:
-        one = model_state(name, _found(name.owner, names), holders_of(network))
-    elif name.owner.endswith(")") and name.owner in network.connection_index:
-        index = np.array([network.connection_index[name.owner]], dtype=np.int64)
-        one = connections_state(name, index, wiring_of(network))
-    else:
-        left, _, right = name.owner.partition("->")
-        one = rule_state(name, _found(left.strip(), names), _found(right.strip(), names), wiring_of(network))
-    if not isinstance(one, StateOf):
-        hint = "" if one is None or one.hint is None else f"; {one.hint}"
-        raise UnknownNameError(f"'{text}': {'there is none' if one is None else one.message}{hint}")
-    return one
-
-
-def _found(reference: str, names: Names) -> tuple[int, ...]:
-    found = names.find(reference)
-    if isinstance(found, str):
-        raise UnknownNameError(found)
-    return found.neurons
 
 
 def probe_of(network: Network, states: Iterable[StateOf]) -> Probe:

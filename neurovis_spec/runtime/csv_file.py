@@ -22,7 +22,7 @@ from typing import BinaryIO
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
-from neurovis_spec.compiler.names.state_references import split_state
+from neurovis_spec.language.references import Sum, parse, state_of
 from neurovis_spec.runtime.files import regular_size, replacing
 from neurovis_spec.runtime.recording import After, Recording, RecordingError, after_rows
 from neurovis_spec.runtime.rows import RowWriter, Steps
@@ -212,11 +212,12 @@ def _columns(names: list[str]) -> tuple[tuple[str, ...], list[str], list[str]]:
     seen: set[str] = set()
     last = 0
     for name in names:
-        state = split_state(name)
-        if state is not None and (state.of_rule or state.owner in seen or last):
+        written = parse(name)
+        state = state_of(written.parts[0]) if isinstance(written, Sum) else None
+        if state is not None and (state.of_rule or state.owner.text in seen or last):
             kind = kinds["state"]
         else:
-            kind = kinds["connection"] if " -> " in name else kinds["neuron"]
+            kind = kinds["neuron"] if isinstance(written, Sum) else kinds["connection"]
         if kind < last:
             raise RecordingError("not a recording: neurons are mixed with weights or states")
         last = kind

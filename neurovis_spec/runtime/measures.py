@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray
-from neurovis_spec.compiler.names.state_references import StateOf, names_of_states, split_state
+from neurovis_spec.compiler.names.state_references import StateOf, names_of_states
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import Findings, Span, shorten, suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
@@ -23,9 +23,11 @@ from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.measures import PLACE, Formula, parse_measure
 from neurovis_spec.language.expressions.parser import ExpressionError
 from neurovis_spec.language.expressions.tree import Binary, Call, Chain, Name, Tree, is_square, names, walk
-from neurovis_spec.runtime.columns import Probe, find_states, probe_of
+from neurovis_spec.language.references import Arrow, parse_sum, state_of
+from neurovis_spec.runtime.columns import Probe, probe_of
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.recording import UnknownNameError
+from neurovis_spec.runtime.references import find_states
 from neurovis_spec.runtime.state import constants
 from neurovis_spec.runtime.windows import running
 
@@ -143,10 +145,11 @@ def _resolve_state(
     """Whether a name is a state, or an output that is one; what it is, or what is wrong with it, is reported."""
     output = next((one for one in network.outputs if one.name == name and one.states), None)
     if output is None:
-        split = split_state(name)
-        if split is None or not isinstance(directory.find(name), str):
+        (part,) = parse_sum(name)
+        state = state_of(part)
+        if state is None or not isinstance(directory.find(name), str):
             return False
-        if not split.of_rule and isinstance(directory.find(split.owner), str):
+        if not isinstance(state.owner, Arrow) and isinstance(directory.find(state.owner.text), str):
             return False
         try:
             found = find_states(network, name, directory)

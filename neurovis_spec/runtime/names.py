@@ -1,4 +1,4 @@
-"""References in a recording: ``K``, ``K3``, ``K3..K5``, ``K1 + O``, ``left.K``, as a spec writes them.
+"""What references name in a recording: ``K``, ``K3``, ``K3..K5``, ``K1 + O``, ``left.K``, as a spec writes them.
 
 In: the names of neurons, groups and outputs, how many there are of counted instances, and a reference. Out: indices of
 neurons, or a text that says why there are none. It goes by names alone, which a file holds.
@@ -6,21 +6,13 @@ neurons, or a text that says why there are none. It goes by names alone, which a
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from itertools import count
 from typing import NamedTuple
 
-from neurovis_spec.compiler.names.state_references import StateName, split_state, split_sum
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import suggest
-
-_RANGE = re.compile(
-    r"(?P<way>(?:[^.\s]+\.)*)(?P<stem>[^.\s]*[^.\s\d])(?P<low>0|[1-9]\d*)\s*\.\.\s*"
-    r"(?P<again>(?:[^.\s]+\.)*)(?P=stem)(?P<high>0|[1-9]\d*)",
-    re.ASCII,
-)
+from neurovis_spec.language.references import Arrow, NeuronRange, Part, RuleState, parse_sum, state_of
 
 
 class Found(NamedTuple):
@@ -46,7 +38,7 @@ class Names:
 
     def find_states(self, reference: str) -> Found | str | None:
         """The columns of the states of a reference; None where it is to no state, a text where that is not there."""
-        parts = [part.strip() for _, part in split_sum(reference)]
+        parts = parse_sum(reference)
         result: list[int] = []
         single = len(parts) == 1
         for part in parts:
@@ -57,20 +49,20 @@ class Names:
             result += found.neurons
         return Found(tuple(result), single)
 
-    def _states(self, text: str) -> Found | str | None:
+    def _states(self, part: Part) -> Found | str | None:
+        text, name = part.text, state_of(part)
         if text in self.state_views:
             return Found(*self.state_views[text])
-        name = split_state(text)
-        if text in self.states and (name is None or not name.of_rule or name.owner.endswith(")")):
+        if text in self.states and not (isinstance(part, RuleState) and not part.ends.text.endswith(")")):
             return Found((self.states[text],), True)
-        if name is None or (not name.of_rule and isinstance(self.find(text), Found)):
-            return None
         single = False
-        if name.of_rule:
-            columns, single = self._of_rules(name)
+        if name is None:
+            return None
+        if isinstance(name.owner, Arrow):
+            columns, single = self._of_rules(name.owner, name.state)
         else:
-            owners = self.find(name.owner)
-            if isinstance(owners, str):
+            owners = self.find(name.owner.text)
+            if isinstance(owners, str) or isinstance(self.find(text), Found):
                 return None
             called = list(self.neurons)
             columns = [self.states.get(f"{called[index]}.{name.state}") for index in owners.neurons]
@@ -81,25 +73,24 @@ class Names:
             )
         return Found(there, single)
 
-    def _of_rules(self, name: StateName) -> tuple[list[int | None], bool]:
+    def _of_rules(self, wanted: Arrow, state: str) -> tuple[list[int | None], bool]:
         """The columns of a state between two ends, and whether it is the only one of two single neurons."""
-        left, _, right = name.owner.partition("->")
-        ends = [self.find(left.strip()), self.find(right.strip())]
-        if isinstance(ends[0], str) or isinstance(ends[1], str):
+        sources, targets = self.find(wanted.sources.text), self.find(wanted.targets.text)
+        if isinstance(sources, str) or isinstance(targets, str):
             return [], False
         columns: list[int | None] = []
         for text, column in self.states.items():
-            other = split_state(text)
-            if other is None or not other.of_rule or other.state != name.state:
+            (part,) = parse_sum(text)
+            if not isinstance(part, RuleState) or part.state != state:
                 continue
-            source, _, target = other.owner.partition(" -> ")
-            if self.neurons[source] in ends[0].neurons and self.neurons[target.partition(" ")[0]] in ends[1].neurons:
+            source, target = part.ends.sources.text, part.ends.targets.text.partition(" ")[0]
+            if self.neurons[source] in sources.neurons and self.neurons[target] in targets.neurons:
                 columns.append(column)
-        return columns, len(columns) == 1 and ends[0].single and ends[1].single
+        return columns, len(columns) == 1 and sources.single and targets.single
 
     def find(self, reference: str) -> Found | str:
         """The neurons of a reference, in the order written; a text says what is wrong."""
-        parts = [part.strip() for _, part in split_sum(reference)]
+        parts = parse_sum(reference)
         if len(parts) == 1:
             return self._one(parts[0])
         result: list[int] = []
@@ -108,16 +99,16 @@ class Names:
             if isinstance(found, str):
                 return found
             if not set(result).isdisjoint(found.neurons):
-                return f"'{part}' names neurons that are named before it in '{reference}'"
+                return f"'{part.text}' names neurons that are named before it in '{reference}'"
             result.extend(found.neurons)
         return Found(tuple(result), False)
 
-    def _one(self, name: str) -> Found | str:
-        found = self._plain(name)
-        if found is None and (match := _RANGE.fullmatch(name)) and match["again"] in ("", match["way"]):
-            found = self._range(match["way"], match["stem"], int(match["low"]), int(match["high"]))
+    def _one(self, part: Part) -> Found | str:
+        found = self._plain(part.text)
+        if found is None and isinstance(part, NeuronRange) and part.numbers is not None:
+            found = self._range(*part.numbers)
         if found is None:
-            return unknown_text("neuron, group or output", name, [*self.neurons, *self.views])
+            return unknown_text("neuron, group or output", part.text, [*self.neurons, *self.views])
         return found
 
     def _plain(self, name: str) -> Found | None:
@@ -132,19 +123,17 @@ class Names:
             return Found((self.neurons[name],), True)
         return Found(*self.views[name]) if name in self.views else None
 
-    def _range(self, way: str, stem: str, low: int, high: int) -> Found | None:
-        paths = [""] if not way else [f"{path}." for path in self._paths(way[:-1])]
-        return None if low > high else _joined([self._run(f"{path}{stem}", low, high) for path in paths])
+    def _range(self, group: str, numbers: range) -> Found | None:
+        way, dot, stem = group.rpartition(".")
+        return _joined([self._run(f"{path}{dot}{stem}", numbers) for path in (self._paths(way) if dot else [""])])
 
-    def _run(self, stem: str, low: int, high: int) -> Found | None:
+    def _run(self, stem: str, numbers: range) -> Found | None:
         indices: list[int] = []
-        for number in count(low):
+        for number in numbers:
             index = self.neurons.get(f"{stem}{number}")
             if index is None:
                 return None
             indices.append(index)
-            if number == high:
-                break
         return Found(tuple(indices), False)
 
     def _paths(self, way: str) -> list[str]:

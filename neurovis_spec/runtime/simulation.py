@@ -24,12 +24,14 @@ from neurovis_spec.compiler.events.settable import ParameterFormula
 from neurovis_spec.compiler.network import Network, Output
 from neurovis_spec.diagnostics import suggest
 from neurovis_spec.language.expressions.tree import Number
+from neurovis_spec.language.references import Sum, parse
 from neurovis_spec.runtime.backend import Backend, prepare
 from neurovis_spec.runtime.columns import probe_of
 from neurovis_spec.runtime.conditions import Controls
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.recording import Recording, UnknownNameError, unknown
+from neurovis_spec.runtime.references import find_connections, find_neurons
 from neurovis_spec.runtime.resume import resumed_state
 from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.runtime.watch import Watch
@@ -235,26 +237,14 @@ class Simulation:
         self._controls.learn(self._state, members, arguments.truth("on", on))
 
     def _neurons(self, text: str) -> IntArray:
-        found = self._names.find(arguments.text("reference", text))
-        if isinstance(found, str):
-            raise UnknownNameError(found)
-        return np.array(found.neurons, dtype=np.int64)
+        return np.array(find_neurons(arguments.text("reference", text), self._names), dtype=np.int64)
 
     def _parts(self, text: str) -> tuple[IntArray, IntArray]:
         """The neurons, or else the connections, that a reference names."""
         none = np.zeros(0, dtype=np.int64)
-        if "->" not in arguments.text("reference", text):
+        if isinstance(parse(arguments.text("reference", text)), Sum):
             return self._neurons(text), none
-        index = self.network.connection_index.get(text)
-        if index is not None and text.endswith(")"):
-            return none, np.array([index], dtype=np.int64)
-        source, _, target = text.partition("->")
-        connections = self.network.connections
-        sources, targets = self._neurons(source.strip()), self._neurons(target.strip())
-        found = np.flatnonzero(np.isin(connections.sources, sources) & np.isin(connections.targets, targets))
-        if not len(found):
-            raise unknown("connection", text, self.network.connection_names)
-        return none, found
+        return none, find_connections(self.network, text, self._names)
 
     def reset(self) -> None:
         """Back to the beginning, with the parameters of the beginning."""

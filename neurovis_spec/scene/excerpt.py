@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 from neurovis_spec.compiler.drawing.drawing_settings import RenderSettings
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.language.references import Arrow, parse
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.scene.renderers import RendererError
 from neurovis_spec.scene.shown import check_path
@@ -37,11 +38,11 @@ def excerpted(network: Network, settings: RenderSettings, excerpt: Excerpt) -> R
     if excerpt.focus is not None:
         settings = replace(settings, focus=(excerpt.focus, _found(network, names, excerpt.focus)))
     if excerpt.path is not None:
-        begin, arrow, end = (part.strip() for part in excerpt.path.partition("->"))
-        if not (begin and arrow and end):
+        path = parse(excerpt.path)
+        if not (isinstance(path, Arrow) and path.sources.text and path.targets.text):
             raise RendererError(f"'{excerpt.path}' is no path", "write 'A -> B'")
-        sources, targets = _found(network, names, begin), _found(network, names, end)
-        settings = replace(settings, path=(f"{begin} -> {end}", sources, targets))
+        sources, targets = _found(network, names, path.sources.text), _found(network, names, path.targets.text)
+        settings = replace(settings, path=(path.normal, sources, targets))
         check_path(network, settings)
     if excerpt.min_weight is not None:
         if not (math.isfinite(excerpt.min_weight) and excerpt.min_weight >= 0):

@@ -9,17 +9,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TypeAlias
 
-import numpy as np
-
 from neurovis_spec import arguments
 from neurovis_spec.compiler.drawing.drawing_settings import Curve, Panel
-from neurovis_spec.compiler.names.state_references import split_state, split_sum
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import suggest
+from neurovis_spec.language.references import Part, Sum, parse, state_of
 from neurovis_spec.language.views import VIEWS
-from neurovis_spec.runtime.columns import find_states
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.recording import UnknownNameError
+from neurovis_spec.runtime.references import find_connections, find_states
 from neurovis_spec.scene.renderers import RendererError
 
 #: A view by its name, with ``: `` and references behind it; or {view: references}.
@@ -75,11 +73,11 @@ def _taken_apart(wanted: View) -> Iterator[tuple[str, list[str]]]:
 def curves_of(network: Network, view: str, reference: str) -> list[Curve]:
     """What a reference names. Raises ViewError where the view does not show its kind, KeyError for an unknown name."""
     names = names_of(network)
-    state = split_state(reference)
-    if "->" in reference and not (state is not None and state.of_rule):
-        curves = _weights(network, reference, names)
+    found = parse(reference)
+    if isinstance(found, Sum):
+        curves = [curve for part in found.parts for curve in _part(network, part, names)]
     else:
-        curves = [curve for _, part in split_sum(reference) for curve in _part(network, part.strip(), names)]
+        curves = [Curve("connection", index) for index in find_connections(network, reference, names).tolist()]
     refused = refusal(view, reference, curves)
     if refused is not None:
         raise ViewError(*refused)
@@ -95,36 +93,20 @@ def refusal(view: str, reference: str, curves: Sequence[Curve]) -> tuple[str, st
     return None
 
 
-def _weights(network: Network, reference: str, names: Names) -> list[Curve]:
-    if reference in network.connection_index:
-        return [Curve("connection", network.connection_index[reference])]
-    ends = network.connections
-    found = []
-    for end in reference.split("->", 1):
-        members = names.find(end.strip())
-        if isinstance(members, str):
-            raise UnknownNameError(members)
-        found.append(members.neurons)
-    between = np.flatnonzero(np.isin(ends.sources, found[0]) & np.isin(ends.targets, found[1]))
-    if not len(between):
-        entries = suggest(reference, ends.entries, "connections")
-        raise UnknownNameError(f"there is no connection '{reference}'" + (f"; {entries}" if entries else ""))
-    return [Curve("connection", index) for index in between.tolist()]
-
-
-def _part(network: Network, part: str, names: Names) -> Iterator[Curve]:
-    output = next((one for one in network.outputs if one.name == part), None)
-    neurons = names.find(part)
+def _part(network: Network, part: Part, names: Names) -> Iterator[Curve]:
+    text = part.text
+    output = next((one for one in network.outputs if one.name == text), None)
+    neurons = names.find(text)
     if output is not None and output.states:
         states = output.states
-    elif isinstance(neurons, str) and part in network.input_index:
-        taking = [group for group in network.neurons.groups if group.input == part]
+    elif isinstance(neurons, str) and text in network.input_index:
+        taking = [group for group in network.neurons.groups if group.input == text]
         yield from (Curve("neuron", index) for group in taking for index in group.indices)
         return
     elif isinstance(neurons, str):
-        if split_state(part) is None:
+        if state_of(part) is None:
             raise UnknownNameError(neurons)
-        states = find_states(network, part, names)
+        states = find_states(network, text, names)
     else:
         yield from (Curve("neuron", index) for index in neurons.neurons)
         return

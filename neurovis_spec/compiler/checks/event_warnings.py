@@ -14,10 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
-from neurovis_spec.compiler.names.references import Directory, key_of, piece, resolve_end
+from neurovis_spec.compiler.names.references import Directory, key_of, resolve_sum
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.located import Formula, Located
+from neurovis_spec.language.references import Arrow, Sum, parse
 from neurovis_spec.language.sections import EventModel
 
 
@@ -72,18 +73,22 @@ class _Reader:
         return None if formula is None else self.constants.scalar(formula)
 
     def neurons(self, text: Located[str]) -> IntArray:
-        """The neurons of a reference, or of the end of a connection."""
-        if text.value not in self.known:
-            found = resolve_end(text, self.directory, self.constants.findings) or ()
-            self.known[text.value] = np.array(found, dtype=np.int64)
-        return self.known[text.value]
+        """The neurons of a reference."""
+        found = parse(text.value)
+        return self._of(found, text) if isinstance(found, Sum) else np.zeros(0, dtype=np.int64)
 
     def ends(self, text: Located[str]) -> tuple[IntArray, ...]:
         """The neurons of a reference, or those of either end of a connection."""
-        arrow = text.value.find("->")
-        if arrow < 0:
-            return (self.neurons(text),)
-        return self.neurons(piece(text, 0, arrow)), self.neurons(piece(text, arrow + 2, len(text.value)))
+        found = parse(text.value)
+        ends = (found.sources, found.targets) if isinstance(found, Arrow) else (found,)
+        return tuple(self._of(end, text) for end in ends if isinstance(end, Sum))
+
+    def _of(self, end: Sum, text: Located[str]) -> IntArray:
+        """The neurons of an end of a connection."""
+        if end.text not in self.known:
+            found = resolve_sum(end, text, self.directory, self.constants.findings) or ()
+            self.known[end.text] = np.array(found, dtype=np.int64)
+        return self.known[end.text]
 
     def clamps(self, models: tuple[EventModel, ...]) -> Iterator[_Clamp]:
         """All clamps, key by key."""

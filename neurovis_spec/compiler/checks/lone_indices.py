@@ -10,11 +10,13 @@ from collections.abc import Collection, Iterable, Iterator
 
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.names.expand import COUNTED
-from neurovis_spec.compiler.names.references import Section, parts, piece
+from neurovis_spec.compiler.names.references import Section
 from neurovis_spec.diagnostics import Findings, shorten
 from neurovis_spec.language.expressions.parser import parse, unknown_names
 from neurovis_spec.language.expressions.tree import Name, names
 from neurovis_spec.language.located import Located
+from neurovis_spec.language.references import Arrow
+from neurovis_spec.language.references import parse as parse_reference
 from neurovis_spec.language.sections import ConnectionModel, GroupModel
 from neurovis_spec.language.values import EdgeRows
 from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence
@@ -85,14 +87,11 @@ def _mentions(node: Sequence | Packed) -> bool:
 
 def _alone(key: Located[str], compiled: Compiled, place: int) -> dict[str, str]:
     """Which indices of an entry stand for one neuron, of the scope at a place."""
-    arrow = key.value.index("->")
-    ends = {"i": piece(key, 0, arrow), "j": piece(key, arrow + 2, len(key.value))}
-    alone = {}
-    for index, end in ends.items():
-        named = [name for name, _ in parts(end)]
-        if len(named) == 1 and _is_one(named[0], compiled, place):
-            alone[index] = named[0]
-    return alone
+    arrow = parse_reference(key.value)
+    ends = {"i": arrow.sources, "j": arrow.targets} if isinstance(arrow, Arrow) else {}
+    return {
+        index: end.text for index, end in ends.items() if len(end.parts) == 1 and _is_one(end.text, compiled, place)
+    }
 
 
 def _is_one(name: str, compiled: Compiled, place: int) -> bool:

@@ -15,13 +15,13 @@ from neurovis_spec.arrays import IntArray, frozen
 from neurovis_spec.compiler.connections.entries import Bundle, EntryBuilder, Place
 from neurovis_spec.compiler.connections.plasticity import title_of
 from neurovis_spec.compiler.limits import Limits
-from neurovis_spec.compiler.names.references import Directory, resolve_each
+from neurovis_spec.compiler.names.references import Directory, arrow_of, resolve_sum
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import Connections
 from neurovis_spec.compiler.neurons.populate import Population
 from neurovis_spec.compiler.values.constants import Constants
-from neurovis_spec.diagnostics import shorten
 from neurovis_spec.language.located import Located
+from neurovis_spec.language.references import Sum
 from neurovis_spec.language.sections import ConnectionModel, written
 
 
@@ -99,8 +99,10 @@ class Connector:
     def _entry(self, key: Located[str], body: ConnectionModel, seen: dict[str, int], total: int) -> Bundle | None:
         """One entry; None where it is invalid, and then all that does not depend on that is still looked at."""
         before = self.constants.findings.errors
-        sources, targets = self._ends(key)
-        name = _normal(key.value)
+        arrow = arrow_of(key, self.constants.findings)
+        sources = None if arrow is None else self._end(arrow.sources, key)
+        targets = None if arrow is None else self._end(arrow.targets, key)
+        name = key.value if arrow is None else arrow.normal
         seen[name] = seen.get(name, 0) + 1
         if seen[name] > 1:
             name = f"{name} ({seen[name]})"
@@ -109,24 +111,9 @@ class Connector:
         bundle = EntryBuilder(place, key, body, name, sources, targets).build()
         return bundle if self.constants.findings.errors == before else None
 
-    def _ends(self, key: Located[str]) -> tuple[IntArray | None, IntArray | None]:
-        _, arrow, right = key.value.partition("->")
-        if not arrow or "->" in right:
-            message = f"'{shorten(key.value)}' is no connection"
-            self.constants.findings.error("bad-connection", key.span, message, "write FROM -> TO")
-            return None, None
-        sources, targets = resolve_each(key, self.directory, self.constants.findings)
-        return (
-            None if sources is None else np.array(sources, dtype=np.int64),
-            None if targets is None else np.array(targets, dtype=np.int64),
-        )
-
-
-def _normal(text: str) -> str:
-    """An entry's name with single blanks: ``K1 + K3 -> O``."""
-    left, _, right = text.partition("->")
-    ends = (" + ".join(part.strip() for part in end.split("+")) for end in (left, right))
-    return " -> ".join(ends)
+    def _end(self, end: Sum, key: Located[str]) -> IntArray | None:
+        found = resolve_sum(end, key, self.directory, self.constants.findings)
+        return None if found is None else np.array(found, dtype=np.int64)
 
 
 def join(bundles: tuple[Bundle, ...], rules: IntArray) -> Connections:

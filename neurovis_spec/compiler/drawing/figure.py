@@ -1,7 +1,7 @@
 """The ``figure`` of the section ``render``: which views a picture is made of, their references resolved.
 
-In: the section as written, the Population, the connections, inputs and outputs. Out: Panels, or findings with the
-nearest known names.
+In: the section as written, the Population, the outputs, who finds what references name. Out: Panels, or findings with
+the nearest known names.
 """
 
 from __future__ import annotations
@@ -9,33 +9,28 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from neurovis_spec.compiler.connections.connect import Connected
 from neurovis_spec.compiler.drawing.drawing_settings import Curve, Panel
-from neurovis_spec.compiler.names.connection_references import Finder, wires_of
-from neurovis_spec.compiler.names.outputs import StateReader, state_reader
-from neurovis_spec.compiler.names.references import Directory, parts, resolve, resolve_part
-from neurovis_spec.compiler.names.state_references import StateName, StateOf
+from neurovis_spec.compiler.names.finder import Finder
+from neurovis_spec.compiler.names.references import Directory, resolve_part
+from neurovis_spec.compiler.names.state_references import StateOf
 from neurovis_spec.compiler.network import Output
 from neurovis_spec.compiler.neurons.populate import Population
-from neurovis_spec.diagnostics import Findings, Span, shorten
+from neurovis_spec.diagnostics import Span, shorten
 from neurovis_spec.language.drawing import PanelModel
 from neurovis_spec.language.located import Located
+from neurovis_spec.language.references import Part, Sum, parse
 from neurovis_spec.language.spec import Spec
-from neurovis_spec.language.yaml.source import Scalar
 
 
 def figure_of(
     spec: Spec,
     population: Population,
-    made: Connected,
     outputs: tuple[Output, ...],
-    findings: Findings,
+    finder: Finder,
 ) -> tuple[Panel, ...]:
     """The views in the order written; those that are invalid are left out, and reported."""
     models = () if spec.render is None else spec.render.figure
-    finder = Finder(wires_of(made), population.directory, findings)
-    states = state_reader(population, made, findings)
-    reader = _Reader(population, {output.name: output for output in outputs}, frozenset(spec.outputs), finder, states)
+    reader = _Reader(population, {output.name: output for output in outputs}, frozenset(spec.outputs), finder)
     panels = [reader.panel(model) for model in models]
     return tuple(panel for panel in panels if panel is not None)
 
@@ -47,7 +42,6 @@ class _Reader:
     #: the names of all outputs, also of those that are invalid
     declared: frozenset[str]
     finder: Finder
-    states: StateReader
 
     @property
     def directory(self) -> Directory:
@@ -70,58 +64,56 @@ class _Reader:
 
     def _curves(self, view: str, text: Located[str]) -> Iterator[Curve]:
         """What a reference names, where the view can show it."""
-        wired = view in ("weights", "matrix")
-        name = self.states.name(text.value.strip())
-        if "->" in text.value and (name is None or not name.of_rule):
+        found = parse(text.value)
+        if not isinstance(found, Sum):
             if view == "raster":
                 self._refuse(text.value, text.span, "a raster shows neurons", "show it as weights")
                 return
-            found = self.finder.connections(text)
-            yield from (Curve("connection", index) for index in ([] if found is None else found.tolist()))
+            connections = self.finder.connections(text)
+            yield from (Curve("connection", index) for index in ([] if connections is None else connections.tolist()))
             return
-        for part, span in parts(text):
-            if wired:
-                self._refuse(part, span, f"the view '{view}' shows connections", "write FROM -> TO")
+        for part in found.parts:
+            if view in ("weights", "matrix"):
+                span = text.node.at(part.start, part.end)
+                self._refuse(part.text, span, f"the view '{view}' shows connections", "write FROM -> TO")
                 continue
-            yield from self._part(view, part, span)
+            yield from self._part(view, part, text)
 
-    def _part(self, view: str, part: str, span: Span) -> Iterator[Curve]:
-        output = self.outputs.get(part)
-        known = self.directory.find(part) is not None
-        if not known and output is None and part in self.declared:
+    def _part(self, view: str, part: Part, text: Located[str]) -> Iterator[Curve]:
+        name = part.text
+        output = self.outputs.get(name)
+        known = self.directory.find(name) is not None
+        if not known and output is None and name in self.declared:
             return
-        name = None if known else self.states.name(part)
+        state = None if known else self.finder.name_of_state(part)
         if not known and output is not None and output.states:
             states: tuple[StateOf, ...] = output.states
-        elif name is not None and not (output is not None or self._fed(part)):
-            states = self._states(name, span)
+        elif state is not None and not (output is not None or self._fed(name)):
+            one = self.finder.state(state, part, text)
+            states = () if one is None else (one,)
         else:
-            yield from (Curve("neuron", index) for index in self._neurons(part, span, output))
+            yield from (Curve("neuron", index) for index in self._neurons(part, text, output))
             return
         if view == "raster":
-            self._refuse(part, span, "a raster shows neurons", "show it as traces")
+            self._refuse(name, text.node.at(part.start, part.end), "a raster shows neurons", "show it as traces")
             return
         for one in states:
             yield from (Curve("neuron", index, one.state) for index in one.neurons.tolist())
             yield from (Curve("connection", index, one.state) for index in one.connections.tolist())
 
-    def _states(self, name: StateName, span: Span) -> tuple[StateOf, ...]:
-        one = self.states.find(name, span)
-        return () if one is None else (one,)
-
-    def _neurons(self, part: str, span: Span, output: Output | None) -> tuple[int, ...]:
+    def _neurons(self, part: Part, text: Located[str], output: Output | None) -> tuple[int, ...]:
         """Those of a reference, of an output, of an instance, or those that take in an input."""
-        directory, findings = self.directory, self.finder.findings
-        if directory.find(part) is None:
+        directory, name = self.directory, part.text
+        if directory.find(name) is None:
             if output is not None:
                 return tuple(output.neurons.tolist())
-            if directory.instance(part):
-                found = resolve((Located(part, Scalar(part, span)),), directory, findings, instances=True)
-                return found or ()
-            if self._fed(part):
+            inside = directory.instance(name)
+            if inside:
+                return tuple(index for one in inside for index in one.members)
+            if self._fed(name):
                 groups = self.population.neurons.groups
-                return tuple(index for group in groups if group.input == part for index in group.indices)
-        return resolve_part(part, span, directory, findings) or ()
+                return tuple(index for group in groups if group.input == name for index in group.indices)
+        return resolve_part(part, text, directory, self.finder.findings) or ()
 
     def _fed(self, name: str) -> bool:
         """Whether it is an input that neurons take in."""

@@ -10,11 +10,12 @@ import math
 from typing import Literal
 
 from neurovis_spec.compiler.drawing.drawing_settings import StatedGain
-from neurovis_spec.compiler.names.connection_references import Finder
+from neurovis_spec.compiler.names.finder import Finder
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Span, shorten
 from neurovis_spec.language.drawing import GainValue, Range
 from neurovis_spec.language.located import Located
+from neurovis_spec.language.references import Sum, parse
 
 Sort = Literal["activity", "signal", "thickness", "change"]
 
@@ -32,7 +33,7 @@ def stated_gains(
         if one.key is None:
             found.append((StatedGain(value[0], None, "", value[1]), one.span))
         elif members is not None:
-            found.append((StatedGain(value[0], members, _called(one.key.value), value[1]), one.key.span))
+            found.append((StatedGain(value[0], members, parse(one.key.value).normal, value[1]), one.key.span))
     found.sort(key=lambda item: math.inf if item[0].members is None else len(item[0].members))
     _check_ties(found, constants)
     return tuple(stated for stated, _ in reversed(found))
@@ -63,7 +64,7 @@ def _value(one: GainValue, constants: Constants) -> tuple[float, float] | None:
 def _members(key: Located[str], sort: Sort, finder: Finder) -> tuple[int, ...] | None:
     """What a reference names: neurons, or connections."""
     if sort == "activity":
-        if "->" in key.value:
+        if not isinstance(parse(key.value), Sum):
             message = f"'{shorten(key.value)}' is a connection; 'activity' is the colour of neurons"
             finder.findings.error("wrong-type", key.span, message, "the colour of connections is 'signal'")
             return None
@@ -71,11 +72,6 @@ def _members(key: Located[str], sort: Sort, finder: Finder) -> tuple[int, ...] |
     else:
         found = finder.connections(key)
     return None if found is None else tuple(found.tolist())
-
-
-def _called(reference: str) -> str:
-    """A reference with single blanks."""
-    return " ".join(reference.replace("->", " -> ").split())
 
 
 def _check_ties(found: list[tuple[StatedGain, Span]], constants: Constants) -> None:

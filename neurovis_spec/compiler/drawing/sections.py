@@ -13,7 +13,7 @@ from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, Rend
 from neurovis_spec.compiler.drawing.gains import stated_gains
 from neurovis_spec.compiler.drawing.mirrors import check_pins, lines_of, mirrors_of
 from neurovis_spec.compiler.drawing.pins import DIAMETER, FARTHEST, pins_of
-from neurovis_spec.compiler.names.connection_references import Finder
+from neurovis_spec.compiler.names.finder import Finder
 from neurovis_spec.compiler.names.references import Directory, check_keys, key_of, resolve, resolve_end
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.neurons.populate import Population
@@ -21,6 +21,7 @@ from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, Span, shorten, suggest
 from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel, RenderModel
 from neurovis_spec.language.located import Formula, Located
+from neurovis_spec.language.references import Sum, parse
 from neurovis_spec.language.theme import ThemeModel
 from neurovis_spec.language.values import Reference
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
@@ -131,10 +132,8 @@ def _collapsed(
             yield text.value.strip(), found
 
 
-def render_settings(
-    model: RenderModel | None, finder: Finder, constants: Constants, directory: Directory
-) -> RenderSettings:
-    """The ``render`` section; ``finder`` and ``directory`` know what references in it name."""
+def render_settings(model: RenderModel | None, finder: Finder, constants: Constants) -> RenderSettings:
+    """The ``render`` section; ``finder`` knows what references in it name."""
     if model is None:
         return RenderSettings()
     gain, theme = model.gain, model.theme
@@ -163,7 +162,7 @@ def render_settings(
         legend=model.legend is None or model.legend.value,
         title=True if model.title is None else model.title.value,
         window=None if model.window is None else constants.integer(model.window, "a window of steps", 1),
-        collapse=tuple(_collapsed(model.collapse, directory, constants.findings)),
+        collapse=tuple(_collapsed(model.collapse, finder.directory, constants.findings)),
         min_weight=least,
     )
 
@@ -173,7 +172,7 @@ def _traces(model: RenderModel, finder: Finder, constants: Constants) -> tuple[S
     found: list[StatedTrace] = []
     for name, formula in model.trace.items():
         seconds, key = constants.scalar(formula), key_of(model.source, "trace", name)
-        if "->" in name:
+        if not isinstance(parse(name), Sum):
             message = f"'{shorten(name)}' is a connection; a trace is of neurons"
             constants.findings.error("wrong-type", key.span, message, "lines show the traces of their sources")
             continue

@@ -10,12 +10,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from neurovis_spec.arrays import IntArray
-from neurovis_spec.compiler.names.connection_references import Finder
+from neurovis_spec.compiler.names.finder import Finder
 from neurovis_spec.compiler.names.references import check_keys, key_of, other_parameter
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.model import lost_names
+from neurovis_spec.language.references import Sum, parse
 from neurovis_spec.language.sections import EventModel
 
 #: What an event may do.
@@ -139,7 +140,7 @@ class EventReader:
         neurons: list[IntArray] = []
         connections: list[IntArray] = []
         for text in texts:
-            joined = "->" in text.value
+            joined = not isinstance(parse(text.value), Sum)
             found = self.finder.connections(text) if joined else self.finder.neurons(text)
             if found is not None:
                 (connections if joined else neurons).append(found)
@@ -148,9 +149,9 @@ class EventReader:
     def _learning(self, name: Located[str], on: bool) -> list[tuple[IntArray, bool]]:
         """The connections whose rules are stopped or started."""
         found = self.finder.connections(name)
-        if found is None or self.finder.wires is None:
+        if found is None:
             return []
-        if not self.finder.wires.plastic[found].any():
+        if not self.finder.learns(found):
             message = f"nothing learns at '{shorten(name.value)}'"
             self.findings.error("no-rule", name.span, message, "name a connection that has a 'plasticity'")
         return [(found, on)]

@@ -1,4 +1,4 @@
-"""References: from ``K``, ``K3``, ``K3..K5`` or ``K1 + O`` to neuron indices.
+"""What references name: from ``K``, ``K3``, ``K3..K5`` or ``K1 + O`` to neuron indices.
 
 In: the groups and neuron names of a network. Out: tuples of indices, or a finding with the nearest known names.
 """
@@ -6,19 +6,19 @@ In: the groups and neuron names of a network. Out: tuples of indices, or a findi
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import islice
 from typing import TypeAlias
 
 from neurovis_spec.compiler.limits import PATIENCE
-from neurovis_spec.compiler.names.state_references import split_sum
 from neurovis_spec.compiler.names.unresolved import Gaps
 from neurovis_spec.compiler.network import Group
 from neurovis_spec.diagnostics import Findings, Span, did_you_mean, listed, meant, nearest, shorten, suggest
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.modules import ModuleModel
+from neurovis_spec.language.references import Arrow, Fault, NeuronRange, Part, Sum, parse, parse_sum
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 from neurovis_spec.language.yaml.source import Scalar
@@ -30,7 +30,6 @@ _MANY = 10_000
 #: A neuron's number as its name has it: without leading zeros.
 _NUMBER = re.compile(r"0|[1-9][0-9]{0,63}")
 _QUOTED = re.compile(r"'([^']*)'")
-_RANGE = re.compile(r"\s*(?P<low>\S+?)\s*\.\.\s*(?P<high>\S+)\s*")
 
 
 @dataclass(frozen=True)
@@ -199,43 +198,24 @@ def check_keys(
             resolve_end(Located(entry.name, entry.key), directory, findings)
 
 
-def piece(text: Located[str], start: int, end: int) -> Located[str]:
-    """Characters ``start`` to ``end`` of a text as a text of their own, with their place."""
-    return Located(text.value[start:end], text.node.part(start, end))
-
-
-def parts(text: Located[str]) -> Iterator[tuple[str, Span]]:
-    """The references that are joined with ``+``, each with its place.
-
-    >>> from neurovis_spec.language.yaml.source import Scalar
-    >>> node = Scalar("K1 + K3", Span("x", 1, 1, 1, 8))
-    >>> [(name, span.column) for name, span in parts(Located("K1 + K3", node))]
-    [('K1', 1), ('K3', 6)]
-    """
-    for start, piece in split_sum(text.value):
-        stripped = piece.strip()
-        offset = start + (len(piece) - len(piece.lstrip()))
-        yield stripped, text.node.at(offset, offset + len(stripped))
-
-
-def resolve_part(name: str, span: Span, directory: Directory, findings: Findings) -> tuple[int, ...] | None:
-    """One reference: a group, a neuron or a range."""
-    match = _RANGE.fullmatch(name)
-    if match:
-        found = directory.range(match["low"], match["high"])
+def resolve_part(part: Part, text: Located[str], directory: Directory, findings: Findings) -> tuple[int, ...] | None:
+    """One reference within a text: a group, a neuron or a range."""
+    span = text.node.at(part.start, part.end)
+    if isinstance(part, Fault):
+        findings.error(part.code, span, part.message, part.hint)
+        return None
+    if isinstance(part, NeuronRange):
+        found = directory.range(part.low.text, part.high.text)
         if isinstance(found, str):
-            if not directory.covers(match["low"]):
-                findings.error("bad-range", span, f"'{shorten(name)}' is no range: {found}")
+            if not directory.covers(part.low.text):
+                findings.error("bad-range", span, f"'{shorten(part.text)}' is no range: {found}")
             return None
         return found
-    result = directory.find(name)
-    if result is None:
-        if not name:
-            findings.error("empty-reference", span, "a reference is missing here", "name a group, a neuron or a range")
-        elif not directory.covers(name):
-            right = None if findings.many else directory.meant(name)
-            _unknown(name, span, directory, findings)
-            return None if right is None else directory.find(right)
+    result = directory.find(part.text)
+    if result is None and not directory.covers(part.text):
+        right = None if findings.many else directory.meant(part.text)
+        _unknown(part.text, span, directory, findings)
+        return None if right is None else directory.find(right)
     return result
 
 
@@ -256,51 +236,54 @@ def _unknown(name: str, span: Span, directory: Directory, findings: Findings) ->
 
 
 def resolve(
-    texts: tuple[Located[str], ...], directory: Directory, findings: Findings, *, instances: bool = False
+    texts: Iterable[Located[str]], directory: Directory, findings: Findings, *, instances: bool = False
 ) -> tuple[int, ...] | None:
     """Several references, in the order written; a neuron named twice is a finding. With ``instances`` the name of an
     instance stands for all of its neurons."""
+    return _resolve([(part, text) for text in texts for part in parse_sum(text.value)], directory, findings, instances)
+
+
+def resolve_end(text: Located[str], directory: Directory, findings: Findings) -> tuple[int, ...] | None:
+    """References joined with ``+``."""
+    return resolve((text,), directory, findings)
+
+
+def resolve_sum(found: Sum, text: Located[str], directory: Directory, findings: Findings) -> tuple[int, ...] | None:
+    """References joined with ``+`` within a text: an end of a connection."""
+    return _resolve([(part, text) for part in found.parts], directory, findings)
+
+
+def arrow_of(text: Located[str], findings: Findings) -> Arrow | None:
+    """A text that is to name connections, taken apart; None, and a finding, where it is no ``FROM -> TO``."""
+    found = parse(text.value)
+    if isinstance(found, Arrow):
+        return found
+    message = f"'{shorten(text.value)}' is no connection"
+    findings.error("bad-connection", text.span, message, "write FROM -> TO")
+    return None
+
+
+def _resolve(
+    written: Iterable[tuple[Part, Located[str]]], directory: Directory, findings: Findings, instances: bool = False
+) -> tuple[int, ...] | None:
     result: list[int] = []
     seen: set[int] = set()
     before = findings.errors
     failed = False
-    for text in texts:
-        for name, span in parts(text):
-            if findings.errors - before >= PATIENCE:
-                return None
-            inside = directory.instance(name) if instances else ()
-            found: tuple[int, ...] | None = tuple(index for one in inside for index in one.members)
-            if not inside:
-                found = resolve_part(name, span, directory, findings)
-            if found is None:
-                failed = True
-                continue
-            if not seen.isdisjoint(found):
-                findings.error("repeated-reference", span, f"'{shorten(name)}' names neurons that are named before it")
-                failed = True
-            seen.update(found)
-            result.extend(found)
+    for part, text in written:
+        if findings.errors - before >= PATIENCE:
+            return None
+        inside = directory.instance(part.text) if instances else ()
+        found: tuple[int, ...] | None = tuple(index for one in inside for index in one.members)
+        if not inside:
+            found = resolve_part(part, text, directory, findings)
+        if found is None:
+            failed = True
+            continue
+        if not seen.isdisjoint(found):
+            span = text.node.at(part.start, part.end)
+            findings.error("repeated-reference", span, f"'{shorten(part.text)}' names neurons that are named before it")
+            failed = True
+        seen.update(found)
+        result.extend(found)
     return None if failed else tuple(result)
-
-
-def resolve_end(text: Located[str], directory: Directory, findings: Findings) -> tuple[int, ...] | None:
-    """One end of a connection: references joined with ``+``."""
-    return resolve((text,), directory, findings)
-
-
-def resolve_ends(
-    text: Located[str], directory: Directory, findings: Findings
-) -> tuple[tuple[int, ...], tuple[int, ...]] | None:
-    """Both ends of ``FROM -> TO``; None where one is invalid."""
-    sources, targets = resolve_each(text, directory, findings)
-    return None if sources is None or targets is None else (sources, targets)
-
-
-def resolve_each(
-    text: Located[str], directory: Directory, findings: Findings
-) -> tuple[tuple[int, ...] | None, tuple[int, ...] | None]:
-    """Each end of ``FROM -> TO``, split at its first arrow; both are checked even if one is invalid."""
-    arrow = text.value.index("->")
-    sources = resolve_end(piece(text, 0, arrow), directory, findings)
-    targets = resolve_end(piece(text, arrow + 2, len(text.value)), directory, findings)
-    return sources, targets

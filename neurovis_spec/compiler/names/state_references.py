@@ -1,12 +1,11 @@
 """States by reference: ``K.v`` is the state v of the model of K's neurons, ``(K -> O).eligibility`` that of a rule.
 
-In: a reference as written, who finds neurons by name, who has which states. Out: StateOf, or what is wrong with it.
-Specs, commands, simulations and recordings read such references here; a name that is a neuron's is never a state's.
+In: the name of a state, the neurons or connections that are to have it, who has which states. Out: StateOf, or what is
+wrong with it. A name that is a neuron's is never a state's.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,20 +13,12 @@ import numpy as np
 
 from neurovis_spec.arrays import IntArray
 from neurovis_spec.diagnostics import shorten, suggest
+from neurovis_spec.language.references import StateName
 
 if TYPE_CHECKING:
     from neurovis_spec.compiler.network import Network
 
-_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _NONE: IntArray = np.zeros(0, dtype=np.int64)
-
-
-class StateName(NamedTuple):
-    """A reference to a state, taken apart: ``owner`` is a reference to neurons, or ``FROM -> TO``."""
-
-    owner: str
-    state: str
-    of_rule: bool
 
 
 class StateOf(NamedTuple):
@@ -59,46 +50,18 @@ class Holder(NamedTuple):
 
 
 class Wiring(NamedTuple):
-    """The ends of all connections, and the states of their rules. ``complete``: there are no others."""
+    """The ends of all connections, what the entries are called, and the states of the rules. ``complete``: there are no
+    others."""
 
     sources: IntArray
     targets: IntArray
+    names: tuple[str, ...]
     rules: tuple[Holder, ...]
     complete: bool = True
 
-
-def split_state(text: str) -> StateName | None:
-    """A reference taken apart, None where it cannot be one to a state.
-
-    >>> [None if name is None else tuple(name) for name in map(split_state, ("left1.K.v", "(K -> O).e", "K1..K3"))]
-    [('left1.K', 'v', False), ('K -> O', 'e', True), None]
-    """
-    owner, dot, state = (part.strip() for part in text.rpartition("."))
-    if not dot or not _NAME.fullmatch(state) or not owner or owner.endswith("."):
-        return None
-    low, dots, high = text.partition("..")
-    way, dot, _ = low.strip().rpartition(".")
-    if dots and "." not in high.strip().removeprefix(way + dot):  # left1.K1..left1.K3: the end of a range
-        return None
-    if owner.startswith("(") and owner.endswith(")"):
-        ends = owner[1:-1].strip()
-        return StateName(ends, state, True) if ends.count("->") == 1 else None
-    return None if "->" in owner or "(" in owner or ")" in owner else StateName(owner, state, False)
-
-
-def split_sum(text: str) -> Iterator[tuple[int, str]]:
-    """The references that are joined with ``+``, which stand outside of parentheses, each with where it begins.
-
-    >>> list(split_sum("(K + L -> O).e + K.v"))
-    [(0, '(K + L -> O).e '), (16, ' K.v')]
-    """
-    start = depth = 0
-    for place, character in enumerate(text):
-        depth += (character == "(") - (character == ")")
-        if character == "+" and depth <= 0:
-            yield start, text[start:place]
-            start = place + 1
-    yield start, text[start:]
+    def between(self, sources: Sequence[int], targets: Sequence[int]) -> IntArray:
+        """The connections from any of some neurons to any of others."""
+        return np.flatnonzero(np.isin(self.sources, sources) & np.isin(self.targets, targets))
 
 
 def model_state(name: StateName, neurons: Sequence[int], models: Iterable[Holder]) -> StateOf | Refusal:
@@ -106,20 +69,13 @@ def model_state(name: StateName, neurons: Sequence[int], models: Iterable[Holder
     wanted = np.array(neurons, dtype=np.int64)
     for holder in models:
         if name.state not in holder.states and np.isin(wanted, holder.members).any():
-            return no_state(f"the model '{holder.kind}' of '{shorten(name.owner)}'", name.state, holder.states)
+            return no_state(f"the model '{holder.kind}' of '{shorten(name.owner.text)}'", name.state, holder.states)
     return StateOf(name.state, wanted, _NONE)
 
 
-def rule_state(
-    name: StateName, sources: Sequence[int], targets: Sequence[int], wiring: Wiring
-) -> StateOf | Refusal | None:
-    """A state of the rules between two ends; None where the connection that has it may be one that is invalid."""
-    between = np.isin(wiring.sources, np.array(sources)) & np.isin(wiring.targets, np.array(targets))
-    return connections_state(name, np.flatnonzero(between), wiring)
-
-
 def connections_state(name: StateName, connections: IntArray, wiring: Wiring) -> StateOf | Refusal | None:
-    """A state of those of these connections whose rule has it."""
+    """A state of those of these connections whose rule has it; None where the connection that has it may be one that is
+    invalid."""
     holders = [holder for holder in wiring.rules if np.isin(connections, holder.members).any()]
     having = [holder.members for holder in holders if name.state in holder.states]
     if having:
@@ -127,10 +83,10 @@ def connections_state(name: StateName, connections: IntArray, wiring: Wiring) ->
     if not wiring.complete:
         return None
     if not len(connections):
-        return Refusal(f"there is no connection '{shorten(name.owner)}'")
+        return Refusal(f"there is no connection '{shorten(name.owner.text)}'")
     if not holders:
-        return Refusal(f"no rule changes '{shorten(name.owner)}', so it has no states")
-    return no_state(f"the rule '{holders[0].kind}' of '{shorten(name.owner)}'", name.state, holders[0].states)
+        return Refusal(f"no rule changes '{shorten(name.owner.text)}', so it has no states")
+    return no_state(f"the rule '{holders[0].kind}' of '{shorten(name.owner.text)}'", name.state, holders[0].states)
 
 
 def no_state(owner: str, state: str, states: tuple[str, ...]) -> Refusal:
@@ -154,7 +110,8 @@ def wiring_of(network: Network) -> Wiring:
         Holder(entry.members, entry.rule.name, tuple(quantity.name for quantity in entry.rule.state))
         for entry in network.plasticity
     )
-    return Wiring(network.connections.sources, network.connections.targets, rules)
+    connections = network.connections
+    return Wiring(connections.sources, connections.targets, connections.entries, rules)
 
 
 def singles(states: Iterable[StateOf]) -> Iterator[tuple[str, str, int]]:

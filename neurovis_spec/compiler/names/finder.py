@@ -1,0 +1,135 @@
+"""Who finds what references name in a spec: neurons, connections, states of models and rules.
+
+In: the Population, the connections that are made. Out: arrays of indices and StateOf, or findings with the nearest
+names. References that are written alike share one array.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from neurovis_spec.arrays import IntArray, frozen
+from neurovis_spec.compiler.connections.connect import Connected
+from neurovis_spec.compiler.names.references import Directory, arrow_of, few, resolve_end, resolve_part, resolve_sum
+from neurovis_spec.compiler.names.state_references import (
+    Holder,
+    Refusal,
+    StateOf,
+    Wiring,
+    connections_state,
+    model_state,
+)
+from neurovis_spec.compiler.neurons.populate import Population
+from neurovis_spec.diagnostics import Findings, shorten, suggest
+from neurovis_spec.language.located import Located
+from neurovis_spec.language.references import Arrow, Part, StateName, state_of
+
+
+@dataclass(frozen=True)
+class Finder:
+    """Finds what references name; ``models`` has the states of neurons, ``wiring`` the connections and their states."""
+
+    directory: Directory
+    models: tuple[Holder, ...]
+    wiring: Wiring
+    findings: Findings
+    #: what references mean, those that are valid
+    known_neurons: dict[str, IntArray] = field(default_factory=dict)
+    known_connections: dict[str, IntArray] = field(default_factory=dict)
+
+    def neurons(self, text: Located[str]) -> IntArray | None:
+        """The neurons of a reference; None where it is invalid."""
+        if text.value not in self.known_neurons:
+            found = resolve_end(text, self.directory, self.findings)
+            if found is None:
+                return None
+            self.known_neurons[text.value] = np.unique(np.array(found, dtype=np.int64))
+            frozen(self.known_neurons[text.value])
+        return self.known_neurons[text.value]
+
+    def connections(self, text: Located[str]) -> IntArray | None:
+        """The connections between two ends; None, and a finding, where there is none."""
+        if text.value not in self.known_connections:
+            arrow = arrow_of(text, self.findings)
+            found = None if arrow is None else self._between(arrow, text)
+            if arrow is None or found is None or not self.wiring.complete:
+                return None
+            if not len(found):
+                message = f"there is no connection '{shorten(text.value)}'"
+                self.findings.error("no-connection", text.span, message, lambda: self._other(arrow, text))
+                return None
+            frozen(found)
+            self.known_connections[text.value] = found
+        return self.known_connections[text.value]
+
+    def _between(self, arrow: Arrow, text: Located[str], back: bool = False) -> IntArray | None:
+        sources = resolve_sum(arrow.sources, text, self.directory, self.findings)
+        targets = resolve_sum(arrow.targets, text, self.directory, self.findings)
+        if sources is None or targets is None:
+            return None
+        return self.wiring.between(targets, sources) if back else self.wiring.between(sources, targets)
+
+    def learns(self, connections: IntArray) -> bool:
+        """Whether any of these connections has a rule."""
+        return any(bool(np.isin(connections, rule.members).any()) for rule in self.wiring.rules)
+
+    def _other(self, arrow: Arrow, text: Located[str]) -> str | None:
+        """Which connection may be meant: the one the other way, those that are called alike, those of either end."""
+        source, target = arrow.sources.text, arrow.targets.text
+        back = self._between(arrow, text, back=True)
+        if back is not None and len(back):
+            return f"there is '{shorten(target)} -> {shorten(source)}', the other way"
+        names = self.wiring.names
+        near = [name for name in names if source in name.split(" -> ")[0] or target in name.split(" -> ")[-1]]
+        return suggest(f"{source} -> {target}", few(arrow.text, near or names), "connections")
+
+    def name_of_state(self, part: Part) -> StateName | None:
+        """A reference that is to a state, and to no neuron or range of neurons."""
+        name = state_of(part)
+        if name is None or isinstance(name.owner, Arrow):
+            return name
+        if self.directory.find(part.text) is not None or self.directory.instance(part.text):
+            return None
+        owner = name.owner.text
+        return None if self.directory.instance(owner) or owner in self.directory.instances else name
+
+    def state(self, name: StateName, part: Part, text: Located[str]) -> StateOf | None:
+        """The state that a part of a text names; None where there is none, which is reported."""
+        one: StateOf | Refusal | None
+        if isinstance(name.owner, Arrow):
+            connections = self._between(name.owner, text)
+            one = None if connections is None else connections_state(name, connections, self.wiring)
+        else:
+            neurons = resolve_part(name.owner, text, self.directory, self.findings)
+            one = None if neurons is None else model_state(name, neurons, self.models)
+        if isinstance(one, Refusal):
+            self.findings.error("unknown-state", text.node.at(part.start, part.end), one.message, one.hint)
+            return None
+        return one
+
+
+def finder_of(population: Population, made: Connected, findings: Findings) -> Finder:
+    """Who finds what is called how in a spec."""
+    rules, start = [], 0
+    for bundle in made.bundles:
+        members = np.arange(start, start + len(bundle.sources))
+        start += len(members)
+        if bundle.learning is not None:
+            rule = bundle.learning.rule
+            rules.append(Holder(members, rule.name, tuple(quantity.name for quantity in rule.state)))
+    names = tuple(bundle.name for bundle in made.bundles)
+    wiring = Wiring(made.sources, made.targets, names, tuple(rules), made.complete)
+    return Finder(population.directory, _models(population), wiring, findings)
+
+
+def _models(population: Population) -> tuple[Holder, ...]:
+    """The states of the models of groups; nothing is known of a group whose model is invalid."""
+    result = []
+    for group, kind, written in zip(population.neurons.groups, population.kinds, population.models, strict=True):
+        if "model" in written.lost or (written.model is not None and written.model.name.value != kind.model.name):
+            continue
+        states = tuple(quantity.name for quantity in kind.model.state)
+        result.append(Holder(np.array(group.indices, dtype=np.int64), kind.model.name, states))
+    return tuple(result)

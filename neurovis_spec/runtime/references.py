@@ -1,0 +1,75 @@
+"""What references name in a network: neurons, connections, states of models and rules.
+
+In: a Network, a reference as a spec writes it. Out: indices, or KeyError with the nearest names.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from neurovis_spec.arrays import IntArray
+from neurovis_spec.compiler.names.state_references import (
+    Refusal,
+    StateOf,
+    connections_state,
+    holders_of,
+    model_state,
+    wiring_of,
+)
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.diagnostics import suggest
+from neurovis_spec.language.references import Arrow, Part, parse, parse_sum, state_of
+from neurovis_spec.runtime.names import Names, names_of
+from neurovis_spec.runtime.recording import UnknownNameError
+
+
+def find_neurons(reference: str, names: Names) -> tuple[int, ...]:
+    """The neurons of a reference. Raises KeyError."""
+    found = names.find(reference)
+    if isinstance(found, str):
+        raise UnknownNameError(found)
+    return found.neurons
+
+
+def find_connections(network: Network, reference: str, names: Names) -> IntArray:
+    """The connections of ``FROM -> TO``, or the one of several with the same ends that is called ``A -> B (2)``. Raises
+    KeyError."""
+    found = parse(reference)
+    if not isinstance(found, Arrow):
+        raise UnknownNameError(f"'{reference}' is no connection: write FROM -> TO")
+    connections = _between(network, found, names)
+    if not len(connections):
+        hint = suggest(reference, (*network.connections.entries, *network.connection_names), "connections")
+        raise UnknownNameError(f"there is no connection '{reference}'" + (f"; {hint}" if hint else ""))
+    return connections
+
+
+def _between(network: Network, arrow: Arrow, names: Names) -> IntArray:
+    if arrow.text.endswith(")") and arrow.text in network.connection_index:
+        return np.array([network.connection_index[arrow.text]], dtype=np.int64)
+    sources, targets = find_neurons(arrow.sources.text, names), find_neurons(arrow.targets.text, names)
+    return wiring_of(network).between(sources, targets)
+
+
+def find_states(network: Network, reference: str, names: Names | None = None) -> tuple[StateOf, ...]:
+    """The states of a reference (``K.v``, ``(K -> O).eligibility``, several joined with ``+``). Raises KeyError with
+    the nearest names."""
+    names = names_of(network) if names is None else names
+    return tuple(_state(network, part, names) for part in parse_sum(reference))
+
+
+def _state(network: Network, part: Part, names: Names) -> StateOf:
+    text = part.text
+    if not isinstance(names.find(text), str):
+        raise UnknownNameError(f"'{text}' is no state: its activity is recorded as that of a neuron, group or output")
+    name = state_of(part)
+    if name is None:
+        raise UnknownNameError(f"'{text}' is no state: write K.v for v of K's model, (K -> O).v for that of a rule")
+    if isinstance(name.owner, Arrow):
+        one = connections_state(name, _between(network, name.owner, names), wiring_of(network))
+    else:
+        one = model_state(name, find_neurons(name.owner.text, names), holders_of(network))
+    assert one is not None  # no connection of a network is invalid
+    if isinstance(one, Refusal):
+        raise UnknownNameError(f"'{text}': {one.message}" + (f"; {one.hint}" if one.hint else ""))
+    return one
