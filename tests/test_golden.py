@@ -53,14 +53,6 @@ def plain(value: object) -> Plain:
 
 def network_of(compiled: CompiledNetwork) -> Plain:
     network = compiled.network
-    program: list[Plain] = [
-        {
-            "operation": type(operation).__name__,
-            "reads": plain(operation.reads),
-            "writes": plain(operation.writes),
-        }
-        for operation in network.program
-    ]
     described = {key: plain(value) for key, value in compiled.describe().items() if key != "hash"}
     return {
         **described,
@@ -69,7 +61,7 @@ def network_of(compiled: CompiledNetwork) -> Plain:
         "initial": plain(network.neurons.initial),
         "blocks": plain(network.blocks),
         "plasticity": plain(network.plasticity),
-        "program": program,
+        "program": plain(network.program),
     }
 
 

@@ -1,7 +1,7 @@
 """The update program: what a step does, and by which definitions.
 
 In: nothing; these are values of a Network. Definitions (activations, models, rules) are typed expressions; blocks and
-plasticities say which neurons and connections they are for; operations say what each reads and what it writes.
+plasticities say which neurons and connections they are for; operations are what a step does, in order.
 """
 
 from __future__ import annotations
@@ -94,58 +94,32 @@ class Plasticity:
     signals: Mapping[str, IntArray]
 
 
-# The update program. Names in ``reads`` and ``writes``: inputs, activity, weights, signals (w·a under way), history
-# (past activities), drive[b], cells[b] (states of block b), traces[p] (states of plasticity p).
+# The update program: operations in the order of §5. Each sees what those before it have made in the same step.
 
 
 @dataclass(frozen=True, slots=True)
 class ReadInputs:
     """s[t]: expressions, tables and what the caller supplied, into the vector of all inputs."""
 
-    reads: frozenset[str] = frozenset()
-    writes: frozenset[str] = frozenset({"inputs"})
-
 
 @dataclass(frozen=True, slots=True)
 class Gather:
-    """u[t] of a block: what arrives, combined, + bias + input (§5.2)."""
+    """u[t] of a block: what arrives, combined, + bias + input. Delay 0 reads activities of this step, the rest the
+    signals under way."""
 
     block: int
-
-    @property
-    def reads(self) -> frozenset[str]:
-        """Delay 0 reads activities of this step, the rest the signals under way."""
-        return frozenset({"inputs", "activity", "weights", "signals"})
-
-    @property
-    def writes(self) -> frozenset[str]:
-        """The drive of the block."""
-        return frozenset({f"drive[{self.block}]"})
 
 
 @dataclass(frozen=True, slots=True)
 class Update:
-    """The states and the activity of a block; at step 0 neurons with ``initial`` take it instead."""
+    """The states and the activity of a block, from its drive; at step 0 neurons with ``initial`` take it instead."""
 
     block: int
-
-    @property
-    def reads(self) -> frozenset[str]:
-        """The drive and the states of the block."""
-        return frozenset({f"drive[{self.block}]", f"cells[{self.block}]"})
-
-    @property
-    def writes(self) -> frozenset[str]:
-        """The states of the block and its activities."""
-        return frozenset({f"cells[{self.block}]", "activity"})
 
 
 @dataclass(frozen=True, slots=True)
 class Send:
     """w[t]·a[t] of every delayed connection leaves its source; a[t] is remembered for ``pre``."""
-
-    reads: frozenset[str] = frozenset({"activity", "weights"})
-    writes: frozenset[str] = frozenset({"signals", "history"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,16 +127,6 @@ class Learn:
     """The rule of a plasticity, step and (where it has them) episode: w[t+1] and its states, from old values."""
 
     plasticity: int
-
-    @property
-    def reads(self) -> frozenset[str]:
-        """Everything that a rule may name."""
-        return frozenset({"inputs", "activity", "history", "weights", f"traces[{self.plasticity}]"})
-
-    @property
-    def writes(self) -> frozenset[str]:
-        """The weights of its connections and their states."""
-        return frozenset({"weights", f"traces[{self.plasticity}]"})
 
 
 Operation: TypeAlias = ReadInputs | Gather | Update | Send | Learn
