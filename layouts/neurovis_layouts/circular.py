@@ -14,7 +14,7 @@ class CircularEngine:
 
     name = "circular"
     capabilities = Capabilities(
-        pins=True, arrange=False, boxes=True, direction=True, modules=True, memory=True, neurons=100_000
+        pins=True, arrange=False, boxes=True, direction=True, modules=True, memory=True, neurons=100_000, suits="tangle"
     )
 
     def lay_out(self, problem: LayoutProblem) -> Layout:

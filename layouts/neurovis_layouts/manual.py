@@ -13,7 +13,9 @@ class ManualEngine:
     """Positions as given, routes that avoid discs."""
 
     name = "manual"
-    capabilities = Capabilities(pins=True, free=False, arrange=False, boxes=True, direction=True, memory=True)
+    capabilities = Capabilities(
+        pins=True, free=False, arrange=False, boxes=True, direction=True, memory=True, suits="places"
+    )
 
     def lay_out(self, problem: LayoutProblem) -> Layout:
         """Keep every pin, route every edge."""

@@ -89,9 +89,6 @@ class Spacing(Model):
     rank: FormulaField | None = Field(None, description="Between ranks (default 2).")
 
 
-ENGINES = ("auto", "layered", "organic", "large", "circular", "grid", "spatial", "manual")
-
-
 class LayoutModel(Model):
     """How the network is laid out."""
 

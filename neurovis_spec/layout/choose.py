@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence, Set
 
-from neurovis_spec.layout.engines import engine_of
-from neurovis_spec.layout.model import LayoutProblem, LayoutRefusalError
+from neurovis_spec.layout.engines import engine_of, engines_that
+from neurovis_spec.layout.model import LayoutProblem, LayoutRefusalError, Suits
 from neurovis_spec.layout.refusals import asked_by, refuse
 
 #: A component of so many neurons, with so many connections each within their group, is a tangle.
@@ -36,11 +36,24 @@ _MOST_TO_AND_FRO, _MOST_IN_ROW, _ENDS = 60, 120, 0.1
 
 def choose_engine(problem: LayoutProblem) -> tuple[str, str]:
     """The engine that ``auto`` stands for, and why, in words for ``inspect``. What is too large for the one that suits
-    it best is drawn by ``large``, if that can do all that is asked."""
-    name, why = _most_suitable(problem)
-    if _takes(name, problem) or not _takes("large", problem):
+    it best is drawn by the one for clusters, if that can do all that is asked. Raises LayoutRefusalError where none is
+    installed."""
+    suits, why = _most_suitable(problem)
+    name = _suited(suits)
+    if _takes(name, problem):
         return name, why
-    return "large", f"{why}, and '{name}' does not draw so many neurons and connections"
+    large = _suited("clusters")
+    if not _takes(large, problem):
+        return name, why
+    return large, f"{why}, and '{name}' does not draw so many neurons and connections"
+
+
+def _suited(suits: Suits) -> str:
+    """The engine that shows something best."""
+    names = engines_that(lambda can: can.suits == suits)
+    if not names:
+        raise LayoutRefusalError("unknown-engine", f"no layout engine is installed that suits {suits}")
+    return names[0]
 
 
 def _takes(name: str, problem: LayoutProblem) -> bool:
@@ -52,15 +65,15 @@ def _takes(name: str, problem: LayoutProblem) -> bool:
     return True
 
 
-def _most_suitable(problem: LayoutProblem) -> tuple[str, str]:
-    """The engine whose drawing says most, and why."""
+def _most_suitable(problem: LayoutProblem) -> tuple[Suits, str]:
+    """What a drawing is to show, and why."""
     edges = len(problem.edges)
     if problem.arrange or problem.mirrors or problem.align:
-        return "layered", "it can arrange, mirror and align as the spec says"
+        return "flow", "it can arrange, mirror and align as the spec says"
     if problem.neurons and len(problem.pins) == len(problem.neurons):
-        return "manual", "every neuron has a position"
+        return "places", "every neuron has a position"
     if problem.modules and edges <= _MOST_IN_LAYERS:
-        return "layered", "it draws instances as frames"
+        return "flow", "it draws instances as frames"
     if not (problem.pins or problem.modules) and _tangled(problem):
         why = "its neurons drive one another in loops so densely that ranks would say nothing"
         if (
@@ -68,20 +81,20 @@ def _most_suitable(problem: LayoutProblem) -> tuple[str, str]:
             and len(problem.neurons) <= _MOST_IN_RING
             and edges > _COMPLETE * len(problem.neurons) ** 2
         ):
-            return "circular", why
+            return "tangle", why
         if len(problem.neurons) <= _MOST_BY_DISTANCE:
-            return "organic", why
-        return "large", why
+            return "nearness", why
+        return "clusters", why
     if not (problem.pins or problem.boxes or problem.modules) and _as_trees(problem):
-        return "large", f"its {edges} connections form trees, which it draws without a crossing"
+        return "clusters", f"its {edges} connections form trees, which it draws without a crossing"
     if edges > _MOST_IN_RANKS and _in_branches(problem):
-        return "layered", f"its {edges} connections form chains or trees, whose flow ranks keep"
+        return "flow", f"its {edges} connections form chains or trees, whose flow ranks keep"
     if edges > _MOST_IN_RANKS and not _in_layers(problem):
         if problem.boxes and not (problem.pins or problem.modules) and len(problem.neurons) <= _MOST_BY_DISTANCE:
-            return "organic", f"its {edges} connections are too many to follow each: boxes that stand apart say more"
+            return "nearness", f"its {edges} connections are too many to follow each: boxes that stand apart say more"
         shown = ", and instances show as such, not as frames drawn alike" if problem.modules else ""
-        return "large", f"its {edges} connections are too many to follow each: clusters say more{shown}"
-    return "layered", "the default for networks whose positions are not all given"
+        return "clusters", f"its {edges} connections are too many to follow each: clusters say more{shown}"
+    return "flow", "the default for networks whose positions are not all given"
 
 
 def _in_branches(problem: LayoutProblem) -> bool:

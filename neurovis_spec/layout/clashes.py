@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec.layout.engines import engines_that
 from neurovis_spec.layout.frames import BOX_ACROSS, BOX_TIGHT, Frames
 from neurovis_spec.layout.model import Layout, LayoutProblem
 
@@ -20,8 +21,6 @@ from neurovis_spec.layout.model import Layout, LayoutProblem
 _SLACK = 1 / 32
 #: With more frames than this nobody looks at one.
 _MOST = 2000
-#: Engines in which boxes are frames; in the others they are drawn around what happens to stand there.
-_WITH_BOXES = ("layered",)
 #: So many neurons are looked for in a spec.
 _MOST_ABOUT = 20
 
@@ -37,9 +36,11 @@ class Clash:
 
 
 def clashes(problem: LayoutProblem, layout: Layout) -> list[Clash]:
-    """Pairs of frames, then frames with a neuron that is none of theirs; instances come before boxes."""
+    """Pairs of frames, then frames with a neuron that is none of theirs; instances come before boxes, which are frames
+    in the drawings of some engines alone: in others they are around what happens to stand there."""
     frames = Frames(problem)
-    count = len(frames.members) if layout.engine in _WITH_BOXES else frames.instances
+    boxed = layout.engine in engines_that(lambda can: can.frames)
+    count = len(frames.members) if boxed else frames.instances
     if not 0 < count <= _MOST:
         return []
     placed = {i: layout.positions[name] for i, name in enumerate(problem.neurons)}

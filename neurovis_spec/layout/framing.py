@@ -6,28 +6,25 @@ engine leaves their neurons to themselves: they are then drawn as anybody's, eac
 
 from __future__ import annotations
 
-from typing import Final
-
-from neurovis_spec import plugins
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.located import Located
-from neurovis_spec.layout.model import LayoutEngine
-
-#: These draw frames, and are not loaded in order to be asked.
-_WITH_FRAMES: Final = ("layered", "circular", "grid")
+from neurovis_spec.layout.engines import engine_of, engines_that, they_can
+from neurovis_spec.layout.model import LayoutRefusalError
+from neurovis_spec.plugins import PluginError
 
 
 def check_engine(engine: Located[str], network: Network, findings: Findings) -> None:
     """Report a warning (``engine-without-frames``) where instances will not be drawn alike. An engine that draws what
-    is pinned alone (``manual``) has no choice, and one that cannot be loaded is told of when it is called."""
+    is pinned alone has no choice, and one that cannot be loaded is told of when it is called."""
     name = engine.value
-    if not network.instances or name == "auto" or name in _WITH_FRAMES:
+    if not network.instances or name == "auto":
         return
     try:
-        made = plugins.load(plugins.LAYOUTS, name)
-    except (KeyError, plugins.PluginError):
+        can = engine_of(name).capabilities
+    except (LayoutRefusalError, PluginError):
         return
-    if isinstance(made, LayoutEngine) and made.capabilities.free and not made.capabilities.modules:
+    if can.free and not can.modules:
         message = f"the engine '{name}' draws no frames: instances of a module are not drawn alike"
-        findings.warning("engine-without-frames", engine.span, message, "use layered, circular or grid")
+        hint = they_can(engines_that(lambda other: other.modules))
+        findings.warning("engine-without-frames", engine.span, message, hint)

@@ -20,6 +20,9 @@ Point: TypeAlias = tuple[float, float]
 Route: TypeAlias = tuple[Point, ...]
 Direction = Literal["down", "up", "right", "left"]
 Arrangement = Literal["row", "column", "grid", "ring", "arc"]
+#: What a drawing may show best: how signals flow, what is near what in the network, clusters of very many neurons, some
+#: neurons that nearly all drive each other, places that are all given.
+Suits = Literal["flow", "nearness", "clusters", "tangle", "places"]
 
 #: Radius of a neuron's disc.
 RADIUS = 0.3
@@ -139,6 +142,10 @@ class Capabilities:
     align: bool = False
     #: keeps what it can of an earlier layout
     memory: bool = False
+    #: draws boxes as frames, into which nothing else comes
+    frames: bool = False
+    #: what it shows best, of which ``auto`` takes the first engine by name
+    suits: Suits | None = None
     #: says how far it is: ``lay_out`` takes a Progress as its second argument (ReportingEngine)
     progress: bool = False
     #: most neurons and most connections

@@ -8,13 +8,14 @@ would refuse.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 
 import numpy as np
 
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.layout.engines import engines_that, they_can
 from neurovis_spec.layout.geometry import distance
 from neurovis_spec.layout.model import (
     RADIUS,
@@ -87,18 +88,24 @@ def refuse(wishes: Wishes, name: str, can: Capabilities) -> None:
     that contradicts itself."""
     _refuse_size(wishes, name, can)
     _refuse_without_place(wishes, name, can)
-    asked: Mapping[str, tuple[bool, bool, str]] = {
-        "layout-pins-unsupported": (bool(wishes.pins), can.pins, "keep pinned positions (layout.positions)"),
-        "layout-arrange-unsupported": (bool(wishes.arrange), can.arrange, "arrange groups (layout.arrange)"),
-        "layout-boxes-unsupported": (wishes.boxes, can.boxes, "keep the members of a box together"),
-        "layout-mirror-unsupported": (wishes.mirrors, can.mirrors, "draw mirror images (layout.mirror)"),
-        "layout-align-unsupported": (bool(wishes.align), can.align, "put neurons on one line (layout.align)"),
-        "layout-memory-unsupported": (wishes.memory, can.memory, "remember a layout (layout.file)"),
-        "layout-direction-unsupported": (wishes.direction != "down", can.direction, "draw in another direction"),
-    }
-    for code, (wanted, possible, what) in asked.items():
-        if wanted and not possible:
-            raise LayoutRefusalError(code, f"the engine '{name}' cannot {what}", "the engine 'layered' can")
+    asked: Sequence[tuple[str, bool, Callable[[Capabilities], bool], str]] = (
+        ("layout-pins-unsupported", bool(wishes.pins), lambda it: it.pins, "keep pinned positions (layout.positions)"),
+        ("layout-arrange-unsupported", bool(wishes.arrange), lambda it: it.arrange, "arrange groups (layout.arrange)"),
+        ("layout-boxes-unsupported", wishes.boxes, lambda it: it.boxes, "keep the members of a box together"),
+        ("layout-mirror-unsupported", wishes.mirrors, lambda it: it.mirrors, "draw mirror images (layout.mirror)"),
+        ("layout-align-unsupported", bool(wishes.align), lambda it: it.align, "put neurons on one line (layout.align)"),
+        ("layout-memory-unsupported", wishes.memory, lambda it: it.memory, "remember a layout (layout.file)"),
+        (
+            "layout-direction-unsupported",
+            wishes.direction != "down",
+            lambda it: it.direction,
+            "draw in another direction",
+        ),
+    )
+    for code, wanted, does, words in asked:
+        if wanted and not does(can):
+            hint = they_can(engines_that(does))
+            raise LayoutRefusalError(code, f"the engine '{name}' cannot {words}", hint)
     _refuse_contradictions(wishes)
     _refuse_close_pins(wishes)
 
@@ -164,7 +171,7 @@ def _refuse_without_place(wishes: Wishes, name: str, can: Capabilities) -> None:
         hint = "give them a position, or pin them under layout.positions"
     else:
         message = f"the engine '{name}' needs a position for every neuron; {shown}{more} {has} none"
-        hint = "give it one in layout.positions, or choose the layered engine, which arranges the rest around the pins"
+        hint = "give it one in layout.positions, or leave the engine out: another arranges the rest around the pins"
     raise LayoutRefusalError("position-missing", message, hint, tuple(free))
 
 

@@ -90,7 +90,7 @@ def _larger(places: FloatArray, radii: FloatArray) -> float:
 def _routed(drawn: Gathered, where: dict[str, Point], larger: float) -> Layout:
     """Routes between these places, round discs so many times as large as neurons: as if all else were smaller."""
     pins = {name: (x / larger, y / larger) for name, (x, y) in where.items()}
-    found = lay_out_problem(_problem(drawn, pins, 1.0), "manual")
+    found = lay_out_problem(_problem(drawn, pins, 1.0))
     ends = zip(drawn.network.connections.sources.tolist(), drawn.network.connections.targets.tolist(), strict=True)
     routes, names = {}, drawn.network.neurons.names
     for name, (a, b) in zip(drawn.network.connection_names, ends, strict=True):

@@ -45,7 +45,14 @@ class LargeEngine:
 
     name = "large"
     capabilities = Capabilities(
-        pins=True, boxes=True, direction=True, memory=True, progress=True, neurons=200_000, edges=2_000_000
+        pins=True,
+        boxes=True,
+        direction=True,
+        memory=True,
+        progress=True,
+        neurons=200_000,
+        edges=2_000_000,
+        suits="clusters",
     )
 
     def lay_out(self, problem: LayoutProblem, progress: Progress | None = None) -> Layout:

@@ -23,6 +23,8 @@ class LayeredEngine:
         memory=True,
         neurons=100_000,
         edges=1_000_000,
+        frames=True,
+        suits="flow",
     )
 
     def lay_out(self, problem: LayoutProblem) -> Layout:

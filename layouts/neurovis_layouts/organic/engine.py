@@ -37,7 +37,9 @@ class OrganicEngine:
     """Stress majorisation with a direction."""
 
     name = "organic"
-    capabilities = Capabilities(pins=True, boxes=True, direction=True, memory=True, neurons=1000, edges=20_000)
+    capabilities = Capabilities(
+        pins=True, boxes=True, direction=True, memory=True, neurons=1000, edges=20_000, suits="nearness"
+    )
 
     def lay_out(self, problem: LayoutProblem) -> Layout:
         """Place the neurons by their distances in the network, route the edges round what is in the way."""
