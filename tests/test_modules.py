@@ -522,27 +522,25 @@ def test_nesting_goes_as_deep_as_it_may() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "number"),
+    "text",
     [
-        (nested(60, 2) + "instances: {x: {module: m0}}", f"{2.0**61 - 1:.3g}"),
-        (nested(60, 2) + "neurons: {A: {bias: 1}}", f"{2.0**61 - 2:.3g}"),
-        (nested(1, 400) + "instances: {x: {module: m0, count: 300}}", "120,300"),
-        (nested(0) + f"instances: {{x: {{module: m0, count: {MOST_INSTANCES + 1}}}}}", f"{MOST_INSTANCES + 1:,}"),
-        (nested(0) + "parameters: {p: 1e15}\ninstances: {x: {module: m0, count: p}}", "1e+15"),
-        (
-            "modules:\n  b: {neurons: {K: {bias: 1}}}\n"
-            "  a: {parameters: {p: 1}, instances: {x: {module: b, count: 1 + p}}}\n"
-            "instances: {y: {module: a, count: 1000, set: {p: i}}}",
-            "501,500",
-        ),
+        nested(60, 2) + "instances: {x: {module: m0}}",
+        nested(60, 2) + "neurons: {A: {bias: 1}}",
+        nested(1, 400) + "instances: {x: {module: m0, count: 300}}",
+        nested(5, 50) + "instances: {x: {module: m0, count: 50}}",
+        nested(0) + f"instances: {{x: {{module: m0, count: {MOST_INSTANCES + 1}}}}}",
+        nested(0) + "parameters: {p: 1e15}\ninstances: {x: {module: m0, count: p}}",
+        "modules:\n  b: {neurons: {K: {bias: 1}}}\n"
+        "  a: {parameters: {p: 1}, instances: {x: {module: b, count: 1 + p}}}\n"
+        "instances: {y: {module: a, count: 1000, set: {p: i}}}",
     ],
 )
-def test_too_many_instances_are_refused_before_they_are_made(text: str, number: str) -> None:
+def test_too_many_instances_are_refused_before_they_are_made(text: str) -> None:
     with pytest.raises(nv.SpecError) as caught:
         nv.compile_text(HEAD + text)
     (found,) = caught.value.diagnostics
     assert found.code == "too-many"
-    assert found.message.startswith(f"this makes {number} instances"), found.message
+    assert found.message == "this makes more than 100,000 instances, the most that there may be"
 
 
 def test_the_limit_of_neurons_counts_those_of_all_instances() -> None:

@@ -1,4 +1,4 @@
-"""The census: what is counted is what is made, and too much is refused before anything is."""
+"""What is counted is what is made, and too much is refused before anything is."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from small_specs import HEAD, network_of
 
 import neurovis_spec as nv
 from neurovis_spec.compiler.names.modules import library_of
-from neurovis_spec.compiler.names.size_estimate import Excess, SizeEstimate, Tally
+from neurovis_spec.compiler.names.size_estimate import SizeEstimate
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.parameters import make_parameters
-from neurovis_spec.diagnostics import Findings
+from neurovis_spec.diagnostics import Diagnostic, Findings
 from neurovis_spec.language.includes import read_includes
 from neurovis_spec.language.yaml.reader import read_text
 from neurovis_spec.pipeline import shape
@@ -44,8 +44,8 @@ def nested(draw: st.DrawFn) -> str:
     return text + f"neurons: {{N: {{bias: 1, names: [N1, N2]}}}}\ninstances: {entries(below, 1)}\n"
 
 
-def counted(text: str, most: int = 10**6) -> Tally | Excess:
-    """What the census says of a spec without its head."""
+def counted(text: str, most: int = 10**6) -> tuple[int | None, tuple[Diagnostic, ...]]:
+    """How many instances a spec without its head makes, and what is found where that is too much."""
     findings = Findings()
     document = read_text(HEAD + text, "x", findings)
     assert document is not None
@@ -56,15 +56,18 @@ def counted(text: str, most: int = 10**6) -> Tally | Excess:
     library = library_of(spec, read_includes(spec, folder, folder, findings), folder, 1.0, findings)
     make_parameters(spec, constants, {})
     assert not findings.failed
-    return SizeEstimate(library.modules, 1.0, most).check(spec, constants)
+    return SizeEstimate(library.modules, 1.0, most).instances(spec, constants, findings), findings.sorted()
 
 
 @settings(max_examples=60, deadline=None)
 @given(nested())
 def test_what_is_counted_is_what_is_made(text: str) -> None:
     network = network_of(text)
-    assert counted(text) == Tally(len(network.instances), len(network.neurons))
-    assert isinstance(counted(text, len(network.neurons) - 1), Excess)
+    neurons = len(network.neurons)
+    assert counted(text, neurons) == (len(network.instances), ())
+    instances, found = counted(text, neurons - 1)
+    assert instances is None
+    assert [item.code for item in found] == ["too-many"]
 
 
 def test_more_than_there_may_be_is_never_looked_at_one_by_one() -> None:
@@ -74,9 +77,15 @@ def test_more_than_there_may_be_is_never_looked_at_one_by_one() -> None:
         inner = f"{{x: {{module: m{level + 1}, count: 2, set: {{p: p + i*2^{level}}}}}}}"
         text += f"  m{level}: {{parameters: {{p: 1}}, instances: {inner}}}\n"
     text += "instances: {x: {module: m0}}\n"
-    found = counted(text)
-    assert isinstance(found, Excess)
-    assert found.message.startswith("this makes more than 100,000 instances")
+    instances, (found,) = counted(text)
+    assert instances is None
+    assert found.message == "this makes more than 100,000 instances, the most that there may be"
+
+
+def test_a_count_that_is_an_integer_up_to_rounding_is_counted() -> None:
+    """3·0.1/0.1 is no integer in floating point, and makes three instances."""
+    text = "modules: {leg: {neurons: {K: {bias: 1}}}}\ninstances: {x: {module: leg, count: 0.3/0.1}}\n"
+    assert counted(text) == (len(network_of(text).instances), ()) == (3, ())
 
 
 def test_instances_are_refused_for_their_neurons_before_any_is_made() -> None:

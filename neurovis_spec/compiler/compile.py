@@ -19,7 +19,6 @@ from neurovis_spec.compiler.canonical import canonical
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.checks.warnings import warn
 from neurovis_spec.compiler.connections.connect import Connected, connect, join
-from neurovis_spec.compiler.connections.connection_limit import crowded
 from neurovis_spec.compiler.connections.entries import Bundle
 from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.drawing.sections import layout_settings, render_settings
@@ -83,8 +82,6 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
     make_parameters(spec, constants, request.parameters)
     _check_given(spec, constants, request.parameters)
     steps, episode = _clock(spec, constants)
-    if crowded(spec, constants, request.limits):
-        return None
     expander = Expander(library, request.root, findings, constants.dt, files={**request.files}, limits=request.limits)
     expansion = expander.expand(spec, constants, request.base)
     scopes, inputs = expansion.scopes, expansion.inputs

@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import NoReturn
 
 from neurovis_spec.compiler.events.settable import ParameterFormula
 from neurovis_spec.compiler.limits import DEEPEST, MOST_INSTANCES, Limits
@@ -19,7 +18,7 @@ from neurovis_spec.compiler.names.input_bindings import Binding, bindings_of, ch
 from neurovis_spec.compiler.names.modules import Library, Module
 from neurovis_spec.compiler.names.references import Section, key_of, key_span
 from neurovis_spec.compiler.names.scope import Expansion, Scope
-from neurovis_spec.compiler.names.size_estimate import Excess, SizeEstimate
+from neurovis_spec.compiler.names.size_estimate import SizeEstimate
 from neurovis_spec.compiler.names.unresolved import Gaps
 from neurovis_spec.compiler.network import Input
 from neurovis_spec.compiler.neurons.inputs import make_input
@@ -169,17 +168,10 @@ class Expander:
             raise _StoppedError
         if scope.section.instances:
             quiet = replace(scope.constants, findings=Findings(), structural=set())
-            found = self._size_estimate.check(scope.section, quiet)
-            if isinstance(found, Excess):
-                self._stop(found)
-            if self.made + found.instances > MOST_INSTANCES and scope.module is not None:
+            instances = self._size_estimate.instances(scope.section, quiet, self.findings)
+            self.stopped = instances is None
+            if instances is None or (self.made + instances > MOST_INSTANCES and scope.module is not None):
                 raise _StoppedError
-
-    def _stop(self, excess: Excess, code: str = "too-many") -> NoReturn:
-        self.stopped = True
-        if excess.span is not None:
-            self.findings.error(code, excess.span, excess.message, excess.hint)
-        raise _StoppedError
 
     def _at(self, index: int) -> Scope:
         scope = self.scopes[index]
@@ -233,7 +225,9 @@ class Expander:
             return None
         if len(way) > DEEPEST:
             span = key_span(scope.section, "instances", name)
-            self._stop(Excess(span, f"modules are nested at most {DEEPEST} deep"), "too-deep")
+            self.findings.error("too-deep", span, f"modules are nested at most {DEEPEST} deep")
+            self.stopped = True
+            raise _StoppedError
         called = [name] if count is None else [f"{name}{number}" for number in range(1, count + 1)]
         if len(called[-1]) > 64:
             self.findings.error("bad-name", key_span(scope.section, "instances", name), too_long(called[-1]), NAME_RULE)
