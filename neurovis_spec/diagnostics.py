@@ -7,9 +7,8 @@ are shown (text, JSON) is in ``neurovis_spec.findings``.
 
 from __future__ import annotations
 
-import re
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -20,8 +19,6 @@ Severity = Literal["error", "warning"]
 Hint: TypeAlias = "str | Callable[[], str | None] | None"
 #: Errors after which no help line is looked for, and no misspelt name understood: nobody reads them.
 MOST_HINTS = 200
-#: A number in a message, with what belongs to it; that of a name (K3) is none.
-_NUMBER = re.compile(r"(?<![\w.])-?\d[\d.,]*(e[+-]?\d+)?")
 
 
 class Span(NamedTuple):
@@ -66,50 +63,52 @@ class SpecError(Exception):
 
 @dataclass(slots=True)
 class Findings:
-    """Collects findings while the stages go on; ``sources`` maps each file read to its text."""
+    """Collects findings while the stages go on; ``sources`` maps each file read to its text.
+
+    A stretch of the text is invalid for one reason, which is the first that is found: what later stages make of it is a
+    follow-up. So findings merge by their place: a module, which is checked in each of its instances, is told of once.
+    """
 
     sources: dict[str, str] = field(default_factory=dict)
     #: the files that an author names, as far as they were looked for
     files: set[Path] = field(default_factory=set)
-    _items: list[Diagnostic] = field(default_factory=list)
+    _told: dict[tuple[Span, str, Hashable], Diagnostic] = field(default_factory=dict)
     _errors: int = 0
-    _faults: set[Span] = field(default_factory=set)
-    _several: dict[Diagnostic, int] = field(default_factory=dict)
-    _unread: dict[Span, frozenset[Diagnostic]] = field(default_factory=dict)
+    #: the code of the first error about each stretch
+    _first: dict[Span, str] = field(default_factory=dict)
+    _unread: set[Span] = field(default_factory=set)
 
-    def error(self, code: str, span: Span, message: str, hint: Hint = None, *, several: bool = False) -> None:
-        """Report a mistake. ``several``: it is one of a data file that the stretch names, which may have several; they
-        are told in the order in which they are reported."""
+    def error(self, code: str, span: Span, message: str, hint: Hint = None, *, key: Hashable = None) -> None:
+        """Report a mistake. ``key``: a stretch may have several mistakes, and this is what tells them apart, such as a
+        row of a data file that the stretch names."""
         if callable(hint):
             hint = None if self.many else hint()
-        found = Diagnostic(code, message, span, "error", hint)
-        self._items.append(found)
-        if several:
-            self._several.setdefault(found, len(self._several))
-        self._errors += 1
-        self._faults.add(span)
+        self._add(Diagnostic(code, message, span, "error", hint), key)
 
     def warning(self, code: str, span: Span, message: str, hint: str | None = None) -> None:
         """Note something legal that is surely not meant."""
-        self._items.append(Diagnostic(code, message, span, "warning", hint))
+        self._add(Diagnostic(code, message, span, "warning", hint), None)
+
+    def _add(self, item: Diagnostic, key: Hashable) -> None:
+        if item.severity == "error":
+            self._errors += 1
+            self._first.setdefault(item.span, item.code)
+        if item.span not in self._unread:
+            self._told.setdefault((item.span, item.code, key), item)
 
     def unread(self, span: Span) -> None:
         """What stands there could not be read, for a reason that is reported: all else that is found there follows."""
-        self._unread[span] = frozenset(item for item in self._items if item.span == span)
-        self._faults.add(span)
+        self._unread.add(span)
 
     def take(self, others: Findings) -> None:
         """Report what others have noted."""
         self.files |= others.files
-        for item in others._items:
-            self._items.append(item)
-            if item.severity == "error":
-                self._errors += 1
-                self._faults.add(item.span)
+        for (_, _, key), item in others._told.items():
+            self._add(item, key)
 
     def drop(self, unwanted: Callable[[Diagnostic], bool]) -> None:
         """Forget warnings that the author has allowed; errors stay."""
-        self._items = [item for item in self._items if item.severity == "error" or not unwanted(item)]
+        self._told = {mark: item for mark, item in self._told.items() if item.severity == "error" or not unwanted(item)}
 
     @property
     def failed(self) -> bool:
@@ -128,31 +127,16 @@ class Findings:
 
     def is_invalid(self, span: Span) -> bool:
         """Whether there is an error about exactly this stretch of a text."""
-        return span in self._faults
+        return span in self._first or span in self._unread
 
     def sorted(self) -> tuple[Diagnostic, ...]:
-        """All findings by place, each once, and once also where it is the same but for numbers: a module is checked
-        in each of its instances.
-
-        Where a stretch of the text is invalid in one way, what later stages make of it is a follow-up and held back.
-        """
-        first: dict[Span, str] = {}
-        for item in self._items:
-            if item.severity == "error":
-                first.setdefault(item.span, item.code)
-        told: dict[tuple[Span, str, str], Diagnostic] = {}
-        for item in self._items:
-            if item not in self._unread.get(item.span, (item,)):
-                continue
-            if item in self._several:
-                told[item.span, item.code, item.message] = item
-            elif first.get(item.span, item.code) == item.code:
-                told.setdefault((item.span, item.code, _NUMBER.sub("0", item.message)), item)
-        return tuple(sorted(told.values(), key=self._place))
-
-    def _place(self, item: Diagnostic) -> tuple[Span, Severity, int, str, str]:
-        """By what findings are ordered."""
-        return (item.span, item.severity, self._several.get(item, -1), item.code, item.message)
+        """All findings by place, those of one place in the order in which they were found."""
+        told = (
+            item
+            for (span, code, key), item in self._told.items()
+            if key is not None or self._first.get(span, code) == code
+        )
+        return tuple(sorted(told, key=lambda item: (item.span, item.severity)))
 
     def check(self) -> None:
         """Raise SpecError if there is an error."""

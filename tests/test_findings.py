@@ -7,7 +7,7 @@ import json
 from hypothesis import given
 from hypothesis import strategies as st
 
-from neurovis_spec.diagnostics import Diagnostic, Span
+from neurovis_spec.diagnostics import Diagnostic, Findings, Span
 from neurovis_spec.findings import printable, show_text, to_json
 
 
@@ -125,3 +125,26 @@ def test_json_holds_every_field() -> None:
         },
     ]
     assert json.loads(to_json([])) == []
+
+
+def test_findings_merge_by_place_and_code() -> None:
+    place, other = Span("net.yaml", 1, 1, 1, 5), Span("net.yaml", 2, 1, 2, 5)
+    found = Findings()
+    found.warning("odd", place, "it is odd")
+    found.error("wrong-size", place, "7 where there are 3")
+    found.error("wrong-size", place, "7 where there are 4 of 'another' make")  # of another instance
+    found.error("unknown-name", place, "what follows from it")
+    found.error("file-format", other, "row 7 is wrong", key=7)
+    found.error("not-finite", other, "row 2 is infinite", key=2)
+    assert found.errors == 5
+    assert found.is_invalid(place)
+    assert [item.message for item in found.sorted()] == ["7 where there are 3", "row 7 is wrong", "row 2 is infinite"]
+
+
+def test_what_could_not_be_read_has_no_other_findings() -> None:
+    place = Span("net.yaml", 1, 1, 1, 2)
+    found = Findings()
+    found.error("yaml-syntax", place, "cannot be read")
+    found.unread(place)
+    found.error("missing-key", place, "what follows", key="name")
+    assert [item.message for item in found.sorted()] == ["cannot be read"]

@@ -242,7 +242,7 @@ def _report_no_neurons(spec: Spec, population: Population, findings: Findings) -
         if spec.source.entry("name") is None:
             return  # which is said, with what the file is good for
         hint += "; or leave out its name: specs use what it holds with include: [FILE]"
-    findings.error("no-neurons", span, message, hint, several=True)  # also where the name is missing there
+    findings.error("no-neurons", span, message, hint, key="neurons")  # also where the name is missing there
 
 
 def _check_cycles(made: Connected, population: Population, findings: Findings) -> None:

@@ -108,12 +108,12 @@ class Model(BaseModel):
             else:
                 result[entry.name] = entry.value
         hopeless = False
+        told = findings.is_invalid(opening(data))
         for name, field in fields.items():
             if field.is_required() and name not in result:
-                if name not in perhaps:
-                    findings.error(
-                        "missing-key", opening(data), f"the key '{name}' is missing", cls._without(name, data)
-                    )
+                if name not in perhaps and not told:
+                    message = f"the key '{name}' is missing"
+                    findings.error("missing-key", opening(data), message, cls._without(name, data), key=name)
                 if name in cls.STAND_INS:
                     result[name] = _standing_in(cls.STAND_INS[name], opening(data))
                 else:

@@ -140,7 +140,7 @@ class EdgeReader:
             return
         hint = suggest(name, few(name, end.positions), f"{what}s of this entry" if end.perhaps is None else "neurons")
         message = f"'{shorten(name)}'{where} is not among the {what}s of this entry"
-        self.constants.findings.error("edge-outside", span, message, hint, several=bool(where))
+        self.constants.findings.error("edge-outside", span, message, hint, key=(what, where) if where else None)
 
     def _from_file(self, reference: FileReference) -> EdgeList | None:
         table = self.files.edges(reference, self.most)
@@ -155,7 +155,7 @@ class EdgeReader:
         long = np.flatnonzero(table.delays > LONGEST_DELAY).tolist()
         for place in long[:PATIENCE]:
             message = f"row {table.rows[place]} of the file: a delay must be at most {LONGEST_DELAY:,}"
-            self.constants.findings.error("out-of-range", span, message, several=True)
+            self.constants.findings.error("out-of-range", span, message, key=("delay", place))
         if i is None or j is None or long or table.fault is not None:
             return None
         return EdgeList(i, j, table.weights, table.delays)

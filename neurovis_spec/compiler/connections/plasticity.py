@@ -75,14 +75,15 @@ def learning_of(
     values = parameters(choice, defaults, None if targets is None else len(targets), constants, settled, each)
     signals: dict[str, IntArray] = {}
     failed = values is None
+    told = constants.findings.is_invalid(choice.name.span)
     for signal in rule.signals:
         entry = settled.entries.get(signal)
         if entry is None:
             failed = True
-            if signal not in settled.perhaps:
+            if signal not in settled.perhaps and not told:
                 message = f"the rule '{rule.name}' needs the signal '{signal}'"
                 hint = f"write {{{rule.name}: {{{signal}: NEURON_OR_INPUT}}}}"
-                constants.findings.error("missing-signal", choice.name.span, message, hint)
+                constants.findings.error("missing-signal", choice.name.span, message, hint, key=signal)
             continue
         where = _signal(entry, targets, target_count, scope, directory, neurons)
         if where is None:

@@ -196,9 +196,9 @@ def _refuse_key(key: Located[str], findings: Findings) -> None:
 
 
 def _refuse(error: CellError, path_text: str, span: Span, findings: Findings, gaps: bool = True) -> None:
-    for one in (error, *error.others):
+    for number, one in enumerate((error, *error.others)):
         message = f"the file '{_short(path_text)}': {one}"
-        findings.error(one.code, span, message, _hint(one, gaps), several=True)
+        findings.error(one.code, span, message, _hint(one, gaps), key=number)
 
 
 def _hint(error: CellError, gaps: bool) -> str | None:
