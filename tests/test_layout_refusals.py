@@ -45,6 +45,7 @@ REFUSED = [
     (f"{GROUPS}  engine: spatial\n", "position-missing", "B"),
     (f"{GROUPS}  engine: manual\n", "position-missing", "A"),
     (f"{GROUPS}  engine: circular\n  align: [[A1, B]]\n", "layout-align-unsupported", "[A1, B]"),
+    (f"{GROUPS}  engine: circular\n  plan: [[A, B]]\n", "layout-plan-unsupported", "[A, B]"),
     (LEGS.replace("    conn", "    layout: {mirror: [[S, K]]}\n    conn") + "  engine: grid\n",
      "layout-mirror-unsupported", "[S, K]"),
     (LEGS.replace("{bias: 1}, K: {}}", "{count: 1}, K: {}}\n    layout: {arrange: {S: row, S1: row}}")
@@ -74,7 +75,7 @@ def test_a_refusal_is_a_finding_with_its_place(text: str, code: str, marked: str
 
 #: what no engine has to begin for
 FORESEEN = {"arranged-twice", "align-conflict", "position-missing", "layout-align-unsupported",
-            "layout-mirror-unsupported", "layout-arrange-unsupported"}  # fmt: skip
+            "layout-mirror-unsupported", "layout-arrange-unsupported", "layout-plan-unsupported"}  # fmt: skip
 MORE = [
     (f"{GROUPS}  engine: circular\n  arrange: {{A: row}}\n", "layout-arrange-unsupported", "A"),
     (f"{GROUPS}  engine: organic\n  mirror: [[A1, A2]]\n", "layout-mirror-unsupported", "[A1, A2]"),

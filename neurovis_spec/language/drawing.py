@@ -23,6 +23,7 @@ from neurovis_spec.language.located import (
     Located,
     TextField,
     as_formula,
+    as_text,
     findings_of,
     give_up,
     one_of,
@@ -57,6 +58,30 @@ def _pairs(node: Node, info: ValidationInfo) -> tuple[Reference, ...]:
             findings_of(info).error("wrong-size", reference.span, message)
             give_up()
     return found
+
+
+class PlanRow(NamedTuple):
+    """A row of the page as written: the name in each cell, None where a cell is empty."""
+
+    cells: tuple[Located[str] | None, ...]
+    span: Span
+
+
+def _plan(node: Node, info: ValidationInfo) -> tuple[PlanRow, ...]:
+    """A list of rows of names; ``~`` is an empty cell."""
+    hint = "write [[left1, ~, right1], [left2, middle, right2]]"
+    if not isinstance(node, (Sequence, Packed)):
+        refuse(info, node, "a list of rows", hint)
+    rows: list[PlanRow] = []
+    for row in node.items:
+        if not isinstance(row, (Sequence, Packed)):
+            refuse(info, row, "a row, that is a list of names", hint)
+        cells: list[Located[str] | None] = []
+        for cell in row.items:
+            empty = isinstance(cell, Scalar) and cell.value is None
+            cells.append(None if empty else as_text(cell, info))
+        rows.append(PlanRow(tuple(cells), row.span))
+    return tuple(rows)
 
 
 _TEXT = {"type": "string"}
@@ -107,6 +132,13 @@ class LayoutModel(Model):
     boxes: BoxesField
     mirror: MirrorField
     align: AlignField
+    plan: Annotated[
+        tuple[PlanRow, ...],
+        Leaf(_plan, {"type": "array", "items": {"type": "array", "items": {"type": ["string", "null"]}}}),
+    ] = Field(
+        default=(),
+        description="[[name, ~, name], …]: rows of the page; a cell is an instance, a group, a box's title or empty.",
+    )
     file: TextField | None = Field(None, description="An earlier layout, whose places are kept where they can be.")
     spacing: Spacing | None = Field(None, description="Distances in units of the layout.")
 

@@ -17,7 +17,7 @@ def foreseen(network: Network, memory: Layout | None) -> LayoutRefusalError | No
     """What would be refused, by the engine of the spec, or by the one that ``auto`` stands for."""
     settings, name = network.layout, network.layout.engine
     if name == "auto":
-        if not (settings.arrange or settings.mirrors or settings.align):
+        if not (settings.arrange or settings.mirrors or settings.align or settings.plan):
             return None  # it stands for none that cannot do the rest
         from neurovis_spec.layout.choose import choose_engine
         from neurovis_spec.layout.problem import problem_of

@@ -79,6 +79,18 @@ class LayoutMirror:
 
 
 @dataclass(frozen=True, slots=True)
+class LayoutCell:
+    """Neurons that stand together in a cell of the page, or in several that are neighbours: the first of its rows and
+    columns, and how many it spans."""
+
+    members: tuple[int, ...]
+    row: int
+    column: int
+    rows: int = 1
+    columns: int = 1
+
+
+@dataclass(frozen=True, slots=True)
 class LayoutProblem:
     """What is to be laid out, in canonical order: neurons in the natural order of their names (K2 before K10), edges by
     the natural order of their names, so that the order of the spec cannot show in the result."""
@@ -104,6 +116,8 @@ class LayoutProblem:
     mirrors: tuple[LayoutMirror, ...] = ()
     #: neurons on one line across the direction
     align: tuple[tuple[int, ...], ...] = ()
+    #: what stands in which row and column of the page, whatever the direction; no neuron is in two cells
+    plan: tuple[LayoutCell, ...] = ()
     #: where neurons are as data (a body, a connectome); NaN where that is not known
     places: tuple[Point, ...] = ()
     #: an earlier layout of the same network: memory, not pins
@@ -140,6 +154,8 @@ class Capabilities:
     modules: bool = False
     mirrors: bool = False
     align: bool = False
+    #: puts what the author says into rows and columns of the page
+    plan: bool = False
     #: keeps what it can of an earlier layout
     memory: bool = False
     #: draws boxes as frames, into which nothing else comes

@@ -18,6 +18,7 @@ from neurovis_spec.layout.model import (
     Arrangement,
     Direction,
     Layout,
+    LayoutCell,
     LayoutEdge,
     LayoutGroup,
     LayoutMirror,
@@ -46,6 +47,7 @@ def canonical(
     origins: Mapping[str, Point] | None = None,
     mirrors: Iterable[tuple[str, Iterable[tuple[str, str]], Iterable[tuple[str, str]]]] = (),
     align: Iterable[Iterable[str]] = (),
+    plan: Iterable[tuple[Iterable[str], tuple[int, int, int, int]]] = (),
     places: Mapping[str, Point] | None = None,
     memory: Layout | None = None,
 ) -> LayoutProblem:
@@ -56,7 +58,8 @@ def canonical(
     numbers). ``modules`` are the paths of instances and the names of their modules (their neurons are those whose names
     begin with the path), ``relative`` the pins within instances, ``origins`` the places of
     these, ``mirrors`` the scope's path, the
-    pairs of neurons and the pairs of instances; ``places`` where neurons are as data.
+    pairs of neurons and the pairs of instances; ``plan`` what stands in which row and column, and how many of them it
+    spans; ``places`` where neurons are as data.
     """
     names = tuple(sorted(neurons, key=natural_key))
     index = {name: i for i, name in enumerate(names)}
@@ -107,6 +110,7 @@ def canonical(
             )
         ),
         align=tuple(sorted(members(line) for line in align)),
+        plan=tuple(sorted((LayoutCell(members(of), *place) for of, place in plan), key=lambda cell: cell.members)),
         places=tuple((places or {}).get(name, _NOWHERE) for name in names) if places else (),
         memory=memory,
     )
@@ -157,6 +161,7 @@ def problem_of(network: Network, memory: Layout | None = None) -> LayoutProblem:
             for mirror in settings.mirrors
         ],
         [named(line) for line in settings.align],
+        [(named(cell.members), (cell.row, cell.column, cell.rows, cell.columns)) for cell in settings.plan],
         _places(network),
         memory,
     )

@@ -47,6 +47,7 @@ class Wishes:
     direction: Direction
     boxes: bool
     mirrors: bool
+    plan: bool
     memory: bool
 
 
@@ -62,6 +63,7 @@ def asked_by(problem: LayoutProblem) -> Wishes:
         problem.direction,
         bool(problem.boxes),
         bool(problem.mirrors),
+        bool(problem.plan),
         problem.memory is not None,
     )
 
@@ -79,6 +81,7 @@ def asked_of(network: Network, memory: bool) -> Wishes:
         settings.direction,
         bool(settings.boxes) or any(group.box is not None for group in network.neurons.groups),
         bool(settings.mirrors),
+        bool(settings.plan),
         memory,
     )
 
@@ -94,6 +97,7 @@ def refuse(wishes: Wishes, name: str, can: Capabilities) -> None:
         ("layout-boxes-unsupported", wishes.boxes, lambda it: it.boxes, "keep the members of a box together"),
         ("layout-mirror-unsupported", wishes.mirrors, lambda it: it.mirrors, "draw mirror images (layout.mirror)"),
         ("layout-align-unsupported", bool(wishes.align), lambda it: it.align, "put neurons on one line (layout.align)"),
+        ("layout-plan-unsupported", wishes.plan, lambda it: it.plan, "put cells in rows and columns (layout.plan)"),
         ("layout-memory-unsupported", wishes.memory, lambda it: it.memory, "remember a layout (layout.file)"),
         (
             "layout-direction-unsupported",

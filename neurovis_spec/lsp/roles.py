@@ -150,6 +150,7 @@ _VALUES: Final[Mapping[str, Role]] = {
     "layout boxes * #": Role("references"),
     "layout mirror # #": Role("references"),
     "layout align # #": Role("references"),
+    "layout plan # #": Role("references"),
     "layout engine": Role("engine"),
     "layout positions * #": _FORMULA,
     "layout spacing *": _FORMULA,

@@ -20,6 +20,7 @@ class LayeredEngine:
         modules=True,
         mirrors=True,
         align=True,
+        plan=True,
         memory=True,
         neurons=100_000,
         edges=1_000_000,

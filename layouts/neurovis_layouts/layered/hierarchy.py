@@ -16,6 +16,7 @@ from neurovis_layouts.layered.component_layout import Plan, planned
 from neurovis_layouts.layered.drawing import Drawing, Move, Piece
 from neurovis_layouts.layered.frame_routing import linked
 from neurovis_layouts.layered.mirror_units import symmetric_units
+from neurovis_layouts.layered.page_plan import facing, in_direction, parts_by_cell
 from neurovis_layouts.layered.parts import Part, columns_of, firm, images_of, may_be_frame, parts_of
 from neurovis_layouts.layered.pinning import Settled, settled
 from neurovis_layouts.layered.same_rank import bonded
@@ -23,7 +24,7 @@ from neurovis_layouts.layered.templates import Book, Key, keys_of, restricted
 from neurovis_layouts.layered.units import Unit
 from neurovis_spec.layout.frames import BOX_DOWN, Rect
 from neurovis_spec.layout.geometry import distance, snap
-from neurovis_spec.layout.model import LayoutMirror, LayoutProblem, Point, Route
+from neurovis_spec.layout.model import Direction, LayoutMirror, LayoutProblem, Point, Route
 
 #: What a module pins gives way to pins closer than this.
 _OFF = 0.75
@@ -35,7 +36,7 @@ class Composer:
     def __init__(self, problem: LayoutProblem) -> None:
         """Raises LayoutRefusalError where a mirror pairs what cannot be mirror images."""
         self._book = Book(problem)
-        self._kinds: dict[int, Drawing] = {}
+        self._kinds: dict[tuple[int, Direction], Drawing] = {}
 
     def whole(self) -> Drawing:
         """The drawing of the problem. Raises LayoutRefusalError for what cannot be met."""
@@ -53,7 +54,7 @@ class Composer:
         for module in problem.modules:
             if module.origin is None:
                 continue
-            drawing = self.kind(int(module.template))
+            drawing = self.kind(int(module.template), problem.direction)
             flip = not drawing.fixed and module.members[0] in second
             places = [Move((0.0, 0.0), flip).point(place) for place in drawing.places]
             x, y = module.origin
@@ -66,15 +67,18 @@ class Composer:
                     found[member] = place
         return dict(sorted({**found, **problem.pins}.items()))
 
-    def kind(self, number: int) -> Drawing:
-        """The drawing of a kind of instance."""
-        if number not in self._kinds:
-            self._kinds[number] = self.compose(self._book.problem_of(number))
-        return self._kinds[number]
+    def kind(self, number: int, direction: Direction) -> Drawing:
+        """The drawing of a kind of instance in a direction, in the frame of an engine that draws in it."""
+        key = number, direction
+        if key not in self._kinds:
+            self._kinds[key] = self.compose(replace(self._book.problem_of(number), direction=direction))
+        return self._kinds[key]
 
     def compose(self, problem: LayoutProblem) -> Drawing:
         """The drawing of one problem, its modules named by their kinds."""
         pair = {a: b for mirror in problem.mirrors for one in mirror.pairs for a, b in (one, one[::-1])}
+        if problem.plan:
+            return self._on_page(problem, pair)
         frames = firm(problem, pair)
         loose = {i for i in range(len(problem.boxes)) if i not in frames and may_be_frame(problem, i, pair)}
         while True:
@@ -123,11 +127,48 @@ class Composer:
         rests = settled(problem, plan, [_resting(plan, piece) for piece in pieces], pair, redraw)
         return _joined(problem, plan, rests, units, pair, columns)
 
+    def _on_page(self, problem: LayoutProblem, pair: Mapping[int, int]) -> Drawing:
+        """The drawing of a problem whose cells say what stands in which row and column."""
+        known: dict[tuple[tuple[int, ...], Direction], Piece] = {}
+
+        def drawn(part: Part, direction: Direction) -> Piece:
+            key = part.members, direction
+            if key not in known:
+                if part.image_of >= 0:
+                    drawing = drawn(parts[part.image_of], direction).drawing
+                else:
+                    inner = self._inside(problem, part, direction, pair)
+                    drawing = inner if isinstance(inner, Drawing) else self.compose(inner)
+                    drawing = in_direction(drawing, direction, problem.direction)
+                known[key] = _as_piece(part, drawing)
+            return known[key]
+
+        def redraw(piece: Piece, pins: Mapping[int, Point]) -> Piece:
+            inner = self._inside(problem, piece.part, problem.direction, pair)
+            inner = self._book.problem_of(piece.part.kind) if isinstance(inner, Drawing) else inner
+            return _as_piece(piece.part, self.compose(replace(inner, pins=_around_pins(piece.drawing, pins, inner))))
+
+        parts, where = parts_by_cell(problem, pair)
+        pieces = facing(problem, parts, where, pair, drawn)
+        plan = Plan()
+        for piece, move in pieces:
+            plan.places.update(zip(piece.part.members, map(move.point, piece.drawing.places), strict=True))
+        rests = settled(problem, plan, pieces, pair, redraw)
+        return _joined(problem, plan, rests, (), pair, frozenset())
+
+    def _inside(
+        self, problem: LayoutProblem, part: Part, direction: Direction, pair: Mapping[int, int]
+    ) -> LayoutProblem | Drawing:
+        """An instance as it is drawn in a direction; of what is none the problem that it is by itself."""
+        if part.kind >= 0:
+            return self.kind(part.kind, direction)
+        return replace(_boxed(problem, part, pair), direction=direction)
+
     def _piece(self, problem: LayoutProblem, part: Part, before: Sequence[Piece], pair: Mapping[int, int]) -> Piece:
         if part.image_of >= 0:
             drawing = before[part.image_of].drawing
         elif part.kind >= 0:
-            drawing = self.kind(part.kind)
+            drawing = self.kind(part.kind, problem.direction)
         else:
             drawing = self.compose(_boxed(problem, part, pair))
         return _as_piece(part, drawing)

@@ -45,10 +45,10 @@ def parts_of(problem: LayoutProblem, boxes: AbstractSet[int], pair: Mapping[int,
             parts.append(part)
             taken.update(part.members)
     parts.sort(key=lambda p: min(p.members))
-    return _imaged(parts, pair)
+    return imaged(parts, pair)
 
 
-def _imaged(parts: Sequence[Part], pair: Mapping[int, int]) -> list[Part]:
+def imaged(parts: Sequence[Part], pair: Mapping[int, int]) -> list[Part]:
     """Mirror images marked as such; a box that has no box for its image gets one without a line."""
     first = [
         part

@@ -24,6 +24,17 @@ class Mirror:
 
 
 @dataclass(frozen=True, slots=True)
+class Cell:
+    """Neurons that stand together on the page: from which row and column on, and how many of them they take."""
+
+    members: tuple[int, ...]
+    row: int
+    column: int
+    rows: int
+    columns: int
+
+
+@dataclass(frozen=True, slots=True)
 class LayoutSettings:
     """The ``layout`` section, references resolved. Pins by neuron index, units of the layout."""
 
@@ -42,6 +53,8 @@ class LayoutSettings:
     mirrors: tuple[Mirror, ...] = ()
     #: neurons on one line across the direction
     align: tuple[tuple[int, ...], ...] = ()
+    #: what stands in which row and column of the page
+    plan: tuple[Cell, ...] = ()
     #: an earlier layout, as the spec names it
     file: str | None = None
 

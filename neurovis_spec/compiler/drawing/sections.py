@@ -12,6 +12,7 @@ from neurovis_spec import plugins
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings, StatedTrace
 from neurovis_spec.compiler.drawing.gains import stated_gains
 from neurovis_spec.compiler.drawing.mirrors import check_pins, lines_of, mirrors_of
+from neurovis_spec.compiler.drawing.page_plan import check_plan, plan_of
 from neurovis_spec.compiler.drawing.pins import DIAMETER, FARTHEST, pins_of
 from neurovis_spec.compiler.names.finder import Finder
 from neurovis_spec.compiler.names.references import Directory, check_keys, key_of, resolve, resolve_end
@@ -54,6 +55,14 @@ def layout_settings(
     direction = cast(
         Literal["down", "up", "right", "left"], "down" if model.direction is None else model.direction.value
     )
+    titled: dict[str, tuple[int, ...]] = {}
+    for title, members in boxes:
+        titled[title] = (*titled.get(title, ()), *members)
+    for group in population.neurons.groups:
+        if group.box is not None:
+            titled[group.box] = (*titled.get(group.box, ()), *group.indices)
+    plan = plan_of(model.plan, population.directories[0], titled, population.neurons.names, findings)
+    check_plan(model.plan, plan, mirrors, lines, direction, population.neurons.names, findings)
     check_pins(mirrors, lines, pins, direction, population.neurons.names, findings)
     spacing = model.spacing
     neuron = _spacing(None if spacing is None else spacing.neuron, 1.0, scopes[0].constants)
@@ -70,6 +79,7 @@ def layout_settings(
         origins=pins.origins,
         mirrors=mirrors,
         align=lines,
+        plan=plan,
         file=None if model.file is None else model.file.value,
     )
 

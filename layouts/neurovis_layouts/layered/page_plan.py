@@ -1,0 +1,387 @@
+"""Page plan: a network on the plan of a body or a cortical sheet, in rows and columns of the page (``layout.plan``).
+
+In: a problem whose cells say what stands in which row and column, and how a part of it is drawn in a direction. Out:
+parts, each drawn in the direction in which it faces what it is connected to, and where each of them stands. What no
+cell names is placed behind the cell that it has most connections with. Mirror images stand in mirrored columns.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+from neurovis_layouts.frame import from_picture, to_picture
+from neurovis_layouts.layered.drawing import Drawing, Move, Piece
+from neurovis_layouts.layered.parts import Part, imaged
+from neurovis_spec.layout.frames import Rect
+from neurovis_spec.layout.geometry import distance, snap
+from neurovis_spec.layout.model import Direction, LayoutProblem, LayoutRefusalError, Point
+
+#: A part drawn in a direction, with the frame around it.
+Drawn = Callable[[Part, Direction], Piece]
+
+_Members: TypeAlias = tuple[int, ...]
+#: Columns across and rows along, in the engine's frame.
+_Span: TypeAlias = tuple[range, range]
+#: Between parts that share a cell, in units of the layout.
+_BESIDE = 0.5
+#: Rounds in which each part may turn to face the others; after the second hardly any does.
+_ROUNDS = 3
+_OPPOSITE: Mapping[Direction, Direction] = {"down": "up", "up": "down", "right": "left", "left": "right"}
+
+
+@dataclass(frozen=True, slots=True)
+class _Slot:
+    """A cell in the engine's frame: which columns across and which rows along it spans, and the parts in it; two parts
+    in one line are mirror images of each other."""
+
+    across: range
+    along: range
+    lines: tuple[_Members, ...]
+
+
+def parts_by_cell(problem: LayoutProblem, pair: Mapping[int, int]) -> tuple[list[Part], dict[int, int]]:
+    """What the cells hold, and what no cell names (instances, boxes, neurons of one group), with the cell in which each
+    part stands, the number behind the last being a row below all. Mirror images are marked as such, and come last."""
+    seats = _seats(problem, pair)
+    outer = {m.members: i for i, m in enumerate(problem.modules) if m.parent < 0}
+    boxes = {members: i for i, (_, members) in enumerate(problem.boxes)}
+    found: list[Part] = []
+    for members in seats:
+        module = outer.get(members, -1)
+        if module >= 0:
+            one = problem.modules[module]
+            family = f"{one.module} {one.path.rstrip('0123456789')}"
+            found.append(Part(members, int(one.template), module=module, family=family))
+        else:
+            found.append(Part(members, box=boxes.get(members, -1)))
+    parts = imaged(sorted(found, key=lambda part: min(part.members)), pair)
+    number = {frozenset(members): seat for members, seat in seats.items()}
+    return parts, {k: number[frozenset(part.members)] for k, part in enumerate(parts)}
+
+
+def _seats(problem: LayoutProblem, pair: Mapping[int, int]) -> dict[_Members, int]:
+    """The number of the cell in which neurons stand together. What no cell names stands with what it has most
+    connections with, images in the mirrored cell; what nothing leads to, below all."""
+    seat = {cell.members: i for i, cell in enumerate(problem.plan)}
+    taken = {m for members in seat for m in members}
+    loose: list[_Members] = []
+    for members in [
+        *(m.members for m in problem.modules if m.parent < 0),
+        *sorted((own for _, own in problem.boxes), key=lambda own: (-len(own), own)),
+        *((m,) for m in range(len(problem.neurons))),
+    ]:
+        if members and taken.isdisjoint(members):
+            loose.append(members)
+            taken.update(members)
+    owner = {m: members for members in [*seat, *loose] for m in members}
+    near: dict[_Members, Counter[_Members]] = {members: Counter() for members in owner.values()}
+    for edge in problem.edges:
+        near[owner[edge.source]][owner[edge.target]] += 1
+        near[owner[edge.target]][owner[edge.source]] += 1
+    spans, below = _spans(problem), len(seat)
+    while loose:
+        pulls = [(_pull(near[members], seat, spans, _symmetric(members, pair)), members) for members in loose]
+        (many, to), members = max(pulls, key=lambda one: (one[0][0], [-m for m in one[1]]))
+        image = owner.get(pair.get(members[0], -1), members)
+        seat[members] = to if many else below
+        if image != members and image in loose:
+            seat[image] = _mirrored(to, spans) if many else below
+            loose.remove(image)
+        loose.remove(members)
+    return _together(problem, seat)
+
+
+def _pull(
+    near: Counter[_Members],
+    seat: Mapping[_Members, int],
+    spans: Sequence[_Span],
+    middle: bool,
+) -> tuple[int, int]:
+    """The cell with which something has most connections, and how many; ``middle``: one that is its own image."""
+    pulls: Counter[int] = Counter()
+    for members, times in near.items():
+        if (
+            members in seat
+            and seat[members] < len(spans)
+            and (not middle or _mirrored(seat[members], spans) == seat[members])
+        ):
+            pulls[seat[members]] += times
+    best = max(pulls.values(), default=0)
+    return best, min((i for i, times in pulls.items() if times == best), default=len(spans))
+
+
+def _together(problem: LayoutProblem, seat: Mapping[_Members, int]) -> dict[_Members, int]:
+    """Neurons of one group that no cell names, and that stand in one cell, stand together there."""
+    group = {m: number for number, one in enumerate(problem.groups) for m in one.members}
+    named = {cell.members for cell in problem.plan}
+    found: dict[_Members, int] = {}
+    loose: dict[tuple[int, int], list[int]] = {}
+    for members, place in seat.items():
+        if len(members) == 1 and members not in named and members[0] in group:
+            loose.setdefault((place, group[members[0]]), []).append(members[0])
+        else:
+            found[members] = place
+    return {**found, **{tuple(sorted(members)): place for (place, _), members in loose.items()}}
+
+
+def facing(
+    problem: LayoutProblem, parts: Sequence[Part], where: Mapping[int, int], pair: Mapping[int, int], drawn: Drawn
+) -> list[tuple[Piece, Move]]:
+    """Each part in the direction, and as the mirror image, in which the connections between parts are shortest, and
+    where it stands. Copies of one instance are drawn in one direction, so that they are alike. Raises
+    LayoutRefusalError where mirror images do not stand in mirrored cells."""
+    _check_mirrors(problem, parts, where, pair)
+    slots = _slots(problem, parts, where)
+    owner = {m: k for k, part in enumerate(parts) for m in part.members}
+    between = [(e.source, e.target) for e in problem.edges if owner[e.source] != owner[e.target]]
+    makes: dict[tuple[int, int], list[int]] = {}
+    for k, part in enumerate(parts):
+        if part.image_of < 0:
+            makes.setdefault((part.kind, -1 if part.kind >= 0 else k), []).append(k)
+    turns: list[Direction] = [problem.direction for _ in parts]
+    flips = [part.image_of >= 0 for part in parts]
+
+    def pieces() -> list[Piece]:
+        return [drawn(part, turn) for part, turn in zip(parts, turns, strict=True)]
+
+    def length() -> float:
+        """How long straight lines between the ends of connections from part to part would be together."""
+        moved = _placed(problem, slots, parts, pieces(), flips)
+        at = {
+            m: move.point(p)
+            for piece, move in moved
+            for m, p in zip(piece.part.members, piece.drawing.places, strict=True)
+        }
+        return sum(distance(at[a], at[b]) for a, b in between)
+
+    def turn(own: Sequence[int], direction: Direction) -> None:
+        for k, part in enumerate(parts):
+            if k in own or part.image_of in own:
+                turns[k] = direction
+
+    def flip(k: int) -> None:
+        for other, part in enumerate(parts):
+            if other == k or part.image_of == k:
+                flips[other] = not flips[other]
+
+    best = length()
+    for _ in range(_ROUNDS):
+        before = best
+        for own in makes.values():
+            for direction in _directions(problem, parts[own[0]], pair, drawn):
+                kept, held = list(turns), list(flips)
+                turn(own, direction)
+                now = _flipped(own, parts, pair, drawn, turns, flip, length)
+                if now < best - 1e-9:
+                    best = now
+                else:
+                    turns[:], flips[:] = kept, held
+        if best == before:
+            break
+    return _placed(problem, slots, parts, pieces(), flips)
+
+
+def _flipped(
+    own: Sequence[int],
+    parts: Sequence[Part],
+    pair: Mapping[int, int],
+    drawn: Drawn,
+    turns: Sequence[Direction],
+    flip: Callable[[int], None],
+    length: Callable[[], float],
+) -> float:
+    """Draw each of these parts as its mirror image where that is shorter; how long all is then."""
+    now = length()
+    for k in own:
+        if drawn(parts[k], turns[k]).drawing.fixed or _symmetric(parts[k].members, pair):
+            continue
+        flip(k)
+        then = length()
+        if then < now - 1e-9:
+            now = then
+        else:
+            flip(k)
+    return now
+
+
+def _directions(problem: LayoutProblem, part: Part, pair: Mapping[int, int], drawn: Drawn) -> tuple[Direction, ...]:
+    """The directions in which a part may be drawn: one that holds mirror images of its own along the axis of the
+    whole, one whose module pins its neurons as they are pinned."""
+    if drawn(part, problem.direction).drawing.fixed:
+        return (problem.direction,)
+    if _symmetric(part.members, pair):
+        return (problem.direction, _OPPOSITE[problem.direction])
+    return ("down", "up", "right", "left")
+
+
+def _symmetric(members: Sequence[int], pair: Mapping[int, int]) -> bool:
+    """Whether some of these neurons are mirror images of others of them."""
+    own = set(members)
+    return any(pair.get(m) in own for m in members)
+
+
+def in_direction(drawing: Drawing, of: Direction, frame: Direction) -> Drawing:
+    """A drawing made in one direction, in the frame of an engine that draws in another."""
+    if of == frame:
+        return drawing
+
+    def point(p: Point) -> Point:
+        return from_picture(to_picture(p, of), frame)
+
+    def rect(r: Rect) -> Rect:
+        (ax, ay), (bx, by) = point((r[0], r[1])), point((r[2], r[3]))
+        return min(ax, bx), min(ay, by), max(ax, bx), max(ay, by)
+
+    return replace(
+        drawing,
+        places=tuple(map(point, drawing.places)),
+        routes={key: tuple(map(point, route)) for key, route in drawing.routes.items()},
+        frames=tuple((own, rect(r)) for own, r in drawing.frames),
+        boxes=tuple((own, rect(r)) for own, r in drawing.boxes),
+        axis=drawing.axis if of == _OPPOSITE[frame] else None,
+        direction=frame,
+    )
+
+
+def _slots(problem: LayoutProblem, parts: Sequence[Part], where: Mapping[int, int]) -> list[_Slot]:
+    """The cells with their parts, and where something stands below all, a row for that."""
+    spans = _spans(problem)
+    held: dict[int, list[int]] = {}
+    for k, place in where.items():
+        held.setdefault(place, []).append(k)
+    across, along = 1 + max(span[0][-1] for span in spans), 1 + max(span[1][-1] for span in spans)
+    spans.append((range(across), range(along, along + 1)))
+    named = {cell.members for cell in problem.plan}
+    slots: list[_Slot] = []
+    for i, own in sorted(held.items()):
+        own.sort(key=lambda k: (parts[k].members not in named, k))  # what no cell names is behind what one does
+        slots.append(_Slot(*spans[i], tuple(_lines(parts, own))))
+    return slots
+
+
+def _spans(problem: LayoutProblem) -> list[_Span]:
+    """The columns across and the rows along that each cell spans, in the engine's frame."""
+    rows = max(cell.row + cell.rows for cell in problem.plan)
+    columns = max(cell.column + cell.columns for cell in problem.plan)
+    return [_span(problem.direction, c.row, c.rows, c.column, c.columns, rows, columns) for c in problem.plan]
+
+
+def _span(
+    direction: Direction, row: int, rows: int, column: int, columns: int, height: int, width: int
+) -> tuple[range, range]:
+    """From rows and columns of the page to the engine's frame."""
+    down, right = range(row, row + rows), range(column, column + columns)
+    match direction:
+        case "down":
+            return right, down
+        case "up":
+            return right, range(height - row - rows, height - row)
+        case "right":
+            return down, right
+        case "left":
+            return down, range(width - column - columns, width - column)
+
+
+def _mirrored(cell: int, spans: Sequence[_Span]) -> int:
+    """The cell that is the mirror image of one; −1 without one."""
+    own, along = spans[cell]
+    across = 1 + max(span[0][-1] for span in spans)
+    image = range(across - own.stop, across - own.start)
+    return next((i for i, span in enumerate(spans) if span == (image, along)), -1)
+
+
+def _check_mirrors(
+    problem: LayoutProblem, parts: Sequence[Part], where: Mapping[int, int], pair: Mapping[int, int]
+) -> None:
+    spans = _spans(problem)
+    for k, part in enumerate(parts):
+        first = part.image_of
+        if first < 0:
+            if not _symmetric(part.members, pair):
+                continue
+            first = k
+        place = where[first]
+        if where[k] != (place if place == len(spans) else _mirrored(place, spans)):
+            one = problem.neurons[min(part.members)]
+            raise LayoutRefusalError(
+                "plan-mirror",
+                f"'{one}' and its mirror image do not stand in cells of the plan that are mirror images",
+                "put mirror images into one row, as far to the left as to the right of the middle",
+                (one,),
+            )
+
+
+def _lines(parts: Sequence[Part], held: Sequence[int]) -> Iterator[_Members]:
+    """The parts in one slot, mirror images beside each other."""
+    for k in held:
+        if parts[k].image_of in held:
+            continue
+        image = next((other for other in held if parts[other].image_of == k), None)
+        yield (k,) if image is None else (k, image)
+
+
+def _placed(
+    problem: LayoutProblem,
+    slots: Sequence[_Slot],
+    parts: Sequence[Part],
+    pieces: Sequence[Piece],
+    flips: Sequence[bool],
+) -> list[tuple[Piece, Move]]:
+    """Columns as wide and rows as high as what stands in them, with streets between; parts in the middle of theirs."""
+    sizes = [_size(slot, pieces) for slot in slots]
+    across = _edges(
+        [(slot.across, size[0]) for slot, size in zip(slots, sizes, strict=True)], problem.rank_spacing, True
+    )
+    along = _edges(
+        [(slot.along, size[1]) for slot, size in zip(slots, sizes, strict=True)], problem.rank_spacing, False
+    )
+    moves: dict[int, Move] = {}
+    for slot, size in zip(slots, sizes, strict=True):
+        x = _middle(across, slot.across)
+        y = _middle(along, slot.along) - size[1] / 2
+        for line in slot.lines:
+            piece = pieces[line[0]]
+            height = piece.rect[3] - piece.rect[1]
+            offset = (piece.rect[2] - piece.rect[0] + _BESIDE) / 2 if len(line) > 1 else 0.0
+            mx, my = Move((0.0, 0.0), flips[line[0]]).point(piece.middle)
+            moves[line[0]] = Move((snap(x - offset - mx), snap(y + height / 2 - my)), flips[line[0]])
+            y += height + _BESIDE
+    for k, part in enumerate(parts):
+        if part.image_of >= 0:
+            (dx, dy), flipped = moves[part.image_of].shift, moves[part.image_of].flip
+            moves[k] = Move((-dx + 0.0, dy), not flipped)
+    return [(piece, moves[k]) for k, piece in enumerate(pieces)]
+
+
+def _size(slot: _Slot, pieces: Sequence[Piece]) -> Point:
+    """How much room the parts in a slot take across and along."""
+    widths = [
+        sum(pieces[k].rect[2] - pieces[k].rect[0] for k in line) + _BESIDE * (len(line) - 1) for line in slot.lines
+    ]
+    heights = [pieces[line[0]].rect[3] - pieces[line[0]].rect[1] for line in slot.lines]
+    return max(widths), sum(heights) + _BESIDE * (len(heights) - 1)
+
+
+def _edges(taken: Sequence[tuple[range, float]], street: float, even: bool) -> list[tuple[float, float]]:
+    """Where each row or column begins and ends. ``even``: its mirror image is as wide, and 0 is the middle."""
+    count = 1 + max(span[-1] for span, _ in taken)
+    size = [0.0] * count
+    for span, need in sorted(taken, key=lambda one: len(one[0])):
+        lack = need - sum(size[i] for i in span) - street * (len(span) - 1)
+        for i in span:
+            size[i] += max(lack, 0.0) / len(span)
+    if even:
+        size = [max(one, other) for one, other in zip(size, reversed(size), strict=True)]
+    start = -(sum(size) + street * (count - 1)) / 2
+    found: list[tuple[float, float]] = []
+    for width in size:
+        found.append((start, start + width))
+        start += width + street
+    return found
+
+
+def _middle(edges: Sequence[tuple[float, float]], span: range) -> float:
+    return (edges[span[0]][0] + edges[span[-1]][1]) / 2 + 0.0

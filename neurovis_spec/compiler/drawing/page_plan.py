@@ -1,0 +1,138 @@
+"""The plan of the page: what stands in which row and column (``layout.plan``).
+
+In: rows of names as written, who is called what, the boxes, mirrors and lines. Out: cells: the same name in
+neighbouring cells is one cell that spans them. Mirror images stand in cells that are mirror images.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal
+
+from neurovis_spec.compiler.drawing.drawing_settings import Cell, Mirror
+from neurovis_spec.compiler.limits import plural
+from neurovis_spec.compiler.names.references import Directory
+from neurovis_spec.diagnostics import Findings, shorten, suggest
+from neurovis_spec.language.drawing import PlanRow
+from neurovis_spec.language.located import Located
+
+Place = tuple[int, int]
+
+
+def plan_of(
+    rows: tuple[PlanRow, ...],
+    directory: Directory,
+    boxes: Mapping[str, tuple[int, ...]],
+    names: tuple[str, ...],
+    findings: Findings,
+) -> tuple[Cell, ...]:
+    """The cells of a plan; none where a name in it is invalid."""
+    before = findings.errors
+    for number, row in enumerate(rows[1:], 2):
+        if len(row.cells) != len(rows[0].cells):
+            message = f"row {number} has {plural(len(row.cells), 'cell')}, the first has {len(rows[0].cells)}"
+            findings.error("wrong-size", row.span, message, "write ~ for an empty cell")
+    places: dict[str, dict[Place, Located[str]]] = {}
+    for r, row in enumerate(rows):
+        for c, cell in enumerate(row.cells):
+            if cell is not None:
+                places.setdefault(cell.value.strip(), {})[r, c] = cell
+    taken: dict[int, str] = {}
+    cells: list[Cell] = []
+    for name, at in places.items():
+        first = next(iter(at.values()))
+        members = _members(name, first, directory, boxes, findings)
+        if not members:
+            continue
+        low, high = (min(r for r, _ in at), min(c for _, c in at)), (max(r for r, _ in at), max(c for _, c in at))
+        size = high[0] - low[0] + 1, high[1] - low[1] + 1
+        if len(at) != size[0] * size[1]:
+            message = f"'{shorten(name)}' is in {len(at)} cells that are no rectangle"
+            findings.error("plan-cells", list(at.values())[-1].span, message, "cells with one name are neighbours")
+            continue
+        other = next((taken[m] for m in members if m in taken), None)
+        if other is not None:
+            twice = next(m for m in members if m in taken)
+            message = f"'{names[twice]}' is in the cell '{shorten(other)}' already"
+            findings.error("plan-cells", first.span, message, "a neuron stands in one cell")
+            continue
+        taken.update(dict.fromkeys(members, name))
+        cells.append(Cell(tuple(sorted(members)), low[0], low[1], size[0], size[1]))
+    return tuple(cells) if findings.errors == before else ()
+
+
+def _members(
+    name: str, cell: Located[str], directory: Directory, boxes: Mapping[str, tuple[int, ...]], findings: Findings
+) -> tuple[int, ...]:
+    """The neurons of an instance, else of a group, else of a box."""
+    inside = directory.instance(name)
+    if inside:
+        return tuple(index for one in inside for index in one.members)
+    found = directory.find(name) or boxes.get(name)
+    if found is None and not directory.covers(name):
+        known = [*directory.instances, *directory.groups, *boxes]
+        message = f"there is no instance, group or box '{shorten(name)}'"
+        findings.error("unknown-cell", cell.span, message, lambda: suggest(name, known, "known here"))
+    return found or ()
+
+
+def check_plan(
+    rows: tuple[PlanRow, ...],
+    cells: tuple[Cell, ...],
+    mirrors: tuple[Mirror, ...],
+    lines: tuple[tuple[int, ...], ...],
+    direction: Literal["down", "up", "right", "left"],
+    names: tuple[str, ...],
+    findings: Findings,
+) -> None:
+    """Mirror images that do not stand in mirrored cells, and lines from cell to cell, are findings."""
+    if not cells:
+        return
+    height, width = len(rows), len(rows[0].cells)
+    where = {m: cell for cell in cells for m in cell.members}
+    told: set[tuple[Place, Place]] = set()
+    for mirror in mirrors:
+        for a, b in mirror.pairs if not mirror.scope else ():
+            one, other = where.get(a), where.get(b)
+            if one is None and other is None:
+                continue
+            if one is not None and other is not None:
+                places = (one.row, one.column), (other.row, other.column)
+                if places in told or _mirrored(one, height, width, direction) == (
+                    *places[1],
+                    other.rows,
+                    other.columns,
+                ):
+                    continue
+                told.add(places)
+            known = one or other
+            assert known is not None
+            message = f"'{names[a]}' and '{names[b]}' are mirror images and do not stand in mirrored cells"
+            hint = "as far to the left as to the right of the middle, in one row"
+            if direction in ("left", "right"):
+                hint = "as far above the middle as below it, in one column"
+            findings.error("plan-mirror", _span(rows, known).span, message, hint)
+            break
+    for line in lines:
+        held = {where[m] for m in line if m in where}
+        if len(held) > 1 or (held and any(m not in where for m in line)):
+            cell = min(held, key=lambda one: (one.row, one.column))
+            first = next(m for m in line if where.get(m) is cell)
+            odd = next(m for m in line if where.get(m) is not cell)
+            message = f"'{names[first]}' and '{names[odd]}' are aligned and stand in different cells"
+            findings.error(
+                "plan-align", _span(rows, cell).span, message, "the plan says where cells are; align within one"
+            )
+
+
+def _span(rows: tuple[PlanRow, ...], cell: Cell) -> Located[str]:
+    found = rows[cell.row].cells[cell.column]
+    assert found is not None
+    return found
+
+
+def _mirrored(cell: Cell, height: int, width: int, direction: str) -> tuple[int, int, int, int]:
+    """Where the image of a cell is: the axis runs along the direction, through the middle of the page."""
+    if direction in ("left", "right"):
+        return height - cell.row - cell.rows, cell.column, cell.rows, cell.columns
+    return cell.row, width - cell.column - cell.columns, cell.rows, cell.columns

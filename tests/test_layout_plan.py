@@ -1,0 +1,138 @@
+"""A plan of the page: what a cell names stands in its row and column; mirror images, copies and pins are kept."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+import layout_conformance as suite
+import pytest
+
+import neurovis_spec as nv
+from neurovis_spec.layout import Direction, Point
+from neurovis_spec.layout.arrange import lay_out_problem
+from neurovis_spec.layout.problem import problem_of
+
+LEG = """\
+  leg:
+    neurons: {A: {}, B: {count: 2}, C: {}, D: {}}
+    connections: {A -> B: 1, B -> C: 1, C -> D: 1}
+"""
+BODY = f"""\
+neurovis: 1
+name: body
+modules:
+{LEG}instances:
+  left: {{module: leg, count: 2}}
+  right: {{module: leg, count: 2}}
+neurons: {{R: {{count: 2, bias: 1, box: rhythm}}, T: {{count: 2}}, Z: {{}}}}
+connections:
+  R1 -> left.A: 1
+  R2 -> right.A: 1
+  T1 -> left1.B: 1
+  T2 -> right1.B: 1
+layout:
+  direction: DIRECTION
+  mirror: [[left, right], [R1, R2], [T1, T2]]
+  plan: PLAN
+"""
+ROWS = "[[left1, ~, right1], [left2, rhythm, right2]]"
+
+
+def body(plan: str = ROWS, direction: Direction = "down") -> nv.CompiledNetwork:
+    return nv.compile_text(BODY.replace("PLAN", plan).replace("DIRECTION", direction))
+
+
+def span(at: Mapping[str, Point], names: Sequence[str], axis: int) -> tuple[float, float]:
+    values = [point[axis] for name, point in at.items() if name.startswith(tuple(names))]
+    return min(values), max(values)
+
+
+def in_order(at: Mapping[str, Point], cells: Sequence[Sequence[str]], axis: int) -> bool:
+    spans = [span(at, names, axis) for names in cells]
+    return all(one[1] < other[0] for one, other in pairwise(spans))
+
+
+@pytest.mark.parametrize("direction", ["down", "up"])
+def test_rows_and_columns_are_those_of_the_page_in_either_direction(direction: Direction) -> None:
+    at = body(direction=direction).layout().positions
+    assert in_order(at, [["left"], ["R"], ["right"]], 0)
+    assert in_order(at, [["left1", "right1"], ["left2", "right2"]], 1)
+
+
+@pytest.mark.parametrize("direction", ["right", "left"])
+def test_where_signals_go_sideways_images_are_above_each_other(direction: Direction) -> None:
+    at = body("[[left1, left2], [rhythm, rhythm], [right1, right2]]", direction).layout().positions
+    assert in_order(at, [["left"], ["R"], ["right"]], 1)
+    assert in_order(at, [["left1", "right1"], ["left2", "right2"]], 0)
+
+
+def test_mirror_images_are_exact_and_copies_alike() -> None:
+    layout = body().layout()
+    at = layout.positions
+    axis = at["R1"][0] + at["R2"][0]
+    for name, (x, y) in at.items():
+        if name.startswith("left"):
+            image = name.replace("left", "right")
+            assert at[image] == (axis - x, y)
+            for edge in (edge for edge in layout.routes if edge.startswith(f"{name} ->")):
+                mirrored = tuple((axis - px, py) for px, py in layout.routes[edge])
+                assert layout.routes[edge.replace("left", "right")] == mirrored
+    shifts = {
+        (at[f"left2.{n}"][0] - at[f"left1.{n}"][0], at[f"left2.{n}"][1] - at[f"left1.{n}"][1])
+        for n in ("A", "B1", "B2", "C", "D")
+    }
+    assert len(shifts) == 1
+
+
+def test_each_part_faces_what_it_is_connected_to() -> None:
+    at = body().layout().positions
+    assert at["left1.A"][0] > at["left1.C"][0] > at["left1.D"][0], "the rhythm between the legs drives A"
+
+
+def test_what_no_cell_names_is_beside_what_it_is_connected_to() -> None:
+    at = body().layout().positions
+    legs = {name: span(at, [name], 0) for name in ("left1", "right1")}
+    for taps, leg in (("T1", "left1"), ("T2", "right1")):
+        assert legs[leg][0] <= at[taps][0] <= legs[leg][1]
+        assert at[taps][1] < span(at, ["left2"], 1)[0]
+    assert at["Z"][1] > max(y for name, (_, y) in at.items() if name != "Z"), "connected to nothing: below all"
+
+
+def test_a_name_in_neighbouring_cells_spans_them() -> None:
+    at = body("[[rhythm, rhythm], [left1, right1], [left2, right2]]").layout().positions
+    assert (at["R1"][0] + at["R2"][0]) / 2 == (at["left1.A"][0] + at["right1.A"][0]) / 2
+    assert in_order(at, [["R"], ["left1"], ["left2"]], 1)
+
+
+def test_pins_are_kept_and_take_their_copies_place() -> None:
+    text = BODY.replace("PLAN", ROWS).replace("DIRECTION", "down") + "  positions: {R1: [3, 20]}\n"
+    at = nv.compile_text(text).layout().positions
+    assert at["R1"] == (3, 20)
+    assert at["R2"][1] == 20
+
+
+def test_groups_and_boxes_may_be_cells_of_a_network_without_instances() -> None:
+    text = """\
+neurovis: 1
+name: sheet
+neurons: {A: {count: 3, bias: 1}, B: {count: 3}, C: {count: 3}, D: {count: 3}}
+connections: {A -> B: {pattern: all_to_all}, B -> C: {pattern: all_to_all}, C -> D: {pattern: all_to_all}}
+layout: {boxes: {upper: [A]}, plan: [[upper, B], [D, C]]}
+"""
+    layout = nv.compile_text(text).layout()
+    at = layout.positions
+    assert in_order(at, [["A", "D"], ["B", "C"]], 0)
+    assert in_order(at, [["A", "B"], ["D", "C"]], 1)
+    assert layout.metrics()["overlaps"] == 0
+
+
+@pytest.mark.parametrize("network", ["body", "hexapod"])
+def test_the_promises_of_the_engine_hold(network: str) -> None:
+    compiled = body() if network == "body" else nv.compile("specs/hexapod/hexapod.yaml")
+    problem = problem_of(compiled.network)
+    layout = lay_out_problem(problem, "layered")
+    suite.check_positions(problem, layout)
+    suite.check_routes(problem, layout)
+    assert not suite.frames_meet(layout, problem)
+    assert suite.through_frames(layout, problem) == []
