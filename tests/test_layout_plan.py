@@ -127,6 +127,21 @@ layout: {boxes: {upper: [A]}, plan: [[upper, B], [D, C]]}
     assert layout.metrics()["overlaps"] == 0
 
 
+def test_a_module_may_plan_the_frame_of_its_instances() -> None:
+    text = (
+        BODY.replace("PLAN", ROWS)
+        .replace("DIRECTION", "down")
+        .replace("C -> D: 1}", "C -> D: 1}\n    layout: {plan: [[A, B], [C, B]]}")
+    )
+    at = nv.compile_text(text).layout().positions
+    for leg, sign in (("left1", 1), ("left2", 1), ("right1", -1), ("right2", -1)):
+        own = {name.partition(".")[2]: point for name, point in at.items() if name.startswith(leg)}
+        assert own["A"][1] < own["C"][1]
+        side = {(own["B1"][0] > own["A"][0]), (own["B2"][0] > own["C"][0])}
+        assert len(side) == 1
+        assert side == {(at["left1.B1"][0] > at["left1.A"][0]) == (sign > 0)}
+
+
 @pytest.mark.parametrize("network", ["body", "hexapod"])
 def test_the_promises_of_the_engine_hold(network: str) -> None:
     compiled = body() if network == "body" else nv.compile("specs/hexapod/hexapod.yaml")

@@ -104,6 +104,15 @@ AlignField = Annotated[
     Field(default=(), description="[[references], …]: each list on one line across the direction."),
 ]
 
+PlanField = Annotated[
+    tuple[PlanRow, ...],
+    Leaf(_plan, {"type": "array", "items": {"type": "array", "items": {"type": ["string", "null"]}}}),
+    Field(
+        default=(),
+        description="[[name, ~, name], …]: rows of the page; a cell is an instance, a group, a box's title or empty.",
+    ),
+]
+
 
 class Spacing(Model):
     """Distances of the layout in its units."""
@@ -132,13 +141,7 @@ class LayoutModel(Model):
     boxes: BoxesField
     mirror: MirrorField
     align: AlignField
-    plan: Annotated[
-        tuple[PlanRow, ...],
-        Leaf(_plan, {"type": "array", "items": {"type": "array", "items": {"type": ["string", "null"]}}}),
-    ] = Field(
-        default=(),
-        description="[[name, ~, name], …]: rows of the page; a cell is an instance, a group, a box's title or empty.",
-    )
+    plan: PlanField
     file: TextField | None = Field(None, description="An earlier layout, whose places are kept where they can be.")
     spacing: Spacing | None = Field(None, description="Distances in units of the layout.")
 
@@ -155,6 +158,7 @@ class ModuleLayoutModel(Model):
     boxes: BoxesField
     mirror: MirrorField
     align: AlignField
+    plan: PlanField
 
 
 class Range(NamedTuple):

@@ -81,13 +81,14 @@ class LayoutMirror:
 @dataclass(frozen=True, slots=True)
 class LayoutCell:
     """Neurons that stand together in a cell of the page, or in several that are neighbours: the first of its rows and
-    columns, and how many it spans."""
+    columns, and how many it spans. ``scope`` is the instance whose frame is divided so, −1 for the page."""
 
     members: tuple[int, ...]
     row: int
     column: int
     rows: int = 1
     columns: int = 1
+    scope: int = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +117,8 @@ class LayoutProblem:
     mirrors: tuple[LayoutMirror, ...] = ()
     #: neurons on one line across the direction
     align: tuple[tuple[int, ...], ...] = ()
-    #: what stands in which row and column of the page, whatever the direction; no neuron is in two cells
+    #: what stands in which row and column of the page, or of an instance, whatever the direction; in none of these is a
+    #: neuron in two cells
     plan: tuple[LayoutCell, ...] = ()
     #: where neurons are as data (a body, a connectome); NaN where that is not known
     places: tuple[Point, ...] = ()

@@ -47,7 +47,7 @@ def canonical(
     origins: Mapping[str, Point] | None = None,
     mirrors: Iterable[tuple[str, Iterable[tuple[str, str]], Iterable[tuple[str, str]]]] = (),
     align: Iterable[Iterable[str]] = (),
-    plan: Iterable[tuple[Iterable[str], tuple[int, int, int, int]]] = (),
+    plan: Iterable[tuple[str, Iterable[str], tuple[int, int, int, int]]] = (),
     places: Mapping[str, Point] | None = None,
     memory: Layout | None = None,
 ) -> LayoutProblem:
@@ -58,8 +58,8 @@ def canonical(
     numbers). ``modules`` are the paths of instances and the names of their modules (their neurons are those whose names
     begin with the path), ``relative`` the pins within instances, ``origins`` the places of
     these, ``mirrors`` the scope's path, the
-    pairs of neurons and the pairs of instances; ``plan`` what stands in which row and column, and how many of them it
-    spans; ``places`` where neurons are as data.
+    pairs of neurons and the pairs of instances; ``plan`` the path of the instance that is divided, what
+    stands in which row and column of it, and how many of them that spans; ``places`` where neurons are as data.
     """
     names = tuple(sorted(neurons, key=natural_key))
     index = {name: i for i, name in enumerate(names)}
@@ -110,7 +110,12 @@ def canonical(
             )
         ),
         align=tuple(sorted(members(line) for line in align)),
-        plan=tuple(sorted((LayoutCell(members(of), *place) for of, place in plan), key=lambda cell: cell.members)),
+        plan=tuple(
+            sorted(
+                (LayoutCell(members(of), *place, where.get(scope, -1)) for scope, of, place in plan),
+                key=lambda cell: (cell.scope, cell.members),
+            )
+        ),
         places=tuple((places or {}).get(name, _NOWHERE) for name in names) if places else (),
         memory=memory,
     )
@@ -161,7 +166,7 @@ def problem_of(network: Network, memory: Layout | None = None) -> LayoutProblem:
             for mirror in settings.mirrors
         ],
         [named(line) for line in settings.align],
-        [(named(cell.members), (cell.row, cell.column, cell.rows, cell.columns)) for cell in settings.plan],
+        [(cell.scope, named(cell.members), (cell.row, cell.column, cell.rows, cell.columns)) for cell in settings.plan],
         _places(network),
         memory,
     )

@@ -16,7 +16,6 @@ from neurovis_spec.compiler.names.modules import library_of
 from neurovis_spec.compiler.names.references import Section, key_of, key_span
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import Findings, Span
-from neurovis_spec.language.drawing import LayoutModel
 from neurovis_spec.language.references import NeuronRange, parse_sum
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.layout.clashes import Clash
@@ -163,7 +162,7 @@ def _entries(section: Section, part: str) -> Iterator[_Entry]:
     elif part in ("mirror", "align"):
         for reference in layout.mirror if part == "mirror" else layout.align:
             yield _Entry(reference.span, tuple(text.value for text in reference.parts))
-    elif part == "plan" and isinstance(layout, LayoutModel):
+    elif part == "plan":
         for row in layout.plan:
             yield _Entry(row.span, tuple(cell.value for cell in row.cells if cell is not None))
     elif part == "boxes":

@@ -25,6 +25,8 @@ Drawn = Callable[[Part, Direction], Piece]
 _Members: TypeAlias = tuple[int, ...]
 #: Columns across and rows along, in the engine's frame.
 _Span: TypeAlias = tuple[range, range]
+#: Width by height that a page, or the frame of an instance, comes near to: that of a screen or a slide.
+_ASPECT = 4 / 3
 #: Between parts that share a cell, in units of the layout.
 _BESIDE = 0.5
 #: Rounds in which each part may turn to face the others; after the second hardly any does.
@@ -130,9 +132,9 @@ def _together(problem: LayoutProblem, seat: Mapping[_Members, int]) -> dict[_Mem
 def facing(
     problem: LayoutProblem, parts: Sequence[Part], where: Mapping[int, int], pair: Mapping[int, int], drawn: Drawn
 ) -> list[tuple[Piece, Move]]:
-    """Each part in the direction, and as the mirror image, in which the connections between parts are shortest, and
-    where it stands. Copies of one instance are drawn in one direction, so that they are alike. Raises
-    LayoutRefusalError where mirror images do not stand in mirrored cells."""
+    """Each part in the direction, and as the mirror image, in which the connections between parts are short and the
+    page has its proportions, and where it stands. Copies of one instance are drawn in one direction, so that they are
+    alike. Raises LayoutRefusalError where mirror images do not stand in mirrored cells."""
     _check_mirrors(problem, parts, where, pair)
     slots = _slots(problem, parts, where)
     owner = {m: k for k, part in enumerate(parts) for m in part.members}
@@ -147,15 +149,20 @@ def facing(
     def pieces() -> list[Piece]:
         return [drawn(part, turn) for part, turn in zip(parts, turns, strict=True)]
 
-    def length() -> float:
-        """How long straight lines between the ends of connections from part to part would be together."""
+    def cost() -> float:
+        """How long straight lines between the ends of connections from part to part would be together, and how far the
+        page is from its proportions."""
         moved = _placed(problem, slots, parts, pieces(), flips)
-        at = {
-            m: move.point(p)
-            for piece, move in moved
-            for m, p in zip(piece.part.members, piece.drawing.places, strict=True)
-        }
-        return sum(distance(at[a], at[b]) for a, b in between)
+        at: dict[int, Point] = {}
+        for piece, move in moved:
+            at.update(zip(piece.part.members, map(move.point, piece.drawing.places), strict=True))
+        rects = [move.rect(piece.rect) for piece, move in moved]
+        wide = max(r[2] for r in rects) - min(r[0] for r in rects)
+        high = max(r[3] for r in rects) - min(r[1] for r in rects)
+        if problem.direction in ("right", "left"):
+            wide, high = high, wide
+        stretched = max(wide / (_ASPECT * high), _ASPECT * high / wide)
+        return (wide + high + sum(distance(at[a], at[b]) for a, b in between)) * stretched
 
     def turn(own: Sequence[int], direction: Direction) -> None:
         for k, part in enumerate(parts):
@@ -167,14 +174,14 @@ def facing(
             if other == k or part.image_of == k:
                 flips[other] = not flips[other]
 
-    best = length()
+    best = cost()
     for _ in range(_ROUNDS):
         before = best
         for own in makes.values():
             for direction in _directions(problem, parts[own[0]], pair, drawn):
                 kept, held = list(turns), list(flips)
                 turn(own, direction)
-                now = _flipped(own, parts, pair, drawn, turns, flip, length)
+                now = _flipped(own, parts, pair, drawn, turns, flip, cost)
                 if now < best - 1e-9:
                     best = now
                 else:
@@ -191,15 +198,15 @@ def _flipped(
     drawn: Drawn,
     turns: Sequence[Direction],
     flip: Callable[[int], None],
-    length: Callable[[], float],
+    cost: Callable[[], float],
 ) -> float:
-    """Draw each of these parts as its mirror image where that is shorter; how long all is then."""
-    now = length()
+    """Draw each of these parts as its mirror image where that costs less; what all costs then."""
+    now = cost()
     for k in own:
         if drawn(parts[k], turns[k]).drawing.fixed or _symmetric(parts[k].members, pair):
             continue
         flip(k)
-        then = length()
+        then = cost()
         if then < now - 1e-9:
             now = then
         else:
@@ -330,14 +337,12 @@ def _placed(
     pieces: Sequence[Piece],
     flips: Sequence[bool],
 ) -> list[tuple[Piece, Move]]:
-    """Columns as wide and rows as high as what stands in them, with streets between; parts in the middle of theirs."""
+    """Columns as wide and rows as high as what stands in them, with streets between for connections; parts in the
+    middle of theirs."""
     sizes = [_size(slot, pieces) for slot in slots]
-    across = _edges(
-        [(slot.across, size[0]) for slot, size in zip(slots, sizes, strict=True)], problem.rank_spacing, True
-    )
-    along = _edges(
-        [(slot.along, size[1]) for slot, size in zip(slots, sizes, strict=True)], problem.rank_spacing, False
-    )
+    street = problem.neuron_spacing
+    across = _edges([(slot.across, size[0]) for slot, size in zip(slots, sizes, strict=True)], street, True)
+    along = _edges([(slot.along, size[1]) for slot, size in zip(slots, sizes, strict=True)], street, False)
     moves: dict[int, Move] = {}
     for slot, size in zip(slots, sizes, strict=True):
         x = _middle(across, slot.across)

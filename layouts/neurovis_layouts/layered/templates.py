@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import TypeAlias
 
 from neurovis_spec.layout.model import (
+    LayoutCell,
     LayoutEdge,
     LayoutGroup,
     LayoutMirror,
@@ -137,6 +138,7 @@ class Book:
             modules=tuple(replace(m, template=str(self._find(i))) for i, m in enumerate(problem.modules)),
             mirrors=_mirror(self._pairs.get(-1, [])),
             align=tuple(self._lines.get(-1, [])),
+            plan=tuple(cell for cell in problem.plan if cell.scope < 0),
         )
 
     def problem_of(self, kind: int) -> LayoutProblem:
@@ -149,6 +151,7 @@ class Book:
         exits: set[int] = set()
         pairs: set[tuple[int, int]] = set()
         lines: set[tuple[int, ...]] = set()
+        cells: set[LayoutCell] = set()
         pins: dict[int, tuple[float, float]] = {}
         for number in copies:
             place = local[number]
@@ -161,6 +164,11 @@ class Book:
             exits.update(place[n] for n in self._problem.exits if n in place)
             pairs.update((place[a], place[b]) for a, b in self._pairs.get(number, ()))
             lines.update(tuple(place[n] for n in line) for line in self._lines.get(number, ()))
+            cells.update(
+                replace(cell, members=tuple(sorted(place[n] for n in cell.members)), scope=-1)
+                for cell in self._problem.plan
+                if cell.scope == number
+            )
             for neuron, point in modules[number].pins.items():
                 pins.setdefault(place[neuron], point)
         part = restricted(self._problem, modules[copies[0]].members, copies[0])
@@ -172,6 +180,7 @@ class Book:
             modules=tuple(replace(m, template=str(self._find(self._number[m.path]))) for m in part.modules),
             mirrors=_mirror(sorted(pairs)),
             align=tuple(sorted(lines)),
+            plan=tuple(sorted(cells, key=lambda cell: cell.members)),
             pins=dict(sorted(pins.items())),
         )
 

@@ -25,8 +25,10 @@ class Mirror:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """Neurons that stand together on the page: from which row and column on, and how many of them they take."""
+    """Neurons that stand together on the page, or in the frame of the instance whose path ``scope`` is: from which row
+    and column on, and how many of them they take."""
 
+    scope: str
     members: tuple[int, ...]
     row: int
     column: int

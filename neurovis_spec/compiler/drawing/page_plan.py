@@ -20,13 +20,15 @@ Place = tuple[int, int]
 
 
 def plan_of(
+    scope: str,
     rows: tuple[PlanRow, ...],
     directory: Directory,
     boxes: Mapping[str, tuple[int, ...]],
     names: tuple[str, ...],
     findings: Findings,
 ) -> tuple[Cell, ...]:
-    """The cells of a plan; none where a name in it is invalid."""
+    """The cells of a plan, of the instance whose path ``scope`` is or of the page; none where a name in it is
+    invalid."""
     before = findings.errors
     for number, row in enumerate(rows[1:], 2):
         if len(row.cells) != len(rows[0].cells):
@@ -53,11 +55,11 @@ def plan_of(
         other = next((taken[m] for m in members if m in taken), None)
         if other is not None:
             twice = next(m for m in members if m in taken)
-            message = f"'{names[twice]}' is in the cell '{shorten(other)}' already"
+            message = f"'{names[twice][len(scope) + 1 if scope else 0 :]}' is in the cell '{shorten(other)}' already"
             findings.error("plan-cells", first.span, message, "a neuron stands in one cell")
             continue
         taken.update(dict.fromkeys(members, name))
-        cells.append(Cell(tuple(sorted(members)), low[0], low[1], size[0], size[1]))
+        cells.append(Cell(scope, tuple(sorted(members)), low[0], low[1], size[0], size[1]))
     return tuple(cells) if findings.errors == before else ()
 
 
@@ -77,6 +79,7 @@ def _members(
 
 
 def check_plan(
+    scope: str,
     rows: tuple[PlanRow, ...],
     cells: tuple[Cell, ...],
     mirrors: tuple[Mirror, ...],
@@ -89,10 +92,12 @@ def check_plan(
     if not cells:
         return
     height, width = len(rows), len(rows[0].cells)
+    skip = len(scope) + 1 if scope else 0
+    names = tuple(name[skip:] for name in names)
     where = {m: cell for cell in cells for m in cell.members}
     told: set[tuple[Place, Place]] = set()
     for mirror in mirrors:
-        for a, b in mirror.pairs if not mirror.scope else ():
+        for a, b in mirror.pairs if mirror.scope == scope else ():
             one, other = where.get(a), where.get(b)
             if one is None and other is None:
                 continue

@@ -5,11 +5,11 @@ In: the sections as written, who finds what they name. Out: LayoutSettings, Rend
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Literal, cast
 
 from neurovis_spec import plugins
-from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings, StatedTrace
+from neurovis_spec.compiler.drawing.drawing_settings import Cell, LayoutSettings, Mirror, RenderSettings, StatedTrace
 from neurovis_spec.compiler.drawing.gains import stated_gains
 from neurovis_spec.compiler.drawing.mirrors import check_pins, lines_of, mirrors_of
 from neurovis_spec.compiler.drawing.page_plan import check_plan, plan_of
@@ -55,14 +55,7 @@ def layout_settings(
     direction = cast(
         Literal["down", "up", "right", "left"], "down" if model.direction is None else model.direction.value
     )
-    titled: dict[str, tuple[int, ...]] = {}
-    for title, members in boxes:
-        titled[title] = (*titled.get(title, ()), *members)
-    for group in population.neurons.groups:
-        if group.box is not None:
-            titled[group.box] = (*titled.get(group.box, ()), *group.indices)
-    plan = plan_of(model.plan, population.directories[0], titled, population.neurons.names, findings)
-    check_plan(model.plan, plan, mirrors, lines, direction, population.neurons.names, findings)
+    plan = _plans(scopes, population, boxes, mirrors, lines, direction, findings)
     check_pins(mirrors, lines, pins, direction, population.neurons.names, findings)
     spacing = model.spacing
     neuron = _spacing(None if spacing is None else spacing.neuron, 1.0, scopes[0].constants)
@@ -82,6 +75,32 @@ def layout_settings(
         plan=plan,
         file=None if model.file is None else model.file.value,
     )
+
+
+def _plans(
+    scopes: tuple[Scope, ...],
+    population: Population,
+    boxes: Iterable[tuple[str, tuple[int, ...]]],
+    mirrors: tuple[Mirror, ...],
+    lines: tuple[tuple[int, ...], ...],
+    direction: Literal["down", "up", "right", "left"],
+    findings: Findings,
+) -> tuple[Cell, ...]:
+    """The plans of the page and of instances, whose boxes are known by the titles that they have there."""
+    titled: dict[str, tuple[int, ...]] = {}
+    grouped = [(group.box, tuple(group.indices)) for group in population.neurons.groups if group.box is not None]
+    for title, members in [*boxes, *grouped]:
+        titled[title] = (*titled.get(title, ()), *members)
+    cells: list[Cell] = []
+    names = population.neurons.names
+    for scope, directory in zip(scopes, population.directories, strict=True):
+        rows = () if scope.section.layout is None else scope.section.layout.plan
+        start = scope.called("")
+        own = {title.removeprefix(start): found for title, found in titled.items() if title.startswith(start)}
+        found = plan_of(scope.path, rows, directory, own, names, findings)
+        check_plan(scope.path, rows, found, mirrors, lines, direction, names, findings)
+        cells += found
+    return tuple(cells)
 
 
 def _spacing(formula: Formula | None, default: float, constants: Constants) -> float:
