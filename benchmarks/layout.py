@@ -1,7 +1,8 @@
 """What layouts are worth, ours beside dot, sfdp and networkx on the same graphs in one run.
 
-In: nothing; ``--graphs FOLDER`` (see ``networks.py``), ``--all`` for the large ones, ``--only WORD`` for rows whose
-name holds it, ``--peers "dot;sfdp"``, ``--engines layered,large``, ``--limit SECONDS`` for a peer. Out: a table, in
+In: nothing; ``--graphs FOLDER`` (see ``networks.py``), ``--sample SEED`` for thirty other Rome and North graphs (or
+``1,2,3`` for several times thirty: constants were set on sample 11), ``--all`` for the large ones, ``--only WORD`` for
+rows whose name holds it, ``--peers "dot;sfdp"``, ``--engines layered,large``, ``--limit SECONDS`` for a peer. Out: a table, in
 Markdown, on standard output: crossings of the routes as drawn, discs that overlap, routes over foreign discs, the share
 of connections along the direction (of those in no loop), area, CPU seconds, and our crossings by the best peer's: of
 ``layered`` by the best of dot's, which draws ranks as well, of the others by the best of all. Sets of graphs are summed
@@ -30,7 +31,7 @@ from neurovis_spec.layout.problem import problem_of
 
 HEXAPOD = Path(__file__).resolve().parent.parent / "specs" / "hexapod"
 #: These draw ranks as `layered` does.
-_DOTS = ("dot", "dot, hurried", "dot, clusters")
+_DOTS = ("dot", "dot, polylines", "dot, hurried", "dot, clusters")
 _HEAD = ("graph", "by", "crossings", "overlaps", "over discs", "flow", "area", "CPU", "ratio")
 
 
@@ -44,7 +45,7 @@ class Case:
     name: str
     problems: Sequence[LayoutProblem]
     engines: Sequence[str] = ("layered",)
-    peers: Sequence[str] = ("dot", "sfdp", "spring", "multipartite")
+    peers: Sequence[str] = ("dot", "dot, polylines", "sfdp", "spring", "multipartite")
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,12 +60,12 @@ class Worth:
     seconds: float
 
 
-def cases(folder: Path | None, slow: bool) -> Iterator[Case]:
+def cases(folder: Path | None, slow: bool, seeds: Sequence[int | None] = (None,)) -> Iterator[Case]:
     yield Case("10-20-10", [layers(10, 20, 10)])
-    rome, name = sample(folder, "rome")
-    yield Case(name, rome)
-    north, name = sample(folder, "north")
-    yield Case(name, north)
+    for kind in ("rome", "north"):
+        for seed in seeds:
+            graphs, name = sample(folder, kind, seed)
+            yield Case(name, graphs)
     for path in sorted(HEXAPOD.glob("*.yaml")) if HEXAPOD.is_dir() else ():
         problem = problem_of(nv.compile(path).network)
         peers: tuple[str, ...] = ("dot", "dot, clusters", "sfdp")
@@ -131,6 +132,7 @@ def row(name: str, by: str, worth: Worth | None, ratio: float | None, limit: flo
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--graphs", type=Path)
+    parser.add_argument("--sample", default="")
     parser.add_argument("--all", action="store_true")
     parser.add_argument("--only", default="")
     parser.add_argument("--peers", default=";".join(PEERS))
@@ -138,7 +140,8 @@ def main() -> None:
     parser.add_argument("--limit", type=float, default=150.0)
     asked = parser.parse_args()
     print(f"| {' | '.join(_HEAD)} |\n|{' --- |' * len(_HEAD)}")
-    for case in cases(asked.graphs, asked.all or bool(asked.only)):
+    seeds = [int(seed) for seed in asked.sample.split(",")] if asked.sample else [None]
+    for case in cases(asked.graphs, asked.all or bool(asked.only), seeds):
         if asked.only not in case.name:
             continue
         best: dict[str, Worth] = {}

@@ -31,6 +31,11 @@ def dot(problem: LayoutProblem, limit: float) -> Timed | None:
     return _graphviz(problem, "dot", _DOT, limit)
 
 
+def polylines(problem: LayoutProblem, limit: float) -> Timed | None:
+    """dot with its other routing for such graphs: straight pieces."""
+    return _graphviz(problem, "dot", f"{_DOT}; splines=polyline", limit)
+
+
 def hurried(problem: LayoutProblem, limit: float) -> Timed | None:
     """dot for what it does not finish untouched: fewer steps of its simplex and of its sweeps, straight lines."""
     return _graphviz(problem, "dot", f"{_DOT}; nslimit=0.5; mclimit=0.2; splines=line", limit)
@@ -108,6 +113,7 @@ def multipartite(problem: LayoutProblem, limit: float) -> Timed | None:
 
 PEERS: dict[str, Callable[[LayoutProblem, float], Timed | None]] = {
     "dot": dot,
+    "dot, polylines": polylines,
     "dot, hurried": hurried,
     "dot, clusters": clusters,
     "sfdp": sfdp,

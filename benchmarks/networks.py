@@ -89,17 +89,23 @@ def sparse(units: int, connections: int, seed: int) -> LayoutProblem:
     return problem_of_pairs(f"sparse {units}", ((f"n{a}", f"n{b}") for a, b in sorted(pairs)))
 
 
-def sample(folder: Path | None, kind: str) -> tuple[list[LayoutProblem], str]:
-    """Thirty of the graphs in a folder, evenly over their natural order (by size and number for North graphs), else
-    stand-ins; and what they are."""
+def sample(folder: Path | None, kind: str, seed: int | None = None) -> tuple[list[LayoutProblem], str]:
+    """Thirty of the graphs in a folder, drawn with a seed, else evenly over their natural order (by size and number
+    for North graphs); without a folder stand-ins; and what they are."""
     paths = sorted((folder / kind).iterdir(), key=lambda path: natural_key(path.name)) if folder else []
     paths = [path for path in paths if path.suffix in (".graphml", ".json")]
     if len(paths) < SAMPLE:
         density = 1.35 if kind == "rome" else 1.5
         sizes = [10 + 3 * i for i in range(SAMPLE)]
-        return [sparse(n, round(density * n), n) for n in sizes], f"{SAMPLE} stand-ins for {kind.capitalize()} graphs"
-    chosen = [paths[(2 * i + 1) * len(paths) // (2 * SAMPLE)] for i in range(SAMPLE)]
-    return [read(path) for path in chosen], f"{SAMPLE} {kind.capitalize()} graphs"
+        graphs = [sparse(n, round(density * n), n if seed is None else 1000 * seed + n) for n in sizes]
+        return graphs, f"{SAMPLE} stand-ins for {kind.capitalize()} graphs{_drawn(seed)}"
+    evenly = [paths[(2 * i + 1) * len(paths) // (2 * SAMPLE)] for i in range(SAMPLE)]
+    chosen = evenly if seed is None else Random(seed).sample(paths, SAMPLE)
+    return [read(path) for path in chosen], f"{SAMPLE} {kind.capitalize()} graphs{_drawn(seed)}"
+
+
+def _drawn(seed: int | None) -> str:
+    return "" if seed is None else f", sample {seed}"
 
 
 def read(path: Path) -> LayoutProblem:

@@ -5,6 +5,7 @@ In: a problem, its units, who shares a rank. Out: a Plan: places of neurons and 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
@@ -134,7 +135,7 @@ def _component(
     if pair:
         order, partner = mirrored(problem, levels, pair)
     else:
-        order = ordered(levels)
+        levels, order = ordered(levels, frozenset() if columns or folds.ranks else _free(levels, units, bonds))
         straight = straightened(levels, order, columns) if columns else None
         if straight is None:
             columns = frozenset()
@@ -178,6 +179,17 @@ def _ranks(problem: LayoutProblem, units: Sequence[Unit], bonds: Sequence[int], 
     last = {owner[m] for m in problem.exits if m in owner}
     ranks = ranks_of(len(numbers), arcs, first, last)
     return [ranks[numbers[bond]] for bond in bonds]
+
+
+def _free(levels: Levels, units: Sequence[Unit], bonds: Sequence[int]) -> set[int]:
+    """The nodes that may change their rank: single neurons that share none with others, outside of boxes."""
+    count = Counter(bonds)
+    alone = {
+        unit.members[0]
+        for unit, bond in zip(units, bonds, strict=True)
+        if count[bond] == 1 and len(unit.members) == 1 and unit.places is None
+    }
+    return {n for n, node in enumerate(levels.nodes) if node.members and node.members[0][0] in alone and node.box < 0}
 
 
 def _one_on_axis(

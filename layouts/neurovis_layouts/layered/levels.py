@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 from neurovis_layouts.layered.units import Unit
@@ -16,6 +16,9 @@ from neurovis_spec.layout.model import LayoutProblem
 
 #: Passages in all; beyond it the longest connections get none.
 _MOST_PASSAGES = 60_000
+
+
+Ends = tuple[int, float, int, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +58,8 @@ class Levels:
     passages: dict[int, list[int]] = field(default_factory=dict)
     #: nodes that only mark where a box passes through a rank
     spines: set[int] = field(default_factory=set)
+    #: by edge: the upper node and the offset there, the lower node and the offset there
+    ends: dict[int, Ends] = field(default_factory=dict)
 
 
 def levels_of(
@@ -92,7 +97,11 @@ def levels_of(
             with_passages.add(i)
     for _, i in sorted(spans, key=lambda item: item[1]):
         if i in with_passages:
-            _connect(levels, problem, i, where)
+            edge = problem.edges[i]
+            one, other = where[edge.source], where[edge.target]
+            if levels.nodes[one[0]].rank > levels.nodes[other[0]].rank:
+                one, other = other, one
+            _connect(levels, i, (*one, *other))
     return levels
 
 
@@ -118,17 +127,27 @@ def _add(levels: Levels, node: Node) -> int:
     return len(levels.nodes) - 1
 
 
-def _connect(levels: Levels, problem: LayoutProblem, i: int, where: dict[int, tuple[int, float]]) -> None:
+def moved(levels: Levels, rank: Sequence[int], height: int) -> Levels:
+    """The levels with each node in another of ``height`` ranks, by index, and connected anew; passages are others."""
+    result = Levels()
+    result.ranks = [[] for _ in range(height)]
+    result.segments = [[] for _ in range(height - 1)]
+    for node, level in zip(levels.nodes, rank, strict=True):
+        if node.members:
+            _add(result, replace(node, rank=level))
+    for i, ends in levels.ends.items():
+        _connect(result, i, ends)
+    return result
+
+
+def _connect(levels: Levels, i: int, ends: Ends) -> None:
     """Segments for one edge, through passages where it crosses ranks; a line of passages is pulled straight."""
-    edge = problem.edges[i]
-    upper, lower = where[edge.source], where[edge.target]
-    if levels.nodes[upper[0]].rank > levels.nodes[lower[0]].rank:
-        upper, lower = lower, upper
-    top, bottom = levels.nodes[upper[0]].rank, levels.nodes[lower[0]].rank
+    upper, a, lower, b = levels.ends[i] = ends
+    top, bottom = levels.nodes[upper].rank, levels.nodes[lower].rank
     passages = [_add(levels, Node(rank)) for rank in range(top + 1, bottom)]
     if passages:
         levels.passages[i] = passages
-    line = [upper, *((node, 0.0) for node in passages), lower]
-    for step, ((a, offset_a), (b, offset_b)) in enumerate(pairwise(line)):
-        ends = (step == 0) + (step == len(line) - 2)
-        levels.segments[top + step].append(Segment(a, offset_a, b, offset_b, (8.0, 2.0, 1.0)[ends]))
+    line = [(upper, a), *((node, 0.0) for node in passages), (lower, b)]
+    for step, (one, other) in enumerate(pairwise(line)):
+        ends_here = (step == 0) + (step == len(line) - 2)
+        levels.segments[top + step].append(Segment(*one, *other, (8.0, 2.0, 1.0)[ends_here]))

@@ -1,20 +1,21 @@
 """Order: who stands beside whom in a rank, so that few segments cross.
 
-In: Levels. Out: node indices by rank, in order. Sweeps by barycentres from several starts, sifting after each, then the
-best order shaken and sifted again, as often as its size allows (an iterated local search; the shaking is the same every
-time). Members of a box stay together; neurons of a group keep the order of their numbers unless crossings gain clearly.
+In: Levels. Out: node indices by rank, in order, and Levels in which what may has moved to other ranks. Sweeps by
+barycentres from several starts, sifting after each; then nodes are taken out and put back (``reinsertion``). Members of
+a box stay together; neurons of a group keep the order of their numbers unless crossings gain clearly.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from itertools import repeat
+from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 
 import numpy as np
 
 from neurovis_layouts.layered.crossings import Floats, Ints, Segments
 from neurovis_layouts.layered.exchange import Exchange
 from neurovis_layouts.layered.levels import Levels
+from neurovis_layouts.layered.reinsertion import reinserted
 from neurovis_layouts.layered.sifting import HELD, sifted, sifted_in_boxes
 
 Order = list[list[int]]
@@ -22,39 +23,35 @@ Order = list[list[int]]
 _CLEARLY = 0.85
 #: Work is counted as pairs of segments that a pass of sifting compares, and this for each rank.
 _A_RANK = 3000
-#: Beyond this a pass takes too long; within it the best order is shaken as often as this allows, or this many times.
-_SIFTED, _SHAKEN, _MOST_TIMES = 1_500_000, 4_000_000, 60
+#: Beyond this a pass takes too long.
+_SIFTED = 1_500_000
 #: Sweeps from each start, with sifting and without.
 _SWEEPS, _PLAIN_SWEEPS = 4, 14
-#: How far nodes are shaken, as a share of the rank, in 1/1024; and how many sweeps follow.
-_SHAKES = ((100, 0), (200, 2), (400, 0), (100, 2), (200, 0), (400, 2))
-#: In a short rank nodes are shaken at least so many 1024ths of a place.
-_LEAST_SHAKE = 2048
-_PATIENCE = 24
-#: Beyond this the order that keeps groups in theirs is not shaken where another is clearly better.
+#: Beyond this the order that keeps groups in theirs is not improved where another is clearly better.
 _LONG = 100_000
 
 
-def ordered(levels: Levels) -> Order:
-    """The ranks in order. Deterministic: every tie falls to the order before, in the end to that of the names."""
-    if not any(levels.segments):
-        return [_grouped_start(levels, rank) for rank in levels.ranks]
-    segments = Segments(levels)
+def ordered(levels: Levels, free: AbstractSet[int] = frozenset()) -> tuple[Levels, Order]:
+    """The ranks in order; ``free`` nodes may have moved to others. Deterministic: every tie falls to the order before,
+    in the end to that of the names."""
     natural = [_grouped_start(levels, rank) for rank in levels.ranks]
+    if not any(levels.segments):
+        return levels, natural
+    segments = Segments(levels)
     held = _Search(levels, segments, True)
     starts = [natural, _by_descent(levels, natural)]
     if segments.ports > 1:  # blocks are not turned round with the order around them
         starts.append([rank[::-1] for rank in natural])
     strict = held.best(starts)
     if strict[0] == 0 or not any(held.kin):
-        return held.shaken(*strict)[1]
+        return held.improved(*strict, free)[1:]
     loose = _Search(levels, segments, False)
     if held.work > _LONG:
-        free = loose.shaken(*loose.best([natural, strict[1]]))
-        return free[1] if free[0] < _CLEARLY * strict[0] else held.shaken(*strict)[1]
-    strict = held.shaken(*strict)
-    free = loose.shaken(*loose.best([natural, strict[1]]))
-    return free[1] if free[0] < _CLEARLY * strict[0] else strict[1]
+        unbound = loose.improved(*loose.best([natural, strict[1]]), free)
+        return (unbound if unbound[0] < _CLEARLY * strict[0] else held.improved(*strict, free))[1:]
+    kept = held.improved(*strict, free)
+    unbound = loose.improved(*loose.best([natural, strict[1]]), free)
+    return (unbound if unbound[0] < _CLEARLY * kept[0] else kept)[1:]
 
 
 def crossings(levels: Levels, order: Order) -> int:
@@ -92,7 +89,7 @@ class _Search:
         best: tuple[int, list[Ints]] | None = None
         for start in starts if sift else starts[1:2]:
             state = _State(self, [np.array(rank, dtype=np.int64) for rank in start])
-            state.shake(repeat(0), 0)
+            state.group()
             for sweep in range((_SWEEPS if sift else _PLAIN_SWEEPS) + 1):
                 if sweep and sift:
                     state = self._after(state, sweep % 2 == 1)
@@ -131,26 +128,11 @@ class _Search:
         box = np.array([node.box for node in nodes], dtype=np.int64)
         return box, np.array([node.kin if self.strict else -1 for node in nodes], dtype=np.int64)
 
-    def shaken(self, crossings: int, order: Order) -> tuple[int, Order]:
-        """The best of what that order is shaken into."""
-        arrays = [np.array(rank, dtype=np.int64) for rank in order]
-        best, now = (crossings, arrays), (crossings, arrays)
-        dice, since = _dice(), 0
-        for turn in range(min(_MOST_TIMES, _SHAKEN // self.work) if self.sifts and crossings else 0):
-            far, sweeps = _SHAKES[turn % len(_SHAKES)]
-            state = _State(self, list(now[1]))
-            state.shake(dice, far)
-            for sweep in range(sweeps):
-                state = self._after(state, (sweep + turn) % 2 == 0)
-            found, shaken = self._sifted(state)
-            since = 0 if found < best[0] else since + 1
-            if found <= now[0]:
-                now = found, shaken
-            if found < best[0]:
-                best = now
-            if found == 0 or since > _PATIENCE:
-                break
-        return best[0], [rank.tolist() for rank in best[1]]
+    def improved(self, crossings: int, order: Order, free: AbstractSet[int]) -> tuple[int, Levels, Order]:
+        """What reinsertion makes of it."""
+        if self.sifts and crossings:
+            return reinserted(self.levels, order, self.strict, free)
+        return crossings, self.levels, order
 
 
 class _State:
@@ -214,14 +196,10 @@ class _State:
             down = not down
         return saved
 
-    def shake(self, dice: Iterator[int], far: int) -> None:
-        """Every node somewhere near, at most ``far`` 1024ths of its rank behind; groups in their order if they keep
-        it."""
+    def group(self) -> None:
+        """Boxes together, and neurons of a group that keep their order in it."""
         for r, rank in enumerate(self.order):
-            count = len(rank)
-            reach = max(far * count, _LEAST_SHAKE) if far else 0
-            moved = np.array([i * 1024 + next(dice) * reach // 1024 for i in range(count)], dtype=np.float64)
-            self.set(r, self._settled(r, self.search.segments.local[rank], moved))
+            self.set(r, self._settled(r, self.search.segments.local[rank], np.arange(len(rank), dtype=np.float64)))
 
     def _sifted(self, r: int, order: Ints, both: bool, down: bool) -> tuple[Ints, int]:
         search = self.search
@@ -272,14 +250,6 @@ def _kin(levels: Levels, rank: Sequence[int]) -> list[Ints]:
         if levels.nodes[node].kin >= 0:
             kin.setdefault((levels.nodes[node].kin, levels.nodes[node].box), []).append(i)
     return [np.array(mates, dtype=np.int64) for mates in kin.values() if len(mates) > 1]
-
-
-def _dice() -> Iterator[int]:
-    """Numbers from 0 to 1023, the same every time (a linear congruential generator, its high bits)."""
-    state = 1
-    while True:
-        state = (state * 1664525 + 1013904223) % (1 << 32)
-        yield state >> 22
 
 
 def _grouped_start(levels: Levels, rank: Sequence[int]) -> list[int]:
