@@ -111,7 +111,7 @@ def built(problem: LayoutProblem, rank: list[int], units: list[Unit]) -> tuple[L
     columns = set(range(len(problem.boxes)))
     levels = levels_of(problem, units, rank, range(len(problem.edges)), columns)
     with_spines(problem, levels, columns)
-    order = straightened(levels, ordered(levels), columns)
+    order = straightened(levels, ordered(levels)[1], columns)
     return (levels, order or [], columns)
 
 

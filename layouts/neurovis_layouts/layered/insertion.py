@@ -121,7 +121,7 @@ class Insertion:
                 self._points[n].append(len(self._owner))
                 self._owner.append(n)
         for n in range(count):
-            for lower, a, b in () if passing[n] else below[n]:
+            for lower, a, b in () if passing[n] else sorted(below[n]):
                 end, offset, passages = lower, b, []
                 while passing[end]:
                     passages.append(end)

@@ -1,0 +1,90 @@
+"""Reinsertion: what it counts is what there is, what leads down leads down, and crossings become fewer."""
+
+from __future__ import annotations
+
+from random import Random
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from neurovis_layouts.layered.insertion import CROSSING, Insertion
+from neurovis_layouts.layered.levels import Levels, levels_of
+from neurovis_layouts.layered.order import crossings, ordered
+from neurovis_layouts.layered.ranks import ranks_of
+from neurovis_layouts.layered.reinsertion import reinserted
+from neurovis_layouts.layered.units import Unit
+
+from neurovis_spec.layout.arrange import lay_out_problem
+from neurovis_spec.layout.metrics import metrics
+from neurovis_spec.layout.model import LayoutEdge, LayoutGroup, LayoutProblem
+
+Pairs = list[tuple[int, int]]
+
+
+def problem(count: int, pairs: Pairs, *groups: tuple[int, ...]) -> LayoutProblem:
+    """Neurons N0, N1, …, each a group of its own where no other is asked for."""
+    names = tuple(f"N{i}" for i in range(count))
+    edges = tuple(LayoutEdge(f"{names[a]} -> {names[b]}", a, b, 1) for a, b in pairs)
+    wanted = groups or tuple((i,) for i in range(count))
+    return LayoutProblem("test", names, tuple(LayoutGroup(f"G{m[0]}", m) for m in wanted), edges)
+
+
+def levels(count: int, pairs: Pairs) -> Levels:
+    rank = ranks_of(count, dict.fromkeys(pairs, 1.0), set(), set())
+    return levels_of(problem(count, pairs), [Unit((i,)) for i in range(count)], rank, range(len(pairs)))
+
+
+@st.composite
+def downward(draw: st.DrawFn, most: int = 12) -> tuple[int, Pairs]:
+    """A connected graph whose connections lead from lower to higher numbers."""
+    count = draw(st.integers(3, most))
+    pairs = {(draw(st.integers(0, i - 1)), i) for i in range(1, count)}
+    more = draw(st.lists(st.tuples(st.integers(0, count - 1), st.integers(0, count - 1)), max_size=14))
+    pairs |= {(min(a, b), max(a, b)) for a, b in more if a != b}
+    return count, sorted(pairs)
+
+
+@given(downward(), st.randoms(use_true_random=False))
+@settings(deadline=None, max_examples=60)
+def test_what_is_taken_out_and_put_back_costs_what_is_counted(graph: tuple[int, Pairs], random: Random) -> None:
+    found = levels(*graph)
+    order = [random.sample(rank, len(rank)) for rank in found.ranks]
+    state = Insertion(found, order, False, frozenset(range(graph[0])))
+    length = sum(state.rank[link.lower] - state.rank[link.upper] for link in state.links)
+    cost = state.cost()
+    assert cost == crossings(found, order) * CROSSING + length
+    for _ in range(6):
+        kept = state.keep()
+        gone = random.sample(range(graph[0]), random.randint(1, graph[0] - 1))
+        saved = sum(state.take(node) for node in gone)
+        again = sum(state.put(node, random.getrandbits(20)) for node in gone)
+        assert state.cost() == cost - saved + again
+        assert all(state.rank[link.upper] < state.rank[link.lower] for link in state.links)
+        if random.random() < 0.3:
+            state.restore(kept)
+        cost = state.cost()
+
+
+def test_a_neuron_moves_to_a_rank_in_which_nothing_crosses() -> None:
+    pairs = [(0, 1), (0, 2), (0, 3), (0, 4), (0, 5), (1, 2), (1, 4), (1, 5), (2, 3)]
+    found = levels(6, pairs)
+    assert crossings(*ordered(found)) == 1  # in ranks that make the connections as short as can be
+    moved, order = ordered(found, frozenset(range(6)))
+    assert crossings(moved, order) == 0
+    layout = metrics(lay_out_problem(problem(6, pairs), "layered"), problem(6, pairs))
+    assert (layout["crossings"], layout["flow"]) == (0, 1)
+
+
+@given(downward())
+@settings(deadline=None, max_examples=40)
+def test_levels_in_new_ranks_are_whole(graph: tuple[int, Pairs]) -> None:
+    found = levels(*graph)
+    count, moved, order = reinserted(found, found.ranks, False, frozenset(range(graph[0])))
+    assert count == crossings(moved, order) <= crossings(found, found.ranks)
+    assert sorted(node for rank in order for node in rank) == list(range(len(moved.nodes)))
+    assert all(moved.nodes[node].rank == r for r, rank in enumerate(order) for node in rank)
+    assert all(any(moved.nodes[node].members for node in rank) for rank in order)
+    ends = {i: (upper, lower) for i, (upper, _, lower, _) in moved.ends.items()}
+    assert ends == dict(enumerate(graph[1]))
+    for i, (upper, lower) in ends.items():
+        between = [moved.nodes[node].rank for node in moved.passages.get(i, [])]
+        assert between == list(range(moved.nodes[upper].rank + 1, moved.nodes[lower].rank))
