@@ -10,9 +10,10 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
+from neurovis_spec.language.patterns import PATTERNS
 from neurovis_spec.manual.builtins import Builtin, builtins
 from neurovis_spec.manual.keys import keys_of
-from neurovis_spec.manual.words import ALL_PATTERNS, functions, names
+from neurovis_spec.manual.words import functions, names
 
 PAGE = Path(__file__).parent / "language.md"
 _PART = re.compile(r"(<!-- (\w+)(?: ([\w.]+))? -->\n)(?:(?!<!--).)*?(<!-- end -->)", re.DOTALL)
@@ -71,7 +72,7 @@ def _value(builtin: Builtin) -> str:
 
 def pattern_table(_: str) -> str:
     """The patterns that this version reads."""
-    rows = [(code(one.use), one.about) for one in ALL_PATTERNS]
+    rows = [(code(one.use), one.about) for one in PATTERNS.values()]
     return table(("pattern", "connects"), rows)
 
 

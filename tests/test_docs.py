@@ -13,13 +13,13 @@ import yaml
 import neurovis_spec as nv
 from neurovis_spec.cli.topics import contents, text_of
 from neurovis_spec.compiled import CompiledNetwork
-from neurovis_spec.compiler.connections.patterns import PATTERNS
 from neurovis_spec.language.expressions.functions import FUNCTIONS
+from neurovis_spec.language.patterns import PATTERNS, Pattern
 from neurovis_spec.manual.builtins import builtins
 from neurovis_spec.manual.keys import Key, keys
 from neurovis_spec.manual.samples import example, examples
 from neurovis_spec.manual.topics import find, near, topics
-from neurovis_spec.manual.words import ALL_PATTERNS, FUNCTION_TEXTS, functions, names
+from neurovis_spec.manual.words import FUNCTION_TEXTS, functions, names
 
 BASE = {
     "neurovis": "neurovis: 1",
@@ -118,15 +118,14 @@ def test_a_description_of_several_lines_is_whole() -> None:
 
 
 def test_every_pattern_and_every_function_is_explained() -> None:
-    assert set(PATTERNS) <= {pattern.name for pattern in ALL_PATTERNS}
+    assert all(
+        pattern.about and all(setting.about for setting in pattern.settings.values()) for pattern in PATTERNS.values()
+    )
     assert list(FUNCTION_TEXTS) == list(FUNCTIONS)
 
 
-@pytest.mark.parametrize("pattern", ALL_PATTERNS, ids=lambda pattern: pattern.name)
-def test_a_pattern_is_written_as_shown(pattern: object) -> None:
-    from neurovis_spec.manual.words import Pattern
-
-    assert isinstance(pattern, Pattern)
+@pytest.mark.parametrize("pattern", PATTERNS.values(), ids=lambda pattern: pattern.name)
+def test_a_pattern_is_written_as_shown(pattern: Pattern) -> None:
     spec = completed(
         "neurons: {K: {count: 6}, L: {count: 6}}\n"
         f"connections: {{K -> L: {{weight: 0.1, pattern: {pattern.use}}}}}\nseed: 1"

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lsp_marks import marked
 
-from neurovis_spec.language.patterns import SETTINGS
+from neurovis_spec.language.patterns import PATTERNS
 from neurovis_spec.lsp import protocol as wire
 from neurovis_spec.lsp.check import check
 from neurovis_spec.lsp.completion import Completion, complete
@@ -124,9 +124,9 @@ def test_a_key_comes_with_its_colon_and_its_description() -> None:
 def test_patterns_and_their_settings_come_with_what_they_mean() -> None:
     found = offered(BASE + "connections:\n  K -> O: {pattern: {¦")
     assert found["ring"].documentation == "As chain, and the last with the first."
-    for name, wanted in SETTINGS.items():
+    for name, pattern in PATTERNS.items():
         inside = offered(BASE + f"connections:\n  K -> O: {{pattern: {{{name}: {{¦")
-        assert tuple(inside) == wanted
+        assert list(inside) == [*pattern.settings]
         assert all(item.documentation for item in inside.values())
 
 
@@ -147,7 +147,7 @@ def test_behind_a_dot_the_neurons_of_the_module_are_offered() -> None:
 
 def test_an_instance_is_given_the_parameters_and_inputs_of_its_module() -> None:
     text = "parameters: {outer: 1}\nmodules:\n  leg: {parameters: {gain: 1}, inputs: {load: {}}, neurons: {S: {}}}\n"
-    text += "  body: {instances: {a2: {module: leg, count: 3}}, outputs: {o: a21.¦}}\n"
+    text += "  body: {instances: {a2: {module: leg, count: 3}}, layout: {boxes: {B: a21.¦}}}\n"
     assert set(offered(text)) == {"S"}
     text = text.replace("¦", "S") + "instances:\n  left: {module: leg, "
     assert set(offered(text + "set: {¦")) == {"gain"}

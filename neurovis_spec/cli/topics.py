@@ -10,11 +10,12 @@ from collections.abc import Iterable, Sequence
 from typing import Final
 
 from neurovis_spec.cli.tables import table
+from neurovis_spec.language.patterns import PATTERNS, Pattern
 from neurovis_spec.manual.builtins import Builtin, builtins
 from neurovis_spec.manual.keys import Key, keys, keys_of
 from neurovis_spec.manual.samples import example
 from neurovis_spec.manual.topics import Topic
-from neurovis_spec.manual.words import ALL_PATTERNS, Pattern, Word, functions, names
+from neurovis_spec.manual.words import Word, functions, names
 
 _WIDTH: Final = 100
 _KINDS: Final = {"activation": "an activation", "model": "a neuron model", "rule": "a plasticity rule"}
@@ -66,7 +67,7 @@ def _key(key: Key) -> str:
     parts = [", ".join(head), filled(key.about)]
     choices = [one.name for one in builtins() if one.kind == _NAMING.get(key.path)]
     if key.path == "connections.pattern":
-        choices = [pattern.name for pattern in ALL_PATTERNS]
+        choices = [*PATTERNS]
     if choices:
         parts.append(filled(f"built in: {', '.join(choices)}"))
     below = keys_of(key.path)
@@ -88,7 +89,7 @@ def contents() -> str:
             parts.append(_listed(f"keys of {key.path}", (one.name for one in below)))
     for kind in _KINDS:
         parts.append(_listed(f"{kind}s", (one.name for one in builtins() if one.kind == kind)))
-    parts.append(_listed("patterns", (one.name for one in ALL_PATTERNS)))
+    parts.append(_listed("patterns", PATTERNS))
     parts.append(_listed("functions", (one.name for one in functions())))
     parts.append(_listed("names in expressions", (one.name for one in names())))
     return "\n".join([*parts, "", "'neurovis docs NAME' explains each of them."])

@@ -10,12 +10,25 @@ from contextlib import suppress
 from typing import Annotated, ClassVar, NamedTuple
 
 from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
-from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import PydanticCustomError
 
 from neurovis_spec.diagnostics import Span
-from neurovis_spec.language.located import (
+from neurovis_spec.language import grammar
+from neurovis_spec.language.grammar import (
+    ENDS,
     FORMULA,
+    NULL,
+    REFERENCES,
+    TEXT,
+    TWO,
+    Either,
+    Key,
+    ListOf,
+    Map,
+    Role,
+    Shape,
+)
+from neurovis_spec.language.located import (
     BoolField,
     Formula,
     FormulaField,
@@ -32,7 +45,7 @@ from neurovis_spec.language.located import (
 )
 from neurovis_spec.language.model import Keyed, Model
 from neurovis_spec.language.theme import ThemeField
-from neurovis_spec.language.values import REFERENCES, PointField, Reference, ReferenceField, TitleField, as_reference
+from neurovis_spec.language.values import SEVERAL, PointField, Reference, ReferenceField, TitleField, as_reference
 from neurovis_spec.language.views import VIEWS
 from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence
 
@@ -84,29 +97,30 @@ def _plan(node: Node, info: ValidationInfo) -> tuple[PlanRow, ...]:
     return tuple(rows)
 
 
-_TEXT = {"type": "string"}
-_PAIR = {"type": "array", "items": _TEXT, "minItems": 2, "maxItems": 2}
-
 # what a spec and a module both say of their drawing
 ArrangeField = Annotated[
     Keyed[Annotated[Located[str], words("row", "column", "grid", "ring", "arc")]],
+    REFERENCES,
     Field(default_factory=dict, description="{reference: row | column | grid | ring | arc}."),
 ]
 BoxesField = Annotated[Keyed[ReferenceField], Field(default_factory=dict, description="{title: references}.")]
 MirrorField = Annotated[
     tuple[Reference, ...],
-    Leaf(_pairs, {"type": "array", "items": _PAIR}),
+    Leaf(_pairs, ListOf(ListOf(TEXT, least=2, most=2))),
+    REFERENCES,
     Field(default=(), description="[[left, right], …]: groups or instances; the second is the first's mirror image."),
 ]
 AlignField = Annotated[
     tuple[Reference, ...],
-    Leaf(_references, {"type": "array", "items": {"type": "array", "items": _TEXT}}),
+    Leaf(_references, ListOf(ListOf(TEXT))),
+    REFERENCES,
     Field(default=(), description="[[references], …]: each list on one line across the direction."),
 ]
 
 PlanField = Annotated[
     tuple[PlanRow, ...],
-    Leaf(_plan, {"type": "array", "items": {"type": "array", "items": {"type": ["string", "null"]}}}),
+    Leaf(_plan, ListOf(ListOf(Either((TEXT, NULL))))),
+    REFERENCES,
     Field(
         default=(),
         description="[[name, ~, name], …]: rows of the page; a cell is an instance, a group, a box's title or empty.",
@@ -128,7 +142,7 @@ class LayoutModel(Model):
 
     PLACE: ClassVar[str] = "'layout'"
 
-    engine: TextField | None = Field(
+    engine: Annotated[TextField, Role("engine")] | None = Field(
         None,
         description="What lays it out: auto, layered, organic, large, circular, grid, spatial, manual, or a plug-in "
         "(default auto).",
@@ -136,7 +150,9 @@ class LayoutModel(Model):
     direction: Annotated[Located[str], words("down", "up", "right", "left")] | None = Field(
         None, description="Where the signals go: down, up, right, left (default down)."
     )
-    positions: Keyed[PointField] = Field(default_factory=dict, description="Pins: {neuron: [x, y]}.")
+    positions: Annotated[Keyed[PointField], REFERENCES] = Field(
+        default_factory=dict, description="Pins: {neuron: [x, y]}."
+    )
     arrange: ArrangeField
     boxes: BoxesField
     mirror: MirrorField
@@ -151,7 +167,7 @@ class ModuleLayoutModel(Model):
 
     PLACE: ClassVar[str] = "the 'layout' of a module"
 
-    positions: Keyed[PointField] = Field(
+    positions: Annotated[Keyed[PointField], REFERENCES] = Field(
         default_factory=dict, description="{neuron: [x, y]}, relative to the instance's origin."
     )
     arrange: ArrangeField
@@ -209,21 +225,17 @@ def _gains(
     return tuple(found)
 
 
-_RANGE = {"type": "array", "items": FORMULA, "minItems": 2, "maxItems": 2}
-_GAIN = FORMULA["anyOf"]
-_GAIN_OR_RANGE = [*_GAIN, _RANGE]
+def _by_reference(value: Shape, role: Role) -> Either:
+    """A gain, or a mapping of references to gains."""
+    return Either((value, Map({}, value, role, least=1)))
 
 
-def _by_reference(values: list[JsonSchemaValue]) -> JsonSchemaValue:
-    """The schema of a gain, or of a mapping of references to gains."""
-    mapping = {"type": "object", "additionalProperties": {"anyOf": values}, "minProperties": 1}
-    return {"anyOf": [*values, mapping]}
-
-
-GainField = Annotated[tuple[GainValue, ...], Leaf(lambda node, info: _gains(node, info, _factor), _by_reference(_GAIN))]
+GainField = Annotated[
+    tuple[GainValue, ...], Leaf(lambda node, info: _gains(node, info, _factor), _by_reference(FORMULA, ENDS))
+]
 ActivityGainField = Annotated[
     tuple[GainValue, ...],
-    Leaf(lambda node, info: _gains(node, info, _factor_or_range), _by_reference(_GAIN_OR_RANGE)),
+    Leaf(lambda node, info: _gains(node, info, _factor_or_range), _by_reference(Either((FORMULA, TWO)), REFERENCES)),
 ]
 
 
@@ -281,22 +293,16 @@ def _panel(node: Node, info: ValidationInfo) -> PanelModel | None:
     return None
 
 
-_PANEL = {
-    "anyOf": [
-        {"enum": list(VIEWS)},
-        {
-            "type": "object",
-            "properties": {"network": {"type": "null"}, **dict.fromkeys(VIEWS[1:], REFERENCES)},
-            "minProperties": 1,
-            "maxProperties": 1,
-            "additionalProperties": False,
-        },
-    ]
-}
-FigureField = Annotated[
-    tuple[PanelModel, ...],
-    Leaf(_figure, {"anyOf": [*_PANEL["anyOf"], {"type": "array", "items": _PANEL}]}),
-]
+_PANEL = Either(
+    (
+        grammar.words(*VIEWS),
+        Map(
+            {"network": Key(NULL, "The network."), **dict.fromkeys(VIEWS[1:], Key(SEVERAL, "What it shows."))},
+            one=True,
+        ),
+    )
+)
+FigureField = Annotated[tuple[PanelModel, ...], Leaf(_figure, Either((_PANEL, ListOf(_PANEL)))), ENDS]
 
 
 class RenderModel(Model):
@@ -305,7 +311,7 @@ class RenderModel(Model):
     PLACE: ClassVar[str] = "'render'"
 
     gain: Gain | None = Field(None, description="The scaling factors γ of Eqs. 2–5.")
-    trace: Keyed[FormulaField] = Field(
+    trace: Annotated[Keyed[FormulaField], REFERENCES] = Field(
         default_factory=dict,
         description="{neurons: seconds}: how long activity is still seen while it fades, to 1/e; 0: not at all.",
     )
@@ -315,7 +321,7 @@ class RenderModel(Model):
     size: Annotated[
         tuple[FormulaField, FormulaField] | None,
         BeforeValidator(lambda node, info: _size(node, info)),
-        WithJsonSchema({"type": "array", "items": FORMULA, "minItems": 2, "maxItems": 2}),
+        WithJsonSchema(TWO.schema),
     ] = Field(None, description="[width, height] in pixels: 64 to 16384 each, and 33554432 in all.")
     labels: BoolField | None = Field(None, description="Whether neurons show their labels (default true).")
     legend: BoolField | None = Field(None, description="Whether there is a legend (default true).")

@@ -1,74 +1,75 @@
-"""Keys that exclude or need each other, as JSON Schema says it.
+"""Keys that exclude or need each other, as the fields of the models say (``NotWith``, ``Needs``, ``OneOf``).
 
-In: names of keys. Out: keywords of a schema, which models give as their ``json_schema_extra``. The compiler checks the
-same and says it in words; the tests hold the two to each other.
+In: these rules and a mapping as written. Out: findings, and the same as JSON Schema.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from itertools import combinations
-from typing import Final
+from collections.abc import Collection
+from typing import TypeAlias
 
-from pydantic import ConfigDict
-from pydantic.config import JsonDict
+from pydantic.json_schema import JsonSchemaValue
 
-#: Exactly one key of the model.
-ONE_KEY: Final = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
+from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.grammar import AsTable, Needs, NotWith, OneOf, Written
+from neurovis_spec.language.yaml.source import Mapping, Scalar
 
-
-def _both(first: JsonDict, second: JsonDict) -> JsonDict:
-    return {"not": {"allOf": [first, second]}}
+#: What the fields of a model say, by their keys.
+Rules: TypeAlias = tuple[tuple[str, NotWith | Needs], ...]
 
 
-def _has(*keys: str) -> JsonDict:
-    return {"required": [*keys]}
+def _key(other: Written) -> str:
+    return other.key if isinstance(other, AsTable) else other
 
 
-def _is_table(key: str) -> JsonDict:
-    """Whether a key is there and its value a matrix or a file."""
-    return {"required": [key], "properties": {key: {"type": ["array", "object"]}}}
+def _is_there(other: Written, data: Mapping) -> bool:
+    entry = data.entry(_key(other))
+    return entry is not None and not (isinstance(other, AsTable) and isinstance(entry.value, Scalar))
 
 
-def _if(condition: JsonDict, then: JsonDict) -> JsonDict:
-    return {"if": condition, "then": then}
+def _excluded(rule: NotWith, data: Mapping) -> str | None:
+    """The first key that is there and excludes that of a field."""
+    return next((_key(other) for other in rule.others if _is_there(other, data)), None)
 
 
-def _any(choices: Iterable[JsonDict]) -> JsonDict:
-    return {"anyOf": [*choices]}
+def contradictory(rules: Rules, data: Mapping) -> bool:
+    """Whether two keys of a mapping exclude each other."""
+    return any(
+        isinstance(rule, NotWith) and data.entry(own) is not None and _excluded(rule, data) is not None
+        for own, rule in rules
+    )
 
 
-#: An input has one source at the most.
-INPUT: Final = ConfigDict(
-    json_schema_extra={
-        "allOf": [
-            _both(_has(one), _has(other)) for one, other in combinations(("expression", "file", "values", "size"), 2)
-        ]
-    }
-)
-#: ``first`` counts from somewhere.
-GROUP: Final = ConfigDict(json_schema_extra=_if(_has("first"), _any([_has("count"), _has("names")])))
+def check_rules(rules: Rules, data: Mapping, perhaps: Collection[str], findings: Findings) -> None:
+    """Report keys that exclude each other, each once, and those that miss another one, unless an unknown key may be
+    meant for that (``perhaps``)."""
+    for own, rule in rules:
+        entry = data.entry(own)
+        if entry is None:
+            continue
+        if isinstance(rule, NotWith):
+            other = _excluded(rule, data)
+            if other is not None:
+                hint = None if rule.hint is None else rule.hint.format(own=own, other=other)
+                findings.error(rule.code, entry.key.span, rule.why.format(own=own, other=other), hint)
+        elif not any(_key(other) in perhaps or _is_there(other, data) for other in rule.others):
+            findings.error(rule.code, entry.key.span, rule.why, rule.hint)
 
-_WRITTEN: Final = ("matrix", "edges")
-_TABLE: Final = _is_table("centre")
-#: What makes the connections is said once, and what is said of it has something to hold to.
-CONNECTION: Final = ConfigDict(
-    json_schema_extra={
-        "dependentRequired": {"bounds": ["plasticity"]},
-        "allOf": [
-            *[_both(_has(one), _has(other)) for one in _WRITTEN for other in ("weight", "pattern", "self")],
-            _both(*map(_has, _WRITTEN)),
-            *[_both(_TABLE, _has(other)) for other in ("edges", "pattern", "self")],
-            _if(_has("rows"), _any([_has("matrix"), _TABLE])),
-        ],
-    }
-)
-#: A clamp lasts and is an event of its own; what is set or removed is so from one step on.
-_AT_ONCE: Final = ("set", "lesion", "mend", "learning")
-EVENT: Final = ConfigDict(
-    json_schema_extra={
-        "if": _has("clamp"),
-        "then": {"required": ["from"], "properties": dict.fromkeys(("at", *_AT_ONCE), False)},
-        "else": {"required": ["at"], "properties": {"from": False, "to": False}, **_any([*map(_has, _AT_ONCE)])},
-    }
-)
+
+def _has(other: Written) -> JsonSchemaValue:
+    if isinstance(other, AsTable):
+        return {"required": [other.key], "properties": {other.key: {"type": ["array", "object"]}}}
+    return {"required": [other]}
+
+
+def schema_of(rules: Rules, one_of: OneOf | None) -> JsonSchemaValue:
+    """The rules as keywords of a JSON Schema."""
+    found: list[JsonSchemaValue] = []
+    for own, rule in rules:
+        if isinstance(rule, NotWith):
+            found += ({"not": {"allOf": [_has(own), _has(other)]}} for other in rule.others)
+        else:
+            found.append({"if": _has(own), "then": {"anyOf": [_has(other) for other in rule.others]}})
+    if one_of is not None:
+        found.append({"anyOf": [_has(key) for key in one_of.keys]})
+    return {"allOf": found} if found else {}

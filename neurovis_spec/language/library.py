@@ -7,8 +7,18 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar
 
-from pydantic import ConfigDict, Field, ValidationInfo
+from pydantic import Field, ValidationInfo
 
+from neurovis_spec.language.grammar import (
+    ACTIVITY,
+    IN_ACTIVATION,
+    IN_MODEL,
+    IN_RULE,
+    PLAIN,
+    OneOf,
+    Plain,
+    declaring,
+)
 from neurovis_spec.language.located import (
     BoolField,
     FormulaField,
@@ -26,6 +36,9 @@ from neurovis_spec.language.values import ParameterField
 from neurovis_spec.language.yaml.source import Mapping, Node, Scalar
 
 LANGUAGE_VERSION = 1
+VERSION = Plain({"const": LANGUAGE_VERSION})
+#: What is declared in a definition, and known in it alone.
+LOCAL = declaring("local")
 
 
 def version_field(node: Node, info: ValidationInfo) -> Located[int]:
@@ -43,7 +56,7 @@ def version_field(node: Node, info: ValidationInfo) -> Located[int]:
 class StateModel(Model):
     """A state of a model or of a rule."""
 
-    initial: FormulaField | None = Field(None, description="Its value before step 0 (default 0).")
+    initial: Annotated[FormulaField, PLAIN] | None = Field(None, description="Its value before step 0 (default 0).")
     each_step: FormulaField | None = Field(None, description="Its new value at each step.")
     each_episode: FormulaField | None = Field(None, description="Its new value at an episode's end.")
 
@@ -53,9 +66,13 @@ class ActivationModel(Model):
 
     STAND_INS: ClassVar[StandIns] = {"value": 0}
 
-    parameters: Named[ParameterField] = Field(default_factory=dict, description="Names and defaults.")
-    let: Named[FormulaField] = Field(default_factory=dict, description="Intermediate values, in order.")
-    value: FormulaField = Field(description="An expression of x, the combined input, and the parameters.")
+    parameters: Annotated[Named[ParameterField], LOCAL] = Field(default_factory=dict, description="Names and defaults.")
+    let: Annotated[Named[Annotated[FormulaField, IN_ACTIVATION]], LOCAL] = Field(
+        default_factory=dict, description="Intermediate values, in order."
+    )
+    value: Annotated[FormulaField, IN_ACTIVATION] = Field(
+        description="An expression of x, the combined input, and the parameters."
+    )
     description: TextField | None = Field(None, description="What it is, its equation and its source.")
 
 
@@ -64,10 +81,16 @@ class ModelModel(Model):
 
     STAND_INS: ClassVar[StandIns] = {"activity": 0}
 
-    parameters: Named[ParameterField] = Field(default_factory=dict, description="Names and defaults.")
-    let: Named[FormulaField] = Field(default_factory=dict, description="Intermediate values, in order.")
-    state: Named[StateModel] = Field(default_factory=dict, description="States, updated together from old values.")
-    activity: FormulaField = Field(description="The activity; f(…) is the neuron's activation, drive is u[t].")
+    parameters: Annotated[Named[ParameterField], LOCAL] = Field(default_factory=dict, description="Names and defaults.")
+    let: Annotated[Named[Annotated[FormulaField, IN_MODEL]], LOCAL] = Field(
+        default_factory=dict, description="Intermediate values, in order."
+    )
+    state: Annotated[Named[Annotated[StateModel, IN_MODEL]], LOCAL] = Field(
+        default_factory=dict, description="States, updated together from old values."
+    )
+    activity: Annotated[FormulaField, ACTIVITY] = Field(
+        description="The activity; f(…) is the neuron's activation, drive is u[t]."
+    )
     spikes: BoolField | None = Field(
         None,
         description="Whether its activity is a spike, of one step, or silence; pictures show a trace (default false).",
@@ -78,10 +101,14 @@ class ModelModel(Model):
 class WeightModel(Model):
     """How a rule changes the weight."""
 
-    model_config = ConfigDict(json_schema_extra={"minProperties": 1})
+    ONE_OF: ClassVar[OneOf | None] = OneOf(
+        ("each_step", "each_episode"), "a rule changes the weight in 'each_step' or in 'each_episode'"
+    )
 
-    each_step: FormulaField | None = Field(None, description="w[t+1], an expression of weight, pre, post, ….")
-    each_episode: FormulaField | None = Field(None, description="The weight after an episode.")
+    each_step: Annotated[FormulaField, IN_RULE] | None = Field(
+        None, description="w[t+1], an expression of weight, pre, post, …."
+    )
+    each_episode: Annotated[FormulaField, IN_RULE] | None = Field(None, description="The weight after an episode.")
 
 
 class RuleModel(Model):
@@ -89,10 +116,16 @@ class RuleModel(Model):
 
     STAND_INS: ClassVar[StandIns] = {"weight": {"each_step": 0}}
 
-    parameters: Named[ParameterField] = Field(default_factory=dict, description="Names and defaults.")
-    signals: TextsField = Field(default=(), description="Names of signals that the connection must supply.")
-    let: Named[FormulaField] = Field(default_factory=dict, description="Intermediate values, in order.")
-    state: Named[StateModel] = Field(default_factory=dict, description="States, one for each connection.")
+    parameters: Annotated[Named[ParameterField], LOCAL] = Field(default_factory=dict, description="Names and defaults.")
+    signals: Annotated[TextsField, LOCAL] = Field(
+        default=(), description="Names of signals that the connection must supply."
+    )
+    let: Annotated[Named[Annotated[FormulaField, IN_RULE]], LOCAL] = Field(
+        default_factory=dict, description="Intermediate values, in order."
+    )
+    state: Annotated[Named[Annotated[StateModel, IN_RULE]], LOCAL] = Field(
+        default_factory=dict, description="States, one for each connection."
+    )
     weight: WeightModel = Field(description="How the weight changes.")
     description: TextField | None = Field(None, description="What it is, its equation and its source.")
 
@@ -106,11 +139,17 @@ class Library(Model):
 
     STAND_INS: ClassVar[StandIns] = {"neurovis": LANGUAGE_VERSION}
 
-    neurovis: Annotated[Located[int], Leaf(version_field, {"const": 1})] = Field(
+    neurovis: Annotated[Located[int], Leaf(version_field, VERSION)] = Field(
         description="The version of the language: 1."
     )
     title: TextsField | None = Field(None, description="A title.")
     description: TextsField | None = Field(None, description="What this is.")
-    activations: Named[ActivationModel] = Field(default_factory=dict, description="Activation functions of one's own.")
-    models: Named[ModelModel] = Field(default_factory=dict, description="Neuron models of one's own.")
-    rules: Named[RuleModel] = Field(default_factory=dict, description="Plasticity rules of one's own.")
+    activations: Annotated[Named[ActivationModel], declaring("activation")] = Field(
+        default_factory=dict, description="Activation functions of one's own."
+    )
+    models: Annotated[Named[ModelModel], declaring("model")] = Field(
+        default_factory=dict, description="Neuron models of one's own."
+    )
+    rules: Annotated[Named[RuleModel], declaring("rule")] = Field(
+        default_factory=dict, description="Plasticity rules of one's own."
+    )

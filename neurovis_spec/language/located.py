@@ -19,7 +19,9 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import PydanticCustomError, core_schema
 
 from neurovis_spec.diagnostics import Findings, Span, meant, nearest, shorten, suggest
+from neurovis_spec.language import grammar
 from neurovis_spec.language.expressions.lexer import decimal_hint
+from neurovis_spec.language.grammar import FORMULA, REFERENCE, TEXT, TEXTS, Either, ListOf, Plain, Shape
 from neurovis_spec.language.yaml.scalars import INTEGER_HIGH, INTEGER_LOW
 from neurovis_spec.language.yaml.source import Node, Packed, Scalar, Sequence, describe
 
@@ -33,14 +35,15 @@ REPORTED = "reported"
 _PATIENCE = 20
 
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,63}")
+NAME = Plain({"type": "string", "pattern": f"^{IDENTIFIER.pattern}$"})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Leaf(Generic[N]):
-    """The annotation of a field whose value our own ``check`` makes from a node; ``schema`` is what editors see."""
+    """The annotation of a field whose value our own ``check`` makes from a node; ``shape`` is what may be written."""
 
     check: Callable[[N, ValidationInfo], object]
-    schema: JsonSchemaValue
+    shape: Shape
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
         """The check alone: pydantic need not know the classes of our values."""
@@ -50,7 +53,7 @@ class Leaf(Generic[N]):
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
         """The JSON Schema of the value as written."""
-        return dict(self.schema)
+        return self.shape.schema
 
 
 class Located(NamedTuple, Generic[T]):
@@ -223,27 +226,17 @@ def one_of(*words: str) -> Callable[[Node, ValidationInfo], Located[str]]:
 
 def words(*allowed: str) -> Leaf[Node]:
     """The annotation of a field that takes one of these words."""
-    return Leaf(one_of(*allowed), {"enum": list(allowed)})
+    return Leaf(one_of(*allowed), grammar.words(*allowed))
 
 
-#: The schema of a formula: a number, or the text of an expression.
-FORMULA: JsonSchemaValue = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": "\\S", "maxLength": 1000}]}
-
-TextField = Annotated[Located[str], Leaf(as_text, {"type": "string"})]
-TextsField = Annotated[
-    tuple[Located[str], ...],
-    Leaf(as_texts, {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
-]
-PartsField = Annotated[
-    tuple[Located[str], ...],
-    Leaf(as_parts, {"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}),
-]
-IdentifierField = Annotated[
-    Located[str],
-    Leaf(as_identifier, {"type": "string", "pattern": "^[A-Za-z_][A-Za-z0-9_]{0,63}$"}),
-]
-BoolField = Annotated[Located[bool], Leaf(as_bool, {"type": "boolean"})]
+TextField = Annotated[Located[str], Leaf(as_text, TEXT)]
+TextsField = Annotated[tuple[Located[str], ...], Leaf(as_texts, TEXTS)]
+#: A reference, or a list of them: each stands for itself.
+PartsField = Annotated[tuple[Located[str], ...], Leaf(as_parts, Either((REFERENCE, ListOf(REFERENCE))))]
+IdentifierField = Annotated[Located[str], Leaf(as_identifier, NAME)]
+NamesField = Annotated[tuple[Located[str], ...], Leaf(as_texts, Either((NAME, ListOf(NAME))))]
+BoolField = Annotated[Located[bool], Leaf(as_bool, Plain({"type": "boolean"}))]
 IntegerField = Annotated[
-    Located[int], Leaf(as_integer, {"type": "integer", "minimum": INTEGER_LOW, "maximum": INTEGER_HIGH})
+    Located[int], Leaf(as_integer, Plain({"type": "integer", "minimum": INTEGER_LOW, "maximum": INTEGER_HIGH}))
 ]
 FormulaField = Annotated[Formula, Leaf(as_formula, FORMULA)]

@@ -29,6 +29,8 @@ from pydantic.json_schema import JsonSchemaValue, SkipJsonSchema
 from pydantic_core import core_schema
 
 from neurovis_spec.diagnostics import Findings, Span, nearest
+from neurovis_spec.language.exclusions import Rules, check_rules, contradictory, schema_of
+from neurovis_spec.language.grammar import Needs, NotWith, OneOf
 from neurovis_spec.language.keys import Words, read_keys
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Leaf, bad_name, findings_of, give_up, refuse
 from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Scalar, ScalarValue, Sequence
@@ -52,6 +54,8 @@ class Model(BaseModel):
     #: what a mapping of this kind is called in a finding, for keys that are written elsewhere
     PLACE: ClassVar[str] = ""
     STAND_INS: ClassVar[StandIns] = {}
+    #: keys of which there has to be one
+    ONE_OF: ClassVar[OneOf | None] = None
     #: what is said of a key without a value
     UNSAID: ClassVar[str] = "leave the key out, or give it a value"
 
@@ -66,6 +70,7 @@ class Model(BaseModel):
             refuse(info, data, "a mapping", hint)  # type: ignore[arg-type]
         keys = read_keys(data, cls._fields(), findings_of(info), Words(cls._foreign, _home))
         data = keys.mapping
+        cls._check_rules(data, keys.perhaps, findings_of(info))
         values = cls._keys(data, keys.perhaps, findings_of(info))
         for _ in range(2):
             try:
@@ -79,6 +84,36 @@ class Model(BaseModel):
                             give_up()
                         values[key] = _standing_in(cls.STAND_INS[key], data.span)
         give_up()
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """The schema of the keys, and of which of them go together."""
+        result = handler.resolve_ref_schema(handler(schema))
+        result.update(schema_of(cls._rules(), cls.ONE_OF))
+        return result
+
+    @classmethod
+    @cache
+    def _rules(cls) -> Rules:
+        """Which keys exclude each other, and which need others."""
+        fields = cls._fields().items()
+        return tuple(
+            (name, item) for name, field in fields for item in field.metadata if isinstance(item, (NotWith, Needs))
+        )
+
+    @classmethod
+    def _check_rules(cls, data: Mapping, perhaps: Collection[str], findings: Findings) -> None:
+        check_rules(cls._rules(), data, perhaps, findings)
+        one_of, there = cls.ONE_OF, {entry.name for entry in data.entries}
+        if one_of is not None and there.isdisjoint(one_of.keys) and there <= cls._fields().keys():
+            findings.error(one_of.code, opening(data), one_of.why, one_of.hint)
+
+    @cached_property
+    def contradictory(self) -> bool:
+        """Whether keys exclude each other, which is reported: which of them is meant is not known."""
+        return contradictory(self._rules(), self.source)
 
     @classmethod
     @cache
@@ -251,6 +286,34 @@ class Filled:
             findings_of(info).error("no-value", node.span, message, "leave the key out, or give it a value")
             give_up()
         return node
+
+
+@dataclass(frozen=True, slots=True)
+class Short:
+    """Says of a model that a bare value is short for a mapping with this ``key`` alone; ``wanted`` is what may stand
+    there, for a finding."""
+
+    key: str
+    wanted: str = "a value or a mapping"
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        """What is short is written out before anything is made of it."""
+        return core_schema.with_info_before_validator_function(self._written_out, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """The value of the key, or the mapping."""
+        whole = handler(schema)
+        key = dict(handler.resolve_ref_schema(whole)["properties"][self.key]["anyOf"][0])
+        return {"anyOf": [key, whole]}
+
+    def _written_out(self, node: Node, info: ValidationInfo) -> Node:
+        if isinstance(node, Mapping):
+            return node
+        if not isinstance(node, Scalar):
+            refuse(info, node, self.wanted)
+        return Mapping((Entry(Scalar(self.key, node.span), node),), node.span)
 
 
 #: A mapping whose keys are names of the author's: ``Named[Group]``.

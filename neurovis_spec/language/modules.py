@@ -11,7 +11,8 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from neurovis_spec.language.drawing import ModuleLayoutModel
-from neurovis_spec.language.library import Library, version_field
+from neurovis_spec.language.grammar import GROUP, declaring, naming
+from neurovis_spec.language.library import VERSION, Library, version_field
 from neurovis_spec.language.located import FormulaField, IdentifierField, Leaf, Located, TextField, TextsField
 from neurovis_spec.language.model import Model, Named, NamedParameters, StandIns
 from neurovis_spec.language.sections import ConnectionsField, GroupModel, InputModel
@@ -29,14 +30,14 @@ class InstanceModel(Model):
 
     PLACE: ClassVar[str] = "an instance"
 
-    module: IdentifierField = Field(description="The module that it is an instance of.")
+    module: Annotated[IdentifierField, naming("module")] = Field(description="The module that it is an instance of.")
     count: FormulaField | None = Field(
         None, description="How many instances; left with count 3 makes left1, left2, left3."
     )
-    set: Named[FormulaField] = Field(
+    set: Annotated[Named[Annotated[FormulaField, GROUP]], naming("parameter")] = Field(
         default_factory=dict, description="{parameter of the module: value}; may use i (0-based) and n (count)."
     )
-    inputs: Named[TextField] = Field(
+    inputs: Annotated[Named[Annotated[TextField, naming("input")]], naming("input")] = Field(
         default_factory=dict,
         description="{input of the module: input out here}; one of count × size is shared out in order.",
     )
@@ -50,15 +51,19 @@ class ModuleModel(Model):
 
     title: TextField | None = Field(None, description="A title.")
     description: TextField | None = Field(None, description="What this is.")
-    parameters: NamedParameters[ParameterField] = Field(
+    parameters: Annotated[NamedParameters[ParameterField], declaring("parameter")] = Field(
         default_factory=dict, description="Constants of its own, in order; an instance may set them."
     )
-    inputs: Named[InputModel] = Field(
+    inputs: Annotated[Named[InputModel], declaring("input")] = Field(
         default_factory=dict,
         description="Signals from outside the module; those that an instance does not name are inputs of the network.",
     )
-    neurons: Named[GroupModel] = Field(default_factory=dict, description="Groups of neurons.")
-    instances: Named[InstanceModel] = Field(default_factory=dict, description="Uses of other modules.")
+    neurons: Annotated[Named[GroupModel], declaring("neuron")] = Field(
+        default_factory=dict, description="Groups of neurons."
+    )
+    instances: Annotated[Named[InstanceModel], declaring("instance")] = Field(
+        default_factory=dict, description="Uses of other modules."
+    )
     connections: ConnectionsField = Field(default=(), description="FROM -> TO: a weight or a body.")
     layout: ModuleLayoutModel | None = Field(None, description="How every instance is laid out.")
 
@@ -69,14 +74,16 @@ class IncludedModel(Library):
     PLACE: ClassVar[str] = "an included file"
     STAND_INS: ClassVar[StandIns] = {}
 
-    neurovis: Annotated[Located[int], Leaf(version_field, {"const": 1})] | None = Field(  # type: ignore[assignment]
+    neurovis: Annotated[Located[int], Leaf(version_field, VERSION)] | None = Field(  # type: ignore[assignment]
         None, description="The version of the language: 1."
     )
     authors: TextsField | None = Field(None, description="Who wrote it.")
     license: TextsField | None = Field(None, description="Under which licence.")
     references: TextsField | None = Field(None, description="What it goes back to.")
     include: TextsField = Field(default=(), description="Files whose modules and definitions are used here.")
-    modules: Named[ModuleModel] = Field(default_factory=dict, description="Networks to be used several times.")
+    modules: Annotated[Named[ModuleModel], declaring("module")] = Field(
+        default_factory=dict, description="Networks to be used several times."
+    )
 
     @classmethod
     def _foreign(cls, name: str) -> tuple[str, str] | None:

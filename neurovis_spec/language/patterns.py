@@ -1,45 +1,100 @@
-"""The patterns of connections as they are written: their names, and the settings that each of them needs.
+"""The patterns of connections: their names, what they connect, and the settings that each of them needs.
 
-In: nothing. Out: names and settings. What a pattern connects is for the compiler.
+In: nothing. Out: a table. Which pairs a pattern makes is for the compiler.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Annotated, Final
 
-from neurovis_spec.language.located import FORMULA, Leaf
+from neurovis_spec.language.grammar import FORMULA, Either, Key, Map, Role, words
+from neurovis_spec.language.located import Leaf
 from neurovis_spec.language.values import Choice, as_choice
 
-#: The settings of each pattern, all of which have to be there.
-SETTINGS: Final[Mapping[str, tuple[str, ...]]] = {
-    "all_to_all": (),
-    "one_to_one": (),
-    "chain": (),
-    "ring": (),
-    "random": ("probability",),
-    "fixed_indegree": ("count",),
-    "fixed_outdegree": ("count",),
-    "nearest": ("count",),
-    "small_world": ("degree", "rewire"),
-    "band": ("width",),
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A setting of a pattern, with a usual value."""
+
+    usual: float
+    about: str
+
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    """Which pairs of neurons a pattern connects. All of its settings have to be there."""
+
+    name: str
+    about: str
+    settings: Mapping[str, Setting] = field(default_factory=dict)
+
+    @property
+    def use(self) -> str:
+        """How it is written, as an example."""
+        settings = ", ".join(f"{name}: {setting.usual:g}" for name, setting in self.settings.items())
+        return f"{{{self.name}: {{{settings}}}}}" if settings else self.name
+
+
+def _count(of: str) -> dict[str, Setting]:
+    return {"count": Setting(3, f"How many {of}.")}
+
+
+PATTERNS: Final[Mapping[str, Pattern]] = {
+    pattern.name: pattern
+    for pattern in (
+        Pattern("all_to_all", "Every source with every target."),
+        Pattern("one_to_one", "The first with the first, the second with the second, …; equal sizes."),
+        Pattern("chain", "i with i + 1; equal sizes, or one group."),
+        Pattern("ring", "As chain, and the last with the first."),
+        Pattern(
+            "random",
+            "Every pair with this probability, drawn from the seed.",
+            {"probability": Setting(0.1, "The probability of each pair, from 0 to 1.")},
+        ),
+        Pattern(
+            "fixed_indegree",
+            "Every target with so many sources, drawn from the seed.",
+            _count("sources each target has"),
+        ),
+        Pattern(
+            "fixed_outdegree",
+            "Every source with so many targets, drawn from the seed.",
+            _count("targets each source has"),
+        ),
+        Pattern(
+            "nearest",
+            "Every source with its nearest targets, by position, or by index where no neuron has a position.",
+            _count("targets each source has"),
+        ),
+        Pattern(
+            "small_world",
+            "A ring whose neurons reach as many neighbours as the degree says, each of these connections led elsewhere "
+            "with the probability rewire; equal sizes (Watts and Strogatz 1998).",
+            {
+                "degree": Setting(4, "How many neighbours on the ring each neuron is connected with; an even number."),
+                "rewire": Setting(0.1, "The probability with which a connection is led elsewhere, from 0 to 1."),
+            },
+        ),
+        Pattern(
+            "band",
+            "All pairs with |i − j| up to the width.",
+            {"width": Setting(1, "The largest difference |i − j| of two neurons that are connected.")},
+        ),
+    )
 }
 
 
-def _schema() -> dict[str, object]:
-    """A name alone where nothing is to be set, else ``{name: {setting: value}}``."""
-    plain = [name for name, settings in SETTINGS.items() if not settings]
-    bodies = {
-        name: {
-            "type": "object" if settings else ["object", "null"],
-            "properties": dict.fromkeys(settings, FORMULA),
-            "required": list(settings),
-            "additionalProperties": False,
-        }
-        for name, settings in SETTINGS.items()
-    }
-    named = {"type": "object", "properties": bodies, "minProperties": 1, "maxProperties": 1}
-    return {"anyOf": [{"enum": plain}, {**named, "additionalProperties": False}]}
+def _body(pattern: Pattern) -> Key:
+    settings = {name: Key(FORMULA, setting.about, required=True) for name, setting in pattern.settings.items()}
+    return Key(Map(settings, nothing=not settings), pattern.about)
 
 
-PatternField = Annotated[Choice, Leaf(as_choice, _schema())]
+_SHAPE: Final = Either(
+    (
+        words(*(name for name, pattern in PATTERNS.items() if not pattern.settings)),
+        Map({name: _body(pattern) for name, pattern in PATTERNS.items()}, one=True),
+    )
+)
+PatternField = Annotated[Choice, Leaf(as_choice, _SHAPE), Role("pattern")]

@@ -13,6 +13,7 @@ from typing import Annotated, ClassVar
 from pydantic import Field, ValidationInfo
 
 from neurovis_spec.diagnostics import shorten
+from neurovis_spec.language.grammar import Plain, Role, naming
 from neurovis_spec.language.located import (
     FormulaField,
     Leaf,
@@ -56,7 +57,7 @@ def _named(what: str, pattern: re.Pattern[str], hint: Callable[[str], str]) -> L
             give_up()
         return text
 
-    return Leaf(check, {"type": "string", "pattern": f"^(?=.{{1,{_LONGEST}}}$)({pattern.pattern})$"})
+    return Leaf(check, Plain({"type": "string", "pattern": f"^(?=.{{1,{_LONGEST}}}$)({pattern.pattern})$"}))
 
 
 def _of_topic(text: str) -> str:
@@ -85,8 +86,8 @@ def _of_field(text: str) -> str:
 
 TopicField = Annotated[Located[str], _named("a topic", TOPIC, _of_topic)]
 NamespaceField = Annotated[Located[str], _named("a namespace", NAMESPACE, _of_namespace)]
-TypeField = Annotated[Located[str], _named("a message type", TYPE, _of_type)]
-PathField = Annotated[Located[str], _named("a field", FIELD, _of_field)]
+TypeField = Annotated[Located[str], _named("a message type", TYPE, _of_type), Role("message")]
+PathField = Annotated[Located[str], _named("a field", FIELD, _of_field), Role("field")]
 
 
 class QosModel(Model):
@@ -149,5 +150,9 @@ class RosModel(Model):
     namespace: NamespaceField | None = Field(None, description="Prefix of the topics (default /neurovis).")
     rate: FormulaField | None = Field(None, description="Steps a second (default 1/dt).")
     qos: QosModel | None = Field(None, description="Quality of service of what is published (ROS 2).")
-    subscribe: Keyed[SubscribeModel] = Field(default_factory=dict, description="{input: where it comes from}.")
-    publish: Keyed[PublishModel] = Field(default_factory=dict, description="{output: where it goes to}.")
+    subscribe: Annotated[Keyed[SubscribeModel], naming("input")] = Field(
+        default_factory=dict, description="{input: where it comes from}."
+    )
+    publish: Annotated[Keyed[PublishModel], naming("output")] = Field(
+        default_factory=dict, description="{output: where it goes to}."
+    )

@@ -5,7 +5,7 @@ In: the pydantic models. Out: a JSON Schema 2020-12 as plain data, with the desc
 
 from __future__ import annotations
 
-from neurovis_spec.language.located import FORMULA
+from neurovis_spec.language.grammar import FORMULA
 from neurovis_spec.language.model import Model
 from neurovis_spec.language.modules import IncludedModel
 from neurovis_spec.language.sections import ConnectionModel
@@ -28,7 +28,7 @@ def json_schema(included: bool = False) -> dict[str, object]:
     entries = {
         "type": "object",
         "propertyNames": {"pattern": "^[^>]*->[^>]*$"},
-        "additionalProperties": {"anyOf": [FORMULA, {"type": "null"}, {"$ref": "#/$defs/ConnectionModel"}]},
+        "additionalProperties": {"anyOf": [FORMULA.schema, {"type": "null"}, {"$ref": "#/$defs/ConnectionModel"}]},
     }
     definitions["Connections"] = {"anyOf": [entries, {"type": "array", "items": entries}]}
     for holder in (schema, definitions["ModuleModel"]):  # a module has connections of the same shape

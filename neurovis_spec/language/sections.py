@@ -13,14 +13,33 @@ from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from neurovis_spec.diagnostics import shorten
-from neurovis_spec.language.exclusions import CONNECTION, EVENT, GROUP, INPUT, ONE_KEY
+from neurovis_spec.language.grammar import (
+    ENDS,
+    FORMULAS,
+    GROUP,
+    GROUP_DRAWN,
+    LABEL,
+    NOISE,
+    PAIR,
+    REFERENCES,
+    RUN,
+    TEXT,
+    TWO,
+    AsTable,
+    Either,
+    ListOf,
+    Needs,
+    NotWith,
+    OneOf,
+    declaring,
+    naming,
+)
 from neurovis_spec.language.located import (
-    FORMULA,
-    IDENTIFIER,
     BoolField,
     FormulaField,
     Leaf,
     Located,
+    NamesField,
     PartsField,
     TextField,
     TextsField,
@@ -28,19 +47,19 @@ from neurovis_spec.language.located import (
     refuse,
     words,
 )
-from neurovis_spec.language.model import Filled, Keyed, KeysAreNames, Model
+from neurovis_spec.language.model import Filled, Keyed, KeysAreNames, Model, Short
 from neurovis_spec.language.patterns import PatternField
 from neurovis_spec.language.values import (
     FILE,
-    FORMULAS,
-    ONE_REFERENCE,
+    ActivationField,
     CentreField,
-    ChoiceField,
     EdgesField,
     FileReference,
     FormulasField,
     InitialField,
     MatrixField,
+    ModelField,
+    RuleField,
     as_file,
 )
 from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Packed, Scalar, Sequence
@@ -62,24 +81,28 @@ def _table(node: Node, info: ValidationInfo) -> FileReference | Sequence | Packe
     refuse(info, node, "a list of rows, one a step")
 
 
+def _one_source(*others: str) -> NotWith:
+    return NotWith(others, "'{own}' beside '{other}': an input has one source", "keep '{other}' or '{own}'")
+
+
 class InputModel(Model):
     """A signal that comes from outside the network."""
 
-    model_config = INPUT
-
     PLACE: ClassVar[str] = "an input"
 
-    expression: FormulaField | None = Field(None, description="A formula of k (the step), t (seconds) and parameters.")
-    file: TextField | None = Field(None, description="A .csv, .npy or .npz file, one row a step; the last row stays.")
-    values: Annotated[
-        Sequence | Packed | None,
-        Leaf(_table, {"type": "array", "items": FORMULAS}),
-    ] = Field(None, description="The same, inline: one row a step.")
-    size: FormulaField | None = Field(None, description="How many numbers a step, for an input without a source.")
+    expression: Annotated[FormulaField, RUN] | None = Field(
+        None, description="A formula of k (the step), t (seconds) and parameters."
+    )
+    file: Annotated[TextField | None, _one_source("expression")] = Field(
+        None, description="A .csv, .npy or .npz file, one row a step; the last row stays."
+    )
+    values: Annotated[Sequence | Packed | None, Leaf(_table, ListOf(FORMULAS)), _one_source("expression", "file")] = (
+        Field(None, description="The same, inline: one row a step.")
+    )
+    size: Annotated[FormulaField | None, _one_source("expression", "file", "values")] = Field(
+        None, description="How many numbers a step, for an input without a source."
+    )
     description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
-
-
-_POINT = {"type": "array", "items": FORMULA, "minItems": 2, "maxItems": 2}
 
 
 def _position(node: Node, info: ValidationInfo) -> FileReference | Sequence | Packed:
@@ -90,26 +113,22 @@ def _position(node: Node, info: ValidationInfo) -> FileReference | Sequence | Pa
     refuse(info, node, "a position [x, y], a list of them, or {file: …}")
 
 
-_NAME = {"type": "string", "pattern": f"^{IDENTIFIER.pattern}$"}
-_NAMES = {"anyOf": [_NAME, {"type": "array", "items": _NAME}]}
-
-
 class GroupModel(Model):
     """A group of neurons, or a single one."""
-
-    model_config = GROUP
 
     PLACE: ClassVar[str] = "a group of neurons"
 
     count: FormulaField | None = Field(None, description="How many neurons; K with count 3 makes K1, K2, K3.")
-    first: FormulaField | None = Field(None, description="The number of the first neuron (default 1).")
-    names: Annotated[TextsField, WithJsonSchema(_NAMES)] | None = Field(
+    first: Annotated[
+        FormulaField | None, Needs(("count", "names"), "'first' needs 'count'", code="first-without-count")
+    ] = Field(None, description="The number of the first neuron (default 1).")
+    names: Annotated[NamesField, declaring("neuron")] | None = Field(
         None, description="The names of the neurons, one by one."
     )
-    activation: ChoiceField | None = Field(
+    activation: ActivationField | None = Field(
         None, description="Activation function, name or {name: {parameter: value}} (default identity)."
     )
-    model: ChoiceField | None = Field(
+    model: ModelField | None = Field(
         None,
         description="How the activity follows from the input, name or {name: {…}}; static is Eq. 1 (default static).",
     )
@@ -117,20 +136,23 @@ class GroupModel(Model):
         None,
         description="What arrives is combined by sum or product of w·a, or by distance √Σ(w·a − c)² (default sum).",
     )
-    bias: FormulasField | None = Field(None, description="Added to the combined input (default 0).")
-    initial: InitialField | None = Field(
+    bias: Annotated[FormulasField, GROUP_DRAWN] | None = Field(
+        None, description="Added to the combined input (default 0)."
+    )
+    initial: Annotated[InitialField, GROUP_DRAWN] | None = Field(
         None,
         description="The activity at step 0, else computed; or states of the model, too: {v: -65, activity: 0.5}.",
     )
-    input: TextField | None = Field(None, description="An entry of inputs, added to the combined input.")
-    noise: FormulaField | None = Field(
+    input: Annotated[TextField, naming("input")] | None = Field(
+        None, description="An entry of inputs, added to the combined input."
+    )
+    noise: Annotated[FormulaField, NOISE] | None = Field(
         None, description="An expression with normal(m, s) or uniform(a, b), drawn anew and added each step."
     )
     position: Annotated[
-        FileReference | Sequence | Packed | None,
-        Leaf(_position, {"anyOf": [_POINT, {"type": "array", "items": _POINT}, FILE]}),
+        FileReference | Sequence | Packed | None, Leaf(_position, Either((TWO, ListOf(TWO), FILE))), GROUP
     ] = Field(None, description="Where the neuron is, as data: [x, y], a list of them, a file. It is no pin.")
-    label: TextsField | None = Field(
+    label: Annotated[TextsField, LABEL] | None = Field(
         None, description="Display text; a counted group may give a list. May hold expressions: 'd{number}'."
     )
     box: TextField | None = Field(None, description="The named box of the picture that holds the group.")
@@ -140,54 +162,79 @@ class GroupModel(Model):
     description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
 
 
+def _one_scale(*others: str) -> NotWith:
+    return NotWith(
+        others, "'{own}' beside '{other}': an entry is scaled in one way", "keep '{other}' or '{own}'", "one-key"
+    )
+
+
 class ScaleModel(Model):
     """How the weights of an entry are scaled together; one of the three."""
 
-    model_config = ONE_KEY
-
     PLACE: ClassVar[str] = "a 'scale'"
+    ONE_OF: ClassVar[OneOf | None] = OneOf(
+        ("spectral_radius", "norm", "indegree"),
+        "expected one kind of scale here, found 0",
+        "give it one of spectral_radius, norm and indegree",
+        "one-key",
+    )
 
     spectral_radius: FormulaField | None = Field(
         None, description="The largest magnitude of an eigenvalue of the entry's matrix; both ends the same neurons."
     )
-    norm: FormulaField | None = Field(None, description="The Frobenius norm of the entry's matrix.")
-    indegree: BoolField | None = Field(
+    norm: Annotated[FormulaField | None, _one_scale("spectral_radius")] = Field(
+        None, description="The Frobenius norm of the entry's matrix."
+    )
+    indegree: Annotated[BoolField | None, _one_scale("spectral_radius", "norm")] = Field(
         None, description="Whether each weight is divided by the connections of this entry into its target."
     )
+
+
+#: Rows of centres say which neurons are connected, as a matrix does.
+_CENTRE = AsTable("centre")
 
 
 class ConnectionModel(Model):
     """The body of a connection; a bare weight is read as ``{weight: …}``."""
 
-    model_config = CONNECTION
-
     PLACE: ClassVar[str] = "a connection"
 
-    weight: FormulaField | None = Field(
+    weight: Annotated[FormulaField | None, PAIR, NotWith(("matrix", "edges"))] = Field(
         None, description="One number, or an expression of i, j, n_from, n_to (default 1)."
     )
-    centre: CentreField | None = Field(None, description="For combine: distance; like weight or matrix (default 0).")
+    centre: Annotated[CentreField, PAIR] | None = Field(
+        None, description="For combine: distance; like weight or matrix (default 0)."
+    )
     scale: ScaleModel | None = Field(None, description="Scales the weights of this entry together when they are made.")
     matrix: MatrixField | None = Field(None, description="Dense rows, rows are sources; null means no connection.")
-    edges: EdgesField | None = Field(None, description="[[from, to, weight, delay], …], the last two optional.")
-    pattern: PatternField | None = Field(
+    edges: Annotated[EdgesField | None, NotWith(("matrix", _CENTRE))] = Field(
+        None, description="[[from, to, weight, delay], …], the last two optional."
+    )
+    pattern: Annotated[PatternField | None, NotWith(("matrix", "edges", _CENTRE))] = Field(
         None,
         description="Which pairs are connected: all_to_all, one_to_one, chain, ring, {random: {probability: p}}, ….",
     )
-    self: BoolField | None = Field(
-        None, description="Whether a neuron may connect to itself in a pattern (default false)."
-    )
-    rows: Annotated[Located[str], words("from", "to")] | None = Field(
-        None, description="Whether the rows of a matrix are sources (from) or targets (to) (default from)."
-    )
+    self: Annotated[
+        BoolField | None,
+        NotWith(
+            ("matrix", "edges", _CENTRE),
+            "'self' says what a pattern may do; here every connection is written",
+            code="useless-key",
+        ),
+    ] = Field(None, description="Whether a neuron may connect to itself in a pattern (default false).")
+    rows: Annotated[
+        Annotated[Located[str], words("from", "to")] | None,
+        Needs(("matrix", _CENTRE), "'rows' says how a matrix is read; there is no matrix"),
+    ] = Field(None, description="Whether the rows of a matrix are sources (from) or targets (to) (default from).")
     delay: FormulaField | None = Field(
         None, description="Steps the signal travels; 0 is within the same step (default 1)."
     )
-    plasticity: ChoiceField | None = Field(None, description="A rule: name, or {name: {parameter: value, signal: …}}.")
+    plasticity: RuleField | None = Field(None, description="A rule: name, or {name: {parameter: value, signal: …}}.")
     bounds: Annotated[
         tuple[FormulaField, FormulaField] | None,
         BeforeValidator(lambda node, info: _pair(node, info)),
-        WithJsonSchema({"type": "array", "items": FORMULA, "minItems": 2, "maxItems": 2}),
+        WithJsonSchema(TWO.schema),
+        Needs(("plasticity",), "'bounds' hold plastic weights; there is no 'plasticity'"),
     ] = Field(None, description="[low, high] for plastic weights.")
     label: TextField | None = Field(None, description="What it is called in pictures and tooltips.")
     description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
@@ -199,32 +246,59 @@ def _pair(node: Node, info: ValidationInfo) -> tuple[Node, Node]:
     refuse(info, node, "bounds [low, high]")
 
 
-_LESION = {"anyOf": [ONE_REFERENCE, {"type": "array", "items": ONE_REFERENCE}]}
+_AT = Needs(("at", "from"), "at which step? 'at' is missing", "write at: STEP", "bad-event")
 
 
 class EventModel(Model):
     """Something that changes during a run."""
 
-    model_config = EVENT
-
     PLACE: ClassVar[str] = "an event"
+    ONE_OF: ClassVar[OneOf | None] = OneOf(
+        ("set", "clamp", "lesion", "mend", "learning"),
+        "this event does nothing",
+        "give it set, clamp, lesion, mend or learning",
+        "bad-event",
+    )
 
-    at: FormulaField | None = Field(None, description="The step from which on it applies (all but a clamp).")
-    from_: FormulaField | None = Field(None, alias="from", description="The first step of a clamp.")
-    to: FormulaField | None = Field(None, description="The step before which a clamp ends; without it, it lasts.")
-    set: Annotated[Keyed[FormulaField], KeysAreNames(), Filled("{parameter: value}")] = Field(
+    at: Annotated[
+        FormulaField | None,
+        NotWith(
+            ("clamp",),
+            "a clamp lasts: it has 'from', and perhaps 'to'",
+            "write from: instead of at:",
+            "bad-event",
+        ),
+    ] = Field(None, description="The step from which on it applies (all but a clamp).")
+    from_: Annotated[
+        FormulaField | None,
+        Needs(("clamp",), "'from' is of a clamp, all else takes 'at' alone", "write at: STEP", "bad-event"),
+    ] = Field(None, alias="from", description="The first step of a clamp.")
+    to: Annotated[
+        FormulaField | None,
+        Needs(("from", "clamp"), "'to' is the end of a clamp, all else takes 'at' alone", "remove 'to'", "bad-event"),
+    ] = Field(None, description="The step before which a clamp ends; without it, it lasts.")
+    set: Annotated[Keyed[FormulaField], KeysAreNames(), Filled("{parameter: value}"), naming("parameter"), _AT] = Field(
         default_factory=dict, description="{parameter: value} from this step on."
     )
-    clamp: Annotated[Keyed[FormulaField], Filled("{neurons: activity}")] = Field(
-        default_factory=dict, description="{neurons: activity}."
-    )
-    lesion: Annotated[PartsField, WithJsonSchema(_LESION), Filled("a neuron or a connection")] = Field(
+    clamp: Annotated[
+        Keyed[FormulaField],
+        Filled("{neurons: activity}"),
+        REFERENCES,
+        NotWith(
+            ("set", "lesion", "mend", "learning"),
+            "a clamp is an event of its own",
+            "make it an entry of its own",
+            "bad-event",
+        ),
+        Needs(("from", "at"), "a clamp needs 'from'", "write from: STEP", "bad-event"),
+    ] = Field(default_factory=dict, description="{neurons: activity}.")
+    lesion: Annotated[PartsField, Filled("a neuron or a connection"), ENDS, _AT] = Field(
         default=(), description="Neurons and connections (FROM -> TO) that are removed."
     )
-    mend: Annotated[PartsField, WithJsonSchema(_LESION), Filled("a neuron or a connection")] = Field(
+    mend: Annotated[PartsField, Filled("a neuron or a connection"), ENDS, _AT] = Field(
         default=(), description="Neurons and connections (FROM -> TO) whose lesion is undone."
     )
-    learning: Annotated[Keyed[BoolField], Filled("{connections: true or false}")] = Field(
+    learning: Annotated[Keyed[BoolField], Filled("{connections: true or false}"), ENDS, _AT] = Field(
         default_factory=dict, description="{FROM -> TO: whether its rule is carried out} from this step on."
     )
 
@@ -313,7 +387,8 @@ def _body(entry: Entry, info: ValidationInfo) -> Mapping:
 
 
 ConnectionsField = Annotated[
-    tuple[tuple[Annotated[Located[str], Leaf(_as_it_is, {})], ConnectionModel], ...],
+    tuple[tuple[Annotated[Located[str], Leaf(_as_it_is, TEXT)], Annotated[ConnectionModel, Short("weight")]], ...],
+    ENDS,
     BeforeValidator(_connections),
     WithJsonSchema({"title": "Connections"}),
 ]

@@ -6,11 +6,12 @@ and no expression is parsed here. The descriptions are what an editor shows, and
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
 from neurovis_spec.language.drawing import LayoutModel, RenderModel
+from neurovis_spec.language.grammar import declaring
 from neurovis_spec.language.library import LANGUAGE_VERSION, Library
 from neurovis_spec.language.located import IdentifierField, IntegerField, TextsField
 from neurovis_spec.language.model import Named, NamedParameters, StandIns
@@ -33,18 +34,30 @@ class Spec(Library):
     references: TextsField | None = Field(None, description="What it goes back to.")
     time: Time | None = Field(None, description="The clock: dt, steps, episode.")
     seed: IntegerField | None = Field(None, description="The only source of randomness (default 0).")
-    parameters: NamedParameters[ParameterField] = Field(default_factory=dict, description="Named constants, in order.")
+    parameters: Annotated[NamedParameters[ParameterField], declaring("parameter")] = Field(
+        default_factory=dict, description="Named constants, in order."
+    )
     include: TextsField = Field(
         default=(), description="Files whose modules, activations, models and rules are used here."
     )
-    modules: Named[ModuleModel] = Field(default_factory=dict, description="Networks to be used several times.")
-    inputs: Named[InputModel] = Field(default_factory=dict, description="Signals from outside the network.")
-    neurons: Named[GroupModel] = Field(default_factory=dict, description="Groups of neurons.")
-    instances: Named[InstanceModel] = Field(default_factory=dict, description="Uses of modules.")
+    modules: Annotated[Named[ModuleModel], declaring("module")] = Field(
+        default_factory=dict, description="Networks to be used several times."
+    )
+    inputs: Annotated[Named[InputModel], declaring("input")] = Field(
+        default_factory=dict, description="Signals from outside the network."
+    )
+    neurons: Annotated[Named[GroupModel], declaring("neuron")] = Field(
+        default_factory=dict, description="Groups of neurons."
+    )
+    instances: Annotated[Named[InstanceModel], declaring("instance")] = Field(
+        default_factory=dict, description="Uses of modules."
+    )
     connections: ConnectionsField = Field(
         default=(), description="FROM -> TO: a weight or a body. Rows are sources, columns are targets."
     )
-    outputs: Named[ReferenceField] = Field(default_factory=dict, description="Names for what leaves the network.")
+    outputs: Annotated[Named[ReferenceField], declaring("output")] = Field(
+        default_factory=dict, description="Names for what leaves the network."
+    )
     events: EventsField = Field(
         default=(), description="What changes during a run: parameters set, neurons clamped, parts lesioned."
     )

@@ -8,14 +8,13 @@ from __future__ import annotations
 import re
 from typing import Annotated, ClassVar
 
-from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, ValidationInfo, WithJsonSchema
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import core_schema
+from pydantic import Field, ValidationInfo
 
 from neurovis_spec.diagnostics import shorten
-from neurovis_spec.language.located import Leaf, Located, as_text, findings_of, give_up, refuse, words
-from neurovis_spec.language.model import Model
-from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Scalar
+from neurovis_spec.language.grammar import Plain
+from neurovis_spec.language.located import Leaf, Located, as_text, findings_of, give_up, words
+from neurovis_spec.language.model import Model, Short
+from neurovis_spec.language.yaml.source import Node
 
 _COLOUR = re.compile(r"#[0-9A-Fa-f]{6}")
 THEME_NAMES = ("default", "dark", "print", "paper")
@@ -31,7 +30,7 @@ def _colour(node: Node, info: ValidationInfo) -> Located[str]:
     return Located(text.value.lower(), text.node)
 
 
-ColourField = Annotated[Located[str], Leaf(_colour, {"type": "string", "pattern": f"^{_COLOUR.pattern}$"})]
+ColourField = Annotated[Located[str], Leaf(_colour, Plain({"type": "string", "pattern": f"^{_COLOUR.pattern}$"}))]
 
 
 class ThemeModel(Model):
@@ -61,22 +60,4 @@ class ThemeModel(Model):
     )
 
 
-class _OrName(WithJsonSchema):
-    """Says in the schema that a name may stand in place of a mapping."""
-
-    def __get_pydantic_json_schema__(
-        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        return {"anyOf": [dict(self.json_schema or {}), handler(schema)]}
-
-
-def _theme(node: Node, info: ValidationInfo) -> Node:
-    """A name alone is the base of a theme."""
-    if isinstance(node, Mapping):
-        return node
-    if not isinstance(node, Scalar):
-        refuse(info, node, "the name of a theme, or a mapping of its colours")
-    return Mapping((Entry(Scalar("base", node.span), node),), node.span)
-
-
-ThemeField = Annotated[ThemeModel, BeforeValidator(_theme), _OrName({"enum": list(THEME_NAMES)})]
+ThemeField = Annotated[ThemeModel, Short("base", "the name of a theme, or a mapping of its colours")]

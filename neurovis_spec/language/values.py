@@ -7,15 +7,36 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Annotated, NamedTuple, TypeAlias, TypeVar
+from typing import Annotated, Final, NamedTuple, TypeAlias, TypeVar
 
 from pydantic import ValidationInfo
 from pydantic_core import PydanticCustomError
 
 from neurovis_spec.diagnostics import Span, shorten
+from neurovis_spec.language.grammar import (
+    BOOL,
+    CELL,
+    FORMULA,
+    FORMULAS,
+    GROUP,
+    NULL,
+    REFERENCE,
+    REFERENCES,
+    RULE_SETTING,
+    TEXT,
+    TWO,
+    UNNAMED,
+    Either,
+    Key,
+    Kind,
+    ListOf,
+    Map,
+    Plain,
+    Role,
+    Row,
+)
 from neurovis_spec.language.keys import read_keys
 from neurovis_spec.language.located import (
-    FORMULA,
     Formula,
     Leaf,
     Located,
@@ -31,9 +52,6 @@ from neurovis_spec.language.model import opening
 from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Packed, Scalar, Sequence
 
 T = TypeVar("T")
-
-#: The schema of a formula, or of a list with one for each neuron.
-FORMULAS = {"anyOf": [*FORMULA["anyOf"], {"type": "array", "items": FORMULA}]}
 
 
 class Choice(NamedTuple):
@@ -70,23 +88,16 @@ def as_choice(node: Node, info: ValidationInfo) -> Choice:
     return Choice(name, entry.value.entries)
 
 
-ChoiceField = Annotated[
-    Choice,
-    Leaf(
-        as_choice,
-        {
-            "anyOf": [
-                {"type": "string"},
-                {
-                    "type": "object",
-                    "minProperties": 1,
-                    "maxProperties": 1,
-                    "additionalProperties": {"type": ["object", "null"], "additionalProperties": FORMULAS},
-                },
-            ]
-        },
-    ),
-]
+def _choice(kind: Kind, value: Role) -> Either:
+    """A name, or a mapping from it to its settings, each a formula or several."""
+    formula = Plain(FORMULA.written, value, formula=True)
+    settings = Map({}, Either((formula, ListOf(formula))), Role("setting", kind), nothing=True)
+    return Either((TEXT, Map({}, settings, Role("choice", kind), one=True)))
+
+
+ActivationField = Annotated[Choice, Leaf(as_choice, _choice("activation", GROUP)), Role("choice", "activation")]
+ModelField = Annotated[Choice, Leaf(as_choice, _choice("model", GROUP)), Role("choice", "model")]
+RuleField = Annotated[Choice, Leaf(as_choice, _choice("rule", RULE_SETTING)), Role("choice", "rule")]
 
 
 class FileReference(NamedTuple):
@@ -113,7 +124,7 @@ Matrix: TypeAlias = Rows | FileReference
 
 def as_file(node: Mapping, info: ValidationInfo) -> FileReference:
     """``{file: path, key: name}``."""
-    keys = read_keys(node, ("file", "key"), findings_of(info))
+    keys = read_keys(node, FILE.known, findings_of(info))
     node = keys.mapping
     path = node.get("file")
     if path is None:
@@ -139,24 +150,19 @@ def as_matrix(node: Node, info: ValidationInfo) -> Matrix:
     return Rows(node)
 
 
-#: The schema of ``{file: path}``.
-FILE = {
-    "type": "object",
-    "properties": {"file": {"type": "string"}, "key": {"type": "string"}},
-    "required": ["file"],
-    "additionalProperties": False,
-}
-_CELL = {"anyOf": [*FORMULA["anyOf"], {"type": "null"}]}
-_END = {"type": "string", "pattern": "\\S"}
-_EDGE = {
-    "type": "array",
-    "prefixItems": [_END, _END, _CELL, FORMULA],
-    "minItems": 2,
-    "maxItems": 4,
-}
-_ROWS = {"type": "array", "items": {"type": "array", "items": _CELL}}
+#: ``{file: path}``.
+FILE: Final = Map(
+    {
+        "file": Key(UNNAMED, "A file, by its path relative to this one.", required=True),
+        "key": Key(UNNAMED, "The name of the array in an archive."),
+    }
+)
+_WEIGHT: Final = Either((Plain(FORMULA.written, CELL, formula=True), NULL))
+_END: Final = Plain({"type": "string", "pattern": "\\S"}, REFERENCES)
+_EDGE: Final = Row((_END, _END, _WEIGHT, FORMULA), least=2)
+_ROWS: Final = ListOf(ListOf(_WEIGHT))
 
-MatrixField = Annotated[Matrix, Leaf(as_matrix, {"anyOf": [_ROWS, FILE]})]
+MatrixField = Annotated[Matrix, Leaf(as_matrix, Either((_ROWS, FILE)))]
 
 
 class EdgeRows(NamedTuple):
@@ -176,10 +182,7 @@ def as_edges(node: Node, info: ValidationInfo) -> EdgeRows | FileReference:
     return EdgeRows(node)
 
 
-EdgesField = Annotated[
-    EdgeRows | FileReference,
-    Leaf(as_edges, {"anyOf": [{"type": "array", "items": _EDGE}, FILE]}),
-]
+EdgesField = Annotated[EdgeRows | FileReference, Leaf(as_edges, Either((ListOf(_EDGE), FILE)))]
 
 
 def as_centre(node: Node, info: ValidationInfo) -> Formula | Matrix:
@@ -187,10 +190,7 @@ def as_centre(node: Node, info: ValidationInfo) -> Formula | Matrix:
     return as_formula(node, info) if isinstance(node, Scalar) else as_matrix(node, info)
 
 
-CentreField = Annotated[
-    Formula | Matrix,
-    Leaf(as_centre, {"anyOf": [*FORMULA["anyOf"], _ROWS, FILE]}),
-]
+CentreField = Annotated[Formula | Matrix, Leaf(as_centre, Either((FORMULA, _ROWS, FILE)))]
 
 
 class FormulaList(NamedTuple):
@@ -230,13 +230,13 @@ def as_initial(node: Node, info: ValidationInfo) -> Initial:
 
 #: What stands beside the states of a model in ``initial``.
 ACTIVITY = "activity"
-_STATES = {
-    "type": "object",
-    "properties": {ACTIVITY: FORMULAS},
-    "additionalProperties": FORMULAS,
-    "minProperties": 1,
-}
-InitialField = Annotated[Initial, Leaf(as_initial, {"anyOf": [*FORMULAS["anyOf"], _STATES]})]
+_STATES: Final = Map(
+    {ACTIVITY: Key(FORMULAS, "The activity at step 0; without it step 0 is computed.")},
+    FORMULAS,
+    Role("state", "model"),
+    least=1,
+)
+InitialField = Annotated[Initial, Leaf(as_initial, Either((FORMULA, ListOf(FORMULA), _STATES)))]
 
 
 class Parameter(NamedTuple):
@@ -254,7 +254,7 @@ def as_parameter(node: Node, info: ValidationInfo) -> Parameter:
     """A formula, or ``{value, min, max, description}``."""
     if not isinstance(node, Mapping):
         return Parameter(as_formula(node, info), None, None, None)
-    known = ("value", "min", "max", "description")
+    known = tuple(PARAMETER.known)
     keys = read_keys(node, known, findings_of(info))
     value, low, high, text = (keys.mapping.get(name) for name in known)
     if value is None:
@@ -276,28 +276,16 @@ def _tried(check: Callable[[Node, ValidationInfo], T], node: Node, info: Validat
     return None
 
 
-ParameterField = Annotated[
-    Parameter,
-    Leaf(
-        as_parameter,
-        {
-            "anyOf": [
-                *FORMULA["anyOf"],
-                {
-                    "type": "object",
-                    "properties": {
-                        "value": FORMULA,
-                        "min": FORMULA,
-                        "max": FORMULA,
-                        "description": {"type": "string"},
-                    },
-                    "required": ["value"],
-                    "additionalProperties": False,
-                },
-            ]
-        },
-    ),
-]
+#: A parameter that says more than its value.
+PARAMETER: Final = Map(
+    {
+        "value": Key(FORMULA, "The value.", required=True),
+        "min": Key(FORMULA, "The least value that it may be given."),
+        "max": Key(FORMULA, "The greatest value that it may be given."),
+        "description": Key(UNNAMED, "What it is."),
+    }
+)
+ParameterField = Annotated[Parameter, Leaf(as_parameter, Either((FORMULA, PARAMETER)))]
 
 
 class Reference(NamedTuple):
@@ -315,11 +303,10 @@ def as_reference(node: Node, info: ValidationInfo) -> Reference:
     return Reference(parts, node.span, findings_of(info).errors > before)
 
 
-ONE_REFERENCE = {"type": "string", "pattern": "[A-Za-z_]"}
-#: The schema of a reference, or of a list of them: each names something.
-REFERENCES = {"anyOf": [ONE_REFERENCE, {"type": "array", "items": ONE_REFERENCE, "minItems": 1}]}
+#: A reference, or a list of them.
+SEVERAL: Final = Either((REFERENCE, ListOf(REFERENCE, least=1)))
 
-ReferenceField = Annotated[Reference, Leaf(as_reference, REFERENCES)]
+ReferenceField = Annotated[Reference, Leaf(as_reference, SEVERAL), REFERENCES]
 
 
 class Point(NamedTuple):
@@ -338,10 +325,7 @@ def as_point(node: Node, info: ValidationInfo) -> Point:
     return Point(x, y, node.span)
 
 
-PointField = Annotated[
-    Point,
-    Leaf(as_point, {"type": "array", "items": FORMULA, "minItems": 2, "maxItems": 2}),
-]
+PointField = Annotated[Point, Leaf(as_point, TWO)]
 
 
 def as_title(node: Node, info: ValidationInfo) -> Located[bool] | Located[str]:
@@ -351,7 +335,4 @@ def as_title(node: Node, info: ValidationInfo) -> Located[bool] | Located[str]:
     return as_bool(node, info)
 
 
-TitleField = Annotated[
-    Located[bool] | Located[str],
-    Leaf(as_title, {"anyOf": [{"type": "boolean"}, {"type": "string"}]}),
-]
+TitleField = Annotated[Located[bool] | Located[str], Leaf(as_title, Either((BOOL, TEXT)))]

@@ -69,7 +69,7 @@ def _most_suitable(problem: LayoutProblem) -> tuple[Suits, str]:
     """What a drawing is to show, and why."""
     edges = len(problem.edges)
     if problem.plan:
-        return "layered", "it puts what the spec says into rows and columns of the page"
+        return "flow", "it puts what the spec says into rows and columns of the page"
     if problem.arrange or problem.mirrors or problem.align:
         return "flow", "it can arrange, mirror and align as the spec says"
     if problem.neurons and len(problem.pins) == len(problem.neurons):

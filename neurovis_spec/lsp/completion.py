@@ -14,6 +14,9 @@ from typing import Literal
 from neurovis_spec import plugins
 from neurovis_spec.compiler.values.constants import ALWAYS
 from neurovis_spec.diagnostics import Span
+from neurovis_spec.language.grammar import Role
+from neurovis_spec.language.patterns import PATTERNS
+from neurovis_spec.language.places import keys_at, role_of, words_at
 from neurovis_spec.language.ros_types import all_types, numbers_of
 from neurovis_spec.language.templates import Hole, pieces
 from neurovis_spec.lsp.definitions import Definition, known
@@ -21,11 +24,10 @@ from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.index import Index
 from neurovis_spec.lsp.names import Name
 from neurovis_spec.lsp.outline import Path
-from neurovis_spec.lsp.roles import Role, Scope, role_of
-from neurovis_spec.lsp.shapes import keys_at, words_at
+from neurovis_spec.lsp.scopes import Scope, scope_of
 from neurovis_spec.lsp.text import Place
 from neurovis_spec.lsp.tolerant import Where, where
-from neurovis_spec.lsp.words import GIVEN, PATTERNS, THEMES, functions
+from neurovis_spec.lsp.words import GIVEN, THEMES, functions
 
 _WORD = re.compile(r"(?:(?<![\w.])[A-Za-z_]\w*\.(?!\.))*(?:(?<!\w)[A-Za-z_]\w*)?$", re.ASCII)
 _REST = re.compile(r"\w*", re.ASCII)
@@ -91,7 +93,7 @@ def _keys(at: Where, mapping: Path, place: Place, document: Document) -> Iterato
 def _offers(
     at: Where, place: Place, document: Document, index: Index, path: Path, is_key: bool
 ) -> Iterator[Completion]:
-    role, scope = role_of(path, is_key)
+    role, scope = role_of(path, is_key), scope_of(path)
     word = at.typed
     rest = at.rest
     if role is not None and role.use in ("formula", "template", "references", "ends", "setting value"):
@@ -134,7 +136,7 @@ def _of_role(role: Role | None, scope: Scope, path: Path, front: str, index: Ind
         case "state":
             yield from _states_of(index, path[:-2])
         case "pattern":
-            yield from (_Offer(name, "definition", meaning) for name, meaning in PATTERNS.items())
+            yield from (_Offer(one.name, "definition", one.about) for one in PATTERNS.values())
         case "engine":
             yield from (_Offer(name, "word") for name in ("auto", *plugins.names(plugins.LAYOUTS)))
         case "message":
@@ -191,9 +193,9 @@ def _formula(role: Role, scope: Scope, path: Path, index: Index, place: Place) -
     else:
         for name in index.locals(*scope.definition):
             yield _Offer(name.text, "local", str(name.item.path[2]))
-    for given in (*role.given, *ALWAYS):
+    for given in (*role.sees, *ALWAYS):
         yield _Offer(given, "constant", GIVEN.get(given, ""))
-    for function, (usage, meaning) in functions(role.random, role.functions).items():
+    for function, (usage, meaning) in functions(role.draws, role.functions).items():
         yield _Offer(function, "function", usage, meaning)
 
 

@@ -20,7 +20,7 @@ from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.names import Name
 from neurovis_spec.lsp.outline import Item, outline
 from neurovis_spec.lsp.outline import Path as Keys
-from neurovis_spec.lsp.roles import SECTIONS
+from neurovis_spec.lsp.scopes import SECTIONS
 from neurovis_spec.lsp.text import Place
 
 

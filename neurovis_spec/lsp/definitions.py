@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from functools import cache
 
 from neurovis_spec.compiler.values.builtin import libraries
+from neurovis_spec.language.grammar import Kind
 from neurovis_spec.lsp.outline import Item, outline
-from neurovis_spec.lsp.roles import DEFINITIONS, SECTIONS, Kind
+from neurovis_spec.lsp.scopes import DEFINITIONS, SECTIONS
 
 
 @dataclass(frozen=True, slots=True)

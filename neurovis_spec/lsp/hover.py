@@ -12,16 +12,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from neurovis_spec.diagnostics import Span
+from neurovis_spec.language.grammar import Role
+from neurovis_spec.language.patterns import PATTERNS
+from neurovis_spec.language.places import key_at, role_of
 from neurovis_spec.language.templates import Hole, pieces
 from neurovis_spec.lsp.definitions import known
 from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.index import Found, Index
 from neurovis_spec.lsp.names import Name
 from neurovis_spec.lsp.outline import Item
-from neurovis_spec.lsp.roles import DEFINITIONS, Role, role_of
-from neurovis_spec.lsp.shapes import key_at
+from neurovis_spec.lsp.scopes import DEFINITIONS
 from neurovis_spec.lsp.text import Place, holds
-from neurovis_spec.lsp.words import GIVEN, PATTERN_SETTINGS, PATTERNS, functions
+from neurovis_spec.lsp.words import GIVEN, functions
 
 _WORD = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 
@@ -43,14 +45,13 @@ def hover(document: Document, place: Place) -> Hover | None:
     item = document.item_at(place)
     if item is None:
         return None
-    role, _ = role_of(item.path, item.is_key)
+    role = role_of(item.path, item.is_key)
     if role is not None and role.use in ("formula", "template", "setting value") and not item.is_key:
         return _given(item, role, place)
     if role is not None and role.use == "pattern" and item.text in PATTERNS:
-        settings = ", ".join(PATTERN_SETTINGS.get(item.text, ()))
-        return Hover(
-            f"**{item.text}** (pattern): {PATTERNS[item.text]}" + (f" ({settings})" * bool(settings)), item.span
-        )
+        pattern = PATTERNS[item.text]
+        settings = ", ".join(pattern.settings)
+        return Hover(f"**{item.text}** (pattern): {pattern.about}" + (f" ({settings})" * bool(settings)), item.span)
     if role is not None and role.use == "ends" and item.is_key:
         description = document.index.values.get((*item.path, "description"))
         return None if description is None else Hover(f"**{item.text}**\n\n{description.text}", item.span)
@@ -62,7 +63,7 @@ def _given(item: Item, role: Role, place: Place) -> Hover | None:
     """A function or a constant in an expression."""
     if item.scalar.inner is None:
         return None
-    called = functions(role.random, role.functions)
+    called = functions(role.draws, role.functions)
     for match in _WORD.finditer(item.text):
         span = item.scalar.at(match.start(), match.end())
         if not holds(span, place) or not _in_expression(item.text, role, match.start()):

@@ -15,9 +15,9 @@ from itertools import chain
 from typing import Final
 
 from neurovis_spec.diagnostics import Span
+from neurovis_spec.language.grammar import Kind
 from neurovis_spec.lsp.names import Lookup, Name, names_of
 from neurovis_spec.lsp.outline import Item
-from neurovis_spec.lsp.roles import Kind
 from neurovis_spec.lsp.text import Text
 
 _NUMBER = re.compile(r"0|[1-9][0-9]*")

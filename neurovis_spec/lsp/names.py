@@ -13,10 +13,12 @@ from functools import partial
 
 from neurovis_spec.compiler.values.constants import ALWAYS
 from neurovis_spec.diagnostics import Span
+from neurovis_spec.language.grammar import Kind, Role
+from neurovis_spec.language.places import role_of
 from neurovis_spec.language.references import Arrow, DottedName, NeuronRange, Part, RuleState, Sum, parse
 from neurovis_spec.language.templates import Hole, pieces
 from neurovis_spec.lsp.outline import Item
-from neurovis_spec.lsp.roles import SECTIONS, Kind, Role, Scope, role_of
+from neurovis_spec.lsp.scopes import SECTIONS, Scope, scope_of
 from neurovis_spec.lsp.text import Text
 
 #: A name in an expression, and the parenthesis behind the name of a function.
@@ -51,9 +53,9 @@ class Lookup:
 def names_of(items: Iterable[Item], text: Text, lookup: Lookup) -> Iterator[Name]:
     """All names of the items."""
     for item in items:
-        role, scope = role_of(item.path, item.is_key)
+        role = role_of(item.path, item.is_key)
         if role is not None and (item.is_key or isinstance(item.scalar.value, str)):
-            yield from _names(item, role, scope, text, lookup)
+            yield from _names(item, role, scope_of(item.path), text, lookup)
 
 
 def _names(item: Item, role: Role, scope: Scope, text: Text, lookup: Lookup) -> Iterator[Name]:
@@ -102,7 +104,7 @@ def _formula(item: Item, role: Role, scope: Scope, text: Text) -> Iterator[Name]
     places = _inside(item, text, [match.span(1) for match in found])
     local = scope.definition is not None
     for match, (span, exact) in zip(found, places, strict=True):
-        if match[2] is None and match[1] not in ALWAYS and match[1] not in role.given:
+        if match[2] is None and match[1] not in ALWAYS and match[1] not in role.sees:
             yield Name("local" if local else "parameter", match[1], span, scope, item, False, exact)
 
 

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.places import LIBRARY_ALONE, SPEC_ALONE
 from neurovis_spec.language.yaml.reader import read_text
 from neurovis_spec.language.yaml.source import SourceDocument
 from neurovis_spec.lsp.definitions import builtin_signals
 from neurovis_spec.lsp.index import Index
 from neurovis_spec.lsp.outline import Item, item_at, outline
-from neurovis_spec.lsp.shapes import LIBRARY_ALONE, SPEC_ALONE
 from neurovis_spec.lsp.text import Place, Text, holds
 from neurovis_spec.lsp.tolerant import outline_of_text
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from neurovis_spec.diagnostics import Diagnostic, Span
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, bad_name
 from neurovis_spec.language.model import RESERVED
+from neurovis_spec.language.places import role_of
 from neurovis_spec.language.yaml.scalars import resolve
 from neurovis_spec.lsp.check import check
 from neurovis_spec.lsp.document import Document
@@ -21,7 +22,6 @@ from neurovis_spec.lsp.files import CrowdedError
 from neurovis_spec.lsp.index import SHARED, Found, Index, is_common
 from neurovis_spec.lsp.names import Name
 from neurovis_spec.lsp.page import Page
-from neurovis_spec.lsp.roles import role_of
 from neurovis_spec.lsp.text import Place, Text
 from neurovis_spec.lsp.words import GIVEN
 
@@ -122,8 +122,8 @@ def _check_use(document: Document, declaration: Name, name: Name, new: str) -> N
     if not name.exact:
         where = f"'{declaration.text}' stands in {place} in a text with escapes"
         raise RenameError(f"{where}: write it without them, or rename it by hand")
-    role, _ = role_of(name.item.path, name.item.is_key)
-    if role is not None and new in role.given:
+    role = role_of(name.item.path, name.item.is_key)
+    if role is not None and new in role.sees:
         raise RenameError(f"'{new}' means something else in {place}: {GIVEN[new]}")
 
 

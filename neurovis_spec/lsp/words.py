@@ -5,7 +5,6 @@ In: a name. Out: how it is written and what it means, for completions and on hov
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import Final
 
@@ -14,12 +13,6 @@ from neurovis_spec.manual import words as manual
 
 #: Names that expressions have without declaring them.
 GIVEN: Final[Mapping[str, str]] = manual.NAMES
-#: The patterns that this version reads, and what they connect.
-PATTERNS: Final[Mapping[str, str]] = {p.name: p.about for p in manual.ALL_PATTERNS}
-#: The settings of those that have any, as the manual writes them: ``{random: {probability: 0.1}}``.
-PATTERN_SETTINGS: Final[Mapping[str, tuple[str, ...]]] = {
-    p.name: tuple(re.findall(r"(\w+):", p.use)[1:]) for p in manual.ALL_PATTERNS
-}
 THEMES: Final[Mapping[str, str]] = {
     "default": "vermilion over grey to blue, on light",
     "dark": "the same on dark",

@@ -16,6 +16,7 @@ from neurovis_spec.language.model import Model
 from neurovis_spec.language.modules import InstanceModel, ModuleModel
 from neurovis_spec.language.sections import ConnectionModel, GroupModel, InputModel
 from neurovis_spec.language.spec import Spec
+from neurovis_spec.language.values import PARAMETER
 
 _DEFAULT = re.compile(r" \(default ([^()]*)\)")
 #: Where a mapping of the author's names stands between a section and its keys, as in ``neurons.GROUP.count``.
@@ -41,14 +42,6 @@ class Key:
         """The key itself."""
         return self.path.rpartition(".")[2]
 
-
-#: The keys of a parameter that says more than its value.
-_PARAMETER = (
-    Key("parameters.value", "number or expression", "The value.", required=True),
-    Key("parameters.min", "number or expression", "The least value that it may be given."),
-    Key("parameters.max", "number or expression", "The greatest value that it may be given."),
-    Key("parameters.description", "text", "What it is."),
-)
 
 #: What a module has in common with a spec: its keys are those of the section of the same name at the top level.
 _SHARED = (GroupModel, ConnectionModel, InputModel, InstanceModel)
@@ -88,7 +81,8 @@ def _walk(model: type[Model], prefix: str) -> Iterator[Key]:
         if below is not None:
             yield from _walk(below, f"{prefix}{shown}.")
         elif shown == "parameters" and not prefix:
-            yield from _PARAMETER
+            for part, one in PARAMETER.known.items():
+                yield Key(f"{shown}.{part}", kind(one.shape.schema), one.about, required=one.required)
 
 
 def _model_in(annotation: object) -> type[Model] | None:

@@ -10,9 +10,10 @@ from functools import cache
 from typing import Final, TypeAlias
 
 from neurovis_spec.diagnostics import nearest, suggest
+from neurovis_spec.language.patterns import PATTERNS, Pattern
 from neurovis_spec.manual.builtins import Builtin, builtins
 from neurovis_spec.manual.keys import Key, keys
-from neurovis_spec.manual.words import ALL_PATTERNS, Pattern, Word, functions, names
+from neurovis_spec.manual.words import Word, functions, names
 
 Topic: TypeAlias = Builtin | Key | Pattern | Word
 
@@ -23,7 +24,7 @@ _LONGEST: Final = 130  # a path of two names; what is longer is not compared wit
 def topics() -> dict[str, tuple[Topic, ...]]:
     """Every name and what it may mean: built-ins, then keys, patterns, functions and names of expressions."""
     found: dict[str, list[Topic]] = {}
-    everything: tuple[Topic, ...] = (*builtins(), *keys(), *ALL_PATTERNS, *functions(), *names())
+    everything: tuple[Topic, ...] = (*builtins(), *keys(), *PATTERNS.values(), *functions(), *names())
     for topic in everything:
         found.setdefault(topic.name, []).append(topic)
         if isinstance(topic, Key) and topic.path != topic.name:

@@ -1,6 +1,6 @@
-"""The words of expressions and the patterns of connections, with what they mean.
+"""The words of expressions, with what they mean.
 
-In: the tables of functions and of patterns. Out: Words, and Patterns with those that this version does not read yet.
+In: the table of functions. Out: Words.
 """
 
 from __future__ import annotations
@@ -79,42 +79,6 @@ class Word:
     name: str
     usage: str
     about: str
-
-
-@dataclass(frozen=True, slots=True)
-class Pattern:
-    """Which pairs of neurons a pattern connects; ``use`` is how it is written."""
-
-    name: str
-    use: str
-    about: str
-
-
-ALL_PATTERNS = (
-    Pattern("all_to_all", "all_to_all", "Every source with every target."),
-    Pattern("one_to_one", "one_to_one", "The first with the first, the second with the second, …; equal sizes."),
-    Pattern("chain", "chain", "i with i + 1; equal sizes, or one group."),
-    Pattern("ring", "ring", "As chain, and the last with the first."),
-    Pattern("random", "{random: {probability: 0.1}}", "Every pair with this probability, drawn from the seed."),
-    Pattern(
-        "fixed_indegree", "{fixed_indegree: {count: 3}}", "Every target with so many sources, drawn from the seed."
-    ),
-    Pattern(
-        "fixed_outdegree", "{fixed_outdegree: {count: 3}}", "Every source with so many targets, drawn from the seed."
-    ),
-    Pattern(
-        "nearest",
-        "{nearest: {count: 3}}",
-        "Every source with its nearest targets, by position, or by index where no neuron has a position.",
-    ),
-    Pattern(
-        "small_world",
-        "{small_world: {degree: 4, rewire: 0.1}}",
-        "A ring whose neurons reach as many neighbours as the degree says, each of these connections led elsewhere "
-        "with the probability rewire; equal sizes (Watts and Strogatz 1998).",
-    ),
-    Pattern("band", "{band: {width: 1}}", "All pairs with |i − j| up to the width."),
-)
 
 
 def functions() -> tuple[Word, ...]:

@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
-from neurovis_spec.compiler.connections.conflicts import check_conflicts
 from neurovis_spec.compiler.connections.edges import EdgeReader, End, delay_of
 from neurovis_spec.compiler.connections.ends import Ends
 from neurovis_spec.compiler.connections.patterns import all_to_all, is_drawn, pairs_of
@@ -29,14 +28,14 @@ from neurovis_spec.compiler.values.matrices import Grid, grid_of
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.located import Formula, Located
+from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import ConnectionModel
 from neurovis_spec.language.values import FileReference, Rows
 from neurovis_spec.language.yaml.source import Scalar
 
 #: Keys of a body that say which connections there are.
 _SHAPING = frozenset({"matrix", "edges", "pattern", "centre", "rows", "self"})
-#: What a weight may depend on.
-_PAIR = ("i", "j", "n_from", "n_to", "distance")
+_WEIGHT = formula_at(ConnectionModel, "weight")
 
 
 class Bundle(NamedTuple):
@@ -112,8 +111,7 @@ class EntryBuilder:
     def build(self) -> Bundle | None:
         """The connections; None where anything of the entry is invalid, which is reported."""
         before = self.constants.findings.errors
-        check_conflicts(self.body, self.constants.findings)
-        if self.constants.findings.errors == before:
+        if not self.body.contradictory:
             return self._built(before)
         # which of the keys is meant is not known, so nothing is held against the sizes of the ends
         return replace(self, sources=None, targets=None)._built(before)
@@ -281,7 +279,7 @@ class EntryBuilder:
     def _values(self, formula: Formula, shape: _Shape | None, purpose: str) -> FloatArray | None:
         """A formula of i, j, n_from, n_to (and distance) for every pair."""
         if shape is None or self.sources is None or self.targets is None:
-            self.constants.look(formula, _PAIR, random=True)
+            self.constants.look(formula, _WEIGHT.sees, _WEIGHT.draws)
             return None
         extra: dict[str, float | FloatArray] = {
             "i": shape.i.astype(np.float64),
@@ -291,7 +289,7 @@ class EntryBuilder:
         }
         tree = None
         if isinstance(formula.value, str):
-            tree = self.constants.tree(formula, _PAIR, random=True)
+            tree = self.constants.tree(formula, _WEIGHT.sees, _WEIGHT.draws)
             if tree is None:
                 return None
         if tree is not None and "distance" in names(tree):
@@ -374,8 +372,6 @@ class EntryBuilder:
         findings = self.constants.findings
         entry = self.body.source.entry("bounds")
         assert entry is not None
-        if self.body.plasticity is None and self._kept("plasticity"):
-            findings.error("useless-key", entry.key.span, "'bounds' hold plastic weights; there is no 'plasticity'")
         with self.constants.following() as lower:
             low = self.constants.scalar(bounds[0])
         with self.constants.following() as upper:

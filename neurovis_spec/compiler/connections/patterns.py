@@ -21,7 +21,7 @@ from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import Findings, Span, meant, shorten, suggest
 from neurovis_spec.diagnostics import nearest as nearest_names
 from neurovis_spec.language.located import Formula, formula_of
-from neurovis_spec.language.patterns import SETTINGS
+from neurovis_spec.language.patterns import PATTERNS
 from neurovis_spec.language.values import Choice
 
 
@@ -60,16 +60,6 @@ _FIXED: Mapping[str, Callable[[Ends], Pairs]] = {
     "chain": chain,
     "ring": ring,
 }
-#: Patterns with settings, and how they are written.
-_USES: Mapping[str, str] = {
-    "random": "{random: {probability: 0.1}}",
-    "fixed_indegree": "{fixed_indegree: {count: 3}}",
-    "fixed_outdegree": "{fixed_outdegree: {count: 3}}",
-    "nearest": "{nearest: {count: 3}}",
-    "small_world": "{small_world: {degree: 4, rewire: 0.1}}",
-    "band": "{band: {width: 1}}",
-}
-PATTERNS = (*_FIXED, *_USES)
 
 
 def pairs_of(
@@ -99,7 +89,7 @@ def pairs_of(
         message = f"'{name}' needs ends of equal size; these have {n} and {m} neurons"
         findings.error("wrong-size", span, message)
         return None
-    if len(values) < len(SETTINGS[name]) or name != written:
+    if len(values) < len(PATTERNS[name].settings) or name != written:
         return None
     if name in _FIXED:
         return _FIXED[name](ends) if fits(least_pairs(name, n, m, {})) else None
@@ -111,7 +101,7 @@ def least_pairs(name: str, n: int, m: int, values: Mapping[str, float]) -> int:
     or nearly so. 0 where that cannot be said, as these are no settings for such ends."""
     if name in _FIXED:
         return n * m if name == "all_to_all" else n
-    if not set(SETTINGS.get(name, (name,))) <= values.keys():
+    if name not in PATTERNS or not PATTERNS[name].settings.keys() <= values.keys():
         return 0
     if name == "random":
         probability = values["probability"]
@@ -137,7 +127,7 @@ def is_drawn(choice: Choice, constants: Constants) -> bool:
 
 def _settings(name: str, choice: Choice, findings: Findings) -> dict[str, Formula]:
     """The formulas of the settings; each of them has to be there."""
-    allowed = SETTINGS[name]
+    allowed = PATTERNS[name].settings
     entries = {entry.name: entry for entry in choice.settings if entry.name in allowed}
     perhaps: set[str] = set()
     for entry in choice.settings:
@@ -151,7 +141,7 @@ def _settings(name: str, choice: Choice, findings: Findings) -> dict[str, Formul
                 entries[right] = entry
     for missing in [setting for setting in allowed if setting not in entries and setting not in perhaps][:1]:
         message = f"'{name}' needs a {missing}"
-        findings.error("missing-key", choice.name.span, message, f"write {_USES[name]}")
+        findings.error("missing-key", choice.name.span, message, f"write {PATTERNS[name].use}")
     formulas = {setting: formula_of(entry.value, findings) for setting, entry in entries.items()}
     return {setting: formula for setting, formula in formulas.items() if formula is not None}
 

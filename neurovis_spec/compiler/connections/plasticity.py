@@ -19,6 +19,8 @@ from neurovis_spec.compiler.program import Rule
 from neurovis_spec.compiler.values.arguments import Each, check_initials, check_settings, choose, parameters, settle
 from neurovis_spec.diagnostics import shorten, suggest
 from neurovis_spec.language.located import Located
+from neurovis_spec.language.places import formula_at
+from neurovis_spec.language.sections import ConnectionModel
 from neurovis_spec.language.values import Choice
 from neurovis_spec.language.yaml.source import Entry, Node, Packed, Scalar, Sequence
 
@@ -43,8 +45,7 @@ class Wired(NamedTuple):
     n_to: int
 
 
-#: What a parameter of a rule may depend on.
-_PAIR = ("i", "j", "n_from", "n_to")
+_SETTING = formula_at(ConnectionModel, "plasticity", "RULE", "SETTING")
 #: Signals of a list that are named where a rule is shown.
 _SHOWN = 3
 
@@ -65,13 +66,13 @@ def learning_of(
     constants, definitions = scope.constants, scope.definitions
     found = choose(choice, definitions.rules, "rule", definitions, constants.findings)
     if found is None:
-        check_settings(choice, constants, _PAIR)
+        check_settings(choice, constants, _SETTING.sees)
         return None
     rule, defaults = found
     known = (*(default.name for default in defaults), *rule.signals)
     settled = settle(choice, known, constants.findings)
     targets = None if wired is None else wired.j
-    each = Each("connection", _PAIR, None if wired is None else wired._asdict())
+    each = Each("connection", _SETTING.sees, None if wired is None else wired._asdict())
     values = parameters(choice, defaults, None if targets is None else len(targets), constants, settled, each)
     signals: dict[str, IntArray] = {}
     failed = values is None

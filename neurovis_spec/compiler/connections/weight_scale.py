@@ -92,16 +92,9 @@ def check_scale(model: ScaleModel, constants: Constants) -> float | None:
             constants.findings.error("out-of-range", formula.span, f"a {what} is not negative, this is {value:g}")
             value = None
         result.append(value)
-    if model.lost:  # without what is invalid in it, it would be another one
+    if model.lost or model.contradictory:  # without what is invalid in it, it would be another one
         return None
-    given = [key for key in ("spectral_radius", "norm", "indegree") if getattr(model, key) is not None]
-    if len(given) != 1:
-        entry = model.source.entry(given[1]) if given else None
-        span = model.source.span if entry is None else entry.key.span
-        message = f"expected one kind of scale here, found {len(given)}"
-        constants.findings.error("one-key", span, message, "keep one of spectral_radius, norm and indegree")
-        return None
-    return result[0]
+    return result[0] if result else None
 
 
 def _exponent(weights: FloatArray) -> int:

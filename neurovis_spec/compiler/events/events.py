@@ -19,9 +19,6 @@ from neurovis_spec.language.model import lost_names
 from neurovis_spec.language.references import Sum, parse
 from neurovis_spec.language.sections import EventModel
 
-#: What an event may do.
-_ACTIONS = ("set", "clamp", "lesion", "mend", "learning")
-
 
 @dataclass(frozen=True)
 class Event:
@@ -61,7 +58,6 @@ class EventReader:
 
     def _event(self, model: EventModel) -> Event | None:
         before = self.findings.errors
-        self._check_keys(model)
         begin = model.at if model.at is not None else model.from_
         at = None if begin is None else self.constants.integer(begin, "the step of an event", 0)
         to = None if model.to is None else self.constants.integer(model.to, "the end of a clamp", 1)
@@ -82,42 +78,10 @@ class EventReader:
             for name, on in model.learning.items()
             for one in self._learning(key_of(model.source, "learning", name), on.value)
         ]
-        if at is None or self.findings.errors > before:
+        if at is None or model.contradictory or self.findings.errors > before:
             return None
         keys = {name: key_of(model.source, "set", name).span for name in model.set}
         return Event(at, to, model.set, tuple(clamps), neurons, connections, mended, joined, tuple(learning), keys)
-
-    def _check_keys(self, model: EventModel) -> None:
-        """``set`` and ``lesion`` go with ``at``, ``clamp`` with ``from`` and perhaps ``to``."""
-        source = model.source
-
-        def wrong(key: str, message: str, hint: str | None = None) -> None:
-            entry = source.entry(key)
-            span = source.span if entry is None else entry.key.span
-            self.findings.error("bad-event", span, message, hint)
-
-        written = {entry.name for entry in source.entries}
-        actions = [name for name in _ACTIONS if name in written]
-        if not actions and not model.lost:
-            first = source.entries[0].key.span if source.entries else source.span
-            self.findings.error(
-                "bad-event", first, "this event does nothing", "give it set, clamp, lesion, mend or learning"
-            )
-        if not actions:
-            return
-        timed = written & {"at", "from", "to"}
-        perhaps = model.lost_keys - timed  # an unknown key may be meant for these
-        if "clamp" in actions:
-            if "at" in timed:
-                wrong("at", "a clamp lasts: it has 'from', and perhaps 'to'", "write from: instead of at:")
-            elif "from" not in timed | perhaps:
-                wrong("clamp", "a clamp needs 'from'")
-            if len(actions) > 1:
-                wrong("clamp", "a clamp is an event of its own", "make it an entry of its own")
-        elif timed & {"from", "to"}:
-            wrong(min(timed & {"from", "to"}), f"'{actions[0]}' takes 'at' alone", "write at: STEP")
-        elif "at" not in timed | perhaps:
-            wrong(actions[0], "at which step? 'at' is missing")
 
     def _check_set(self, model: EventModel, name: str) -> None:
         span = key_of(model.source, "set", name).span

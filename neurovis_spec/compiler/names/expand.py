@@ -30,9 +30,10 @@ from neurovis_spec.language.expressions.tree import Number, names, substitute
 from neurovis_spec.language.located import NAME_RULE, too_long
 from neurovis_spec.language.model import lost_names
 from neurovis_spec.language.modules import INCLUDED, InstanceModel
+from neurovis_spec.language.places import formula_at
 
 #: What ``set`` knows beside the parameters: the number of the instance, from 0, and how many its entry makes.
-COUNTED = ("i", "n")
+COUNTED = formula_at(InstanceModel, "set", "PARAMETER").sees
 
 
 @dataclass(frozen=True)

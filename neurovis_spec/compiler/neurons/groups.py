@@ -29,9 +29,12 @@ from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import meant, shorten
 from neurovis_spec.language.expressions.tree import Call, walk
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, too_long
+from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.values import Choice, FormulaList, Initial
 from neurovis_spec.language.yaml.source import Scalar
+
+_SETTING = formula_at(GroupModel, "model", "NAME", "SETTING")
 
 
 class Kind(NamedTuple):
@@ -209,9 +212,6 @@ class Builder:
             return None, None
         if model.names is not None:
             return self._listed(model, count), None
-        if model.first is not None and count is None:
-            findings.error("first-without-count", model.first.span, "'first' needs 'count'")
-            return None, None
         if count is None:
             return (name,), None
         first = 1 if model.first is None else self.constants.integer(model.first, "'first'", 0)
@@ -276,9 +276,9 @@ class Builder:
                 activity = parameters(model.activation or _default("identity", model), activation[1], n, self.constants)
             parts += (part._replace(field="activation") for part in found)
         elif model.activation is not None:
-            check_settings(model.activation, self.constants, ("i", "n"))
+            check_settings(model.activation, self.constants, _SETTING.sees)
         if neuron is None and model.model is not None:
-            check_settings(model.model, self.constants, ("i", "n"))
+            check_settings(model.model, self.constants, _SETTING.sees)
         if neuron is not None:
             choice = model.model or _default("static", model)
             with self.constants.following() as found:

@@ -20,6 +20,7 @@ from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.language.located import Formula, Located, formula_of
+from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import InputModel
 from neurovis_spec.language.yaml.source import NULL, Packed, Sequence
 
@@ -39,13 +40,7 @@ def make_input(
         None if model.values is None else _by_values(name, model.values, start, constants),
         None if given and model.size is None else _by_size(name, model, start, section, constants),
     ]
-    if len(given) > 1:
-        entry = model.source.entry(given[1])
-        span = model.source.span if entry is None else entry.key.span
-        message = f"'{given[1]}' beside '{given[0]}': an input has one source"
-        findings.error("conflicting-keys", span, message, f"keep '{given[0]}' or '{given[1]}'")
-        return None
-    if not model.lost_keys.isdisjoint(_SOURCES):
+    if model.contradictory or not model.lost_keys.isdisjoint(_SOURCES):
         return None
     return next((one for one in made if one is not None), None)
 
@@ -85,7 +80,7 @@ def _by_size(name: str, model: InputModel, start: int, section: Section, constan
 
 
 def _expression(formula: Formula, constants: Constants) -> Tree | None:
-    tree = constants.tree(formula, ("k", "t"))
+    tree = constants.tree(formula, formula_at(InputModel, "expression").sees)
     if tree is not None and is_constant(tree, (*ALWAYS, *constants.parameters)):
         constants.value(formula)
     return tree

@@ -19,6 +19,10 @@ from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.tree import Chain, Conditional, Draw, Tree, children, draws, names
 from neurovis_spec.language.located import Formula
+from neurovis_spec.language.places import formula_at
+from neurovis_spec.language.sections import GroupModel
+
+_NOISE = formula_at(GroupModel, "noise")
 
 
 def make_noises(scopes: tuple[Scope, ...], population: Population, inputs: int) -> tuple[Noise, ...]:
@@ -45,7 +49,7 @@ def make_noises(scopes: tuple[Scope, ...], population: Population, inputs: int) 
 
 
 def _tree(formula: Formula, constants: Constants) -> Tree | None:
-    tree = constants.tree(formula, ("k", "t", "i", "n"), random=True)
+    tree = constants.tree(formula, _NOISE.sees, _NOISE.draws)
     if tree is None or draws(tree):
         return tree
     message = "this noise draws nothing: it is the same at each run"
@@ -68,7 +72,7 @@ def _check_deviations(tree: Tree, formula: Formula, count: int, constants: Const
             if np.less(width, 0).any():
                 constants.refuse_draw(formula, draw, float(np.min(width)))
             tree = draw.second if draw.kind == "normal" else Chain(("-",), (draw.second, draw.first))
-            bound = constants.bound(tree, {name: known[name] for name in ("i", "n")})
+            bound = constants.bound(tree, {name: known[name] for name in _NOISE.sees if name in known})
             if bound.slots:
                 following.append(bound)
     return tuple(following)

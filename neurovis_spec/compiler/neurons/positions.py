@@ -19,8 +19,12 @@ from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.located import formula_of
+from neurovis_spec.language.places import formula_at
+from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.values import FileReference
 from neurovis_spec.language.yaml.source import Node, Packed, Scalar, Sequence
+
+_POSITION = formula_at(GroupModel, "position", 0)
 
 
 def _point(node: Node, index: int, n: int, constants: Constants) -> tuple[float, float] | None:
@@ -97,7 +101,7 @@ def depend_on_positions(node: FileReference | Sequence | Packed | None, constant
         for number in item.items if isinstance(item, (Sequence, Packed)) else (item,):
             if isinstance(number, Scalar) and isinstance(number.value, str):
                 formula = formula_of(number, quiet.findings)
-                tree = None if formula is None else quiet.tree(formula, ("i", "n"))
+                tree = None if formula is None else quiet.tree(formula, _POSITION.sees)
                 constants.depend(() if tree is None else names(tree))
 
 
@@ -109,7 +113,7 @@ def _check(node: FileReference | Sequence | Packed | None, constants: Constants,
         for number in item.items if isinstance(item, (Sequence, Packed)) else (item,):
             formula = formula_of(number, constants.findings)
             if formula is not None:
-                constants.look(formula, ("i", "n"))
+                constants.look(formula, _POSITION.sees)
 
 
 def _from_file(reference: FileReference, n: int, constants: Constants, files: Files) -> FloatArray | None:

@@ -23,10 +23,13 @@ from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.tree import Name, Tree, names
 from neurovis_spec.language.located import IDENTIFIER, Formula, formula_of
+from neurovis_spec.language.places import formula_at
+from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.values import Choice, FormulaList
 from neurovis_spec.language.yaml.source import Entry, Packed, Scalar, Sequence
 
 T = TypeVar("T")
+_BIAS = formula_at(GroupModel, "bias")
 
 #: Values of a list that are checked where it is not known how many there should be.
 _MOST_LOOKS = 1000
@@ -61,7 +64,7 @@ class Each(NamedTuple):
 
 def neurons(n: int | None) -> Each:
     """n neurons of a group: ``i`` and ``n``."""
-    return Each("neuron", ("i", "n"), None if n is None else {"i": np.arange(n, dtype=np.int64), "n": n})
+    return Each("neuron", _BIAS.sees, None if n is None else {"i": np.arange(n, dtype=np.int64), "n": n})
 
 
 def choose(

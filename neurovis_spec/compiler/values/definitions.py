@@ -26,13 +26,14 @@ from neurovis_spec.language.expressions.tree import Name, Number, Tree, substitu
 from neurovis_spec.language.library import ActivationModel, Library, ModelModel, RuleModel, StateModel
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, bad_name
 from neurovis_spec.language.model import Model as LanguageModel
-from neurovis_spec.language.model import lost_names, opening
+from neurovis_spec.language.model import lost_names
+from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.values import Parameter
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 
-_ACTIVATION = ("x",)
-_MODEL = ("drive", "k", "t")
-_RULE = ("pre", "sent", "post", "weight", "k", "t")
+_ACTIVATION = formula_at(ActivationModel, "value")
+_MODEL = formula_at(ModelModel, "activity")
+_RULE = formula_at(RuleModel, "weight", "each_step")
 
 
 class Default(NamedTuple):
@@ -193,7 +194,7 @@ def _bound(default: Default, how: str, bound: Tree | None) -> str | None:
 
 def _activation(name: str, model: ActivationModel, findings: Findings, dt: float) -> tuple[Activation, Defaults] | None:
     """The activation; None where an intermediate value is invalid."""
-    checker = _Checker(_ACTIVATION, model.source, findings, dt, not model.lost_keys.isdisjoint(_DECLARING))
+    checker = _Checker(_ACTIVATION.sees, model.source, findings, dt, not model.lost_keys.isdisjoint(_DECLARING))
     defaults = checker.parameters(model.parameters)
     replaced: dict[str, Tree] = {}
     let = checker.let(model.let)
@@ -217,13 +218,13 @@ def _expanded(tree: Tree, let: Mapping[str, Tree], span: Span, findings: Finding
 
 
 def _model(name: str, model: ModelModel, findings: Findings, dt: float) -> tuple[Model, Defaults]:
-    checker = _Checker(_MODEL, model.source, findings, dt, not model.lost_keys.isdisjoint(_DECLARING))
+    checker = _Checker(_MODEL.sees, model.source, findings, dt, not model.lost_keys.isdisjoint(_DECLARING))
     defaults = checker.parameters(model.parameters)
     for key in (*model.state, *lost_names(model.source, "state", dict(model.state))):
         checker.declare("state", key)
     let = checker.let(model.let)
     state = checker.states(model.state, defaults)
-    activity = checker.tree(model.activity, {"f": 1})
+    activity = checker.tree(model.activity, dict.fromkeys(_MODEL.functions, 1))
     names = tuple(default.name for default in defaults)
     spikes = model.spikes is not None and model.spikes.value
     return Model(name, names, let, state, activity or Number(0.0), spikes), defaults
@@ -231,7 +232,7 @@ def _model(name: str, model: ModelModel, findings: Findings, dt: float) -> tuple
 
 def _rule(name: str, model: RuleModel, findings: Findings, dt: float) -> tuple[Rule, Defaults] | None:
     """The rule; None where it is not known which signals it has."""
-    checker = _Checker(_RULE, model.source, findings, dt, not model.lost_keys.isdisjoint(_DECLARING))
+    checker = _Checker(_RULE.sees, model.source, findings, dt, not model.lost_keys.isdisjoint(_DECLARING))
     defaults = checker.parameters(model.parameters)
     before = findings.errors
     for signal in model.signals:
@@ -250,9 +251,6 @@ def _rule(name: str, model: RuleModel, findings: Findings, dt: float) -> tuple[R
     state = checker.states(model.state, defaults)
     step = checker.optional(model.weight.each_step)
     episode = checker.optional(model.weight.each_episode)
-    if model.weight.each_step is None and model.weight.each_episode is None and not model.weight.lost:
-        span = opening(model.weight.source)
-        findings.error("missing-key", span, "a rule changes the weight in 'each_step' or in 'each_episode'")
     signals = tuple(signal.value for signal in model.signals)
     return Rule(name, tuple(default.name for default in defaults), signals, let, state, step, episode), defaults
 
