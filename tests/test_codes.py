@@ -37,13 +37,16 @@ EMITTERS = {
     "CellError": 0,
     "FileFault": 0,
     "NumberRangeError": 0,
+    "NotWith": 3,
+    "Needs": 3,
+    "OneOf": 3,
     "Syntax": 4,
     "fault": 2,
     "refuse": 4,
 }
 #: Codes that are put together, and codes that stand in a table or a default.
 MADE = {"f'unknown-{what}'": {"unknown-activation", "unknown-model", "unknown-rule"}}
-ELSEWHERE = {"wrong-type", "yaml-syntax", "no-comprehensions", "foreign-operator", "useless-allow"}
+ELSEWHERE = {"wrong-type", "conflicting-keys", "yaml-syntax", "no-comprehensions", "foreign-operator", "useless-allow"}
 SHAPE = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)+|alias|anchor|directive|internal|tag|transposed")
 
 

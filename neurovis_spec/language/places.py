@@ -80,7 +80,7 @@ def role_of(path: Path, is_key: bool) -> Role | None:
 def formula_at(model: type[Model], *path: str | int) -> Role:
     """What the formulas below a key of a model see.
 
-    >>> formula_at(ConnectionModel, "weight").draws, formula_at(ConnectionModel, "delay").sees
+    >>> formula_at(Spec, "connections", "A -> B", "weight").draws, formula_at(Spec, "time", "dt").sees
     (True, ())
     """
     places: tuple[_Place, ...] = (_Place(model),)
