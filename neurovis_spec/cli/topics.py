@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from typing import Final
 
 from neurovis_spec.cli.tables import table
+from neurovis_spec.language.grammar import Role
 from neurovis_spec.language.patterns import PATTERNS, Pattern
 from neurovis_spec.manual.builtins import Builtin, builtins
 from neurovis_spec.manual.keys import Key, keys, keys_of
@@ -19,8 +20,6 @@ from neurovis_spec.manual.words import Word, functions, names
 
 _WIDTH: Final = 100
 _KINDS: Final = {"activation": "an activation", "model": "a neuron model", "rule": "a plasticity rule"}
-#: Keys whose value names a built-in, and its kind.
-_NAMING: Final = {"neurons.activation": "activation", "neurons.model": "model", "connections.plasticity": "rule"}
 
 
 def text_of(found: Sequence[Topic]) -> str:
@@ -65,9 +64,13 @@ def _key(key: Key) -> str:
     if key.default or key.required:
         head.append("required" if key.required else f"by default {key.default}")
     parts = [", ".join(head), filled(key.about)]
-    choices = [one.name for one in builtins() if one.kind == _NAMING.get(key.path)]
-    if key.path == "connections.pattern":
+    role = key.role or Role("text")
+    choices = [one.name for one in builtins() if role.use == "choice" and one.kind == role.kind]
+    if role.use == "pattern":
         choices = [*PATTERNS]
+    if role.use in ("formula", "template") and (role.sees or role.draws):
+        draws = "; they may draw random numbers" if role.draws else ""
+        parts.append(filled(f"its expressions know parameters, {', '.join(role.sees)}{draws}"))
     if choices:
         parts.append(filled(f"built in: {', '.join(choices)}"))
     below = keys_of(key.path)

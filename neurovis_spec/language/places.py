@@ -76,6 +76,14 @@ def role_of(path: Path, is_key: bool) -> Role | None:
     return next((role for role in roles if role is not None), None)
 
 
+def role_at(model: type[Model], *path: str | int) -> Role | None:
+    """What the texts below a key of a model are for."""
+    places: tuple[_Place, ...] = (_Place(model),)
+    for part in path:
+        places = _below(places, part)
+    return _role(places)
+
+
 @lru_cache
 def formula_at(model: type[Model], *path: str | int) -> Role:
     """What the formulas below a key of a model see.
@@ -83,10 +91,7 @@ def formula_at(model: type[Model], *path: str | int) -> Role:
     >>> formula_at(Spec, "connections", "A -> B", "weight").draws, formula_at(Spec, "time", "dt").sees
     (True, ())
     """
-    places: tuple[_Place, ...] = (_Place(model),)
-    for part in path:
-        places = _below(places, part)
-    role = _role(places)
+    role = role_at(model, *path)
     assert role is not None
     return role
 

@@ -12,8 +12,10 @@ from dataclasses import dataclass
 from functools import cache
 from typing import get_args
 
+from neurovis_spec.language.grammar import Role
 from neurovis_spec.language.model import Model
 from neurovis_spec.language.modules import InstanceModel, ModuleModel
+from neurovis_spec.language.places import role_at
 from neurovis_spec.language.sections import ConnectionModel, GroupModel, InputModel
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.language.values import PARAMETER
@@ -27,7 +29,8 @@ _SINGLE = "{name: {…}}"
 class Key:
     """A key: ``path`` is the sections and the key joined with dots, names of the author's left out.
 
-    ``kind`` says what may be written there; ``model`` is the model that holds the keys below it, if there are such.
+    ``kind`` says what may be written there, ``role`` what its texts are for; ``model`` is the model that holds the keys
+    below it, if there are such.
     """
 
     path: str
@@ -36,6 +39,7 @@ class Key:
     default: str = ""
     required: bool = False
     model: type[Model] | None = None
+    role: Role | None = None
 
     @property
     def name(self) -> str:
@@ -75,6 +79,7 @@ def _walk(model: type[Model], prefix: str) -> Iterator[Key]:
             default="" if default is None else default[1],
             required=field.is_required(),
             model=below,
+            role=role_at(model, shown),
         )
         if again:
             continue
