@@ -18,7 +18,7 @@ Severity = Literal["error", "warning"]
 #: A help line; where it takes a while to find, what finds it.
 Hint: TypeAlias = "str | Callable[[], str | None] | None"
 #: Errors after which no help line is looked for, and no misspelt name understood: nobody reads them.
-MOST_HINTS = 200
+MOST_HINTS = 100
 
 
 class Span(NamedTuple):

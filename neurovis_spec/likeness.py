@@ -106,7 +106,9 @@ class _Many:
         self._folded = [name.casefold() for name in known]
         self._by_letters = _places("".join(sorted(name)) for name in self._folded)
         self._by_stem = _places(map(_stem, self._folded))
-        self._by_first = _places(name[:1] for name in self._folded)
+        self._by_first = {
+            letter: np.array(places) for letter, places in _places(name[:1] for name in self._folded).items()
+        }
         self._by_name = _places(self._folded)
         self._sorted = sorted(self._by_name)
         self._lengths = np.array([len(name) for name in self._folded], dtype=np.int64)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import neurovis_spec as nv
 from neurovis_spec import likeness
-from neurovis_spec.diagnostics import nearest
+from neurovis_spec.diagnostics import MOST_HINTS, nearest
 
 
 def one_by_one(name: str, known: Iterable[str]) -> list[str]:
@@ -68,6 +68,24 @@ def test_of_many_names_few_are_compared_in_full(stem: str, wrong: str, monkeypat
     assert compared["times"] < 10 * 400
 
 
+def test_of_2000_misspelt_references_to_2000_groups_few_are_compared_in_full(monkeypatch: pytest.MonkeyPatch) -> None:
+    compared = Counter[str]()
+
+    class Counting(SequenceMatcher[str]):
+        def ratio(self) -> float:
+            compared["times"] += 1
+            return super().ratio()
+
+    monkeypatch.setattr(likeness, "SequenceMatcher", Counting)
+    groups = ", ".join(f"group_{number}_x: {{}}" for number in range(2000))
+    wrong = ", ".join(f"gruop_{number}_x -> group_0_x: 1" for number in range(2000))
+    with pytest.raises(nv.SpecError) as raised:
+        nv.compile_text(f"neurovis: 1\nname: x\nneurons: {{{groups}}}\nconnections: {{{wrong}}}\n")
+    assert len(raised.value.diagnostics) == 2000
+    assert str(raised.value.diagnostics[MOST_HINTS - 1].hint).startswith(f"did you mean 'group_{MOST_HINTS - 1}_x'")
+    assert compared["times"] < 3500
+
+
 WORDS_500 = [f"group_{number}_x" for number in range(500)]
 WRONG_500 = [f"gruop_{number}_x" for number in range(500)]
 NEURONS = "neurons: {" + ", ".join(f"{name}: {{}}" for name in WORDS_500) + "}\n"
@@ -110,5 +128,5 @@ def test_not_every_misspelt_name_is_compared_with_all_known_ones(spec: str, monk
     with pytest.raises(nv.SpecError) as raised:
         nv.compile_text(f"neurovis: 1\nname: x\n{spec}")
     assert len(raised.value.diagnostics) == 500
-    assert compared["times"] <= 450
+    assert compared["times"] <= 2 * MOST_HINTS + 50
     assert raised.value.diagnostics[0].hint
