@@ -9,7 +9,7 @@ import pytest
 from small_specs import HEAD, answer, codes, compiled, network_of
 
 import neurovis_spec as nv
-from neurovis_spec.compiler.names.reserved_names import MEANINGS
+from neurovis_spec.language.expressions.given import meaning
 
 USE = "\nneurons: {A: {activation: %s, bias: 2}}"
 
@@ -367,4 +367,4 @@ def test_whoever_declares_a_name_that_is_given_is_told_what_it_means(section: st
         with pytest.raises(nv.SpecError) as caught:
             nv.compile_text(text)
         (found,) = [one for one in caught.value.diagnostics if one.code == "duplicate-name"]
-        assert found.message == f"'{name}' already means something here: {MEANINGS[name]}"
+        assert found.message == f"'{name}' already means something here: {meaning(name)}"

@@ -201,7 +201,7 @@ def test_a_function_is_no_value() -> None:
 
 
 def test_names_of_elsewhere_are_explained() -> None:
-    assert "once" in answer("neurons: {A: {bias: k}}")[2]
+    assert "at each step" in answer("neurons: {A: {bias: k}}")[2]
     assert "group" in answer("parameters: {a: i}\nneurons: {A: {}}")[2]
     assert "n_from" in answer("neurons: {A: {count: 2}}\nconnections: {A -> A1: n}")[2]
 

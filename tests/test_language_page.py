@@ -14,7 +14,7 @@ import yaml
 import neurovis_spec as nv
 from neurovis_spec.language.data.files import KINDS, LARGEST
 from neurovis_spec.language.data.table import MOST_CELLS
-from neurovis_spec.language.model import RESERVED
+from neurovis_spec.language.expressions.given import RESERVED
 from neurovis_spec.manual.keys import keys
 
 ROOT = Path(__file__).parents[1]

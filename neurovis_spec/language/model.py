@@ -30,6 +30,7 @@ from pydantic_core import core_schema
 
 from neurovis_spec.diagnostics import Findings, Span, nearest
 from neurovis_spec.language.exclusions import Rules, check_rules, contradictory, schema_of
+from neurovis_spec.language.expressions.given import RESERVED
 from neurovis_spec.language.grammar import Needs, NotWith, OneOf
 from neurovis_spec.language.keys import Words, read_keys
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Leaf, bad_name, findings_of, give_up, refuse
@@ -318,7 +319,5 @@ class Short:
 
 #: A mapping whose keys are names of the author's: ``Named[Group]``.
 Named = Annotated[dict[str, V], WrapValidator(_named), KeysAreNames()]
-#: Names that mean something in expressions, which no parameter may have.
-RESERVED = ("t", "k", "dt", "i", "j", "n", "pi", "e")
 #: A mapping whose keys are names of parameters: ``NamedParameters[ParameterField]``.
 NamedParameters = Annotated[dict[str, V], WrapValidator(_named), KeysAreNames(RESERVED)]

@@ -14,6 +14,7 @@ from typing import Literal
 from neurovis_spec import plugins
 from neurovis_spec.compiler.values.constants import ALWAYS
 from neurovis_spec.diagnostics import Span
+from neurovis_spec.language.expressions.given import GIVEN
 from neurovis_spec.language.grammar import Role
 from neurovis_spec.language.patterns import PATTERNS
 from neurovis_spec.language.places import keys_at, role_of, words_at
@@ -27,7 +28,7 @@ from neurovis_spec.lsp.outline import Path
 from neurovis_spec.lsp.scopes import Scope, scope_of
 from neurovis_spec.lsp.text import Place
 from neurovis_spec.lsp.tolerant import Where, where
-from neurovis_spec.lsp.words import GIVEN, THEMES, functions
+from neurovis_spec.lsp.words import THEMES, functions
 
 _WORD = re.compile(r"(?:(?<![\w.])[A-Za-z_]\w*\.(?!\.))*(?:(?<!\w)[A-Za-z_]\w*)?$", re.ASCII)
 _REST = re.compile(r"\w*", re.ASCII)
@@ -194,7 +195,7 @@ def _formula(role: Role, scope: Scope, path: Path, index: Index, place: Place) -
         for name in index.locals(*scope.definition):
             yield _Offer(name.text, "local", str(name.item.path[2]))
     for given in (*role.sees, *ALWAYS):
-        yield _Offer(given, "constant", GIVEN.get(given, ""))
+        yield _Offer(given, "constant", GIVEN[given])
     for function, (usage, meaning) in functions(role.draws, role.functions).items():
         yield _Offer(function, "function", usage, meaning)
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from neurovis_spec.diagnostics import Span
+from neurovis_spec.language.expressions.given import GIVEN
 from neurovis_spec.language.grammar import Role
 from neurovis_spec.language.patterns import PATTERNS
 from neurovis_spec.language.places import key_at, role_of
@@ -23,7 +24,7 @@ from neurovis_spec.lsp.names import Name
 from neurovis_spec.lsp.outline import Item
 from neurovis_spec.lsp.scopes import DEFINITIONS
 from neurovis_spec.lsp.text import Place, holds
-from neurovis_spec.lsp.words import GIVEN, functions
+from neurovis_spec.lsp.words import functions
 
 _WORD = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from neurovis_spec.diagnostics import Diagnostic, Span
+from neurovis_spec.language.expressions.given import GIVEN, RESERVED
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, bad_name
-from neurovis_spec.language.model import RESERVED
 from neurovis_spec.language.places import role_of
 from neurovis_spec.language.yaml.scalars import resolve
 from neurovis_spec.lsp.check import check
@@ -23,7 +23,6 @@ from neurovis_spec.lsp.index import SHARED, Found, Index, is_common
 from neurovis_spec.lsp.names import Name
 from neurovis_spec.lsp.page import Page
 from neurovis_spec.lsp.text import Place, Text
-from neurovis_spec.lsp.words import GIVEN
 
 #: How many specs that share a declaration are compiled to see whether a rename does harm; each takes its time.
 _MOST_CHECKED = 8

@@ -11,8 +11,6 @@ from typing import Final
 from neurovis_spec.language.expressions.parser import DRAWS
 from neurovis_spec.manual import words as manual
 
-#: Names that expressions have without declaring them.
-GIVEN: Final[Mapping[str, str]] = manual.NAMES
 THEMES: Final[Mapping[str, str]] = {
     "default": "vermilion over grey to blue, on light",
     "dark": "the same on dark",

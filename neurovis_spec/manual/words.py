@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from neurovis_spec.language.expressions.functions import FUNCTIONS
+from neurovis_spec.language.expressions.given import GIVEN
 
 FUNCTION_TEXTS: Mapping[str, str] = MappingProxyType(
     {
@@ -41,29 +42,6 @@ FUNCTION_TEXTS: Mapping[str, str] = MappingProxyType(
         "step": "1 from 0 on, else 0.",
     }
 )
-NAMES: Mapping[str, str] = MappingProxyType(
-    {
-        "pi": "3.14159…",
-        "e": "2.71828…",
-        "dt": "Seconds a step (time.dt, by default 1).",
-        "k": "The step, from 0; in inputs, noise and definitions.",
-        "t": "The seconds, k·dt; in inputs, noise and definitions.",
-        "i": "The index from 0: of a neuron in its group; in a connection, of the source in its reference.",
-        "j": "In a connection, the index from 0 of the target in its reference.",
-        "n": "The number of neurons of the group.",
-        "number": "In a label within a module, the number of the instance: 1 of left1, and where there is only one.",
-        "n_from": "In a connection, the number of sources.",
-        "n_to": "In a connection, the number of targets.",
-        "distance": "In a connection, how far apart the positions of both neurons are.",
-        "x": "In an activation, the combined input.",
-        "drive": "In a model, the combined input with bias, input and noise: u[t].",
-        "f": "In the activity of a model, the neuron's activation: f(v).",
-        "pre": "In a rule, what reaches the synapse: the source's activity d steps ago, d being the delay.",
-        "sent": "In a rule, the source's activity of this step.",
-        "post": "In a rule, the target's activity of this step.",
-        "weight": "In a rule, the weight before the step.",
-    }
-)
 DRAW_TEXTS: Mapping[str, str] = MappingProxyType(
     {
         "normal(mean, sd)": "A normally distributed random number.",
@@ -89,4 +67,4 @@ def functions() -> tuple[Word, ...]:
 def names() -> tuple[Word, ...]:
     """What expressions may name beside parameters, and the draws."""
     draws = tuple(Word(usage.partition("(")[0], usage, about) for usage, about in DRAW_TEXTS.items())
-    return (*(Word(name, name, about) for name, about in NAMES.items()), *draws)
+    return (*(Word(name, name, about) for name, about in GIVEN.items()), *draws)

@@ -22,6 +22,7 @@ from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import Findings, shorten, suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS, FUNCTIONS
+from neurovis_spec.language.expressions.given import GIVEN, meaning
 from neurovis_spec.language.expressions.parser import DRAWS, ExpressionError, parse, unknown_names
 from neurovis_spec.language.expressions.tree import Draw, Number, Tree, draws, names
 from neurovis_spec.language.located import Formula
@@ -32,18 +33,6 @@ Value: TypeAlias = float | FloatArray
 ALWAYS = (*CONSTANTS, "dt")
 #: A number this close to an integer is that integer.
 NEAR_INTEGER = 1e-9
-#: Names that mean something elsewhere, and why not here.
-_ELSEWHERE: Mapping[str, str] = {
-    "k": "the step is known in a run; this value is worked out once, before it",
-    "t": "the time is known in a run; this value is worked out once, before it",
-    "dt": "this is 'dt' itself",
-    "i": "'i' is known within a group (the neuron's index) and in a connection's weight, centre, rule (the source's)",
-    "j": "'j' is known in a connection's weight, centre, rule (the target's index)",
-    "n": "'n' is known within a group (its count); a connection has n_from and n_to",
-    "n_from": "'n_from' is known in the weight, the centre and the rule of a connection",
-    "n_to": "'n_to' is known in the weight, the centre and the rule of a connection",
-    "distance": "'distance' is known in the weight and the centre of a connection",
-}
 _NOT_FINITE = "look for a division by zero, an overflow, or a root or logarithm of a negative number"
 
 
@@ -118,8 +107,8 @@ def _unknown(name: str, known: Collection[str], functions: Mapping[str, int], wh
     if usage is not None:
         return f"'{name}' is a function, not a value", f"write {usage}"
     message = f"unknown name '{shorten(name)}'"
-    if name in _ELSEWHERE:
-        return message, _ELSEWHERE[name]
+    if name in GIVEN:
+        return message, f"'{name}' is known elsewhere: {meaning(name)}"
     return message, suggest(name, known, what)
 
 

@@ -14,7 +14,6 @@ from typing import NamedTuple, TypeAlias, TypeVar
 import numpy as np
 
 from neurovis_spec.compiler.limits import PATIENCE
-from neurovis_spec.compiler.names.reserved_names import MEANINGS
 from neurovis_spec.compiler.names.unresolved import Gaps, gaps_of
 from neurovis_spec.compiler.program import Activation, Model, Quantity, Rule
 from neurovis_spec.compiler.values.constants import ALWAYS, Value, check_finite, is_constant, parse_formula
@@ -22,6 +21,7 @@ from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.errors import ExpressionError
 from neurovis_spec.language.expressions.functions import CONSTANTS
+from neurovis_spec.language.expressions.given import meaning
 from neurovis_spec.language.expressions.tree import Name, Number, Tree, substitute
 from neurovis_spec.language.library import ActivationModel, Library, ModelModel, RuleModel, StateModel
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, bad_name
@@ -90,7 +90,7 @@ class _Checker:
         first = self.known[name]
         if first is not None:
             return f"'{name}' already means something here (it is declared in line {first.line})"
-        return f"'{name}' already means something here: {MEANINGS[name]}"
+        return f"'{name}' already means something here: {meaning(name)}"
 
     def _key(self, section: str, name: str) -> Span:
         node = self.source.get(section)

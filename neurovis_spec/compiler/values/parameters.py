@@ -9,11 +9,10 @@ import math
 from collections.abc import Collection, Mapping
 
 from neurovis_spec.compiler.names.references import Section, key_span
-from neurovis_spec.compiler.names.reserved_names import MEANINGS
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Span
+from neurovis_spec.language.expressions.given import RESERVED, meaning
 from neurovis_spec.language.expressions.tree import names
-from neurovis_spec.language.model import RESERVED
 from neurovis_spec.language.values import Parameter
 
 
@@ -41,7 +40,7 @@ def _parameter(
     (span, place), findings = spans, constants.findings
     if name in RESERVED:
         message = f"a parameter may not be called '{name}': the language gives this name a meaning of its own"
-        hint = f"'{name}' is {MEANINGS[name]}; take another name, such as '{name}_0'"
+        hint = f"'{name}' is {meaning(name)}; take another name, such as '{name}_0'"
         findings.error("reserved-name", span, message, hint)
     at_fault = name in constants.broken or parameter.failed  # or what is set is invalid
     tree = constants.tree(parameter.value, what="parameters before this one, and constants", later=later)
