@@ -147,14 +147,20 @@ def test_a_package_of_ros_2_is_installed_and_run_as_its_launch_file_says(name: s
         subprocess.run(install, cwd=folder, check=True, capture_output=True, timeout=60)
         assert (prefix / "share" / "ament_index" / "resource_index" / "packages" / "neurovis_arm").is_file()
         share = prefix / "share" / "neurovis_arm"
-        (node,) = ElementTree.parse(share / "launch" / "network.launch.xml").getroot().iter("node")
+        text = (share / "launch" / "network.launch.xml").read_text()
+        text = text.replace("$(var rate)", "200").replace("$(find-pkg-share neurovis_arm)", str(share))
+        assert "$(" not in text
+        launch = ElementTree.fromstring(text)
+        (node,) = launch.iter("node")
+        assert set(node.attrib) == {"pkg", "exec", "output", "args"}
+        assert [(arg.get("name"), arg.get("default")) for arg in launch.iter("arg")] == [("rate", "100.0")]
         (given,) = node.iter("param")
-        parameters = str(given.get("from")).replace("$(find-pkg-share neurovis_arm)", str(share))
+        assert set(given.attrib) == {"from"}
         program = prefix / "lib" / str(node.get("pkg")) / str(node.get("exec"))
         (library,) = prefix.glob("lib/python*/site-packages")
         peer = listening(ros)
-        words = [*str(node.get("args")).replace("$(var rate)", "200").split(), "--steps", str(STEPS), "--wait", "60"]
-        words += ["--backend", "reference", "--ros-args", "--params-file", parameters]
+        words = [*str(node.get("args")).split(), "--steps", str(STEPS), "--wait", "60", "--backend", "reference"]
+        words += ["--ros-args", "--params-file", str(given.get("from"))]
         path = f"{ros.bin}:{os.environ['PATH']}"
         run = ros.started([program, *words], PATH=path, PYTHONPATH=str(library))
         assert run.end() == 0, run.err
