@@ -18,6 +18,7 @@ from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
+from neurovis_spec.ros import recorder as recorder_module
 from neurovis_spec.ros.accept import ARRAY, STRING, Stream, anything, arrays
 from neurovis_spec.ros.bags import read_bag
 from neurovis_spec.ros.definitions import definition, written
@@ -236,6 +237,31 @@ def test_what_a_full_disk_does_not_take_is_lost_and_said_once(name: str, tmp_pat
     assert lines[0] == "the recording cannot be written: No space left on device; messages are lost"
     assert sum("cannot be written" in line for line in lines) == 1
     assert "the recording is written again" in lines
+
+
+class NoRoom(Files):
+    """The disk has room for the first chunk alone."""
+
+    def write(self, messages: object) -> None:
+        if self.paths:
+            raise OSError(28, "No space left on device")
+        super().write(messages)  # type: ignore[arg-type]
+
+
+def test_a_disk_that_stays_full_is_told_of_once(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Having the disk hold what there is goes well all the same."""
+    monkeypatch.setattr(recorder_module, "_SYNC_TIME", 0.0)
+    lines = list[str]()
+    recorder = Recorder(NoRoom(tmp_path / "x.mcap", 1, {}, ()), {ARRAY: text_of_type(ARRAY, 1)}, lines.append)
+    recorder.start()
+    one = stream(1)
+    for first in range(0, 3000, 300):
+        record(recorder, one, sent(1, range(first, first + 300)))
+        time.sleep(0.02)
+    recorder.end()
+    assert one.counts.recorded + one.counts.lost == 3000
+    told = [line for line in lines if "recording" in line]
+    assert told == ["the recording cannot be written: No space left on device; messages are lost"]
 
 
 def test_a_chunk_that_gets_in_partly_is_taken_out_again(tmp_path: Path) -> None:

@@ -164,6 +164,9 @@ class Recorder:
         files, chunk = self._files, self._chunk
         self._chunk, self._size = [], 0
         taken = self._try(lambda: files.write([stored for _, stored in chunk]))
+        if taken and self._full:
+            self._full = False
+            self._tell("the recording is written again")
         for stream, _ in chunk:
             if taken:
                 stream.counts.recorded += 1
@@ -171,7 +174,7 @@ class Recorder:
                 stream.lose(1, self._teller)
 
     def _try(self, do: Callable[[], None]) -> bool:
-        """Do something with the files; tell where the disk does not take it, and where it does again."""
+        """Do something with the files; tell where the disk does not take it, once until messages are written again."""
         try:
             do()
         except OSError as error:
@@ -179,9 +182,6 @@ class Recorder:
                 self._tell(f"the recording cannot be written: {error.strerror or error}; messages are lost")
             self._full = True
             return False
-        if self._full:
-            self._tell("the recording is written again")
-        self._full = False
         return True
 
     def _close(self) -> None:
