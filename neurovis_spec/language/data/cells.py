@@ -1,130 +1,149 @@
-"""Cells of a ``.csv`` file: the numbers in them, many at a time or one by one.
+"""The rows and cells of a ``.csv`` file, and the numbers in them.
 
-In: cells as they are written. Out: float64 numbers, NaN for an empty cell; or a CellError that names row and column.
+In: bytes. Out: rows of texts; float64 numbers, NaN for an empty cell. A fault is a CellError that names row and column
+as an editor or a spreadsheet counts them (from 1, the header included).
 """
 
 from __future__ import annotations
 
-import codecs
+import csv
+import io
 import math
 import re
-from typing import Final
+import warnings
+from collections.abc import Iterator
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from neurovis_spec.language.data.table import EMPTY_CELL, CellError, quoted
 
+#: what is said of a file that begins with a comment
+NO_COMMENT: Final = "row 1 is no comment: all rows of a .csv are read"
 #: bytes of a cell; Python's reader takes twice as many
 LONGEST_CELL: Final = 1 << 16
+#: bytes of lines that are read together
+_STRETCH: Final = 1 << 18
 _NUMBER: Final = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _NOT_FINITE: Final = re.compile(r"[-+]?\.?(?:nan|inf|infinity)", re.IGNORECASE)
-_BEGINS: Final = "0123456789+-.nNiI"
-_DIGITS: Final = b"0123456789+-.eE"
-_BLANK: Final = b" \t"
-_LONGEST_NUMBER: Final = 1000
+_SEPARATOR: Final = re.compile(rb"[,\n]")
+_BLANK: Final = re.compile(rb",[ \t]+(?=,)")
+#: what numbers and blanks consist of
+PLAIN: Final = b"0123456789+-.eE \t"
 
 
-def check_lengths(data: bytes) -> None:
-    """Refuse a cell that is longer than any number or name, before a text is made of it. Raises CellError.
+class Row(NamedTuple):
+    """The number of a row, and its cells as they are written."""
 
-    Such a cell covers a stretch of half its length that holds no separator; few stretches have none.
-    """
+    number: int
+    cells: list[str]
+
+    def stripped(self) -> Row:
+        """The same without blanks around the cells."""
+        return Row(self.number, [cell.strip() for cell in self.cells])
+
+
+def count_lines(data: bytes) -> int:
+    """How many lines end, however they do."""
+    return data.count(b"\n") + data.count(b"\r") - data.count(b"\r\n")
+
+
+def plain_text(data: bytes) -> bytes:
+    """The same file with line feeds alone at the ends of its lines, none at its own, and no byte-order mark. Raises
+    CellError where it is empty or no text, or where a cell is longer than any number or name."""
+    text = data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    if not text:
+        raise CellError("file-format", "the file is empty")
+    _check_lengths(text)
+    if not text.isascii():
+        try:
+            text.decode("utf-8")
+        except UnicodeDecodeError as error:
+            row = text.count(b"\n", 0, error.start) + 1
+            raise CellError("invalid-utf8", f"row {row} is not UTF-8", "save the file as UTF-8", (row, 0)) from None
+    return text
+
+
+def _check_lengths(text: bytes) -> None:
+    """Refuse a cell that is longer than any number or name. It covers a stretch of half its length that holds no
+    separator; few stretches have none. Raises CellError."""
     half = LONGEST_CELL // 2
-    for start in range(0, len(data) - half, half):
-        if any(data.find(mark, start, start + half) >= 0 for mark in (b",", b"\n", b"\r")):
+    for start in range(0, len(text) - half, half):
+        if _SEPARATOR.search(text, start, start + half):
             continue
         low, high = max(0, start - LONGEST_CELL), start + LONGEST_CELL + half
-        begin = max(data.rfind(mark, low, start) for mark in (b",", b"\n", b"\r")) + 1
-        ends = [end for mark in (b",", b"\n", b"\r") if (end := data.find(mark, start + half, high)) >= 0]
-        if min(ends, default=min(len(data), high)) - max(begin, low) > LONGEST_CELL:
-            *before, line = data[: max(begin, low)].replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
-            at = len(before) + 1, line.count(b",") + 1
+        begin = max(low, text.rfind(b",", low, start) + 1, text.rfind(b"\n", low, start) + 1)
+        end = _SEPARATOR.search(text, start + half, high)
+        if (min(len(text), high) if end is None else end.start()) - begin > LONGEST_CELL:
+            row, line = text.count(b"\n", 0, begin) + 1, text.rfind(b"\n", 0, begin) + 1
+            at = row, text.count(b",", line, begin) + 1
             message = f"row {at[0]}, column {at[1]}: no number or name has more than {LONGEST_CELL:,} bytes"
             raise CellError("file-format", message, at=at)
 
 
-def check_utf8(data: bytes) -> None:
-    """Refuse a file that is no text, without making one text of all of it. Raises CellError."""
-    if data.isascii():
-        return
-    decoder = codecs.getincrementaldecoder("utf-8")()
-    fed = 0
+def rows_of(text: bytes, number: int = 1) -> Iterator[Row]:
+    """The rows of a text whose first line has this number; an empty line is a row of one empty cell. Raises
+    CellError."""
+    reader = csv.reader(io.TextIOWrapper(io.BytesIO(text), "utf-8", newline=""), strict=True)
     try:
-        while fed < len(data):
-            part = data[fed : fed + LONGEST_CELL]
-            fed += len(part)
-            decoder.decode(part, final=fed == len(data))
-    except UnicodeDecodeError as error:
-        row = data.count(b"\n", 0, fed - len(error.object) + error.start) + 1
-        raise CellError("invalid-utf8", f"row {row} is not UTF-8", "save the file as UTF-8", (row, 0)) from None
+        for cells in reader:
+            yield Row(number - 1 + reader.line_num, cells or [""])
+    except csv.Error as error:
+        row = number - 1 + reader.line_num
+        raise CellError("file-format", f"row {row} is no CSV: {error}", at=(row, 0)) from error
+
+
+def below(text: bytes, number: int) -> Iterator[tuple[int, bytes]]:
+    """The lines below that of this number, many together, each time with the number of the first; all at once where
+    quotes may hold ends of lines."""
+    for rest in text.split(b"\n", number)[number:]:
+        start, number = 0, number + 1
+        size = len(rest) if b'"' in rest else _STRETCH
+        while start <= len(rest):
+            end = rest.find(b"\n", start + size) % (len(rest) + 1)
+            yield number, rest[start:end]
+            number += 1 + rest.count(b"\n", start, end)
+            start = end + 1
 
 
 def is_number(cell: str) -> bool:
     """Whether a cell holds a number, be it a finite one or not."""
-    return cell[:1] in _BEGINS and bool(_NUMBER.fullmatch(cell) or _NOT_FINITE.fullmatch(cell))
+    return bool(_NUMBER.fullmatch(cell) or _NOT_FINITE.fullmatch(cell))
 
 
-def numbers_in(text: bytes, empty: NDArray[np.bool_]) -> NDArray[np.float64] | None:
-    """The numbers of cells that commas separate, NaN where ``empty`` says that a cell has no byte; None where not all
-    others hold plain numbers without blanks."""
-    values = np.full(len(empty), np.nan)
-    if empty.all():
-        return values
-    if text.translate(None, _DIGITS + b","):
-        return None
-    cells = text.decode("ascii").split(",")
-    numbers = _floats(list(filter(None, cells)) if empty.any() else cells)
-    if numbers is not None:
-        values[~empty] = numbers
-    return None if numbers is None else values
+def numbers_of(cells: bytes) -> NDArray[np.float64] | None:
+    """The numbers of cells that commas separate, NaN for an empty one; None where one holds something else, or a number
+    beyond double precision.
 
-
-def _floats(cells: list[str]) -> NDArray[np.float64] | None:
-    """The numbers of cells that hold digits, signs and points; None where one is no number, or not finite."""
-    if len(max(cells, key=len, default="")) > _LONGEST_NUMBER:
-        return None
-    try:
-        numbers = np.array(list(map(float, cells)), dtype=np.float64)
-    except ValueError:
-        return None
-    return numbers if np.isfinite(numbers).all() else None
-
-
-def numbers_of(cells: list[str]) -> NDArray[np.float64] | None:
-    """The numbers of cells, NaN for an empty one; None where these are not all plain ones, if any is not.
-
-    >>> numbers_of(["1", "", " 2e-1"]), numbers_of(["1", "1_0"])
+    >>> numbers_of(b"1,, 2e-1"), numbers_of(b"1,1_0")
     (array([1. , nan, 0.2]), None)
     """
-    text = "".join(cells).encode("utf-8", "replace")
-    if not text:
-        return np.full(len(cells), np.nan)
-    rest = text.translate(None, _DIGITS)
-    if rest.strip(_BLANK):
+    if cells.translate(None, PLAIN + b","):
         return None
-    if rest:
-        cells = [cell.strip() for cell in cells]
-    filled = [cell for cell in cells if cell]
-    numbers = _floats(filled)
-    if numbers is None:
-        return None
-    if len(filled) == len(cells):
-        return numbers
-    values = np.full(len(cells), np.nan)
-    values[np.fromiter(map(bool, cells), dtype=np.bool_, count=len(cells))] = numbers
-    return values
+    text = b",%b," % cells
+    if b" " in text or b"\t" in text:
+        text = _BLANK.sub(b",", text)  # NumPy would take it for a number
+    if b",," in text:
+        text = text.replace(b",,", b",nan,").replace(b",,", b",nan,")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # of what is no number: older ones end there
+        try:
+            values = np.fromstring(text[1:] + b"0", dtype=np.float64, sep=",")[:-1]
+        except ValueError:
+            return None
+    return None if len(values) != cells.count(b",") + 1 or np.isinf(values).any() else values
 
 
 def number_of(cell: str, row: int, column: int) -> float:
     """A cell's number, NaN for an empty cell. Raises CellError."""
     if not cell:
         return math.nan
-    plain = len(cell) <= _LONGEST_NUMBER and _NUMBER.fullmatch(cell)
-    if plain and math.isfinite(value := float(cell)):
-        return value
     place, at = f"row {row}, column {column}", (row, column)
-    if plain:
+    if _NUMBER.fullmatch(cell):
+        value = float(cell)
+        if math.isfinite(value):
+            return value
         raise CellError("not-finite", f"{place}: {quoted(cell)} is beyond double precision", at=at)
     if _NOT_FINITE.fullmatch(cell):
         raise CellError("not-finite", f"{place}: '{cell}' is not finite", EMPTY_CELL, at)
