@@ -129,13 +129,7 @@ def _compile_text(text: str, file: str, request: Request) -> CompiledNetwork:
 
 
 def _finish(document: SourceDocument | None, request: Request, findings: Findings, file: str) -> CompiledNetwork:
-    spec = None if document is None else pipeline.shape(document, findings)
-    request = request if spec is None else pipeline.include(spec, request, findings)
-    network = None if spec is None else pipeline.build(spec, request, findings)
-    memory = None if spec is None or network is None else pipeline.remember(spec, request, network, findings)
-    if spec is not None and network is not None:
-        pipeline.foresee(spec, network, findings)
-    pipeline.allow(findings)
+    spec, request, network, memory = pipeline.compile(document, request, findings)
     findings.check()
     if spec is None or network is None:
         span = Span(file, 1, 1, 1, 2)

@@ -29,7 +29,7 @@ from neurovis_spec.runtime.files import replacing
 
 if TYPE_CHECKING:
     from neurovis_spec.arrays import FloatArray
-    from neurovis_spec.layout import Layout, Point, Route
+    from neurovis_spec.layout import Layout, LayoutProblem, Point, Route
     from neurovis_spec.notebook.widget import LiveWidget
     from neurovis_spec.runtime.columns import Keep
     from neurovis_spec.runtime.record import Course
@@ -238,7 +238,9 @@ class CompiledNetwork:
     def refusal(self) -> Diagnostic | None:
         """What ``layout`` and all that draws would refuse, as far as that is known before an engine begins; None where
         there is nothing of the kind."""
-        return pipeline.refusal(self.spec, self.request, self.network, self.memory)
+        return pipeline.refusal(
+            self.spec, self.request, self.network, lambda: self.problem, memory=self.memory is not None
+        )
 
     def layout(
         self, engine: str | None = None, *, earlier: Layout | None = None, progress: Progress | None = None
@@ -255,12 +257,18 @@ class CompiledNetwork:
         from neurovis_spec.layout.model import LayoutRefusalError
 
         try:
-            return pipeline.arrange(self.network, engine, earlier or self.memory, progress)
+            problem = self.problem if earlier is None else replace(self.problem, memory=earlier)
+            return pipeline.arrange(problem, engine or self.network.layout.engine, progress)
         except LayoutRefusalError as refusal:
             span = pipeline.locate(refusal, self.spec, self.request, self.network, engine)
             if span is not None:
                 refusal.locate(span, self.sources)
             raise
+
+    @cached_property
+    def problem(self) -> LayoutProblem:
+        """What a layout engine is given."""
+        return pipeline.pose(self.network, self.memory)
 
     @cached_property
     def _layouts(self) -> dict[str | None, NetworkLayout]:
@@ -300,12 +308,11 @@ class CompiledNetwork:
     def choose_engine(self) -> tuple[str, str]:
         """The layout engine, and why."""
         from neurovis_spec.layout.choose import choose_engine
-        from neurovis_spec.layout.problem import problem_of
 
         engine = self.network.layout.engine
         if engine != "auto":
             return engine, "the spec names it"
-        return choose_engine(problem_of(self.network))
+        return choose_engine(self.problem)
 
     def choose_backend(self) -> tuple[str, str]:
         """The backend that runs it by default, and why."""
@@ -770,14 +777,13 @@ class NetworkLayout:
     def warnings(self) -> tuple[Diagnostic, ...]:
         """What was noticed about it, such as frames that pins put on each other (``frames-overlap``)."""
         own = self.compiled
-        return pipeline.examine(self.value, own.spec, own.request, own.network, own.sources).sorted()
+        return pipeline.examine(self.value, own.problem, own.spec, own.request, own.network, own.sources).sorted()
 
     def metrics(self) -> dict[str, float | int]:
         """What ``neurovis layout --metrics`` prints, but for the seconds."""
         from neurovis_spec.layout.metrics import metrics
-        from neurovis_spec.layout.problem import problem_of
 
-        return metrics(self.value, problem_of(self.compiled.network))
+        return metrics(self.value, self.compiled.problem)
 
     def dump(self) -> str:
         """The layout file as a text."""

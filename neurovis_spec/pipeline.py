@@ -4,19 +4,20 @@ Each function is one stage: it takes a value, gives a new one, and reaches back 
 
     text ─read─▶ SourceDocument ─shape─▶ Spec ─include─▶ Includes
     Spec + Includes ─build─▶ Network ─simulate─▶ Recording ─▶ Snapshot
-                                └─arrange─▶ Layout                │
+                                └─pose─▶ LayoutProblem ─arrange─▶ Layout                │
     Network + Layout + Snapshot ─encode (Eqs. 2–5)─▶ Scene ─draw─▶ bytes of a picture
     Network + Layout + Snapshots ─film─▶ Film ─animate─▶ bytes of a moving one
 
-What the first four find invalid goes into Findings, all at once; ``Findings.check`` raises SpecError.
+``compile`` is the first four in their order. What they find invalid goes into Findings, all at once;
+``Findings.check`` raises SpecError.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 
 from neurovis_spec.compiler.compile import Request, compile_spec
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, Panel, RenderSettings
@@ -32,7 +33,7 @@ from neurovis_spec.progress import Progress
 
 if TYPE_CHECKING:  # what only some stages need is imported there: a spec is validated without all of it
     from neurovis_spec.arrays import FloatArray
-    from neurovis_spec.layout.model import Layout, LayoutRefusalError
+    from neurovis_spec.layout.model import Layout, LayoutProblem, LayoutRefusalError
     from neurovis_spec.runtime.record import Course
     from neurovis_spec.runtime.recording import Recording, Snapshot
     from neurovis_spec.scene import Film, Scene
@@ -57,13 +58,37 @@ def shape(document: SourceDocument, findings: Findings) -> Spec | None:
 
 def include(spec: Spec, request: Request, findings: Findings) -> Request:
     """The request with the files whose modules and definitions the spec uses."""
-    return replace(request, includes=read_includes(spec, request.base, request.root, findings))
+    return replace(request, includes=read_includes(spec, request.base, request.root, findings, request.read))
 
 
 def build(spec: Spec, request: Request, findings: Findings) -> Network | None:
     """Expand, connect, check, lower: frozen arrays and an update program."""
     with uncollected():
         return compile_spec(spec, request, findings)
+
+
+class Compiled(NamedTuple):
+    """What a text became, as far as it could be read; what is None is invalid, and the findings say why. ``memory`` is
+    the earlier layout that the spec names."""
+
+    spec: Spec | None
+    request: Request
+    network: Network | None
+    memory: Layout | None = None
+
+
+def compile(document: SourceDocument | None, request: Request, findings: Findings) -> Compiled:
+    """All stages up to the network, in their order."""
+    spec = None if document is None else shape(document, findings)
+    network = memory = None
+    if spec is not None:
+        request = include(spec, request, findings)
+        network = build(spec, request, findings)
+        if network is not None:
+            memory = remember(spec, request, network, findings)
+            foresee(spec, network, findings)
+    allow(findings)
+    return Compiled(spec, request, network, memory)
 
 
 def allow(findings: Findings) -> None:
@@ -126,36 +151,49 @@ def foresee(spec: Spec, network: Network, findings: Findings) -> None:
     check_engine(spec.layout.engine, network, findings)
 
 
-def refusal(spec: Spec, request: Request, network: Network, memory: Layout | None) -> Diagnostic | None:
-    """What laying it out would refuse before the engine begins, and where the spec asks for it."""
+def refusal(
+    spec: Spec, request: Request, network: Network, problem: Callable[[], LayoutProblem], *, memory: bool = False
+) -> Diagnostic | None:
+    """What laying it out would refuse before the engine begins, and where the spec asks for it. The ``problem`` is
+    asked for where the engine depends on it; ``memory``: there is an earlier layout."""
     if network.layout == LayoutSettings():
         return None
     from neurovis_spec.layout.foreseen import foreseen
 
-    found = foreseen(network, memory)
+    found = foreseen(network, problem, memory=memory)
     if found is None:
         return None
     span = locate(found, spec, request, network) or Span(*spec.name.span)
     return Diagnostic(found.code, str(found), span, "error", found.hint)
 
 
-def arrange(
-    network: Network, engine: str | None = None, memory: Layout | None = None, progress: Progress | None = None
-) -> Layout:
-    """A position for every neuron, a route for every connection."""
-    from neurovis_spec.layout.arrange import lay_out
-
-    return lay_out(network, engine, memory, progress)
-
-
-def examine(layout: Layout, spec: Spec, request: Request, network: Network, sources: Mapping[str, str]) -> Findings:
-    """What in a layout is surely not as it is meant: warnings, but for those that are allowed."""
-
-    from neurovis_spec.layout.clashes import clashes
+def pose(network: Network, memory: Layout | None = None) -> LayoutProblem:
+    """What a layout engine is given: neurons, connections, what the spec asks for, an earlier layout (``memory``)."""
     from neurovis_spec.layout.problem import problem_of
 
+    return problem_of(network, memory)
+
+
+def arrange(problem: LayoutProblem, engine: str = "auto", progress: Progress | None = None) -> Layout:
+    """A position for every neuron, a route for every connection."""
+    from neurovis_spec.layout.arrange import lay_out_problem
+
+    return lay_out_problem(problem, engine, progress)
+
+
+def examine(
+    layout: Layout,
+    problem: LayoutProblem,
+    spec: Spec,
+    request: Request,
+    network: Network,
+    sources: Mapping[str, str],
+) -> Findings:
+    """What in a layout is surely not as it is meant: warnings, but for those that are allowed."""
+    from neurovis_spec.layout.clashes import clashes
+
     findings = Findings(dict(sources))
-    found = clashes(problem_of(network), layout)
+    found = clashes(problem, layout)
     if found:
         from neurovis_spec.language.allow import drop_allowed
         from neurovis_spec.layout.where import note_clashes

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from networks_by_hand import cpg_rbf
 
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings
-from neurovis_spec.layout.arrange import lay_out
+from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.naming import edge_key, natural_key
 from neurovis_spec.layout.problem import canonical, problem_of
 
@@ -77,8 +77,8 @@ def test_the_problem_of_a_network_holds_its_structure_and_settings() -> None:
 
 def test_a_network_is_laid_out_by_its_own_engine_or_the_one_named() -> None:
     network = replace(cpg_rbf(), layout=LayoutSettings(engine="grid"))
-    assert lay_out(network).engine == "grid"
-    layout = lay_out(network, "layered")
+    assert lay_out_problem(problem_of(network), network.layout.engine).engine == "grid"
+    layout = lay_out_problem(problem_of(network), "layered")
     assert layout.engine == "layered"
     assert set(layout.positions) == set(network.neurons.names)
     assert set(layout.routes) == set(network.connection_names)

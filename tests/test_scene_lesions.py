@@ -35,14 +35,14 @@ GONE_AT_4 = {"A1 -> B2", "A2 -> B1", "A2 -> B2", "A2"}
 
 def scene_at(step: int) -> Scene:
     snapshot = NETWORK.run(step + 1).snapshot(step)
-    layout = pipeline.arrange(NETWORK.network)
+    layout = NETWORK.layout().value
     return pipeline.picture(NETWORK.network, layout, snapshot, NETWORK.gains, NETWORK.network.render)
 
 
 def film_of(start: int, frames: int) -> Film:
     recording = NETWORK.run(start + frames)
     snapshots = [recording.snapshot(step) for step in range(start, start + frames)]
-    layout = pipeline.arrange(NETWORK.network)
+    layout = NETWORK.layout().value
     return pipeline.moving(NETWORK.network, layout, snapshots, NETWORK.gains, NETWORK.network.render, 10.0)
 
 
@@ -74,7 +74,7 @@ def test_a_network_without_lesions_has_nothing_faint() -> None:
     assert not lesions_of(plain.network)
     drawn = pipeline.draw(
         pipeline.picture(
-            plain.network, pipeline.arrange(plain.network), plain.run(9).snapshot(8), plain.gains, plain.network.render
+            plain.network, plain.layout().value, plain.run(9).snapshot(8), plain.gains, plain.network.render
         ),
         ".svg",
     )

@@ -77,7 +77,7 @@ def drawn(network: nv.CompiledNetwork, step: int = 20) -> Drawn:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         snapshot = network.run(step + 1).snapshot(step)
-        layout = pipeline.arrange(network.network)
+        layout = network.layout().value
         return Drawn(
             network, pipeline.picture(network.network, layout, snapshot, network.gains, network.network.render)
         )

@@ -43,9 +43,10 @@ from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.parameters import make_parameters
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.expressions.functions import CONSTANTS
-from neurovis_spec.language.includes import Includes, read_includes
+from neurovis_spec.language.includes import Includes, ReadBytes
 from neurovis_spec.language.model import opening
 from neurovis_spec.language.spec import Spec, is_library
+from neurovis_spec.language.yaml.opening import read_bytes
 
 if TYPE_CHECKING:
     from neurovis_spec.compiler.events.events import Event
@@ -60,8 +61,9 @@ class Request:
     parameters: Mapping[str, float] = field(default_factory=dict)
     seed: int | None = None
     limits: Limits = field(default_factory=Limits)
-    #: the included files, where they are read already, and the data files by the folder that paths are relative to
-    includes: Includes | None = None
+    #: how included files are read, and those that were; the data files by the folder that paths are relative to
+    read: ReadBytes = read_bytes
+    includes: Includes = field(default_factory=Includes)
     files: Mapping[Path, Files] = field(default_factory=dict)
 
 
@@ -69,16 +71,12 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
     """The network of a spec; None where it is invalid (the findings say why)."""
     before = findings.errors
     seed = request.seed if request.seed is not None else 0 if spec.seed is None else spec.seed.value
-    includes = request.includes
-    if includes is None:
-        includes = read_includes(spec, request.base, request.root, findings)
-        request = replace(request, includes=includes)
     gaps = gaps_of(spec)
     constants = Constants(
         {}, 1.0, findings, broken=set(gaps.names["parameters"]), incomplete="parameters" in gaps.sections
     )
     _step_length(spec, constants)
-    library = library_of(spec, includes, request.base, constants.dt, findings)
+    library = library_of(spec, request.includes, request.base, constants.dt, findings)
     make_parameters(spec, constants, request.parameters)
     _check_given(spec, constants, request.parameters)
     steps, episode = _clock(spec, constants)
@@ -161,7 +159,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
     )
     eventful = _eventful(spec, network, finder, constants)
     if eventful is not None and not findings.failed:  # the shape may have been invalid
-        files = tuple(file.model for file in includes.files)
+        files = tuple(file.model for file in request.includes.files)
         warn(Compiled(spec, scopes, library, expander.used, eventful, bundles, population, files), findings)
     return eventful
 

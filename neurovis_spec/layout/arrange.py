@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from typing import cast
 
-from neurovis_spec.compiler.network import Network
 from neurovis_spec.gc_paused import uncollected
 from neurovis_spec.layout.choose import choose_engine
 from neurovis_spec.layout.engines import engine_of
@@ -22,17 +21,8 @@ from neurovis_spec.layout.model import (
     ReportingEngine,
     Route,
 )
-from neurovis_spec.layout.problem import problem_of
 from neurovis_spec.layout.refusals import asked_by, refuse
 from neurovis_spec.progress import Progress
-
-
-def lay_out(
-    network: Network, engine: str | None = None, memory: Layout | None = None, progress: Progress | None = None
-) -> Layout:
-    """The layout of a network, by the engine named here, else by the spec's; what an earlier one (``memory``) knew
-    stays where it was. Raises LayoutRefusalError."""
-    return lay_out_problem(problem_of(network, memory), engine or network.layout.engine, progress)
 
 
 def lay_out_problem(problem: LayoutProblem, engine: str = "auto", progress: Progress | None = None) -> Layout:

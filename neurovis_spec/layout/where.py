@@ -64,7 +64,7 @@ class _Sections:
         self._spec = spec
         self._modules: Mapping[str, Section] = {}
         self._paths = {instance.path: instance.module for instance in network.instances}
-        if self._paths and request.includes is not None:
+        if self._paths:
             library = library_of(spec, request.includes, request.base, network.dt, Findings())
             self._modules = {name: module.model for name, module in library.modules.items()}
 

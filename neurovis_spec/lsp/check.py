@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from neurovis_spec import pipeline
 from neurovis_spec.compiler.compile import Request
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import Diagnostic, Findings, Span
-from neurovis_spec.language.includes import read_includes
 from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.files import Files
 
@@ -47,16 +47,12 @@ def stumbled(document: Document) -> Checked:
 
 def _compiled(text: str, file: str, folder: Path, root: Path, files: Files) -> Checked:
     findings = Findings()
-    read = pipeline.read_string(text, file, findings)
-    spec = None if read is None else pipeline.shape(read, findings)
-    network = refusal = None
-    if spec is not None:
-        includes = read_includes(spec, folder, root, findings, files.read)
-        request = Request(folder, root, includes=includes)
-        network = pipeline.build(spec, request, findings)
-        if network is not None and not findings.failed:
-            refusal = pipeline.refusal(spec, request, network, None)
-    pipeline.allow(findings)
+    document = pipeline.read_string(text, file, findings)
+    spec, request, network, memory = pipeline.compile(document, Request(folder, root, read=files.read), findings)
+    refusal = None
+    if spec is not None and network is not None and not findings.failed:
+        pose = partial(pipeline.pose, network, memory)
+        refusal = pipeline.refusal(spec, request, network, pose, memory=memory is not None)
     others = frozenset(place_of(name, folder) for name in findings.sources if name != file)
     found = findings.sorted()
     return Checked(found if refusal is None else (*found, refusal), None if findings.failed else network, others)
