@@ -29,7 +29,7 @@ class _Plain:
 
     def __init__(self) -> None:
         self._count = 0
-        self._around: list[int] = []
+        self._around: list[object] = []
 
     def of(self, value: object, place: tuple[str, ...]) -> object:
         """The plain value; ``place``: the keys that lead to it."""
@@ -40,12 +40,12 @@ class _Plain:
             return self.of(value.tolist(), place)
         if isinstance(value, str | int | float) or value is None:
             return value
-        if id(value) in self._around:
+        if any(value is one for one in self._around):
             where = f", at '{': '.join(place[-3:])}'" if place else ""
             raise ValueError(f"the mapping holds itself{where}")
         if not isinstance(value, Iterable) or isinstance(value, bytes | bytearray | memoryview):
             raise TypeError(f"a spec holds mappings, lists, texts and numbers, not {type(value).__name__}")
-        self._around.append(id(value))
+        self._around.append(value)
         plain = self._mapping(value, place) if isinstance(value, Mapping) else [self.of(item, place) for item in value]
         self._around.pop()
         return plain

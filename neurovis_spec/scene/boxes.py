@@ -40,7 +40,7 @@ class Box:
     path: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class _Named:
     kind: str
     path: str
@@ -52,26 +52,24 @@ def boxes_of(network: Network, positions: FloatArray, routes: Sequence[FloatArra
     holds another is drawn around it, and what foreign neurons stand in has no frame: it would say that they belong to
     it. Layout units."""
     named = _named(network)
-    within = {id(n): frozenset(n.members) for n in named}
+    within = {n: frozenset(n.members) for n in named}
     inner = _routes_within(network, routes, [n for n in named if n.kind == "instance"])
-    rects: dict[int, Rect] = {}
+    rects: dict[_Named, Rect] = {}
     for tight in (False, True):
         for item in named:  # what is held by another comes before it
-            held = [
-                rects[id(o)] for o in named if o is not item and id(o) in rects and within[id(o)] < within[id(item)]
-            ]
+            held = [rects[o] for o in named if o is not item and o in rects and within[o] < within[item]]
             if item.kind == "instance":
-                rects[id(item)] = _framed(positions, inner.get(item.path, []), item.members, held)
+                rects[item] = _framed(positions, inner.get(item.path, []), item.members, held)
             elif not tight or any(
-                overlap(rects[id(item)], rects[id(o)])
+                overlap(rects[item], rects[o])
                 for o in named
-                if not (within[id(o)] <= within[id(item)] or within[id(item)] <= within[id(o)])
+                if not (within[o] <= within[item] or within[item] <= within[o])
             ):
-                rects[id(item)] = _around(network, positions, routes, item.members, held, tight)
+                rects[item] = _around(network, positions, routes, item.members, held, tight)
     boxes = [
-        Box(_titled(network, n), n.path.rpartition(".")[2], n.members, rects[id(n)], n.kind, n.path)
+        Box(_titled(network, n), n.path.rpartition(".")[2], n.members, rects[n], n.kind, n.path)
         for n in named
-        if not _entered(positions, rects[id(n)], n.members)
+        if not _entered(positions, rects[n], n.members)
     ]
     return sorted(boxes, key=lambda b: (-(b.rect[2] - b.rect[0]) * (b.rect[3] - b.rect[1]), b.kind, b.path))
 

@@ -6,7 +6,7 @@ mirror are of equal make: as many neurons, in instances with the same names; how
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from itertools import takewhile
 from typing import Literal
 
@@ -27,7 +27,7 @@ _SLACK = 1e-9
 def mirrors_of(scopes: tuple[Scope, ...], population: Population, findings: Findings) -> tuple[Mirror, ...]:
     """All mirrors. A neuron with two mirror images in one frame is a finding; in an instance it may have one, and in
     what is around the instance another."""
-    paths = {id(directory): scope.path for scope, directory in zip(scopes, population.directories, strict=True)}
+    paths = [scope.path for scope in scopes]
     result: list[Mirror] = []
     taken: set[tuple[str, int]] = set()
     for scope, directory in zip(scopes, population.directories, strict=True):
@@ -65,7 +65,7 @@ def _mirror(
     reference: Reference,
     directory: Directory,
     names: tuple[str, ...],
-    paths: Mapping[int, str],
+    paths: Sequence[str],
     findings: Findings,
 ) -> Mirror | None:
     left, right = reference.parts
@@ -99,7 +99,7 @@ def _of_instances(
     reference: Reference,
     sides: tuple[tuple[Directory, ...], tuple[Directory, ...]],
     names: tuple[str, ...],
-    paths: Mapping[int, str],
+    paths: Sequence[str],
     findings: Findings,
 ) -> Mirror | None:
     left, right = reference.parts
@@ -112,7 +112,7 @@ def _of_instances(
     pairs: list[tuple[int, int]] = []
     instances: list[tuple[str, str]] = []
     for one, other in zip(*sides, strict=True):
-        own, theirs = paths[id(one)], paths[id(other)]
+        own, theirs = paths[one.scope], paths[other.scope]
         mates = {names[index][len(theirs) :]: index for index in other.members}
         there = {names[index][len(own) :]: index for index in one.members}
         if mates.keys() != there.keys():

@@ -63,11 +63,7 @@ class _Said(NamedTuple):
 
 def pins_of(scopes: tuple[Scope, ...], population: Population, findings: Findings) -> Pins:
     """All pins. Those closer than 0.6 to each other are a finding."""
-    by_identity = {id(directory): place for place, directory in enumerate(population.directories)}
-    said = [
-        _said(scope, directory, by_identity, findings)
-        for scope, directory in zip(scopes, population.directories, strict=True)
-    ]
+    said = [_said(*one, findings) for one in zip(scopes, population.directories, strict=True)]
     own: dict[int, _Pin] = dict(said[0].neurons)
     taken = set(own)  # what an outer scope says wins
     # for each scope the instance whose origin its pins are relative to, and the way there from that origin
@@ -127,7 +123,7 @@ def _frame(
     return base, (x + found[1].x, y + found[1].y)
 
 
-def _said(scope: Scope, directory: Directory, by_identity: Mapping[int, int], findings: Findings) -> _Said:
+def _said(scope: Scope, directory: Directory, findings: Findings) -> _Said:
     result = _Said({}, {})
     model = scope.section.layout
     if model is None:
@@ -148,7 +144,7 @@ def _said(scope: Scope, directory: Directory, by_identity: Mapping[int, int], fi
             message = f"'{shorten(key.value)}' is {len(instances)} instances; a pin names one"
             findings.error("bad-pin", key.span, message, f"pin {key.value}1 and the others one by one")
             continue
-        found = by_identity[id(instances[0])] if instances else _neuron(key, directory, findings)
+        found = instances[0].scope if instances else _neuron(key, directory, findings)
         if found is None:
             continue
         known = result.origins if instances else result.neurons

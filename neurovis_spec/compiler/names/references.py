@@ -48,6 +48,8 @@ class Directory:
     members: range = range(0)
     #: the inputs that are declared there
     inputs: Collection[str] = ()
+    #: the place of its scope among all
+    scope: int = 0
 
     @cached_property
     def known(self) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple, cast
+from typing import NamedTuple, TypeAlias, cast
 
 import numpy as np
 
@@ -86,6 +86,10 @@ def _unsaid(n: int) -> _Unsaid:
     return result
 
 
+#: What groups are that are the same in all instances of a module, by the module, the group and its count.
+Kinds: TypeAlias = dict[tuple[str | None, str, int], Kind]
+
+
 @dataclass(frozen=True)
 class Builder:
     """What makes the groups of one scope."""
@@ -93,8 +97,7 @@ class Builder:
     scope: Scope
     limits: Limits
     seed: int
-    #: what groups are that are the same in all instances of a module, by the group's model and its count
-    kinds: dict[tuple[int, int], Kind]
+    kinds: Kinds
 
     @property
     def constants(self) -> Constants:
@@ -120,7 +123,7 @@ class Builder:
             self._check(name, model)
             return None
         n = len(names)
-        kind = self._kind(model, n)
+        kind = self._kind(name, model, n)
         with self.constants.following() as biased:
             bias = None if model.bias is None else self._drawn(model.bias, n, "bias", name)
         given = model.initial or Initial(None)
@@ -167,7 +170,7 @@ class Builder:
 
     def _check(self, name: str, model: GroupModel) -> None:
         """What can be said of a group of which it is not known which neurons it has."""
-        kind = self._kind(model, None)
+        kind = self._kind(name, model, None)
         given = model.initial or Initial(None)
         for formulas, purpose in ((model.bias, "bias"), (given.activity, "initial")):
             if formulas is not None:
@@ -257,11 +260,11 @@ class Builder:
             choose(neuron, known.models, "model", known, findings),
         )
 
-    def _kind(self, model: GroupModel, n: int | None) -> Kind:
+    def _kind(self, name: str, model: GroupModel, n: int | None) -> Kind:
         """What the neurons are; identity and static in the place of what is invalid."""
         if n is None or not (_fixed(model.activation) and _fixed(model.model)):
             return self._made(model, n)
-        key = id(model), n
+        key = self.scope.module, name, n
         if key not in self.kinds:
             self.kinds[key] = self._made(model, n)
         return self.kinds[key]

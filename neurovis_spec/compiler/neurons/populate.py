@@ -23,7 +23,7 @@ from neurovis_spec.compiler.names.references import Directory, key_span
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.names.unresolved import Gaps
 from neurovis_spec.compiler.network import Neurons
-from neurovis_spec.compiler.neurons.groups import Builder, Built, Kind
+from neurovis_spec.compiler.neurons.groups import Builder, Built, Kind, Kinds
 from neurovis_spec.compiler.neurons.positions import depend_on_positions
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.language.located import IDENTIFIER
@@ -101,7 +101,7 @@ def populate(scopes: tuple[Scope, ...], limits: Limits, seed: int) -> Population
     """Make every neuron, scope by scope. A group that is invalid is made as far as its names are known, so that what
     refers to it can be checked."""
     settled: list[_Settled] = []
-    kinds: dict[tuple[int, int], Kind] = {}
+    kinds: Kinds = {}
     start = 0
     for scope in scopes:
         made = _settle(scope, start, limits, seed, kinds)
@@ -117,7 +117,7 @@ def without_neurons(population: Population) -> Population:
     return replace(population, directories=(replace(first, gaps=first.gaps.with_section("neurons")), *others))
 
 
-def _settle(scope: Scope, start: int, limits: Limits, seed: int, kinds: dict[tuple[int, int], Kind]) -> _Settled:
+def _settle(scope: Scope, start: int, limits: Limits, seed: int, kinds: Kinds) -> _Settled:
     builder = Builder(scope, limits, seed, kinds)
     built: list[Built] = []
     gaps = scope.gaps
@@ -256,5 +256,6 @@ def _directories(settled: list[_Settled], total: int) -> tuple[Directory, ...]:
             {name: tuple(made[place] for place in places) for name, places in one.scope.children.items()},
             range(one.start, stop),
             one.scope.section.inputs,
+            index,
         )
     return tuple(made[index] for index in range(len(settled)))
