@@ -2,12 +2,14 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from unittest.mock import patch
 
 import layout_conformance as suite
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from neurovis_spec.layout import Direction, Layout, LayoutProblem, Point, Route
+from neurovis_spec.layout import metrics as measures
 from neurovis_spec.layout.geometry import cubics, distance, point_on, snap, straight, turn
 from neurovis_spec.layout.metrics import metrics
 from neurovis_spec.layout.problem import canonical
@@ -135,3 +137,15 @@ def test_snapping_is_odd_and_near(value: float) -> None:
     assert snap(-value) == -snap(value)
     assert abs(snap(value) - value) <= 1 / 2048
     assert distance((snap(value), 0), (value, 0)) <= 1 / 2048
+
+
+def test_of_too_many_pairs_a_sample_of_the_routes_is_compared_which_is_said() -> None:
+    places: dict[str, Point] = {f"A{i}": (math.cos(i), math.sin(i)) for i in range(60)}
+    pairs = [(f"A{i}", f"A{(i * 7 + j * j + 1) % 60}") for i in range(60) for j in range(12)]
+    layout, problem = drawn(places, [(a, b) for a, b in pairs if a != b])
+    whole = metrics(layout, problem)
+    assert "sampled" not in whole
+    with patch.object(measures, "_MOST_PAIRS", 20_000):
+        part = metrics(layout, problem)
+    assert part["sampled"] < len(pairs) / 2
+    assert abs(part["crossings"] / whole["crossings"] - 1) < 0.1

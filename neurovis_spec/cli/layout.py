@@ -36,7 +36,11 @@ if TYPE_CHECKING:
     metavar="FILE",
     help="Keep what this layout file says, lay out what is new, and write it back; made if it is not there.",
 )
-@click.option("--metrics", is_flag=True, help="Print crossings, overlaps, flow and more as JSON instead.")
+@click.option(
+    "--metrics",
+    is_flag=True,
+    help="Print crossings, overlaps, flow and more as JSON instead; 'sampled' routes, where crossings are estimated.",
+)
 @set_option
 def command(
     spec: str, output: Path | None, engine: str | None, update: Path | None, metrics: bool, settings: dict[str, float]

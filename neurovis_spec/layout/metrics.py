@@ -6,6 +6,7 @@ drawn: splines flattened to short segments, which meet only in the cells of a gr
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import networkx as nx
@@ -28,18 +29,25 @@ _FINEST_CELL, _MOST_CELLS = 0.02, 32
 _FINEST = 4096
 #: Beyond this many in all they grow longer: memory has an end.
 _MOST_SEGMENTS = 2_000_000
+#: Pairs of segments that are compared, about; of more than that a sample of the routes is.
+_MOST_PAIRS = 20_000_000
 _ALONG: dict[Direction, Point] = {"down": (0, 1), "up": (0, -1), "right": (1, 0), "left": (-1, 0)}
 
 
 def metrics(layout: Layout, problem: LayoutProblem) -> dict[str, float | int]:
-    """The measures of a complete layout of this problem; ``seconds`` is for whoever measured it."""
+    """The measures of a complete layout of this problem; ``seconds`` is for whoever measured it. Where there are too
+    many pairs of routes to compare them all, ``crossings`` are those of ``sampled`` routes times the pairs that there
+    are by the pairs compared."""
     centres = np.array([layout.positions[name] for name in problem.neurons], dtype=np.float64).reshape(-1, 2)
     segments = _Segments([layout.routes[edge.name] for edge in problem.edges])
     ends = np.array([(edge.source, edge.target) for edge in problem.edges], dtype=np.int64).reshape(-1, 2)
+    crossings, sampled = _crossings(segments, ends, centres)
+    estimated = {"sampled": sampled} if sampled < len(ends) else {}
     return {
         "neurons": len(problem.neurons),
         "edges": len(problem.edges),
-        "crossings": _crossings(segments, ends, centres),
+        "crossings": crossings,
+        **estimated,
         "overlaps": _overlaps(centres),
         "edges_over_neurons": _edges_over_neurons(segments, ends, centres),
         "flow": _flow(layout, problem),
@@ -110,14 +118,23 @@ def _pairs(keys: IntArray) -> Iterator[tuple[IntArray, IntArray]]:
         step += 1
 
 
-def _crossings(segments: _Segments, ends: IntArray, centres: FloatArray) -> int:
+def _crossings(segments: _Segments, ends: IntArray, centres: FloatArray) -> tuple[int, int]:
+    """How many crossings there are, and from how many routes that is known."""
     if not len(segments.a):
-        return 0
+        return 0, len(ends)
     low, high = np.minimum(segments.a, segments.b), np.maximum(segments.a, segments.b)
     # as large as a typical segment, across and down: where all run nearly level, flat cells tell them apart
     extent = high - low
     cell = np.maximum(np.maximum(1.5 * extent.mean(axis=0), extent.max(axis=0) / _MOST_CELLS), _FINEST_CELL)
     items, keys = _in_cells(low, high, cell)
+    pairs = int((np.unique(keys, return_counts=True)[1].astype(np.float64) ** 2).sum() / 2)
+    sampled, scale = len(ends), 1.0
+    if pairs > _MOST_PAIRS:
+        chosen = _sample(len(ends), math.sqrt(_MOST_PAIRS / pairs))
+        sampled = int(chosen.sum())
+        scale = len(ends) * (len(ends) - 1) / (sampled * (sampled - 1))
+        kept = chosen[segments.edge[items]]
+        items, keys = items[kept], keys[kept]
     order = np.argsort(keys, kind="stable")
     items, keys = items[order], keys[order]
     edge, a = segments.edge[items], np.ascontiguousarray(segments.a[items].T)
@@ -132,7 +149,15 @@ def _crossings(segments: _Segments, ends: IntArray, centres: FloatArray) -> int:
         # a pair may share several cells: it counts in the one that the point lies in
         once = _key(*np.floor(where / cell).astype(np.int64).T) == keys[i]
         total += int(_outside(where[once], ends[edge[i[once]]], ends[edge[j[once]]], centres).sum())
-    return total
+    return round(total * scale), sampled
+
+
+def _sample(count: int, share: float) -> npt.NDArray[np.bool_]:
+    """Which of so many routes are in a sample; two at least, the same each time."""
+    scattered = np.arange(count, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)  # Knuth's multiplicative hashing
+    chosen = np.zeros(count, dtype=np.bool_)
+    chosen[np.argsort(scattered, kind="stable")[: max(2, math.ceil(share * count))]] = True
+    return chosen
 
 
 def _outside(where: FloatArray, one: IntArray, two: IntArray, centres: FloatArray) -> npt.NDArray[np.bool_]:
