@@ -258,3 +258,35 @@ def test_a_title_does_not_stand_in_the_frame_of_another_box() -> None:
         assert isinstance(other, Rectangle)
         (x, y), wide, high = other.corner, other.width, other.height
         assert not overlap(text_rect(title), (x, y, x + wide, y + high))
+
+
+RESERVOIR = """\
+neurovis: 1
+name: reservoir
+neurons: {U: {bias: 1}, R: {count: 60, activation: tanh}, Y: {}, T: {bias: 1}}
+connections:
+  U -> R: {weight: "uniform(-1, 1)", pattern: all_to_all}
+  R -> R: {weight: "normal(0, 0.1)", pattern: {random: {probability: 0.1}}}
+  R -> Y: {weight: 0, pattern: all_to_all, plasticity: {delta: {rate: 0.01, target: T}}}
+"""
+
+
+@pytest.mark.parametrize("framed", [False, True])
+def test_the_dotted_line_of_a_rule_stays_in_the_picture_or_in_the_frame_of_its_instance(framed: bool) -> None:
+    text = RESERVOIR
+    if framed:
+        body = "".join(f"    {line}\n" for line in RESERVOIR.splitlines()[2:])
+        instances = "instances: {a: {module: esn}, b: {module: esn}}"
+        text = f"neurovis: 1\nname: framed\nmodules:\n  esn:\n{body}{instances}\n"
+    scene = drawn(nv.compile_text(text), 3).scene
+    groups = [group for group in scene.groups if "signal" in group.data]
+    lines = [shape for group in groups for shape in group.shapes if isinstance(shape, Spline)]
+    rooms = [(0.0, 0.0, scene.width, scene.height)]
+    if framed:
+        frames = [s for g in scene.groups if (g.id or "").startswith("instance:") for s in g.shapes]
+        rooms = [(*r.corner, r.corner[0] + r.width, r.corner[1] + r.height) for r in frames if isinstance(r, Rectangle)]
+    assert len(lines) == len(rooms) == 1 + framed
+    for line in lines:
+        dots = sample(line.points, 40)
+        (x0, y0), (x1, y1) = dots.min(axis=0), dots.max(axis=0)
+        assert any(r[0] <= x0 and r[1] <= y0 and x1 <= r[2] and y1 <= r[3] for r in rooms)

@@ -38,7 +38,7 @@ from neurovis_spec.scene.model import Arrowhead, Group, Rectangle, Spline, Text,
 from neurovis_spec.scene.obstacles import Obstacles
 from neurovis_spec.scene.scaling import at, scaled_group, scaled_label, scaled_line, scaled_rectangle, scaled_text
 from neurovis_spec.scene.shown import shown
-from neurovis_spec.scene.teachers import Teacher, dash, dotted, label_of, teachers_of
+from neurovis_spec.scene.teachers import Teacher, dash, dotted, label_of, room_of, teachers_of
 from neurovis_spec.scene.themes import theme_of
 from neurovis_spec.scene.tints import tints_of
 from neurovis_spec.scene.titles import Titled, outline, titles_of
@@ -131,16 +131,20 @@ def plan(
     trim = trimmed([frame.map(routes[index]) for index in kept], ends[kept], gap, head)
     lines, reaches = dict(zip(kept, trim, strict=True)), _reaches(network, gains, frame.widest)
     obstacles = Obstacles(_dots(trim), [reaches[index] for index in kept], centres, radii)
-    dots = [(teacher, dotted(teacher, centres, radius, gap, head, obstacles)) for teacher in teachers]
+    top = _top(title is not None, len(seen.notes)) or 4.0
+    bottom = frame.height - legend.height(items, frame.width - 2 * MARGIN) - (MARGIN if items else 4.0)
+    picture = (6.0, top, frame.width - 6.0, bottom - (8.0 if items else 0.0))
+    frames = [(box.members, _mapped(box.rect, frame)) for box in boxes]
+    dots = [
+        (teacher, dotted(teacher, centres, radius, gap, head, obstacles, room_of(teacher, frames, picture)))
+        for teacher in teachers
+    ]
     for points in _dots([line for _, line in dots]):
         obstacles.add_line(points)
     for box in boxes:
         obstacles.add_frame(outline(_mapped(box.rect, frame)))
     header = _header(title, frame, theme) if title is not None else None
     notes = _noted(seen.notes, title is not None, frame, theme)
-    top = _top(title is not None, len(seen.notes)) or 4.0
-    bottom = frame.height - legend.height(items, frame.width - 2 * MARGIN) - (MARGIN if items else 4.0)
-    picture = (6.0, top, frame.width - 6.0, bottom - (8.0 if items else 0.0))
     spots: list[Point] = [(x, y) for x, y in centres.tolist()]
     sizes = {unit: size for unit, size in enumerate(drawn.sizes.tolist()) if drawn.glyph[unit]}
     labels: list[Label | None] = [None] * len(spots)

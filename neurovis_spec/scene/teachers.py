@@ -7,17 +7,18 @@ the neuron whose connections learn by it. Signals that come from inputs alone ha
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.scene.geometry import sample
+from neurovis_spec.scene.geometry import Rect, sample
 from neurovis_spec.scene.lines import Line, trimmed
 from neurovis_spec.scene.obstacles import Obstacles
 
-_BENDS = (0.0, 0.18, -0.18, 0.36, -0.36, 0.6, -0.6)
+_BENDS = (0.0, *(side * bend for bend in (0.09, 0.18, 0.27, 0.36, 0.48, 0.6) for side in (1, -1)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,18 +43,40 @@ def teachers_of(network: Network) -> list[Teacher]:
     return list(found.values())
 
 
-def dotted(teacher: Teacher, centres: FloatArray, radius: float, gap: float, head: float, obstacles: Obstacles) -> Line:
-    """The dotted line of a pair: straight, or bent where it would run over a disc or along other lines."""
+def room_of(teacher: Teacher, frames: Iterable[tuple[Collection[int], Rect]], picture: Rect) -> Rect:
+    """Where the dotted line of a pair may run: in the smallest frame that holds both neurons, else in the picture."""
+    around = [rect for members, rect in frames if teacher.source in members and teacher.target in members]
+    return min(around, key=lambda rect: (rect[2] - rect[0]) * (rect[3] - rect[1]), default=picture)
+
+
+def dotted(
+    teacher: Teacher,
+    centres: FloatArray,
+    radius: float,
+    gap: float,
+    head: float,
+    obstacles: Obstacles,
+    room: Rect,
+) -> Line:
+    """The dotted line of a pair: straight, or bent where it would run over a disc or along other lines, but never out
+    of its ``room``."""
     start, end = centres[teacher.source], centres[teacher.target]
     best: tuple[float, Line] | None = None
     for bend in _BENDS:
         (line,) = trimmed([_bent(start, end, bend)], radius, gap + 1, head)
         dots = sample(line.points, max(8, int(math.dist(start, end) / 6)))
+        if bend and not _within(dots, room):
+            continue
         cost = obstacles.path_hits(dots[2:-2], (teacher.source, teacher.target)) + 4 * abs(bend)
         if best is None or cost < best[0]:
             best = (cost, line)
     assert best is not None
     return best[1]
+
+
+def _within(dots: FloatArray, room: Rect) -> bool:
+    low, high = dots.min(axis=0), dots.max(axis=0)
+    return bool(low[0] >= room[0] and low[1] >= room[1] and high[0] <= room[2] and high[1] <= room[3])
 
 
 def _bent(start: FloatArray, end: FloatArray, bend: float) -> FloatArray:
