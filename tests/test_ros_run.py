@@ -472,9 +472,9 @@ ros: {subscribe: {before: {topic: /own}}, publish: {after: {topic: /own}}}
 
 
 def test_a_topic_of_two_types_is_told(ros: World, tmp_path: Path) -> None:
-    spec = tmp_path / "arm.yaml"
-    spec.write_text(written(tmp_path).read_text().replace("{topic: ~/motors,", "{topic: /cmd_vel,"))
-    run = ros.neurovis("ros", "run", spec, "--steps", "5")
+    moved = "/neurovis/arm/motors:=/cmd_vel"
+    given = [moved] if ros.ros == 1 else ["--ros-args", "-r", moved]
+    run = ros.neurovis("ros", "run", written(tmp_path), "--steps", "5", *given)
     assert run.end() == 1
     assert run.err[0].startswith("error: ")
     assert "/cmd_vel" in run.err[0]

@@ -14,7 +14,7 @@ from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.names.references import key_of, known_inputs
 from neurovis_spec.compiler.names.unresolved import Gaps
 from neurovis_spec.compiler.network import Input, Output
-from neurovis_spec.compiler.ros_settings import NAMESPACE, Publication, RosSettings, Subscription
+from neurovis_spec.compiler.ros_settings import NAMESPACE, Publication, RosSettings, Subscription, absolute
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, shorten, suggest
 from neurovis_spec.language.located import Located
@@ -25,6 +25,9 @@ from neurovis_spec.language.spec import Spec
 
 #: Where a message has its numbers if nothing else is said.
 _DATA: Final = "data"
+#: The types of what the network itself publishes.
+_ARRAY: Final = "std_msgs/Float64MultiArray"
+_SPEC: Final = "std_msgs/String"
 #: A queue of more messages is a mistake.
 _DEEPEST: Final = 1_000_000
 
@@ -44,7 +47,7 @@ def ros_settings(model: RosModel, around: Surroundings, constants: Constants) ->
     rate = None if model.rate is None else _above_zero(model.rate, "'rate' is steps a second", constants)
     namespace = NAMESPACE if model.namespace is None else f"/{model.namespace.value.strip('/')}"
     reliability, durability, depth = _quality(model.qos, constants)
-    return RosSettings(
+    settings = RosSettings(
         namespace=namespace,
         rate=1 / constants.dt if rate is None else rate,
         reliability=reliability,
@@ -53,6 +56,30 @@ def ros_settings(model: RosModel, around: Surroundings, constants: Constants) ->
         subscribe=tuple(_subscriptions(model, around, constants)),
         publish=tuple(_publications(model, around, constants)),
     )
+    _check_topics(model, settings, around.spec.name.value, constants.findings)
+    return settings
+
+
+def _check_topics(model: RosModel, settings: RosSettings, name: str, findings: Findings) -> None:
+    """A topic has messages of one type, and of one output: who listens cannot tell them apart."""
+    node = f"{settings.namespace.rstrip('/')}/{name}"
+    own = {f"{node}/activity": "the activities", f"{node}/weights": "the weights", f"{node}/spec": "the spec"}
+    types = {topic: _SPEC if what == "the spec" else _ARRAY for topic, what in own.items()}
+    outputs = {topic: f"{what} of the network" for topic, what in own.items()}
+    for output in settings.publish:
+        entry = model.publish[output.output]
+        topic = absolute(output.topic, node)
+        other = outputs.setdefault(topic, f"the output '{output.output}'")
+        if other != f"the output '{output.output}'":
+            message = f"{topic} is the topic of {other}, too: who listens cannot tell the messages apart"
+            findings.error("topic-conflict", entry.topic.span, message, "take another topic")
+        elif "type" not in entry.lost_keys:
+            types[topic] = output.type
+    for heard in settings.subscribe:
+        source, topic = model.subscribe[heard.input], absolute(heard.topic, node)
+        if "type" not in source.lost_keys and types.setdefault(topic, heard.type) != heard.type:
+            message = f"{topic} has messages of {types[topic]} elsewhere in this spec, here of {heard.type}"
+            findings.error("topic-conflict", (source.type or source.topic).span, message, "a topic has one type")
 
 
 def _quality(

@@ -50,3 +50,16 @@ class RosSettings:
     depth: int = 10
     subscribe: tuple[Subscription, ...] = ()
     publish: tuple[Publication, ...] = ()
+
+
+def absolute(topic: str, node: str) -> str:
+    """A topic's whole name, seen from a node.
+
+    >>> absolute("/a", "/ns/net"), absolute("a/b", "/ns/net"), absolute("~/a", "/ns/net")
+    ('/a', '/ns/a/b', '/ns/net/a')
+    """
+    if topic.startswith("/"):
+        return topic
+    if topic.startswith("~"):
+        return f"{node}/{topic[1:].lstrip('/')}"
+    return f"{node.rpartition('/')[0]}/{topic}"

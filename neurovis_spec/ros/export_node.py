@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.ros_settings import absolute
 from neurovis_spec.language.expressions.emit_c import INEXACT
 from neurovis_spec.ros.definitions import Definition, definition
-from neurovis_spec.ros.run import absolute
 from neurovis_spec.ros.templates import render
 from neurovis_spec.runtime.c_export import Exported
 

@@ -19,6 +19,7 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.ros_settings import absolute
 from neurovis_spec.ros.accept import ARRAY, STRING
 from neurovis_spec.ros.counts import Counts, Teller
 from neurovis_spec.ros.definitions import Definition
@@ -63,19 +64,6 @@ def simulation(network: Network, backend: str | None) -> Simulation:
         if chosen != "c":
             raise
         return Simulation(network, "numpy")  # a compiler that cannot compile
-
-
-def absolute(topic: str, node: str) -> str:
-    """A topic's whole name, seen from a node.
-
-    >>> absolute("/a", "/ns/net"), absolute("a/b", "/ns/net"), absolute("~/a", "/ns/net")
-    ('/a', '/ns/a/b', '/ns/net/a')
-    """
-    if topic.startswith("/"):
-        return topic
-    if topic.startswith("~"):
-        return f"{node}/{topic[1:].lstrip('/')}"
-    return f"{node.rpartition('/')[0]}/{topic}"
 
 
 @dataclass

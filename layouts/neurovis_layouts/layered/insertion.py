@@ -154,9 +154,7 @@ class Insertion:
         return crossed // 2 * CROSSING + length
 
     def keep(self) -> Kept:
-        return Kept(
-            tuple(self.order), tuple(self._before), tuple(self._costs), tuple(self.rank), tuple(self.cells)
-        )
+        return Kept(tuple(self.order), tuple(self._before), tuple(self._costs), tuple(self.rank), tuple(self.cells))
 
     def restore(self, kept: Kept) -> None:
         self.order, self._before, self._costs = list(kept.order), list(kept.before), list(kept.costs)
@@ -190,7 +188,9 @@ class Insertion:
         best = slot = -1
         for r in range(first, last + 1):
             sums = [side[r] for side in (from_above, from_below) if side]
-            costs = sums[0] + sums[1] if len(sums) > 1 else sums[0] if sums else np.zeros(len(self.order[r]) + 1, np.int32)
+            costs = (
+                sums[0] + sums[1] if len(sums) > 1 else sums[0] if sums else np.zeros(len(self.order[r]) + 1, np.int32)
+            )
             if self._tight[r]:
                 costs = costs + self._shut_to(r, node)
             least = int(costs.min())
@@ -203,7 +203,9 @@ class Insertion:
         self.order[r] = self.order[r][:slot] + self._points[node] + self.order[r][slot:]
         if r > 0:
             old = self._before[r - 1]
-            self._set(r - 1, np.concatenate((old[:, :slot], *[old[:, slot : slot + 1]] * (more + 1), old[:, slot + 1 :]), 1))
+            self._set(
+                r - 1, np.concatenate((old[:, :slot], *[old[:, slot : slot + 1]] * (more + 1), old[:, slot + 1 :]), 1)
+            )
         if r < len(self._before):
             old = self._before[r]
             self._set(r, np.concatenate((old[:slot], *[old[slot : slot + 1]] * (more + 1), old[slot + 1 :])))
