@@ -94,11 +94,11 @@ class Ros1Publisher:
         latched = quality.durability == "transient_local"
         queue = quality.depth if quality.reliability == "best_effort" else max(_QUEUE, quality.depth)
         self.handle = rospy.Publisher(topic, self._class, queue_size=queue, latch=latched, tcp_nodelay=True)
+        self.topic = str(self.handle.resolved_name)
         there = self.handle.impl.data_class._type  # rospy would send one type in the name of the other
         if there != type_:
             self.handle.unregister()
-            raise MiddlewareError(f"{topic} cannot be a topic of {type_}: this node publishes {there} on it")
-        self.topic = str(self.handle.resolved_name)
+            raise MiddlewareError(f"{self.topic} cannot be a topic of {type_}: this node publishes {there} on it")
 
     @property
     def subscribers(self) -> int:
