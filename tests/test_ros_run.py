@@ -202,6 +202,7 @@ def test_a_node_that_others_shut_down_is_safe_before(arm: Path) -> None:
         time.sleep(1)
         assert ros.python(SHUTDOWN).end() == 0
         assert run.end() == 0
+        assert len(run.out) == 1
         assert run.json()["steps"] > 0
         assert peer.end() == 0
         signals = [one[0] for one in peer.json()["/cmd_vel"]]
@@ -228,8 +229,15 @@ def test_steps_that_are_late_are_counted_and_made(ros: World, arm: Path) -> None
     assert run.json()["late"] > 300
 
 
-def test_time_can_be_simulated(ros: World, arm: Path) -> None:
-    run = ros.neurovis("ros", "run", arm, "--sim-time", "--steps", "30", "--format", "json")
+@pytest.mark.parametrize("asked", ["here", "by ROS"])
+def test_time_can_be_simulated(ros: World, arm: Path, asked: str) -> None:
+    words = ["--sim-time"]
+    if asked == "by ROS":
+        words = ["--ros-args", "-p", "use_sim_time:=true"] if ros.ros == 2 else []
+        if ros.ros == 1:
+            told = ros.python('import rosgraph; rosgraph.Master("/simulator").setParam("/use_sim_time", True)')
+            assert told.end() == 0
+    run = ros.neurovis("ros", "run", arm, "--steps", "30", "--format", "json", *words)
     run.wait_for("ready")
     time.sleep(0.5)
     assert run.running

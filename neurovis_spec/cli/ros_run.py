@@ -58,7 +58,7 @@ def command(
     from neurovis_spec.ros.run import Course, NodeRun
 
     network = compiled.network
-    course = Course(rate or network.ros.rate, steps, meeting.seconds, meeting.wait, backend, meeting.sim_time)
+    course = Course(rate or network.ros.rate, steps, meeting.seconds, meeting.wait, backend)
     sys.setswitchinterval(0.0005)  # steps are due, and threads must not wait for each other as long as Python lets them
     with meeting.node(network.name, network.ros.namespace) as node, heeded() as asked:
         with desk.open(compiled, node) if desk else nullcontext() as listening:

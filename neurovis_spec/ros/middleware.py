@@ -126,6 +126,8 @@ class Node(Protocol):
     name: str
     #: how often it had to be registered anew
     reconnects: int
+    #: whether its time is that of ``/clock``
+    simulated: bool
 
     @property
     def ended(self) -> bool:
@@ -187,9 +189,9 @@ class Node(Protocol):
 @dataclass(frozen=True, slots=True)
 class Wish:
     """How a node is to be opened: its name and namespace, ``ros`` (None: what is there), whether it meets other
-    machines, whether its time is that of ``/clock``, whether another of its name may be there (``anonymous``),
-    ``arguments`` for ROS itself: ``--ros-args -r a:=b -p name:=1``, in ROS 1 ``a:=b _name:=1``; and for how many
-    ``seconds`` it waits for a master (None: until there is one)."""
+    machines, whether its time is that of ``/clock`` (also where ROS is told so: ``use_sim_time``), whether another of
+    its name may be there (``anonymous``), ``arguments`` for ROS itself: ``--ros-args -r a:=b -p name:=1``, in ROS 1
+    ``a:=b _name:=1``; and for how many ``seconds`` it waits for a master (None: until there is one)."""
 
     name: str
     namespace: str = "/"

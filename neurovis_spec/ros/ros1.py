@@ -7,9 +7,11 @@ node stands there with all its topics, and registers it anew where it does not: 
 from __future__ import annotations
 
 import os
+import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from http.client import HTTPConnection
 from threading import Event, Lock, Thread
 from typing import IO, Final, cast
@@ -161,7 +163,6 @@ class Ros1Node:
     def __init__(self, wish: Wish, tell: Tell) -> None:
         self.tell, self.reconnects, self.closed = tell, 0, False
         self._lock, self._there = Lock(), list[Ros1Publisher | Ros1Subscription]()
-        self._clock = 0 if wish.sim_time else None
         self._prefix, self._set = "", cast("SetParameters | None", None)
         self._seen: dict[str, object] = {}
         self._end, self._gone, self._away, self._ending = Event(), Event(), False, False
@@ -174,6 +175,10 @@ class Ros1Node:
             raise MiddlewareError(f"ROS_MASTER_URI is no address: '{uri}'", "such as http://localhost:11311")
         self._uri = uri
         self._wait_for_master(wish.seconds)
+        self.simulated = wish.sim_time or self._is_told_to_simulate()
+        self._clock = 0 if self.simulated else None
+        # rospy prints who has asked the node to end where the summary is printed
+        rospy.impl.masterslave.print = partial(print, file=sys.stderr)
         try:
             remaps = ["neurovis", f"__ns:={wish.namespace}", *wish.arguments]
             rospy.init_node(wish.name, remaps, anonymous=wish.anonymous, disable_signals=True, disable_rostime=True)
@@ -202,6 +207,12 @@ class Ros1Node:
                 self.tell(f"waiting for the master of ROS 1 at {self._uri}")
                 told = True
             time.sleep(0.2)
+
+    def _is_told_to_simulate(self) -> bool:
+        try:
+            return self._ask(lambda master: master.getParam("/neurovis", "/use_sim_time")) is True
+        except OSError:  # nobody has said so
+            return False
 
     def _tick(self, arrival: Arrival) -> None:
         if len(arrival.data) == 8:

@@ -224,6 +224,7 @@ class Ros2Node:
             raise MiddlewareError(f"a node of ROS 2 cannot be made: {error}") from None
         self.name = str(self.rcl.get_fully_qualified_name())
         self._clock = self.rcl.get_clock()
+        self.simulated = bool(self.rcl.get_parameter("use_sim_time").value)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.rcl)
         self.rcl.create_timer(1.0, self._look)

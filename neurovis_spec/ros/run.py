@@ -50,7 +50,6 @@ class Course:
     seconds: float | None = None
     wait: float = 0.0
     backend: str | None = None
-    sim_time: bool = False
 
 
 def simulation(network: Network, backend: str | None) -> Simulation:
@@ -122,7 +121,7 @@ class NodeRun:
         self._tell, self._teller, self._listening = tell, Teller(tell), listening
         self._lock, self._end = Lock(), Event()
         self._simulation = simulation(self.network, course.backend)
-        self._clock: Clock = SimulatedClock(node.now) if course.sim_time else SteadyClock()
+        self._clock: Clock = SimulatedClock(node.now) if node.simulated else SteadyClock()
         self._pace = Pace(self._clock, course.rate)
         self._begun, self._over = time.monotonic(), math.inf
         self.why: str | None = None
