@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Final, Literal, TypeVar
 import click
 
 from neurovis_spec.cli.options import finite
+from neurovis_spec.interrupts import deferred
 
 if TYPE_CHECKING:
     from neurovis_spec.ros.middleware import Node, Ros
@@ -73,7 +74,8 @@ class Meeting:
         try:
             yield opened
         finally:
-            opened.close()
+            with deferred():  # until what was sent is on its way
+                opened.close()
 
     def show(self, summary: Summary) -> None:
         """Print the summary."""

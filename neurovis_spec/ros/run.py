@@ -20,6 +20,7 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.ros_settings import absolute
+from neurovis_spec.interrupts import deferred
 from neurovis_spec.ros.accept import ARRAY, STRING
 from neurovis_spec.ros.counts import Counts, Teller
 from neurovis_spec.ros.definitions import Definition
@@ -224,17 +225,21 @@ class NodeRun:
                 going = self._step(step)
                 step += 1
         finally:
-            self._make_safe()
-            self._over = time.monotonic()
-            self._end.set()
-            watch.join(2.0)
-            self._teller.rest()
+            with deferred():  # who presses Ctrl-C twice must not lose what is safe
+                self._make_safe()
+                self._over = time.monotonic()
+                self._end.set()
+                watch.join(2.0)
+                self._teller.rest()
 
     def _make_safe(self) -> None:
-        """Send the safe outputs."""
+        """Send the safe outputs, each whatever becomes of the others."""
         now = self.node.now()
         for output in self._outputs:
-            output.end(now)
+            try:
+                output.end(now)
+            except Exception as error:
+                self._tell(f"the output '{output.name}' is not safe: {error}")
 
     def _step(self, step: int) -> bool:
         """Make a step and publish it; False where an input that has fallen silent ends the run."""
