@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -14,6 +15,7 @@ from click.testing import CliRunner
 
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
+from neurovis_spec.live.live import listen
 from neurovis_spec.ros import middleware
 from neurovis_spec.ros.accept import ARRAY
 from neurovis_spec.ros.announced import Others
@@ -96,8 +98,15 @@ def test_files_that_are_in_the_way_are_told_before_anything_is_waited_for(
         assert "ready" not in found.stderr
         assert "waiting" not in found.stderr
         path.unlink()
-    found = CliRunner().invoke(neurovis, ["ros", command, "--record", str(tmp_path / "no" / "a.mcap")])
-    assert (found.exit_code, "No such file or directory" in found.stderr) == (1, True)
+    with closing(listen("127.0.0.1", 0)) as taken:
+        taken.listen()
+        for option, value, said in (
+            ("--record", tmp_path / "no" / "a.mcap", "No such file or directory"),
+            ("--record", tmp_path / "a.txt", "recordings are '.mcap'"),
+            ("--live", taken.getsockname()[1], "is in use"),
+        ):
+            found = CliRunner().invoke(neurovis, ["ros", command, option, str(value)])
+            assert (found.exit_code, said in found.stderr) == (1, True)
 
 
 def test_networks_that_announce_themselves_later_are_told_of_once() -> None:

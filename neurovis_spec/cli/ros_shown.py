@@ -22,10 +22,12 @@ from neurovis_spec.cli.options import engine_option, finite, theme_option
 from neurovis_spec.cli.ros_options import tell
 
 if TYPE_CHECKING:
+    import socket
+
     from neurovis_spec.compiled import CompiledNetwork
     from neurovis_spec.ros.files import Rotation
     from neurovis_spec.ros.listening import Listening
-    from neurovis_spec.ros.middleware import Node
+    from neurovis_spec.ros.middleware import Node, Ros
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -51,24 +53,44 @@ class Desk:
         return replace(self, live=0)
 
     def check(self) -> None:
-        """Raise what says that nothing can be recorded or filmed where it is wanted, before anything is waited for."""
+        """Raise what says that it cannot be recorded, filmed or shown where that is wanted, before anything is waited
+        for."""
         from neurovis_spec.ros.files import in_the_way
 
         if self.record is not None:
+            path = self._path(self.record)
             with _told_of_files():
-                in_the_way(Path(self.record), self.force)
+                in_the_way(path, self.force)
         if self.video:
             self._check_film(Path(self.video))
+        if self.live is not None:
+            self._socket(self.live).close()
+
+    @staticmethod
+    def _path(record: str, ros: Ros | None = None) -> Path:
+        from neurovis_spec.ros.files import refusal
+
+        path = Path(record)
+        if (why := refusal(path, ros)) is not None:
+            raise fault(f"{path}: {why}")
+        return path
+
+    @staticmethod
+    def _socket(port: int) -> socket.socket:
+        if find_spec("aiohttp") is None:
+            raise fault(
+                "the live view needs aiohttp", "pip install 'neurovis-spec[live]'; in a clone: pip install '.[live]'"
+            )
+        from neurovis_spec.cli.live import bound
+
+        return bound("127.0.0.1", port)
 
     @contextmanager
     def open(self, compiled: CompiledNetwork, node: Node) -> Iterator[Listening]:
         """A network's topics, heard for a block, and shown in the page where that is wanted."""
-        from neurovis_spec.ros.files import refusal
         from neurovis_spec.ros.listening import Listening, Wanted
 
-        path = None if self.record is None else Path(self.record)
-        if path is not None and (why := refusal(path, node.ros)) is not None:
-            raise fault(f"{path}: {why}")
+        path = None if self.record is None else self._path(self.record, node.ros)
         film = self._film(compiled)
         wanted = Wanted(path, self.rotation, self.force, self.live is not None or film is not None)
         with _told_of_files():
@@ -117,16 +139,11 @@ class Desk:
         if self.live is None or listening.source is None:
             yield
             return
-        if find_spec("aiohttp") is None:
-            raise fault(
-                "the live view needs aiohttp", "pip install 'neurovis-spec[live]'; in a clone: pip install '.[live]'"
-            )
-        from neurovis_spec.cli.live import bound
         from neurovis_spec.live.show import Show
         from neurovis_spec.ros.page import Page
 
-        show, sock = Show(theme=self.theme, engine=self.engine), bound("127.0.0.1", self.live)
-        with Page(listening.compiled, listening.source, show, sock, tell).served() as url:
+        show = Show(theme=self.theme, engine=self.engine)
+        with Page(listening.compiled, listening.source, show, self._socket(self.live), tell).served() as url:
             tell(f"live: {url}")
             yield
 

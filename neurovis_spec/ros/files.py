@@ -57,12 +57,12 @@ def rotation(text: str) -> Rotation | None:
     return Rotation(float("inf"), value * {"s": 1, "min": 60, "h": 3600}[(matched[3] or "s").lower()])
 
 
-def refusal(path: Path, ros: Ros) -> str | None:
-    """Why there can be no recording of this ROS at a path; None where there can."""
+def refusal(path: Path, ros: Ros | None = None) -> str | None:
+    """Why there can be no recording of this ROS (of any) at a path; None where there can."""
     known = _FORMATS.get(path.suffix.lower())
     if known is None:
         return f"recordings are '.mcap', '.bag' or a folder without suffix, not '{path.suffix}'"
-    if known[1] not in (None, ros):
+    if ros is not None and known[1] not in (None, ros):
         return f"a recording of ROS {ros} cannot be {'a .bag' if ros == 2 else 'a folder'}: name it .mcap"
     return None
 

@@ -193,9 +193,11 @@ class LegacyListener:
         """What was recorded, and entries that were left out, which count as not to be read."""
         self.know()
         if self._to is not None:
-            recorded = {stream.name: stream.counts.recorded for stream in self._to.streams.values()}
-            self.counts["activity"].recorded = recorded[ACTIVITY]
-            self.counts["weightsAll"].recorded = recorded.get(WEIGHTS, 0)
+            there = {stream.name: stream.counts for stream in self._to.streams.values()}
+            for kind, name in _NAMES.items():
+                if name in there:
+                    self.counts[kind].recorded = there[name].recorded
+                    self.counts[kind].lost += there[name].lost
         for kind, count in self.legacy.left_out.items():
             if count:
                 self.counts[kind].rejected["parse"] += count
