@@ -65,7 +65,8 @@ class Arrived:
         if number is None:
             number = max(1, len(runs))
             if len(runs) > 1:
-                warnings.warn(f"{path} holds {_told(runs)}: the last is read, --run N reads another", stacklevel=5)
+                others = "render, animate, analyze and live read another by --run N"
+                warnings.warn(f"{path} holds {_told(runs)}: the last is read; {others}", stacklevel=5)
         elif not 1 <= number <= max(1, len(runs)):
             raise RecordingError(f"there is no run {number}: it holds {_told(runs)}")
         chosen = runs[number - 1] if runs else _Rows(0)
