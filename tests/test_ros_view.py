@@ -304,4 +304,5 @@ def test_a_controller_of_the_first_neurovis_is_recorded_and_described(ros: World
     assert network.connections.weights.tolist() == [0.5, 0.25]
     counts = legacy.json()["topics"]["activity"]
     assert counts["recorded"] == sum(one.topic.name == "/neurovis/old/activity" for one in read_bag(out).messages()) > 5
+    assert counts["received"] == counts["recorded"], "what came before the network was known, too"
     assert read_bag(out).about["hash"] == network.hash == legacy.json()["hash"]
