@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import pickle
 import struct
+import tracemalloc
 import zipfile
 from contextlib import suppress
 from pathlib import Path
@@ -15,8 +16,7 @@ from data_attempts import HERE, THERE, attempt, fault, npy, npz, table, zipped
 from hypothesis import given
 from hypothesis import strategies as st
 
-from neurovis_spec.language.data.archive import MOST_MEMBERS, members
-from neurovis_spec.language.data.npz import parse_npz
+from neurovis_spec.language.data.npz import MOST_MEMBERS, parse_npz
 from neurovis_spec.language.data.table import CellError
 
 MATRIX = np.array([[1.0, -2.5, 0.0], [4.0, 5.0, 1e-300]])
@@ -196,25 +196,18 @@ OVERLAPPING = patched(npz(a=MATRIX, w=MATRIX)[::-1], ENTRY[::-1], -42, "L", 0)[:
         (GOOD[:-1], "file-format", "end is missing"),
         (GOOD[:40], "file-format", "end is missing"),
         (GOOD[1:], "file-format", "damaged"),
-        (b"x" + GOOD, "file-format", "damaged"),
-        (patched(GOOD, END, 10, "H", 0xFFFF), "too-large", "4,000 members"),
-        (patched(GOOD, END, 10, "H", 2), "file-format", "damaged"),
-        (patched(patched(GOOD, END, 10, "H", 2), END, 8, "H", 2), "file-format", "damaged"),
         (patched(GOOD, END, 16, "L", 0xFFFFFFFF), "file-format", "damaged"),
         (patched(GOOD, END, 12, "L", 10), "file-format", "damaged"),
-        (patched(GOOD, END, 4, "H", 1), "file-format", "damaged"),
-        (patched(GOOD, ENTRY, 28, "H", 60_000), "file-format", "damaged"),
         (patched(GOOD, ENTRY, 42, "L", 10**9), "file-format", "damaged"),
         (patched(GOOD, ENTRY, 42, "L", 7), "file-format", "damaged"),
-        (patched(GOOD, ENTRY, 24, "L", 0xFFFFFFFF), "too-large", "4 GiB"),
-        (patched(GOOD, ENTRY, 20, "L", 10**9), "file-format", "overlaps"),
-        (patched(GOOD, LOCAL, 28, "H", 60_000), "file-format", "overlaps"),
+        (patched(GOOD, ENTRY, 24, "L", 0xFFFFFFFF), "file-format", "promises 48 bytes"),
+        (patched(GOOD, LOCAL, 28, "H", 60_000), "file-format", "damaged"),
         (patched(GOOD, ENTRY, 8, "H", 1), "file-format", "encrypted"),
         (patched(GOOD, ENTRY, 10, "H", 12), "file-format", "method"),
         (patched(GOOD, ENTRY, 16, "L", 0), "file-format", "checksum"),
         (patched(GOOD, ENTRY, 24, "L", 177), "file-format", "promises 48 bytes"),
-        (patched(GOOD, ENTRY, 20, "L", 150), "file-format", "does not unpack to"),
-        (patched(PACKED, ENTRY, 20, "L", 5), "file-format", "no .npy file"),
+        (patched(GOOD, ENTRY, 20, "L", 150), "file-format", "checksum"),
+        (patched(PACKED, ENTRY, 20, "L", 5), "file-format", "cannot be unpacked"),
         (patched(PACKED, LOCAL, 55, "L", 0xFFFFFFFF), "file-format", "cannot be unpacked"),
         (zipped({"w.npy": npy(MATRIX)}, zipfile.ZIP_BZIP2), "file-format", "method"),
         (zipped({"w.npy": npy(MATRIX)}, zipfile.ZIP_LZMA), "file-format", "method"),
@@ -242,20 +235,37 @@ def test_faults_of_an_archive(
     assert words in finding.message
 
 
-def test_members_that_share_their_bytes_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(CellError, match="overlaps"):
-        members(OVERLAPPING)
-    assert len(members(npz(a=MATRIX, w=MATRIX))) == 2
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"x" + GOOD,
+        patched(GOOD, END, 10, "H", 0xFFFF),
+        patched(patched(GOOD, END, 10, "H", 2), END, 8, "H", 2),
+        patched(GOOD, END, 4, "H", 1),
+        patched(GOOD, ENTRY, 28, "H", 60_000),
+        patched(GOOD, ENTRY, 20, "L", 10**9),
+    ],
+)
+def test_an_archive_that_counts_wrongly_is_read_all_the_same(data: bytes) -> None:
+    np.testing.assert_array_equal(parse_npz(data, "w").values, MATRIX)
 
 
-def test_a_bomb_takes_no_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_members_that_share_their_bytes_are_refused() -> None:
+    with pytest.raises(CellError, match=r"'w\.npy' is damaged"):
+        parse_npz(OVERLAPPING, "w")
+
+
+def test_a_bomb_takes_no_memory(tmp_path: Path) -> None:
     """64 MB of zeros in 64 KB, whose header is none or promises another size, are never unpacked."""
-    made: list[int] = []
-    monkeypatch.setattr("neurovis_spec.language.data.npz.unpack", lambda data, member: made.append(member.size))
     wrong = npy(np.zeros(10))[:-80]
     for content in (bytes(1 << 26), wrong + bytes(1 << 26)):
-        fault(tmp_path, "a.npz", zipped({"w.npy": content}))
-    assert made == []
+        data = zipped({"w.npy": content})
+        tracemalloc.start()
+        try:
+            fault(tmp_path, "a.npz", data)
+            assert tracemalloc.get_traced_memory()[1] < 1 << 25  # a file is read by 16 MB
+        finally:
+            tracemalloc.stop()
 
 
 @given(st.data())

@@ -52,6 +52,11 @@ def parse_npy(data: bytes, room: Room | None = None) -> NDArray[np.float64]:
     array = parse_array(data, REAL, (1, 2))
     if room is not None:
         room(array.size)
+    return numbers_in(array)
+
+
+def numbers_in(array: NDArray[np.generic]) -> NDArray[np.float64]:
+    """An array of real numbers, rows × columns; one of one dimension as a column. Raises CellError."""
     if not array.size:
         raise CellError("file-format", "the array is empty")
     with np.errstate(over="ignore", invalid="ignore"):

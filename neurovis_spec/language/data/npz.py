@@ -6,15 +6,16 @@ directory before the rest is unpacked, so an archive takes no more memory than t
 
 from __future__ import annotations
 
+import io
 import math
-from collections.abc import Mapping
+import zipfile
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from neurovis_spec.diagnostics import suggest
-from neurovis_spec.language.data.archive import Member, beginning, members, unpack
-from neurovis_spec.language.data.npy import LONGEST_HEADER, REAL, parse_array, parse_npy, read_header
+from neurovis_spec.language.data.npy import LONGEST_HEADER, REAL, numbers_in, parse_array, read_header
 from neurovis_spec.language.data.table import (
     SPARSER,
     CellError,
@@ -29,7 +30,10 @@ from neurovis_spec.language.data.table import (
     scattered,
 )
 
-_SUFFIX = ".npy"
+MOST_MEMBERS: Final = 4_000
+#: what each entry of an archive's directory begins with
+_ENTRY: Final = b"PK\x01\x02"
+_SUFFIX: Final = ".npy"
 #: names that are listed, and compared with one that is unknown
 _SHOWN, _COMPARED = 8, 200
 #: what an archive holds that scipy.sparse.save_npz wrote, beside the places of its entries
@@ -37,35 +41,63 @@ _SPARSE = frozenset({"format", "shape", "data"})
 
 
 class Archive:
-    """The arrays of an archive by name, unpacked when they are asked for."""
+    """The arrays of an archive by name, unpacked when they are asked for. Raises CellError."""
 
     def __init__(self, data: bytes) -> None:
-        self._data = data
-        found = members(data)
-        self._members: Mapping[str, Member] = {
-            name.removesuffix(_SUFFIX): member for name, member in found.items() if name.endswith(_SUFFIX)
-        }
+        if not zipfile.is_zipfile(io.BytesIO(data)):
+            raise CellError("file-format", "this is no .npz file, or its end is missing")
+        if data.count(_ENTRY) > MOST_MEMBERS:
+            raise CellError("too-large", f"the archive has more than {MOST_MEMBERS:,} members")
+        try:
+            self._archive = zipfile.ZipFile(io.BytesIO(data))
+        except Exception as error:  # zipfile has errors of its own and of others for every way to be damaged
+            raise CellError("file-format", "the directory of the archive is damaged") from error
+        self._members: dict[str, zipfile.ZipInfo] = {}
+        for member in self._archive.infolist():
+            if member.filename.endswith(_SUFFIX):
+                name = member.filename.removesuffix(_SUFFIX)
+                if name in self._members:
+                    raise CellError("file-format", f"the archive holds {quoted(member.filename)} twice")
+                self._members[name] = member
         self.names = tuple(self._members)
 
-    def numbers(self, name: str, room: Room | None = None) -> NDArray[np.float64]:
-        """An array of one or two dimensions, rows × columns. Raises CellError."""
-        return parse_npy(self._content(name, REAL, (1, 2), room))
+    def array(
+        self, name: str, kinds: str, dimensions: tuple[int, ...], room: Room | None = None
+    ) -> NDArray[np.generic]:
+        """An array as it stands, of one of these kinds and numbers of dimensions."""
+        member = self._members[name]
+        header = read_header(self._unpacked(member, LONGEST_HEADER), member.file_size, kinds, dimensions)
+        if room is not None:
+            room(math.prod(header.shape))
+        content = self._unpacked(member)
+        if len(content) != member.file_size:
+            message = f"{quoted(member.filename)} does not unpack to the {member.file_size} bytes it promises"
+            raise CellError("file-format", message)
+        return parse_array(content, kinds, dimensions)
 
-    def vector(self, name: str, kinds: str, dimensions: int = 1) -> NDArray[np.generic]:
-        """An array of one dimension, as it stands. Raises CellError."""
+    def part(self, name: str, kinds: str, dimensions: int = 1) -> NDArray[np.generic]:
+        """An array that a sparse matrix has."""
         if name not in self._members:
             raise CellError("file-format", f"there is no array {quoted(name)}, which a sparse matrix has")
         try:
-            return parse_array(self._content(name, kinds, (dimensions,)), kinds, (dimensions,))
+            return self.array(name, kinds, (dimensions,))
         except CellError as error:
             raise CellError(error.code, f"{quoted(name)}: {error}", error.hint) from error
 
-    def _content(self, name: str, kinds: str, dimensions: tuple[int, ...], room: Room | None = None) -> bytes:
-        member = self._members[name]
-        header = read_header(beginning(self._data, member, LONGEST_HEADER), member.size, kinds, dimensions)
-        if room is not None:
-            room(math.prod(header.shape))
-        return unpack(self._data, member)
+    def _unpacked(self, member: zipfile.ZipInfo, most: int = -1) -> bytes:
+        """The first bytes of a member, or all of them, whose checksum is then right."""
+        called = quoted(member.filename)
+        if member.flag_bits & 1:
+            raise CellError("file-format", f"{called} is encrypted")
+        if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            message = f"{called} is packed by a method that is not read"
+            raise CellError("file-format", message, "numpy.savez and numpy.savez_compressed write what is read")
+        try:
+            with self._archive.open(member) as file:
+                return file.read(most)
+        except Exception as error:  # as above, and zlib
+            message = f"{called} is damaged: it cannot be unpacked, or its checksum is another one"
+            raise CellError("file-format", message) from error
 
 
 def parse_npz(data: bytes, key: str | None = None, room: Room | None = None) -> Table:
@@ -80,7 +112,7 @@ def parse_npz(data: bytes, key: str | None = None, room: Room | None = None) -> 
             known = [printable(name) for name in names[:_COMPARED]]
             hint = suggest(key, known, "its arrays") if known else "it holds none"
             raise CellError("unknown-array", f"there is no array {quoted(key)} in the file", hint)
-        return full(archive.numbers(key, room))
+        return full(numbers_in(archive.array(key, REAL, (1, 2), room)))
     if _SPARSE.issubset(names):
         return _sparse(archive, room)
     if not names:
@@ -88,12 +120,12 @@ def parse_npz(data: bytes, key: str | None = None, room: Room | None = None) -> 
     if len(names) > 1:
         listed = ", ".join(printable(name) for name in names[:_SHOWN]) + (", …" if len(names) > _SHOWN else "")
         raise CellError("missing-key", f"it holds {len(names)} arrays: {listed}", "name one of them with 'key'")
-    return full(archive.numbers(names[0], room))
+    return full(numbers_in(archive.array(names[0], REAL, (1, 2), room)))
 
 
 def _sparse(archive: Archive, room: Room | None) -> Table:
     """A matrix as scipy.sparse.save_npz writes it; an entry that is stored is there, also if it is 0."""
-    kind = _text(archive.vector("format", "SU", 0))
+    kind = _text(archive.part("format", "SU", 0))
     if kind not in ("csr", "csc", "coo"):
         message = f"a sparse matrix of the format {quoted(kind)} is not read"
         raise CellError("file-format", message, "save it as csr, csc or coo")
@@ -105,7 +137,7 @@ def _sparse(archive: Archive, room: Room | None) -> Table:
     if room is not None:
         room(rows * columns)
     with np.errstate(over="ignore", invalid="ignore"):
-        values = archive.vector("data", REAL).astype(np.float64)
+        values = archive.part("data", REAL).astype(np.float64)
     if kind == "coo":
         i = _places(archive, "row", rows, len(values))
         j = _places(archive, "col", columns, len(values))
@@ -133,7 +165,7 @@ def _text(array: NDArray[np.generic]) -> str:
 
 def _integers(archive: Archive, name: str) -> NDArray[np.int64]:
     """An array of integers; what is beyond 64 bits becomes negative, and is refused as such."""
-    return archive.vector(name, "iu").astype(np.int64)
+    return archive.part(name, "iu").astype(np.int64)
 
 
 def _places(archive: Archive, name: str, size: int, count: int) -> NDArray[np.int64]:
