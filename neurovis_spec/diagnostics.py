@@ -103,6 +103,7 @@ class Findings:
     def take(self, others: Findings) -> None:
         """Report what others have noted."""
         self.files |= others.files
+        self._unread |= others._unread
         for (_, _, key), item in others._told.items():
             self._add(item, key)
 

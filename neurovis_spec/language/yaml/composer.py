@@ -241,7 +241,10 @@ class Composer:
             key_event = self._next()
         if commas is not None:
             commas.close()
-        return Mapping(tuple(entries.values()), self._end(start, begin, key_event, last))
+        span = self._end(start, begin, key_event, last)
+        if not entries and last != begin:  # whatever was there has been refused
+            self._refuse.nothing_left(span)
+        return Mapping(tuple(entries.values()), span)
 
     def _behind_colon(self, key_event: Event, value_event: Event, value: Scalar) -> Scalar:
         """A value that is not there stands behind its colon; parsers differ about that."""

@@ -39,6 +39,10 @@ class Refusals:
 
     def _error(self, code: str, span: Span, message: str, hint: str | None = None) -> None:
         self._findings.error(code, span, message, hint)
+
+    def nothing_left(self, span: Span) -> None:
+        """A mapping all of whose keys are refused: that it is empty follows from that."""
+        self._findings.unread(span)
         self._noted += 1
         if self._noted >= _MOST_FINDINGS:
             raise ComposingStoppedError
