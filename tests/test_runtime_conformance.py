@@ -21,7 +21,7 @@ import neurovis_spec as nv
 from neurovis_spec.compiler.network import Input, Network
 from neurovis_spec.runtime import c_backend, c_library
 from neurovis_spec.runtime.backend import Backend, Stepper, load
-from neurovis_spec.runtime.c_backend import CBackend
+from neurovis_spec.runtime.c_backend import CBackend, written
 from neurovis_spec.runtime.c_code import Tables
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.numpy_backend import NumpyBackend
@@ -294,3 +294,19 @@ def test_tables_of_indices_are_as_narrow_as_can_be(indices: list[int], kind: str
     assert tables.given[0].dtype == kind
     assert tables.given[0].tolist() == indices
     assert tables.taken() == {name: f"const {kind}_t *const {name} = (const {kind}_t *)p->given[0];"}
+
+
+def test_the_weights_of_a_full_matrix_are_read_where_they_lie() -> None:
+    """A whole run forms what arrives after one step where it arrives; only weights that lie in another order are put
+    beside each other for it."""
+    network = nv.compile_text(
+        "neurovis: 1\nname: x\n"
+        "neurons: {A: {count: 40, activation: tanh, bias: 0.1}, B: {count: 40, activation: sin}}\n"
+        "connections:\n"
+        "  A -> B: {weight: sin(i + j), pattern: all_to_all}\n"
+        "  B -> A: {weight: cos(i * j) / 40, pattern: {band: {width: 25}}}\n"
+    )
+    band = int((network.network.connections.entry == 1).sum())
+    assert written(network.network).packed == band < len(network.network.connections)
+    runs = [network.run(50, backend=name) for name in ("c", "reference")]
+    assert (runs[0].activity == runs[1].activity).all()

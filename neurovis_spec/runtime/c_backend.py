@@ -21,8 +21,8 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.language.expressions.emit_c import Emitter
 from neurovis_spec.runtime import c_library
 from neurovis_spec.runtime.backend import Availability, BackendError, Capabilities
-from neurovis_spec.runtime.c_code import Code, Table, Tables, function, words_of
-from neurovis_spec.runtime.c_step import Form, StepCode
+from neurovis_spec.runtime.c_code import Code, Form, Table, Tables, function, words_of
+from neurovis_spec.runtime.c_step import StepCode
 from neurovis_spec.runtime.conditions import Conditions, Mask, Structure
 from neurovis_spec.runtime.state import State
 
@@ -165,7 +165,8 @@ def _write(network: Network) -> Written:
     taken = _taken(network)
     watched = bool(network.plasticity) and not small
     # a network that is written out is in registers, and nothing is gained
-    fused = 0 if small else StepCode(network, Code(emitter, tables, network.dt, {}), Form()).count
+    whole = StepCode(network, Code(emitter, tables, network.dt, {}), Form())
+    fused = not small and bool(whole.fuses.any())
     of_step = ", int64_t k, const double *restrict s"
     for name, form, write, more in (
         ("double nv_plain", Form(written_out=small, watched=watched), StepCode.write, of_step),
@@ -189,10 +190,12 @@ def _write(network: Network) -> Written:
     defined = [f"#define {name} {value}" for name, value in counts.items()]
     neurons, connections = _look(network)
     defined += [f"#define LOOK_NEURONS ({neurons})", f"#define LOOK_CONNECTIONS ({connections})"]
-    defined += [f"#define WATCHED {int(watched)}", f"#define FUSED {int(fused > 0)}"]
+    defined += [f"#define WATCHED {int(watched)}", f"#define FUSED {int(fused)}"]
     used = words_of(bodies)
     parts = [_HEAD, "\n".join(defined), emitter.helpers(used), tables.text(used), "\n".join(bodies)]
-    return Written("\n\n".join(part for part in parts if part) + _TAIL, tuple(tables.given), fused)
+    return Written(
+        "\n\n".join(part for part in parts if part) + _TAIL, tuple(tables.given), whole.count if fused else 0
+    )
 
 
 def _taken(network: Network) -> dict[str, str]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Container, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -74,6 +75,24 @@ class Tables:
     def taken(self) -> dict[str, str]:
         """For each array that is handed over, the line that gives it its name."""
         return self._taken
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """What a step looks after. ``written_out``: neuron by neuron, without loops. ``first``: neurons with ``initial``
+    take it at step 0 (``first`` is not 0). ``held``: neurons whose byte of ``held`` is set have the activity
+    ``holding``. ``gone`` and ``still``: connections whose byte is set are left out, do not learn. ``fused``: what
+    arrives after one step along weights that stay is formed where it arrives, from the activities ``before`` and the
+    weights ``packed`` in that order; it is not sent. ``watched``: what loops over connections store is checked:
+    the number ``odd`` is NaN after the step where some of it is not finite, else 0."""
+
+    written_out: bool = False
+    first: bool = False
+    held: bool = False
+    gone: bool = False
+    still: bool = False
+    fused: bool = False
+    watched: bool = False
 
 
 class Code:

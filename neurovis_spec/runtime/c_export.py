@@ -19,11 +19,11 @@ from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.language.expressions.emit_c import Emitter, Value
 from neurovis_spec.language.expressions.tree import Draw
 from neurovis_spec.runtime.c_backend import SMALL
-from neurovis_spec.runtime.c_code import Code, Tables, function, words_of
+from neurovis_spec.runtime.c_code import Code, Form, Tables, function, words_of
 from neurovis_spec.runtime.c_draws import drawing
 from neurovis_spec.runtime.c_names import LONGEST_STRING, identifiers, prefix, string, words
 from neurovis_spec.runtime.c_settable import formula, write_follow
-from neurovis_spec.runtime.c_step import Form, StepCode
+from neurovis_spec.runtime.c_step import StepCode
 from neurovis_spec.runtime.conditions import Controls, Mask
 from neurovis_spec.runtime.signals import signal_layout
 from neurovis_spec.runtime.state import State, initial_state

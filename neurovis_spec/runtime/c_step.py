@@ -8,9 +8,7 @@ of a larger one, each block is a loop.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -19,37 +17,14 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.compiler.program import Block, Gather, Learn, Plasticity, ReadInputs, Send, Update
 from neurovis_spec.language.expressions.emit_c import Value
 from neurovis_spec.language.expressions.tree import Tree, names
-from neurovis_spec.runtime.c_code import Code, Place
+from neurovis_spec.runtime.c_arrivals import Arrivals
+from neurovis_spec.runtime.c_code import Code, Form, Place
 from neurovis_spec.runtime.conditions import Mask
 from neurovis_spec.runtime.signals import SignalLayout, signal_layout
 from neurovis_spec.runtime.state import history_depth, rule_names
 
-#: connections of a neuron that are written out one after the other
-_FEW = 16
-#: neurons of a dense block whose sums are kept beside each other
-_BESIDE = 4096
-#: neurons of any other block whose sums go on beside each other: an addition need not wait for the one before
-_LANES = 8
 #: connections that learn beside each other: a compiler makes vectors of them
 _RULES = 4
-
-
-@dataclass(frozen=True, slots=True)
-class Form:
-    """What a step looks after. ``written_out``: neuron by neuron, without loops. ``first``: neurons with ``initial``
-    take it at step 0 (``first`` is not 0). ``held``: neurons whose byte of ``held`` is set have the activity
-    ``holding``. ``gone`` and ``still``: connections whose byte is set are left out, do not learn. ``fused``: what
-    arrives after one step along weights that stay is formed where it arrives, from the activities ``before`` and the
-    weights ``packed`` in that order; it is not sent. ``watched``: what loops over connections store is checked:
-    the number ``odd`` is NaN after the step where some of it is not finite, else 0."""
-
-    written_out: bool = False
-    first: bool = False
-    held: bool = False
-    gone: bool = False
-    still: bool = False
-    fused: bool = False
-    watched: bool = False
 
 
 class StepCode:
@@ -59,10 +34,10 @@ class StepCode:
         self.network, self.code, self.form = network, code, form
         self.layout: SignalLayout = signal_layout(network)
         self.depth = history_depth(network)
-        #: where the weights of each fused block begin among those packed
-        self.packed: dict[int, int] = {}
+        self.arrivals = [Arrivals(network, block, code, form, self.layout) for block in network.blocks]
         #: connections that are fused, (m,)
         self.fuses = np.zeros(len(network.connections), dtype=np.bool_)
+        #: how many weights are packed
         self.count = 0
         #: plasticities whose connections send while they learn, in one pass over their weights: those of one delay
         self.sent_with = frozenset(
@@ -70,20 +45,19 @@ class StepCode:
             for number, plasticity in enumerate(network.plasticity)
             if not form.written_out and _alike(network.connections.delays[plasticity.members]) > 0
         )
-        for number, block in enumerate(network.blocks):
-            delays, rules = network.connections.delays[block.incoming], network.connections.rules[block.incoming]
-            if len(delays) and (delays == 1).all() and (rules < 0).all():
-                self.packed[number] = self.count
-                self.fuses[block.incoming] = True
-                self.count += len(block.incoming)
+        for arrivals in self.arrivals:
+            if arrivals.can_be_fused:
+                self.fuses[arrivals.connections] = True
+                arrivals.begin = self.count
+                self.count += len(arrivals.packed)
 
     def pack(self) -> None:
-        """The weights of fused blocks in the order in which they are read."""
+        """The weights of fused blocks in the order in which they are read, where they do not lie so."""
         code = self.code
-        for number, begin in self.packed.items():
-            arrivals = _Arrivals(self, number)
-            code.line(code.loop("e", len(arrivals.connections)))
-            code.line(f"    packed[{begin} + e] = weights[{code.at(arrivals.connections, 'e')}];")
+        for arrivals in self.arrivals:
+            if len(arrivals.packed):
+                code.line(code.loop("e", len(arrivals.packed)))
+                code.line(f"    packed[{arrivals.begin} + e] = weights[{code.at(arrivals.packed, 'e')}];")
 
     def write(self) -> None:
         """All operations in order. What a block gathers is computed neuron by neuron, together with its update."""
@@ -105,7 +79,7 @@ class StepCode:
     def block(self, number: int) -> None:
         """The neurons of a block."""
         block, code = self.network.blocks[number], self.code
-        arrivals = _Arrivals(self, number)
+        arrivals = self.arrivals[number]
         if self.form.written_out:
             for place in range(len(block.members)):
                 with code.block(""):
@@ -122,7 +96,7 @@ class StepCode:
             with code.block(code.loop("p", len(block.members))):
                 self.neuron(number, "p", arrivals)
 
-    def neuron(self, number: int, place: Place, arrivals: _Arrivals, total: str = "") -> None:
+    def neuron(self, number: int, place: Place, arrivals: Arrivals, total: str = "") -> None:
         """One neuron's step."""
         block, code = self.network.blocks[number], self.code
         neuron = code.at(block.members, place)
@@ -152,7 +126,7 @@ class StepCode:
         trees += [tree for q in model.state for tree in (q.each_step, q.each_episode) if tree is not None]
         return any("drive" in names(tree) for tree in trees)
 
-    def drive(self, block: Block, place: Place, arrivals: _Arrivals, total: str) -> Value:
+    def drive(self, block: Block, place: Place, arrivals: Arrivals, total: str) -> Value:
         """u[t]: what arrives, combined, + bias + input + noise."""
         code, network = self.code, self.network
         drive: Value = total or arrivals.combined(place)
@@ -413,202 +387,3 @@ def read_through(let: tuple[tuple[str, Tree], ...], readers: list[Tree | None]) 
         if name in wanted:
             wanted |= names(tree)
     return wanted
-
-
-@dataclass(frozen=True, slots=True)
-class _Lanes:
-    """How the sums of some neurons go on beside each other. ``neurons``: places in the block, those of like many
-    connections beside each other, eight to a group. First come the connections that all of a group have (those of
-    group g from ``begins[g]`` on, the first of each neuron, then the second of each, …), then the others, neuron by
-    neuron (those of the i-th from ``rests[i]`` on)."""
-
-    neurons: IntArray
-    begins: IntArray
-    rests: IntArray
-
-
-def _in_lanes(ends: IntArray) -> tuple[_Lanes, IntArray]:
-    """Neurons whose connections lie neuron by neuron, those of the i-th up to ``ends[i + 1]``; and the order in which
-    the connections are read then."""
-    degrees = np.diff(ends)
-    neurons = np.argsort(degrees, kind="stable").astype(np.int64)
-    count = len(neurons) - len(neurons) % _LANES
-    # neurons have ever more connections: of a group the first has the fewest
-    shared = np.zeros(len(neurons), dtype=np.int64)
-    shared[:count] = np.repeat(degrees[neurons[:count:_LANES]], _LANES)
-    begins = np.zeros(-(-len(neurons) // _LANES) + 1, dtype=np.int64)
-    begins[1:] = np.cumsum(np.add.reduceat(shared, np.arange(0, len(neurons), _LANES)))
-    rests = begins[-1] + np.concatenate(([0], np.cumsum(degrees[neurons] - shared)))
-    lane = np.arange(len(neurons))
-    owner = np.repeat(lane, degrees[neurons])
-    nth = np.arange(len(owner)) - np.repeat(np.cumsum(degrees[neurons]) - degrees[neurons], degrees[neurons])
-    beside = begins[owner // _LANES] + nth * _LANES + owner % _LANES
-    places = np.where(nth < shared[owner], beside, rests[owner] + nth - shared[owner])
-    order = np.empty(len(owner), dtype=np.int64)
-    order[places] = ends[neurons[owner]] + nth
-    return _Lanes(neurons, begins, rests.astype(np.int64)), order
-
-
-class _Arrivals:
-    """What arrives at the neurons of a block: their connections, in the order in which they are read: neuron by neuron,
-    or as ``lanes`` says. What arrives at one neuron is put together in the order of its connections."""
-
-    def __init__(self, step: StepCode, number: int) -> None:
-        block = step.network.blocks[number]
-        self.step, self.block, self.code = step, block, step.code
-        #: where the weights begin among those packed, None where signals are read
-        self.packed = step.packed.get(number) if step.form.fused else None
-        order = np.argsort(block.slots, kind="stable")
-        self._take(block.incoming[order])
-        self.ends = np.searchsorted(block.slots[order], np.arange(len(block.members) + 1)).astype(np.int64)
-        degrees = np.diff(self.ends)
-        #: the number of connections of each neuron, −1 where they differ
-        self.degree = int(degrees[0]) if (degrees == degrees[0]).all() else -1
-        self.dense = self._is_dense()
-        self.lanes: _Lanes | None = None
-        if not (step.form.written_out or self.dense or 0 <= self.degree <= _FEW):
-            self.lanes, order = _in_lanes(self.ends)
-            self._take(self.connections[order])
-
-    def _take(self, connections: IntArray) -> None:
-        """Read connections in this order."""
-        self.connections = connections
-        self.sources = self.step.network.connections.sources[connections]
-        self.delays = self.step.network.connections.delays[connections]
-        self.offsets = self.step.layout.offsets[connections]
-
-    def _is_dense(self) -> bool:
-        """Whether the connections are a full matrix, row by row: then the sums of all neurons go on beside each other,
-        each in its own order."""
-        count = len(self.block.members)
-        if self.block.combine != "sum" or self.degree <= 1 or not 1 < count <= _BESIDE or self.step.form.gone:
-            return False
-        if self.step.form.written_out or len(set(self.delays.tolist())) > 1:
-            return False
-        rows = self.connections.reshape(count, self.degree)
-        sources = self.sources.reshape(count, self.degree)
-        regular = rows[0, 0] + np.arange(self.degree) * count + np.arange(count).reshape(-1, 1)
-        return bool((rows == regular).all() and (sources == sources[0]).all())
-
-    @contextmanager
-    def beside(self, lanes: _Lanes) -> Iterator[tuple[Place, str]]:
-        """The body of a loop over all neurons of the block: the place of one, and what arrives at it."""
-        code, count = self.code, len(lanes.neurons)
-        start: Value = 1.0 if self.block.combine == "product" else 0.0
-        begins, rests = code.tables.name(lanes.begins), code.tables.name(lanes.rests)
-        with code.block(code.loop("g", len(lanes.begins) - 1)):
-            totals = [code.variable("u", start) for _ in range(_LANES)]
-            with code.block(code.loop("e", f"{begins}[g + 1]", f"{begins}[g]", _LANES)):
-                for lane, total in enumerate(totals):
-                    self._add(total, f"(e + {lane})" if lane else "e", slice(None))
-            sums = code.name("u")
-            code.line(f"const {code.real} {sums}[{_LANES}] = {{{', '.join(totals)}}};")
-            code.line(f"const int32_t last = {_LANES}*g + {_LANES} < {count} ? {_LANES}*g + {_LANES} : {count};")
-            with code.block(code.loop("i", "last", f"{_LANES}*g")):
-                place = code.at(lanes.neurons, "i")
-                if isinstance(place, str):
-                    code.line(f"const int32_t p = {place};")
-                    place = "p"
-                total = code.variable("u", f"{sums}[i - {_LANES}*g]")
-                with code.block(code.loop("e", f"{rests}[i + 1]", f"{rests}[i]")):
-                    self._add(total, "e", slice(None))
-                yield place, code.text(self._finished(total))
-
-    def matrix(self) -> str:
-        """The sums of a full matrix; the name of their array."""
-        code, count = self.code, len(self.block.members)
-        name = code.name("u")
-        code.line(f"{code.real} {name}[{count}];")
-        code.line(code.loop("p", count))
-        code.line(f"    {name}[p] = {code.text(0.0)};")
-        delay = int(self.delays[0])
-        first, offset = int(self.connections[0]), int(self.offsets[0])
-        with code.block(code.loop("q", self.degree)):
-            direct = delay == 0 or self.packed is not None
-            if direct:
-                source = code.at(self.sources[: self.degree], "q")
-                code.line(f"const {code.real} a = {'activity' if delay == 0 else 'before'}[{source}];")
-            code.line(code.loop("p", count))
-            if direct:
-                code.line(f"    {name}[p] += weights[{first} + {count}*q + p]*a;")
-            elif delay == 1:
-                code.line(f"    {name}[p] += signals[{offset} + {count}*q + p];")
-            else:
-                shift = code.remainder(delay)
-                code.line(f"    {name}[p] += signals[{offset} + {delay}*({count}*q + p) + {shift}];")
-        return name
-
-    def combined(self, place: Place) -> Value:
-        """All that arrives at one neuron as one number."""
-        combine = self.block.combine
-        start: Value = 1.0 if combine == "product" else 0.0
-        if not len(self.connections):
-            return start
-        if isinstance(place, int):
-            edges: list[Place] = list(range(int(self.ends[place]), int(self.ends[place + 1])))
-            return self._written(start, edges, [slice(None)] * len(edges)) if edges else start
-        assert 0 <= self.degree <= _FEW, "others go on in lanes"
-        columns = [slice(column, None, self.degree) for column in range(self.degree)]
-        return self._written(start, [place] * self.degree, columns)
-
-    def _written(self, start: Value, edges: list[Place], columns: list[slice]) -> Value:
-        """One term after the other."""
-        if not self.step.form.gone and self.block.combine == "sum":
-            terms = [self.term(edge, column) for edge, column in zip(edges, columns, strict=True)]
-            return " + ".join([self.code.text(start), *terms])
-        total = self.code.variable("u", start)
-        for edge, column in zip(edges, columns, strict=True):
-            self._add(total, edge, column)
-        return self._finished(total)
-
-    def _add(self, total: str, edge: Place, column: slice) -> None:
-        code = self.code
-        if self.step.form.gone:
-            code.line(f"if (!gone[{code.at(self.connections[column], edge)}]) {{")
-            code.indent += 1
-        term = self.term(edge, column)
-        match self.block.combine:
-            case "sum":
-                code.line(f"{total} += {term};")
-            case "product":
-                code.line(f"{total} *= {term};")
-            case "distance":
-                centres = self.step.network.connections.centres
-                centre = code.settable("centres", centres, self.connections[column], edge)
-                difference = code.let("d", f"{term} - {self._operand(centre)}" if centre != 0.0 else term)
-                code.line(f"{total} += {difference}*{difference};")
-        if self.step.form.gone:
-            code.indent -= 1
-            code.line("}")
-
-    def _operand(self, value: Value) -> str:
-        text = self.code.text(value)
-        return f"({text})" if text.startswith("-") else text
-
-    def _finished(self, total: str) -> Value:
-        return f"sqrt{self.code.emitter.suffix}({total})" if self.block.combine == "distance" else total
-
-    def term(self, edge: Place, column: slice) -> str:
-        """w[t−d]·a[t−d] of a connection."""
-        code = self.code
-        delays = self.delays[column] if not isinstance(edge, int) else self.delays[column][edge : edge + 1]
-        kinds = sorted(set(delays.tolist()))
-        if self.packed is not None:
-            places = self.packed + np.arange(len(self.connections))[column]
-            return f"packed[{code.at(places, edge)}]*before[{code.at(self.sources[column], edge)}]"
-        now = ""
-        if kinds[0] == 0:
-            weight, source = code.at(self.connections[column], edge), code.at(self.sources[column], edge)
-            now = f"weights[{weight}]*activity[{source}]"
-        if kinds == [0]:
-            return now
-        offset = code.at(self.offsets[column], edge)
-        if len(kinds) == 1:
-            shift = "" if kinds[0] == 1 else f" + {code.remainder(kinds[0])}"
-            return f"signals[{offset}{shift}]"
-        kind = code.at(np.searchsorted(kinds, delays).astype(np.int64), edge)
-        rests = "_".join(["r", *map(str, kinds)])
-        shifts = ", ".join("0" if delay < 2 else f"(int32_t)(k % {delay})" for delay in kinds)
-        code.head[rests] = f"const int32_t {rests}[{len(kinds)}] = {{{shifts}}};"
-        arriving = f"signals[{offset} + {rests}[{kind}]]"
-        return f"({kind} ? {arriving} : {now})" if kinds[0] == 0 else arriving

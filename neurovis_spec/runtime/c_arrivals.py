@@ -1,0 +1,234 @@
+"""What arrives at the neurons of a block, as C: sums of terms, each in the order of its connections.
+
+In: a Network, one of its blocks. Out: lines of C. The sums of a full matrix, and those of neurons with many
+connections, go on beside each other, since an addition need not wait for the one before in another sum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+
+from neurovis_spec.arrays import IntArray
+from neurovis_spec.compiler.network import Network
+from neurovis_spec.compiler.program import Block
+from neurovis_spec.language.expressions.emit_c import Value
+from neurovis_spec.runtime.c_code import Code, Form, Place
+from neurovis_spec.runtime.signals import SignalLayout
+
+#: connections of a neuron that are written out one after the other
+_FEW = 16
+#: neurons of a dense block whose sums are kept beside each other
+_BESIDE = 4096
+#: neurons of any other block whose sums go on beside each other: an addition need not wait for the one before
+_LANES = 8
+
+
+@dataclass(frozen=True, slots=True)
+class _Lanes:
+    """How the sums of some neurons go on beside each other. ``neurons``: places in the block, those of like many
+    connections beside each other, eight to a group. First come the connections that all of a group have (those of
+    group g from ``begins[g]`` on, the first of each neuron, then the second of each, …), then the others, neuron by
+    neuron (those of the i-th from ``rests[i]`` on)."""
+
+    neurons: IntArray
+    begins: IntArray
+    rests: IntArray
+
+
+def _in_lanes(ends: IntArray) -> tuple[_Lanes, IntArray]:
+    """Neurons whose connections lie neuron by neuron, those of the i-th up to ``ends[i + 1]``; and the order in which
+    the connections are read then."""
+    degrees = np.diff(ends)
+    neurons = np.argsort(degrees, kind="stable").astype(np.int64)
+    count = len(neurons) - len(neurons) % _LANES
+    # neurons have ever more connections: of a group the first has the fewest
+    shared = np.zeros(len(neurons), dtype=np.int64)
+    shared[:count] = np.repeat(degrees[neurons[:count:_LANES]], _LANES)
+    begins = np.zeros(-(-len(neurons) // _LANES) + 1, dtype=np.int64)
+    begins[1:] = np.cumsum(np.add.reduceat(shared, np.arange(0, len(neurons), _LANES)))
+    rests = begins[-1] + np.concatenate(([0], np.cumsum(degrees[neurons] - shared)))
+    lane = np.arange(len(neurons))
+    owner = np.repeat(lane, degrees[neurons])
+    nth = np.arange(len(owner)) - np.repeat(np.cumsum(degrees[neurons]) - degrees[neurons], degrees[neurons])
+    beside = begins[owner // _LANES] + nth * _LANES + owner % _LANES
+    places = np.where(nth < shared[owner], beside, rests[owner] + nth - shared[owner])
+    order = np.empty(len(owner), dtype=np.int64)
+    order[places] = ends[neurons[owner]] + nth
+    return _Lanes(neurons, begins, rests.astype(np.int64)), order
+
+
+class Arrivals:
+    """What arrives at the neurons of a block: their connections, in the order in which they are read: neuron by neuron,
+    or as ``lanes`` says. What arrives at one neuron is put together in the order of its connections."""
+
+    def __init__(self, network: Network, block: Block, code: Code, form: Form, layout: SignalLayout) -> None:
+        self.network, self.block, self.code, self.form, self.layout = network, block, code, form, layout
+        #: where the weights begin among those packed
+        self.begin = 0
+        delays, rules = network.connections.delays[block.incoming], network.connections.rules[block.incoming]
+        #: whether all of it arrives after one step along weights that stay, and whether it is formed here, not sent
+        self.can_be_fused = len(delays) > 0 and bool((delays == 1).all() and (rules < 0).all())
+        self.fused = form.fused and self.can_be_fused
+        order = np.argsort(block.slots, kind="stable")
+        self._take(block.incoming[order])
+        self.ends = np.searchsorted(block.slots[order], np.arange(len(block.members) + 1)).astype(np.int64)
+        degrees = np.diff(self.ends)
+        #: the number of connections of each neuron, −1 where they differ
+        self.degree = int(degrees[0]) if (degrees == degrees[0]).all() else -1
+        self.dense = self._is_dense()
+        self.lanes: _Lanes | None = None
+        if not (form.written_out or self.dense or 0 <= self.degree <= _FEW):
+            self.lanes, order = _in_lanes(self.ends)
+            self._take(self.connections[order])
+
+    @property
+    def packed(self) -> IntArray:
+        """The connections whose weights are packed; those of a full matrix lie as they are read."""
+        return self.connections if self.can_be_fused and not self.dense else self.connections[:0]
+
+    def _take(self, connections: IntArray) -> None:
+        """Read connections in this order."""
+        self.connections = connections
+        self.sources = self.network.connections.sources[connections]
+        self.delays = self.network.connections.delays[connections]
+        self.offsets = self.layout.offsets[connections]
+
+    def _is_dense(self) -> bool:
+        """Whether the connections are a full matrix, row by row: then the sums of all neurons go on beside each other,
+        each in its own order."""
+        count = len(self.block.members)
+        if self.block.combine != "sum" or self.degree <= 1 or not 1 < count <= _BESIDE or self.form.gone:
+            return False
+        if self.form.written_out or len(set(self.delays.tolist())) > 1:
+            return False
+        rows = self.connections.reshape(count, self.degree)
+        sources = self.sources.reshape(count, self.degree)
+        regular = rows[0, 0] + np.arange(self.degree) * count + np.arange(count).reshape(-1, 1)
+        return bool((rows == regular).all() and (sources == sources[0]).all())
+
+    @contextmanager
+    def beside(self, lanes: _Lanes) -> Iterator[tuple[Place, str]]:
+        """The body of a loop over all neurons of the block: the place of one, and what arrives at it."""
+        code, count = self.code, len(lanes.neurons)
+        start: Value = 1.0 if self.block.combine == "product" else 0.0
+        begins, rests = code.tables.name(lanes.begins), code.tables.name(lanes.rests)
+        with code.block(code.loop("g", len(lanes.begins) - 1)):
+            totals = [code.variable("u", start) for _ in range(_LANES)]
+            with code.block(code.loop("e", f"{begins}[g + 1]", f"{begins}[g]", _LANES)):
+                for lane, total in enumerate(totals):
+                    self._add(total, f"(e + {lane})" if lane else "e", slice(None))
+            sums = code.name("u")
+            code.line(f"const {code.real} {sums}[{_LANES}] = {{{', '.join(totals)}}};")
+            code.line(f"const int32_t last = {_LANES}*g + {_LANES} < {count} ? {_LANES}*g + {_LANES} : {count};")
+            with code.block(code.loop("i", "last", f"{_LANES}*g")):
+                place = code.at(lanes.neurons, "i")
+                if isinstance(place, str):
+                    code.line(f"const int32_t p = {place};")
+                    place = "p"
+                total = code.variable("u", f"{sums}[i - {_LANES}*g]")
+                with code.block(code.loop("e", f"{rests}[i + 1]", f"{rests}[i]")):
+                    self._add(total, "e", slice(None))
+                yield place, code.text(self._finished(total))
+
+    def matrix(self) -> str:
+        """The sums of a full matrix; the name of their array."""
+        code, count = self.code, len(self.block.members)
+        name = code.name("u")
+        code.line(f"{code.real} {name}[{count}];")
+        code.line(code.loop("p", count))
+        code.line(f"    {name}[p] = {code.text(0.0)};")
+        delay = int(self.delays[0])
+        first, offset = int(self.connections[0]), int(self.offsets[0])
+        with code.block(code.loop("q", self.degree)):
+            direct = delay == 0 or self.fused
+            if direct:
+                source = code.at(self.sources[: self.degree], "q")
+                code.line(f"const {code.real} a = {'activity' if delay == 0 else 'before'}[{source}];")
+            code.line(code.loop("p", count))
+            if direct:
+                code.line(f"    {name}[p] += weights[{first} + {count}*q + p]*a;")
+            elif delay == 1:
+                code.line(f"    {name}[p] += signals[{offset} + {count}*q + p];")
+            else:
+                shift = code.remainder(delay)
+                code.line(f"    {name}[p] += signals[{offset} + {delay}*({count}*q + p) + {shift}];")
+        return name
+
+    def combined(self, place: Place) -> Value:
+        """All that arrives at one neuron as one number."""
+        combine = self.block.combine
+        start: Value = 1.0 if combine == "product" else 0.0
+        if not len(self.connections):
+            return start
+        if isinstance(place, int):
+            edges: list[Place] = list(range(int(self.ends[place]), int(self.ends[place + 1])))
+            return self._written(start, edges, [slice(None)] * len(edges)) if edges else start
+        assert 0 <= self.degree <= _FEW, "others go on in lanes"
+        columns = [slice(column, None, self.degree) for column in range(self.degree)]
+        return self._written(start, [place] * self.degree, columns)
+
+    def _written(self, start: Value, edges: list[Place], columns: list[slice]) -> Value:
+        """One term after the other."""
+        if not self.form.gone and self.block.combine == "sum":
+            terms = [self.term(edge, column) for edge, column in zip(edges, columns, strict=True)]
+            return " + ".join([self.code.text(start), *terms])
+        total = self.code.variable("u", start)
+        for edge, column in zip(edges, columns, strict=True):
+            self._add(total, edge, column)
+        return self._finished(total)
+
+    def _add(self, total: str, edge: Place, column: slice) -> None:
+        code = self.code
+        if self.form.gone:
+            code.line(f"if (!gone[{code.at(self.connections[column], edge)}]) {{")
+            code.indent += 1
+        term = self.term(edge, column)
+        match self.block.combine:
+            case "sum":
+                code.line(f"{total} += {term};")
+            case "product":
+                code.line(f"{total} *= {term};")
+            case "distance":
+                centres = self.network.connections.centres
+                centre = code.settable("centres", centres, self.connections[column], edge)
+                difference = code.let("d", f"{term} - {self._operand(centre)}" if centre != 0.0 else term)
+                code.line(f"{total} += {difference}*{difference};")
+        if self.form.gone:
+            code.indent -= 1
+            code.line("}")
+
+    def _operand(self, value: Value) -> str:
+        text = self.code.text(value)
+        return f"({text})" if text.startswith("-") else text
+
+    def _finished(self, total: str) -> Value:
+        return f"sqrt{self.code.emitter.suffix}({total})" if self.block.combine == "distance" else total
+
+    def term(self, edge: Place, column: slice) -> str:
+        """w[t−d]·a[t−d] of a connection."""
+        code = self.code
+        delays = self.delays[column] if not isinstance(edge, int) else self.delays[column][edge : edge + 1]
+        kinds = sorted(set(delays.tolist()))
+        if self.fused:
+            places = self.begin + np.arange(len(self.connections))[column]
+            return f"packed[{code.at(places, edge)}]*before[{code.at(self.sources[column], edge)}]"
+        now = ""
+        if kinds[0] == 0:
+            weight, source = code.at(self.connections[column], edge), code.at(self.sources[column], edge)
+            now = f"weights[{weight}]*activity[{source}]"
+        if kinds == [0]:
+            return now
+        offset = code.at(self.offsets[column], edge)
+        if len(kinds) == 1:
+            shift = "" if kinds[0] == 1 else f" + {code.remainder(kinds[0])}"
+            return f"signals[{offset}{shift}]"
+        kind = code.at(np.searchsorted(kinds, delays).astype(np.int64), edge)
+        rests = "_".join(["r", *map(str, kinds)])
+        shifts = ", ".join("0" if delay < 2 else f"(int32_t)(k % {delay})" for delay in kinds)
+        code.head[rests] = f"const int32_t {rests}[{len(kinds)}] = {{{shifts}}};"
+        arriving = f"signals[{offset} + {rests}[{kind}]]"
+        return f"({kind} ? {arriving} : {now})" if kinds[0] == 0 else arriving
