@@ -260,22 +260,22 @@ def test_a_title_does_not_stand_in_the_frame_of_another_box() -> None:
         assert not overlap(text_rect(title), (x, y, x + wide, y + high))
 
 
-RESERVOIR = """\
+#: between T and Y, and to the left, stand others
+TAUGHT = """\
 neurovis: 1
-name: reservoir
-neurons: {U: {bias: 1}, R: {count: 60, activation: tanh}, Y: {}, T: {bias: 1}}
-connections:
-  U -> R: {weight: "uniform(-1, 1)", pattern: all_to_all}
-  R -> R: {weight: "normal(0, 0.1)", pattern: {random: {probability: 0.1}}}
-  R -> Y: {weight: 0, pattern: all_to_all, plasticity: {delta: {rate: 0.01, target: T}}}
-"""
+name: taught
+neurons: {R: {count: 54, bias: 1}, Y: {}, T: {bias: 1}}
+connections: {R -> Y: {weight: 0, pattern: all_to_all, plasticity: {delta: {rate: 0.01, target: T}}}}
+layout:
+  positions: {T: [5, 0], Y: [5, 10], PINS}
+""".replace("PINS", ", ".join(f"R{9 * x + y}: [{x}, {y}]" for x in range(6) for y in range(1, 10)))
 
 
 @pytest.mark.parametrize("framed", [False, True])
 def test_the_dotted_line_of_a_rule_stays_in_the_picture_or_in_the_frame_of_its_instance(framed: bool) -> None:
-    text = RESERVOIR
+    text = TAUGHT
     if framed:
-        body = "".join(f"    {line}\n" for line in RESERVOIR.splitlines()[2:])
+        body = "".join(f"    {line}\n" for line in TAUGHT.splitlines()[2:])
         instances = "instances: {a: {module: esn}, b: {module: esn}}"
         text = f"neurovis: 1\nname: framed\nmodules:\n  esn:\n{body}{instances}\n"
     scene = drawn(nv.compile_text(text), 3).scene
