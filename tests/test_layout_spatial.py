@@ -7,6 +7,7 @@ import pytest
 import neurovis_spec as nv
 from neurovis_spec.layout import LayoutProblem, LayoutRefusalError
 from neurovis_spec.layout.arrange import lay_out_problem
+from neurovis_spec.layout.geometry import sampled
 from neurovis_spec.layout.problem import canonical
 
 BODY = {"A": (0.0, 0.0), "B": (1e-6, 0.0), "C": (0.0, 2e-6), "D": (3e-6, 2e-6)}
@@ -49,12 +50,33 @@ def test_pins_win_and_the_rest_goes_with_them() -> None:
     assert layout.positions["D"] == pytest.approx([c + 10 for c in free.positions["D"]], abs=0.01)
 
 
-def test_neurons_without_a_position_are_named_and_a_pin_will_do() -> None:
+def test_without_any_position_the_engine_refuses_and_a_pin_will_do() -> None:
     with pytest.raises(LayoutRefusalError, match=r"'E', 'F' have none") as caught:
-        lay_out_problem(canonical("x", [*BODY, "E", "F"], places=BODY), "spatial")
+        lay_out_problem(canonical("x", ["E", "F"]), "spatial")
     assert caught.value.code == "position-missing"
     pinned = canonical("x", [*BODY, "E"], places=BODY, pins={"E": (9.0, 9.0)})
     assert lay_out_problem(pinned, "spatial").positions["E"] == (9.0, 9.0)
+
+
+def test_neurons_without_a_position_stand_beside_what_they_are_connected_to() -> None:
+    edges = [("A -> E", "A", "E", 1), ("C -> E", "C", "E", 1), ("E -> F", "E", "F", 1)]
+    at = lay_out_problem(canonical("x", [*BODY, "E", "F", "G", "H"], edges=edges, places=BODY), "spatial").positions
+    assert at["E"][0] < at["D"][0] / 2
+    assert at["A"][1] < at["E"][1] < at["C"][1]
+    assert abs(at["F"][1] - at["E"][1]) + abs(at["F"][0] - at["E"][0]) < 2
+    assert at["G"][1] == at["H"][1] > max(at[name][1] for name in "ABCDEF")
+
+
+def test_routes_do_not_make_the_picture_much_larger_than_what_it_shows() -> None:
+    names = [f"N{i}" for i in range(25)]
+    places = {name: (float(i % 5), float(i // 5)) for i, name in enumerate(names)}
+    edges = [(f"{a} -> {b}", a, b, 1) for a in names for b in names if a != b]
+    layout = lay_out_problem(canonical("x", names, edges=edges, places=places), "spatial")
+    points = [point for route in layout.routes.values() for point in sampled(route, 0.2)]
+    for axis in (0, 1):
+        held = [point[axis] for point in layout.positions.values()]
+        drawn = [point[axis] for point in points]
+        assert max(drawn) - min(drawn) < 1.7 * (max(held) - min(held))
 
 
 def test_a_spec_draws_by_position() -> None:
@@ -74,3 +96,9 @@ def test_the_unit_of_positions_is_free(unit: str) -> None:
             return dict(nv.compile_text(f"neurovis: 1\nname: x\n{text}").layout().positions)
 
     assert places(unit) == places("1")
+
+
+def test_auto_draws_by_position_where_every_neuron_has_one() -> None:
+    text = "neurovis: 1\nname: x\nneurons: {A: {count: 3, position: [i, i*i]}MORE}\n"
+    assert nv.compile_text(text.replace("MORE", "")).layout().engine == "spatial"
+    assert nv.compile_text(text.replace("MORE", ", B: {}")).layout().engine == "layered"

@@ -6,6 +6,7 @@ the direction, what is remembered kept.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 import numpy as np
@@ -27,16 +28,21 @@ _MOST_AROUND_PINS = 300
 
 
 def drawn(
-    problem: LayoutProblem, engine: str, places: FloatArray, frames: bool = True, clear: Iterable[int] = ()
+    problem: LayoutProblem,
+    engine: str,
+    places: FloatArray,
+    frames: bool = True,
+    clear: Iterable[int] = (),
+    highest: float = math.inf,
 ) -> Layout:
     """The layout with the neurons at the first of ``places`` (n, 2), where no pin says otherwise. Instances without a
     pin are kept off the ``frames`` of those that have one. Nothing is in the way of the edges ``clear``, by index, and
-    they run straight."""
+    they run straight; the others bow at most ``highest`` times as high as their way is long."""
     flat: list[Point] = [(snap(x), snap(y)) for x, y in places[: len(problem.neurons)].tolist()]
     pins = with_origins(problem, [to_picture(point, problem.direction) for point in flat])
     centres, _, _ = fit(flat, {i: from_picture(point, problem.direction) for i, point in pins.items()})
     there = {i: straight(centres[problem.edges[i].source], centres[problem.edges[i].target]) for i in clear}
-    routes = route_all(problem.edges, centres, careful=_CAREFUL, there=there)
+    routes = route_all(problem.edges, centres, careful=_CAREFUL, there=there, highest=highest)
     turned = problem.direction
     fresh = Layout(
         problem.network,

@@ -14,7 +14,7 @@ class ManualEngine:
 
     name = "manual"
     capabilities = Capabilities(
-        pins=True, free=False, arrange=False, boxes=True, direction=True, memory=True, suits="places"
+        pins=True, free=False, arrange=False, boxes=True, direction=True, memory=True, suits="pins"
     )
 
     def lay_out(self, problem: LayoutProblem) -> Layout:

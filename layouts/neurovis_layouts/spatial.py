@@ -1,7 +1,8 @@
 """The spatial engine: neurons where the data says that they are, as in a body or a connectome.
 
-In: a problem whose neurons have a ``position``. Out: a layout with x to the right and y downwards, both as given and
-scaled by one factor that gives most discs room; those that are still too close move aside. Pins win.
+In: a problem of which neurons have a ``position``. Out: a layout with x to the right and y downwards, both as given and
+scaled by one factor that gives most discs room; those that are still too close move aside. What has no position stands
+beside what it is connected to. Pins win.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from neurovis_spec.layout.model import Capabilities, Layout, LayoutProblem
 #: In spacings: how far half of the discs are from their next, how far nine tenths of them (the picture may grow by this
 #: factor for it), and how far any two are kept apart.
 _HALF, _NINE_TENTHS, _GROWTH, _APART = 1.0, 0.7, 2.0, 0.7
+#: How high routes bow, by the length of their way: what leads far out would make the picture larger than what it shows.
+_HIGHEST = 0.5
 #: Closer than this share of what they had in a row is as good as in one place.
 _CLOSEST = 0.05
 #: Room for each of those that stand in one place.
@@ -30,7 +33,14 @@ class SpatialEngine:
 
     name = "spatial"
     capabilities = Capabilities(
-        pins=True, places=True, boxes=True, direction=True, memory=True, neurons=200_000, edges=2_000_000
+        pins=True,
+        places=True,
+        boxes=True,
+        direction=True,
+        memory=True,
+        neurons=200_000,
+        edges=2_000_000,
+        suits="positions",
     )
 
     def lay_out(self, problem: LayoutProblem) -> Layout:
@@ -45,17 +55,42 @@ class SpatialEngine:
         if pinned.any():
             places += (there[pinned] - places[fixed[pinned]]).mean(axis=0)
         places[fixed] = there
+        places = _beside(places, problem)
         places = _fanned(places, _CROWD * problem.neuron_spacing)
         places[fixed] = there
-        return drawn(problem, self.name, apart(places, _APART * problem.neuron_spacing, fixed), frames=False)
+        return drawn(
+            problem, self.name, apart(places, _APART * problem.neuron_spacing, fixed), frames=False, highest=_HIGHEST
+        )
 
 
 def _data(problem: LayoutProblem) -> FloatArray:
-    """(n, 2) the positions as given, in the engine's frame: the direction does not turn a body. NaN where a pin stands
-    for one."""
+    """(n, 2) the positions as given, in the engine's frame: the direction does not turn a body. NaN where there is
+    none."""
     nowhere = (math.nan, math.nan)
     given = problem.places or (nowhere,) * len(problem.neurons)
     return np.array([from_picture(point, problem.direction) for point in given], dtype=np.float64).reshape(-1, 2)
+
+
+def _beside(places: FloatArray, problem: LayoutProblem) -> FloatArray:
+    """Places, those that are not known in the middle of what they are connected to, and what leads to none below
+    all."""
+    places = places.copy()
+    ends = np.array([(e.source, e.target) for e in problem.edges], dtype=np.int64).reshape(-1, 2)
+    ends = np.concatenate([ends, ends[:, ::-1]])
+    while not (known := np.isfinite(places.sum(axis=1))).all():
+        lead = ends[~known[ends[:, 0]] & known[ends[:, 1]]]
+        if not len(lead):
+            lost = np.flatnonzero(~known)
+            low, high = np.nanmin(places, axis=0), np.nanmax(places, axis=0)
+            places[lost, 0] = low[0] + np.arange(len(lost)) * problem.neuron_spacing
+            places[lost, 1] = high[1] + problem.rank_spacing
+            break
+        total, times = np.zeros_like(places), np.zeros(len(places))
+        np.add.at(total, lead[:, 0], places[lead[:, 1]])
+        np.add.at(times, lead[:, 0], 1.0)
+        found = times > 0
+        places[found] = total[found] / times[found, None]
+    return places
 
 
 def _factor(data: FloatArray) -> float:

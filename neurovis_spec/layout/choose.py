@@ -5,6 +5,7 @@ In: a LayoutProblem. Out: an engine's name, and why, in words for ``inspect``.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence, Set
 
@@ -73,7 +74,9 @@ def _most_suitable(problem: LayoutProblem) -> tuple[Suits, str]:
     if problem.arrange or problem.mirrors or problem.align:
         return "flow", "it can arrange, mirror and align as the spec says"
     if problem.neurons and len(problem.pins) == len(problem.neurons):
-        return "places", "every neuron has a position"
+        return "pins", "every neuron has a position"
+    if problem.places and not problem.modules and all(math.isfinite(x + y) for x, y in problem.places):
+        return "positions", "every neuron has a 'position' as data"
     if problem.modules and edges <= _MOST_IN_LAYERS:
         return "flow", "it draws instances as frames"
     if not (problem.pins or problem.modules) and _tangled(problem):

@@ -21,8 +21,8 @@ Route: TypeAlias = tuple[Point, ...]
 Direction = Literal["down", "up", "right", "left"]
 Arrangement = Literal["row", "column", "grid", "ring", "arc"]
 #: What a drawing may show best: how signals flow, what is near what in the network, clusters of very many neurons, some
-#: neurons that nearly all drive each other, places that are all given.
-Suits = Literal["flow", "nearness", "clusters", "tangle", "places"]
+#: neurons that nearly all drive each other, pins of all neurons, where neurons are as data.
+Suits = Literal["flow", "nearness", "clusters", "tangle", "pins", "positions"]
 
 #: Radius of a neuron's disc.
 RADIUS = 0.3
@@ -147,7 +147,8 @@ class Capabilities:
     pins: bool = False
     #: lays out what is not pinned (an engine without it needs every position)
     free: bool = True
-    #: draws what is not pinned where its ``position`` says (an engine with it needs one for every other neuron)
+    #: draws what is not pinned where its ``position`` says, and what has none beside what it is connected to (it needs
+    #: one that has a place)
     places: bool = False
     arrange: bool = False
     boxes: bool = False

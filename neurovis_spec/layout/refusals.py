@@ -163,6 +163,8 @@ def _refuse_without_place(wishes: Wishes, name: str, can: Capabilities) -> None:
     if can.free and not can.places:
         return
     known = wishes.known if can.places else frozenset[int]()
+    if can.places and (known or wishes.pins):
+        return
     free = [n for i, n in enumerate(wishes.neurons) if i not in wishes.pins and i not in known]
     if not free:
         return
@@ -172,7 +174,7 @@ def _refuse_without_place(wishes: Wishes, name: str, can: Capabilities) -> None:
     has = "has" if len(free) == 1 else "have"
     if can.places:
         message = f"the engine '{name}' draws neurons where their 'position' says; {shown}{more} {has} none"
-        hint = "give them a position, or pin them under layout.positions"
+        hint = "give some of them a position, or pin them under layout.positions"
     else:
         message = f"the engine '{name}' needs a position for every neuron; {shown}{more} {has} none"
         hint = "give it one in layout.positions, or leave the engine out: another arranges the rest around the pins"

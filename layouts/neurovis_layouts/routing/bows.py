@@ -5,6 +5,7 @@ In: two centres, the obstacles, how far the route should bow at least. Out: a ro
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
@@ -54,12 +55,12 @@ def clear_bow(wish: Wish, obstacles: Obstacles) -> tuple[Route, float, float]:
 
 
 def clear_bows(
-    wishes: Sequence[Wish], obstacles: Obstacles, tries: int = MANY_TRIES
+    wishes: Sequence[Wish], obstacles: Obstacles, tries: int = MANY_TRIES, highest: float = math.inf
 ) -> list[tuple[Route, float, float]]:
     """For each wish the flattest bow clear of foreign discs, else the clearest; its clearance and height. ``tries`` is
-    how many heights are tried on a side."""
+    how many heights are tried on a side, up to ``highest`` times the way."""
     found: list[tuple[Route, float, float] | None] = [None] * len(wishes)
-    ways = [_candidates(w.least, distance(w.start, w.end), w.sided, tries) for w in wishes]
+    ways = [_candidates(w.least, distance(w.start, w.end), w.sided, tries, highest) for w in wishes]
     waiting = list(range(len(wishes)))
     many = 1
     while waiting:
@@ -81,11 +82,13 @@ def clear_bows(
     return [best for best in found if best is not None]
 
 
-def _candidates(least: float, length: float, sided: bool, tries: int) -> Iterator[tuple[float, float]]:
+def _candidates(least: float, length: float, sided: bool, tries: int, highest: float) -> Iterator[tuple[float, float]]:
     yield least, 0.3
     side = -1.0 if least < 0 else 1.0
     for step in range(1, tries + 1):
         more = step * (0.25 + 0.05 * length)
+        if more > highest * length:
+            return
         for hold in (0.3, 0.05):
             yield least + side * more, hold
             if not sided:

@@ -54,6 +54,7 @@ def route_all(
     drawn: Sequence[Route] = (),
     there: Mapping[int, Route] | None = None,
     ease: bool = True,
+    highest: float = math.inf,
 ) -> list[Route]:
     """Routes by edge index.
 
@@ -61,7 +62,8 @@ def route_all(
     direction (through their waypoints, if they have any). Those in ``lateral`` run across it, through waypoints with x
     and y exchanged. With more than ``careful`` edges, discs in the way are not gone round. No route enters one of the
     ``frames`` that holds neither of its ends, if there is a way round. ``drawn`` are other routes, which are
-    there, as are those of these edges that are ``there``.
+    there, as are those of these edges that are ``there``. A bow is at most ``highest`` times as high as its way is
+    long; what it cannot get over it goes round from disc to disc.
     """
     near = Obstacles(centres)
     obstacles = near if len(edges) <= careful else Obstacles(())
@@ -76,7 +78,7 @@ def route_all(
         along = [i for i, edge in enumerate(edges) if i not in chosen and _runs_along(edge, centres)]
         routes.update(_curves(edges, centres, along, waypoints, obstacles))
     rest = [i for i, edge in enumerate(edges) if i not in routes and edge.source != edge.target]
-    bowed_over = _bows(edges, centres, rest, obstacles)
+    bowed_over = _bows(edges, centres, rest, obstacles, highest)
     if len(edges) <= min(careful, _MOST_AT_LENGTH):
         bowed_over.update(nested(edges, centres, bowed_over, obstacles))
     routes.update(bowed_over)
@@ -200,7 +202,7 @@ def _lean(
 
 
 def _bows(
-    edges: Sequence[LayoutEdge], centres: Sequence[Point], chosen: Sequence[int], obstacles: Obstacles
+    edges: Sequence[LayoutEdge], centres: Sequence[Point], chosen: Sequence[int], obstacles: Obstacles, highest: float
 ) -> dict[int, Route]:
     """Straight where alone and clear; both of a reciprocal pair bow to their own left; equal edges fan out."""
     between: dict[tuple[int, int], list[int]] = {}
@@ -226,7 +228,9 @@ def _bows(
             for ends, equal in between.items()
             if place < len(equal)
         }
-        for ends, (route, _, height) in zip(wishes, clear_bows(list(wishes.values()), obstacles, tries), strict=True):
+        for ends, (route, _, height) in zip(
+            wishes, clear_bows(list(wishes.values()), obstacles, tries, highest), strict=True
+        ):
             routes[between[ends][place]] = route
             reach[ends] = min(reach[ends][0], height), max(reach[ends][1], height)
     return routes
