@@ -17,6 +17,7 @@ from click.testing import CliRunner, Result
 from small_specs import SMALL
 
 import neurovis_spec as nv
+from neurovis_spec.cli import inspect
 from neurovis_spec.cli.commands import COMMANDS, neurovis
 from neurovis_spec.cli.tables import table
 from neurovis_spec.version import __version__
@@ -649,3 +650,14 @@ def rest(terminal: int) -> bytes:
     finally:
         os.close(terminal)
     return shown
+
+
+def test_ctrl_c_within_a_definition_of_a_class_is_ctrl_c(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Python 3.11 raises another error then, from it."""
+
+    def asked(**_: object) -> None:
+        raise RuntimeError("Error calling __set_name__") from KeyboardInterrupt()
+
+    monkeypatch.setattr(inspect.command, "callback", asked)
+    result = CliRunner().invoke(neurovis, ["inspect", str(SPECS / "cpg_rbf.yaml")])
+    assert (result.exit_code, result.stderr) == (130, "\nstopped\n")

@@ -97,6 +97,8 @@ class Commands(click.Group):
             _silence(sys.stdout)
             raise click.exceptions.Exit(NO_READER) from None
         except Exception as error:
+            if isinstance(error.__cause__, KeyboardInterrupt):  # Python 3.11 makes another error of it within a class
+                raise error.__cause__ from None
             from neurovis_spec.cli.failure import explain
 
             failure = explain(error)
