@@ -5,16 +5,14 @@ from __future__ import annotations
 import os
 import signal
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 
 import pytest
+from ros_alone import Alone
 
 import neurovis_spec as nv
 from neurovis_spec.interrupts import end_like_ctrl_c, heeded
-from neurovis_spec.ros.definitions import definition
-from neurovis_spec.ros.middleware import Arrived, MiddlewareError, Parameter, Quality, Ros, SetParameters
 from neurovis_spec.ros.run import Course, NodeRun
-from neurovis_spec.runtime.wire import Encoding
 
 SPEC = """
 neurovis: 1
@@ -26,76 +24,14 @@ ros: {rate: 1000, publish: {left: {topic: /left, safe: -1}, right: {topic: /righ
 SAFE = {"/left": struct.pack("<d", -1), "/right": struct.pack("<d", -2)}
 
 
-class Sent:
-    """A publisher that keeps what is sent; ``at_safe`` is called before what is safe is."""
+def alone(at_safe: Callable[[], None]) -> Alone:
+    """A node; ``at_safe`` is called before what is safe is sent."""
 
-    subscribers = 0
+    def before(topic: str, data: bytes) -> None:
+        if SAFE.get(topic) == data:
+            at_safe()
 
-    def __init__(self, topic: str, type_: str, at_safe: Callable[[], None]) -> None:
-        self.topic, self.type, self.at_safe = topic, type_, at_safe
-        self.messages: list[bytes] = []
-
-    def publish(self, data: bytes) -> None:
-        if SAFE.get(self.topic) == data:
-            self.at_safe()
-        self.messages.append(data)
-
-    def close(self) -> None: ...
-
-
-class Listener:
-    """A subscription to which nothing comes."""
-
-    publishers = 0
-
-    def __init__(self, topic: str) -> None:
-        self.topic = topic
-
-    def close(self) -> None: ...
-
-
-class Alone:
-    """A node in this process, which nobody meets."""
-
-    ros: Ros = 1
-    encoding: Encoding = "ros1"
-    name, reconnects, ended, simulated = "/neurovis/pair", 0, False, False
-
-    def __init__(self, at_safe: Callable[[], None]) -> None:
-        self.at_safe, self.sent = at_safe, dict[str, Sent]()
-
-    def now(self) -> int:
-        return 0
-
-    def publisher(self, topic: str, type_: str, quality: Quality) -> Sent:
-        return self.sent.setdefault(topic, Sent(topic, type_, self.at_safe))
-
-    def subscription(self, topic: str, type_: str, quality: Quality, arrived: Arrived) -> Listener:
-        return Listener(topic)
-
-    def definition(self, type_: str) -> str:
-        found = definition(type_, 1)
-        if found is None or type_.startswith("diagnostic_msgs"):
-            raise MiddlewareError(type_)
-        return found
-
-    def resolved(self, topic: str) -> str:
-        return topic
-
-    def topics(self) -> Mapping[str, tuple[str, ...]]:
-        return {}
-
-    def declare(self, parameters: Sequence[Parameter], set_: SetParameters) -> None: ...
-
-    def follow(self, values: Mapping[str, float]) -> None: ...
-
-    def parameters_of(self, node: str, names: Sequence[str]) -> Mapping[str, float] | None:
-        return None
-
-    def set_parameters_of(self, node: str, values: Mapping[str, float]) -> str | None:
-        return None
-
-    def close(self) -> None: ...
+    return Alone("/neurovis/pair", before=before)
 
 
 def run(node: Alone, told: list[str], asked: Callable[[], bool] = lambda: False) -> None:
@@ -122,7 +58,7 @@ def test_who_asks_twice_for_an_end_waits_for_what_is_safe(number: signal.Signals
         if again:
             os.kill(os.getpid(), again.pop())
 
-    node = Alone(ask_again)
+    node = alone(ask_again)
     before = signal.getsignal(signal.SIGTERM)
     end_like_ctrl_c()
     try:
@@ -140,7 +76,7 @@ def test_an_output_that_cannot_be_sent_keeps_no_other_from_being_safe() -> None:
         if failing:
             raise RuntimeError(f"it broke {failing.pop()}")
 
-    node = Alone(fail)
+    node = alone(fail)
     run(node, told)
     assert node.sent["/right"].messages[-1] == SAFE["/right"]
     assert any("it broke once" in line for line in told)
@@ -148,7 +84,7 @@ def test_an_output_that_cannot_be_sent_keeps_no_other_from_being_safe() -> None:
 
 def test_each_output_is_safe_at_the_end() -> None:
     told = list[str]()
-    node = Alone(lambda: None)
+    node = alone(lambda: None)
     run(node, told)
     assert is_safe(node)
     assert len(node.sent["/left"].messages) == 4

@@ -490,7 +490,7 @@ def test_a_topic_of_two_types_is_told(ros: World, tmp_path: Path) -> None:
     assert not any("Traceback" in line for line in run.err)
 
 
-@pytest.mark.parametrize(("given", "gain"), [("9.0", 0.5), ("1", 1.0), (".nan", 0.5), ("much", 0.5), ("1.5", 1.5)])
+@pytest.mark.parametrize(("given", "gain"), [("9.0", 0.5), ("1", 1.0), (".nan", 0.5), ("much", 0.5)])
 def test_a_parameter_of_ros_2_that_it_cannot_start_with_stays_and_is_offered(
     given: str, gain: float, tmp_path: Path
 ) -> None:
