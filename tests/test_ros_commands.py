@@ -101,7 +101,7 @@ def test_files_that_are_in_the_way_are_told_before_anything_is_waited_for(
     with closing(listen("127.0.0.1", 0)) as taken:
         taken.listen()
         for option, value, said in (
-            ("--record", tmp_path / "no" / "a.mcap", "No such file or directory"),
+            ("--record", tmp_path / "no" / "a.mcap", "there is no folder"),
             ("--record", tmp_path / "a.txt", "recordings are '.mcap'"),
             ("--live", taken.getsockname()[1], "is in use"),
         ):
@@ -119,3 +119,19 @@ def test_networks_that_announce_themselves_later_are_told_of_once() -> None:
     others.look()
     others.look()
     assert told == ["another network announces itself, on /a/two/spec: --network two shows it"]
+
+
+def test_a_recording_that_is_played_is_not_written_over(tmp_path: Path) -> None:
+    file = tmp_path / "a.mcap"
+    file.write_bytes(b"mine")
+    found = CliRunner().invoke(neurovis, ["ros", "play", str(file), "--record", str(file), "--force"])
+    assert found.exit_code != 0
+    assert "the recording that is played" in found.stderr
+    assert file.read_bytes() == b"mine"
+
+
+def test_a_spec_that_cannot_be_written_at_the_end_is_refused_at_the_beginning(quiet: Quiet, tmp_path: Path) -> None:
+    found = CliRunner().invoke(neurovis, ["ros", "legacy", "-o", str(tmp_path / "no" / "a.yaml"), "--seconds", "0.1"])
+    assert found.exit_code == 1
+    assert "there is no folder" in found.stderr
+    assert "ready" not in found.stderr

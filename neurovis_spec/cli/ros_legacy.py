@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from contextlib import ExitStack
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -14,6 +15,7 @@ from neurovis_spec.cli.failure import fault
 from neurovis_spec.cli.options import examples
 from neurovis_spec.cli.ros_options import Meeting, meeting_options, tell
 from neurovis_spec.cli.ros_shown import Desk, shown_options
+from neurovis_spec.cli.targets import check_target
 from neurovis_spec.interrupts import heeded
 
 if TYPE_CHECKING:
@@ -44,6 +46,7 @@ def command(output: str | None, namespace: str, network: str, desk: Desk, meetin
     if not desk and output is None:
         desk = desk.in_the_browser()
     desk.check()
+    check_target(None if output is None else Path(output))
     sys.setswitchinterval(0.0005)
     with meeting.node("neurovis_legacy", anonymous=True) as node, ExitStack() as stack, heeded() as asked:
         listener, listening = LegacyListener(node, namespace, network, tell, bool(desk)), None

@@ -53,7 +53,7 @@ def command(file: str, speed: float, loop: bool, network: str | None, desk: Desk
     from neurovis_spec.ros.play import Course, Player
     from neurovis_spec.ros.summary import Summary
 
-    desk.check()
+    desk.check(played=file)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         bag = read_bag(Path(file))

@@ -52,15 +52,21 @@ class Desk:
         """The same, shown at a port that is free."""
         return replace(self, live=0)
 
-    def check(self) -> None:
+    def check(self, played: str | None = None) -> None:
         """Raise what says that it cannot be recorded, filmed or shown where that is wanted, before anything is waited
-        for."""
+        for. A recording that is ``played`` cannot be written over."""
+        from neurovis_spec.cli.targets import check_target
         from neurovis_spec.ros.files import in_the_way
+        from neurovis_spec.scene.renderers import renderer_for
 
         if self.record is not None:
             path = self._path(self.record)
+            if path.suffix:
+                check_target(path, [("the recording that is played", played)], option="--record")
             with _told_of_files():
                 in_the_way(path, self.force)
+        if self.video is not None:
+            renderer_for(".mp4", moving=True)
         if self.video:
             self._check_film(Path(self.video))
         if self.live is not None:
@@ -112,9 +118,7 @@ class Desk:
 
     def _check_film(self, path: Path) -> None:
         from neurovis_spec.cli.targets import check_target
-        from neurovis_spec.scene.renderers import renderer_for
 
-        renderer_for(path.suffix, moving=True)
         check_target(path, option="--video")
         if path.exists() and not self.force:
             raise fault(f"{path} exists", "--force overwrites it")
