@@ -114,8 +114,11 @@ def test_the_print_theme_falls_in_lightness_so_that_greyscale_tells_values_apart
     assert contrast(THEMES["print"].negative, THEMES["print"].zero) > 1.5
 
 
-def test_a_value_that_is_no_number_is_grey() -> None:
-    assert colours(THEMES["default"], [float("nan")]) == ["#969696"]
+@pytest.mark.parametrize("theme", THEMES.values(), ids=list(THEMES))
+def test_a_value_that_is_no_number_has_a_colour_that_no_number_has(theme: Theme) -> None:
+    (fill,) = colours(theme, [float("nan")])
+    assert min(contrast(fill, colour) for colour in colours(theme, np.linspace(-1, 1, 41))) >= 1.5
+    assert contrast(readable(theme, fill), fill) >= 4.5
 
 
 def test_a_glow_is_bounded_however_much_a_weight_changes() -> None:

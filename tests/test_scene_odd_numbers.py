@@ -17,7 +17,8 @@ import neurovis_spec as nv
 from neurovis_spec import pipeline
 from neurovis_spec.runtime.record import Course
 from neurovis_spec.runtime.recording import Recording, Snapshot
-from neurovis_spec.scene import RendererCapabilities, Spline, encoding
+from neurovis_spec.scene import Disc, RendererCapabilities, Spline, encoding
+from neurovis_spec.scene.film import film, still
 from neurovis_spec.scene.film_size import MOST_COLOURS, check_film
 from neurovis_spec.scene.reached import reached
 from neurovis_spec.scene.renderers import RendererError, renderer_for
@@ -151,3 +152,27 @@ connections: {S -> H: 1e12, H -> Q: 1e-11, S -> Q: 1, Q -> S: -1e30, E -> E: 1e2
     peaks = reached(network.network, network.run(2)).activity
     assert (gains.activity > 0).all()
     assert ((gains.activity * peaks)[:5] < 10).all()
+
+
+@pytest.mark.filterwarnings("ignore:the activity of A is inf")
+def test_a_neuron_without_a_finite_activity_has_a_colour_that_no_number_has(tmp_path: Path) -> None:
+    """Also in every frame of a film; the lines from it are those of nothing."""
+    spec = "neurovis: 1\nname: x\nneurons: {A: {initial: 1e300}, B: {}}\nconnections: {A -> A: 1e300, A -> B: 0}\n"
+    network = nv.compile_text(spec)
+    values = encoding.neuron_colour(np.array([-2.0, 0.5, np.inf, -np.inf, np.nan]), 1.0)
+    assert np.array_equal(values, [-1, 0.5, np.nan, np.nan, np.nan], equal_nan=True)
+    sent, weights = np.array([np.nan, np.inf, 2.0]), np.array([1.0, 0.0, 1.0])
+    assert encoding.connection_colour(sent, weights, 1.0).tolist() == [0, 0, 1]
+    run, ink = network.run(4), network.settings_for(None)
+    drawn = network.drawn().value
+    made = film(network.network, drawn, [run.snapshot(step) for step in range(4)], network.gains, ink, 25.0)
+    for step, undefined in enumerate(("", "A", "AB", "AB")):
+        picture = pipeline.picture(network.network, drawn, run.snapshot(step), network.gains, ink)
+        for scene in (picture, still(made, step)):
+            fills = {group.data["neuron"]: disc.fill for group in scene.groups for disc in group.shapes
+                     if isinstance(disc, Disc) and "neuron" in group.data}  # fmt: skip
+            assert {name for name, fill in fills.items() if fill == scene.theme.ink} == set(undefined), step
+    for suffix in (".svg", ".gif"):
+        network.animate(tmp_path / f"x{suffix}", steps=4)
+    moving = (tmp_path / "x.svg").read_text()
+    assert f"color:{made.scene.theme.ink}" in moving

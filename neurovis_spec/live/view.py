@@ -35,6 +35,8 @@ from neurovis_spec.themes import THEMES
 
 #: A colour value of 1 as a number: between neighbours lie less than 1.2 of 255 levels of a colour.
 LEVELS = 127
+#: The colour value of a neuron whose activity is no finite number.
+_NO_LEVEL = -LEVELS - 1
 #: Widths are counted in these parts of a user unit, up to what 16 bits hold.
 FINENESS, _WIDEST = 16, (1 << 16) - 1
 #: Bits of a kind: a line that ends in a bar, what is lesioned, a connection whose weight is negative, a clamped neuron,
@@ -196,7 +198,7 @@ def _without_value(tooltip: str) -> str:
 
 
 def _levels(values: npt.NDArray[np.float64]) -> npt.NDArray[np.int8]:
-    return np.rint(np.nan_to_num(values, nan=0.0) * LEVELS).astype(np.int8)
+    return np.where(np.isnan(values), _NO_LEVEL, np.rint(np.nan_to_num(values, nan=0.0) * LEVELS)).astype(np.int8)
 
 
 def _parts(widths: npt.NDArray[np.float64]) -> npt.NDArray[np.uint16]:

@@ -25,21 +25,23 @@ GLOW_REACH = 8.0
 
 
 def _quiet() -> np.errstate:
-    """The run has warned of values that are no numbers; a picture draws them as nothing."""
+    """The run has warned of values that are no numbers; a picture says of neurons that they have none."""
     return np.errstate(invalid="ignore", over="ignore")
 
 
 def neuron_colour(activity: FloatArray, gain: Gain, centre: Gain = 0.0) -> FloatArray:
-    """Eq. 2: NC_i[t] = clip(−1, γ_NC · a_i[t], 1); of a range that is not centred on 0, a_i[t] − centre."""
+    """Eq. 2: NC_i[t] = clip(−1, γ_NC · a_i[t], 1); of a range that is not centred on 0, a_i[t] − centre. NaN where the
+    activity is no finite number."""
     with _quiet():
-        result: FloatArray = np.clip(gain * (activity - centre), -1.0, 1.0)
+        result: FloatArray = np.where(np.isfinite(activity), np.clip(gain * (activity - centre), -1.0, 1.0), np.nan)
     return result
 
 
 def connection_colour(sent: FloatArray, weight: FloatArray, gain: Gain) -> FloatArray:
-    """Eq. 3: CC_ij[t] = clip(−1, γ_CC · a_i[t] · w_ij[t], 1); ``sent`` is the activity of the source of each."""
+    """Eq. 3: CC_ij[t] = clip(−1, γ_CC · a_i[t] · w_ij[t], 1); ``sent`` is the activity of the source of each. A signal
+    that is no number is drawn as none."""
     with _quiet():
-        result: FloatArray = np.clip(gain * sent * weight, -1.0, 1.0)
+        result: FloatArray = np.nan_to_num(np.clip(gain * sent * weight, -1.0, 1.0), nan=0.0)
     return result
 
 

@@ -251,7 +251,7 @@ class Film:
     is moved from where it stands in ``scene`` by ``shift_values[f, k]`` (x and y, user units; 0 in frame 0). A group
     may be in one of the three at most. From frame ``faint[id]`` on, a group that stands there has the opacity
     ``faintness``. ``captions[f]`` is the text in group ``caption``. Colours are linear in sRGB between the theme's
-    anchors; ``still(f)`` is frame f as a scene.
+    anchors, of NaN that of texts; ``still(f)`` is frame f as a scene.
     """
 
     scene: Scene

@@ -32,10 +32,12 @@ def channels(colour: str) -> tuple[int, int, int]:
 
 
 def blend(theme: Theme, values: FloatArray) -> npt.NDArray[np.uint8]:
-    """Colours of values in −1…1, linear in sRGB between the anchors, rounded: (…, 3), 0…255. A NaN is drawn as 0."""
+    """Colours of values in −1…1, linear in sRGB between the anchors, rounded: (…, 3), 0…255. A NaN has the colour of
+    texts, which is not between them."""
     negative, zero, positive = (np.array(channels(c), float) for c in (theme.negative, theme.zero, theme.positive))
-    share = np.nan_to_num(np.asarray(values, float), nan=0.0)[..., None]
+    share = np.asarray(values, float)[..., None]
     mixed = np.where(share < 0, zero + (zero - negative) * share, zero + (positive - zero) * share)
+    mixed = np.where(np.isnan(share), np.array(channels(theme.ink), float), mixed)
     rounded: npt.NDArray[np.uint8] = np.rint(mixed).astype(np.uint8)
     return rounded
 

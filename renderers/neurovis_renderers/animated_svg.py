@@ -235,7 +235,7 @@ class _Writer:
 
     def _palette(self, theme: Theme) -> list[str]:
         levels = sorted(self._letters)
-        fills = colours(theme, [2 * level / (LEVELS - 1) - 1 for level in levels])
+        fills = colours(theme, [2 * level / (LEVELS - 1) - 1 if level < LEVELS else math.nan for level in levels])
         return [
             f".{LETTERS[level]}{{color:{fill};--d:{readable(theme, fill)}}}"
             for level, fill in zip(levels, fills, strict=True)
@@ -274,8 +274,9 @@ def _shown(token: str, shown: bool) -> str:
 
 
 def _levels(values: FloatArray) -> IntArray:
-    levels: IntArray = np.rint((np.nan_to_num(values) + 1) / 2 * (LEVELS - 1)).astype(np.int64)
-    return levels
+    """The levels of colour values; LEVELS for NaN."""
+    levels: IntArray = np.where(np.isnan(values), LEVELS, np.rint((np.nan_to_num(values) + 1) / 2 * (LEVELS - 1)))
+    return levels.astype(np.int64)
 
 
 def _step(widths: FloatArray) -> float:

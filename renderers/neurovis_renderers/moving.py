@@ -105,7 +105,7 @@ class Moving:
         #: which shapes get another colour, or another width, at any time
         self.coloured = np.zeros(len(sheet), bool)
         for values, parts in ((film.fill_values, (fills, words)), (film.line_values, (lines, ends))):
-            turns = (values != values[:1]).any(axis=0)
+            turns = ((values != values[:1]) & ~(np.isnan(values) & np.isnan(values[:1]))).any(axis=0)
             for place, number in (pair for pairs in parts for pair in pairs):
                 self.coloured[place] = turns[number]
         #: half widths and stems, at least and at most

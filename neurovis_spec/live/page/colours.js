@@ -21,17 +21,18 @@ function contrast(one, other) {
   return (high + 0.05) / (low + 0.05);
 }
 
-/** The colours of all levels from −levels to levels, and of text on a disc of each.
+/** The colours of all levels from −levels to levels and, the last, of what has none; and of text on a disc of each.
  * @param {Theme} theme @param {number} levels @returns {{fills: string[], texts: string[], channels: number[][]}} */
 export function palette(theme, levels) {
   const [negative, zero, positive] = [theme.negative, theme.zero, theme.positive].map(channels);
   const fills = [],
     texts = [],
     all = [];
-  for (let level = -levels; level <= levels; level++) {
+  for (let level = -levels; level <= levels + 1; level++) {
     const end = level < 0 ? negative : positive,
       share = Math.abs(level) / levels;
-    const rgb = zero.map((from, at) => Math.round(from + (end[at] - from) * share));
+    const rgb =
+      level > levels ? channels(theme.ink) : zero.map((from, at) => Math.round(from + (end[at] - from) * share));
     const light = contrast(channels(theme.light), rgb);
     all.push(rgb);
     fills.push(`rgb(${rgb.join(',')})`);

@@ -295,8 +295,8 @@ export class Drawing {
         { shape, laid } = disc;
       const level = look.discs[disc.index] + levels,
         slot = lines.length + at;
-      mosaic.paint(slot, fills[level]);
-      mosaic.paint(slot + discs.length, this.inks[level]);
+      mosaic.paint(slot, fills.at(level) ?? 0);
+      mosaic.paint(slot + discs.length, this.inks.at(level) ?? 0);
       const x = shape.at[0] * scale + left,
         y = shape.at[1] * scale + top;
       if (laid && laid.x === x && laid.y === y && laid.share === share) return;

@@ -127,7 +127,7 @@ export class Matrix {
       at = margin + row * CELL,
       index = Number(id.slice(1));
     context.globalAlpha = this.share([id]);
-    context.fillStyle = this.palette.fills[look.discs[index] + constants.levels];
+    context.fillStyle = this.palette.fills.at(look.discs[index] + constants.levels) ?? '';
     context.fillRect(margin - 9, at + 1, 7, CELL - 2);
     context.fillRect(at + 1, margin - 9, CELL - 2, 7);
     if (id === this.held) {

@@ -17,6 +17,8 @@ const TINY = 3,
   ROOMY = 150;
 /** The size of a closed box's name, in pixels of a page. */
 const NAMED = 12;
+/** The level of a neuron whose activity is no finite number. */
+const NONE = -128;
 
 /** Whether a point lies in a rectangle. @param {number[]} rect @param {number[]} at @returns {boolean} */
 const within = ([x0, y0, x1, y1], [x, y]) => x >= x0 && x <= x1 && y >= y0 && y <= y1;
@@ -172,7 +174,8 @@ export class Zoom {
 
   /** The mean colour of a box's neurons, as a level. @param {Box} box @param {Look} look @returns {number} */
   mean({ members }, look) {
-    return Math.round(members.reduce((sum, index) => sum + look.discs[index], 0) / members.length);
+    const levels = members.map((index) => look.discs[index]).filter((level) => level > NONE);
+    return Math.round(levels.reduce((sum, level) => sum + level, 0) / (levels.length || 1));
   }
 
   /** What is said of a closed box: its mean is in percent of the scale of colours, with its sign. @param {string} id
