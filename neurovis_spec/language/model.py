@@ -306,8 +306,8 @@ class Short:
     ) -> JsonSchemaValue:
         """The value of the key, or the mapping."""
         whole = handler(schema)
-        key = dict(handler.resolve_ref_schema(whole)["properties"][self.key]["anyOf"][0])
-        return {"anyOf": [key, whole]}
+        key = handler.resolve_ref_schema(whole)["properties"][self.key]
+        return {"anyOf": [*(one for one in key["anyOf"] if one != {"type": "null"}), whole]}
 
     def _written_out(self, node: Node, info: ValidationInfo) -> Node:
         if isinstance(node, Mapping):

@@ -5,12 +5,9 @@ In: nodes. Out: one frozen value each, so that nobody behind this module asks ag
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import suppress
-from typing import Annotated, Final, NamedTuple, TypeAlias, TypeVar
+from typing import Annotated, ClassVar, Final, NamedTuple, TypeAlias, TypeVar
 
-from pydantic import ValidationInfo
-from pydantic_core import PydanticCustomError
+from pydantic import Field, ValidationInfo
 
 from neurovis_spec.diagnostics import Span, shorten
 from neurovis_spec.language.grammar import (
@@ -38,8 +35,10 @@ from neurovis_spec.language.grammar import (
 from neurovis_spec.language.keys import read_keys
 from neurovis_spec.language.located import (
     Formula,
+    FormulaField,
     Leaf,
     Located,
+    TextField,
     as_bool,
     as_formula,
     as_parts,
@@ -48,7 +47,7 @@ from neurovis_spec.language.located import (
     give_up,
     refuse,
 )
-from neurovis_spec.language.model import opening
+from neurovis_spec.language.model import Model, Short, StandIns, opening
 from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Packed, Scalar, Sequence
 
 T = TypeVar("T")
@@ -239,53 +238,29 @@ _STATES: Final = Map(
 InitialField = Annotated[Initial, Leaf(as_initial, Either((FORMULA, ListOf(FORMULA), _STATES)))]
 
 
-class Parameter(NamedTuple):
-    """A named constant: its value, and the bounds within which it may be set. ``failed``: something of it is invalid;
-    a value of 0 stands in then."""
+class ParameterModel(Model):
+    """A named constant: its value, and the bounds within which it may be set."""
 
-    value: Formula
-    minimum: Formula | None
-    maximum: Formula | None
-    description: str | None
-    failed: bool = False
+    PLACE: ClassVar[str] = "a parameter"
+    STAND_INS: ClassVar[StandIns] = {"value": 0}
 
+    value: FormulaField = Field(description="The value.")
+    minimum: FormulaField | None = Field(None, alias="min", description="The least value that it may be given.")
+    maximum: FormulaField | None = Field(None, alias="max", description="The greatest value that it may be given.")
+    description: TextField | None = Field(None, description="What it is.")
 
-def as_parameter(node: Node, info: ValidationInfo) -> Parameter:
-    """A formula, or ``{value, min, max, description}``."""
-    if not isinstance(node, Mapping):
-        return Parameter(as_formula(node, info), None, None, None)
-    known = tuple(PARAMETER.known)
-    keys = read_keys(node, known, findings_of(info))
-    value, low, high, text = (keys.mapping.get(name) for name in known)
-    if value is None:
-        if "value" not in keys.perhaps:
-            findings_of(info).error("missing-key", opening(node), "the key 'value' is missing")
-        give_up()
-    before = findings_of(info).errors
-    formulas = [None if one is None else _tried(as_formula, one, info) for one in (value, low, high)]
-    description = None if text is None else _tried(as_text, text, info)
-    failed = findings_of(info).errors > before
-    first = formulas[0] or Located(0, Scalar(0, value.span))
-    return Parameter(first, formulas[1], formulas[2], None if description is None else description.value, failed)
+    @property
+    def about(self) -> str:
+        """What it is, as the author says."""
+        return "" if self.description is None else self.description.value
+
+    @property
+    def failed(self) -> bool:
+        """Whether something of it is invalid, which is reported; of a value that is, 0 stands in."""
+        return bool(self.lost) or self.source.get("value") is None
 
 
-def _tried(check: Callable[[Node, ValidationInfo], T], node: Node, info: ValidationInfo) -> T | None:
-    """A value, None where it is invalid, which is reported."""
-    with suppress(PydanticCustomError):
-        return check(node, info)
-    return None
-
-
-#: A parameter that says more than its value.
-PARAMETER: Final = Map(
-    {
-        "value": Key(FORMULA, "The value.", required=True),
-        "min": Key(FORMULA, "The least value that it may be given."),
-        "max": Key(FORMULA, "The greatest value that it may be given."),
-        "description": Key(UNNAMED, "What it is."),
-    }
-)
-ParameterField = Annotated[Parameter, Leaf(as_parameter, Either((FORMULA, PARAMETER)))]
+ParameterField = Annotated[ParameterModel, Short("value", "a number or an expression")]
 
 
 class Reference(NamedTuple):

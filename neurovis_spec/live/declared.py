@@ -38,8 +38,8 @@ def parameters(compiled: CompiledNetwork) -> list[dict[str, object]]:
         if name not in network.structural:
             slot = settable.slots[settable.index[name]]
             low, high = (_bound(bound, settable.parameters) for bound in (slot.low, slot.high))
-            about = written[name].description if name in written else None
-            result.append({"name": name, "value": value, "low": low, "high": high, "description": about or ""})
+            about = written[name].about if name in written else ""
+            result.append({"name": name, "value": value, "low": low, "high": high, "description": about})
     return result
 
 

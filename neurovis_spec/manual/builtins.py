@@ -14,7 +14,7 @@ from typing import Literal, TypeAlias
 from neurovis_spec import plugins
 from neurovis_spec.compiler.values.builtin import libraries
 from neurovis_spec.language.library import ActivationModel, Library, ModelModel, RuleModel
-from neurovis_spec.language.values import Parameter
+from neurovis_spec.language.values import ParameterModel
 from neurovis_spec.language.yaml.source import Entry, Mapping
 
 Kind: TypeAlias = Literal["activation", "model", "rule"]
@@ -89,9 +89,9 @@ def _builtin(
     return Builtin(kind, name, about, parameters, signals, _excerpt(entry, text), origin, episodes)
 
 
-def _shown(parameter: Parameter) -> tuple[str, str]:
+def _shown(parameter: ParameterModel) -> tuple[str, str]:
     value = parameter.value.value
-    return (value if isinstance(value, str) else f"{value:g}", parameter.description or "")
+    return (value if isinstance(value, str) else f"{value:g}", parameter.about)
 
 
 def _excerpt(entry: Entry, text: list[str]) -> str:

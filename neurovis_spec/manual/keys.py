@@ -14,11 +14,11 @@ from typing import get_args
 
 from neurovis_spec.language.grammar import Role
 from neurovis_spec.language.model import Model
-from neurovis_spec.language.modules import InstanceModel, ModuleModel
+from neurovis_spec.language.modules import InstanceModel
 from neurovis_spec.language.places import role_at
 from neurovis_spec.language.sections import ConnectionModel, GroupModel, InputModel
 from neurovis_spec.language.spec import Spec
-from neurovis_spec.language.values import PARAMETER
+from neurovis_spec.language.values import ParameterModel
 
 _DEFAULT = re.compile(r" \(default ([^()]*)\)")
 #: Where a mapping of the author's names stands between a section and its keys, as in ``neurons.GROUP.count``.
@@ -47,8 +47,9 @@ class Key:
         return self.path.rpartition(".")[2]
 
 
-#: What a module has in common with a spec: its keys are those of the section of the same name at the top level.
-_SHARED = (GroupModel, ConnectionModel, InputModel, InstanceModel)
+#: What modules and definitions have in common with a spec: the keys are those of the section of the same name at the
+#: top level.
+_SHARED = (GroupModel, ConnectionModel, InputModel, InstanceModel, ParameterModel)
 
 
 @cache
@@ -71,7 +72,7 @@ def _walk(model: type[Model], prefix: str) -> Iterator[Key]:
         about = field.description or ""
         default = _DEFAULT.search(about)
         below = _model_in(field.annotation)
-        again = model is ModuleModel and (below in _SHARED or shown == "parameters")
+        again = model is not Spec and below in _SHARED
         yield Key(
             path=prefix + shown,
             kind=kind(shapes[shown]),
@@ -85,9 +86,6 @@ def _walk(model: type[Model], prefix: str) -> Iterator[Key]:
             continue
         if below is not None:
             yield from _walk(below, f"{prefix}{shown}.")
-        elif shown == "parameters" and not prefix:
-            for part, one in PARAMETER.known.items():
-                yield Key(f"{shown}.{part}", kind(one.shape.schema), one.about, required=one.required)
 
 
 def _model_in(annotation: object) -> type[Model] | None:

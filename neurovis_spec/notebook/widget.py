@@ -123,8 +123,7 @@ class LiveWidget(anywidget.AnyWidget):
             trait = name
             while trait in traits or hasattr(self, trait) or iskeyword(trait):
                 trait += "_"
-            about = None if written is None else written.description
-            traits[trait] = Parameter(name, value, help=about or "")
+            traits[trait] = Parameter(name, value, help="" if written is None else written.about)
             self._known[name], self._names[name] = value, trait
         self.add_traits(**traits)
 

@@ -112,7 +112,7 @@ def _values(compiled: CompiledNetwork) -> dict[str, object]:
     for name, value in network.parameters.items():
         if name not in network.structural and name in network.settable.index:
             written = spec.parameters.get(name)
-            settings.append(Setting(name, value, (written and written.description) or ""))
+            settings.append(Setting(name, value, "" if written is None else written.about))
     return {
         "package": f"neurovis_{c}",
         "c": c,

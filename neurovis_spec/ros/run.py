@@ -184,7 +184,7 @@ class NodeRun:
             low, high = (bound if isinstance(bound, float) and np.isfinite(bound) else None
                          for bound in (slot.low, slot.high))  # fmt: skip
             written = spec.parameters.get(name)
-            parameters.append(Parameter(name, value, low, high, (written and written.description) or ""))
+            parameters.append(Parameter(name, value, low, high, "" if written is None else written.about))
         self.node.declare(parameters, self._set)
 
     def _set(self, values: Mapping[str, float]) -> str | None:

@@ -28,7 +28,7 @@ from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, bad_n
 from neurovis_spec.language.model import Model as LanguageModel
 from neurovis_spec.language.model import lost_names
 from neurovis_spec.language.places import formula_at
-from neurovis_spec.language.values import Parameter
+from neurovis_spec.language.values import ParameterModel
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 
 _ACTIVATION = formula_at(ActivationModel, "value")
@@ -114,7 +114,7 @@ class _Checker:
             check_finite(evaluate_array(tree, self.constants), formula, self.findings)
         return tree
 
-    def parameters(self, parameters: Mapping[str, Parameter]) -> Defaults:
+    def parameters(self, parameters: Mapping[str, ParameterModel]) -> Defaults:
         """Declare the parameters; a default sees those before it."""
         result: list[Default] = []
         values: dict[str, Value] = dict(self.constants)

@@ -13,7 +13,7 @@ from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.expressions.given import RESERVED, meaning
 from neurovis_spec.language.expressions.tree import names
-from neurovis_spec.language.values import Parameter
+from neurovis_spec.language.values import ParameterModel
 
 
 def make_parameters(
@@ -30,7 +30,7 @@ def make_parameters(
 
 def _parameter(
     name: str,
-    parameter: Parameter,
+    parameter: ParameterModel,
     spans: tuple[Span, Span],
     constants: Constants,
     given: Mapping[str, float],
