@@ -16,9 +16,8 @@ from typing import Final, NamedTuple, TypeAlias
 from neurovis_spec.diagnostics import Findings, shorten
 from neurovis_spec.language.data.files import locate
 from neurovis_spec.language.located import Located
-from neurovis_spec.language.modules import IncludedModel
 from neurovis_spec.language.shape import read_included
-from neurovis_spec.language.spec import Spec
+from neurovis_spec.language.spec import IncludedModel, Spec
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
 from neurovis_spec.language.yaml.reader import LARGEST, read_content
 

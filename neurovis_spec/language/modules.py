@@ -1,4 +1,4 @@
-"""Modules, instances and included files; the shape as written.
+"""Modules and instances; the shape as written.
 
 In: nodes. Out: frozen models whose leaves know their places. A module is a network that is used several times: it has
 the sections of a spec that say what there is, and none that says how it is run, drawn or connected to the world.
@@ -12,17 +12,13 @@ from pydantic import Field
 
 from neurovis_spec.language.drawing import ModuleLayoutModel
 from neurovis_spec.language.grammar import GROUP, declaring, naming
-from neurovis_spec.language.library import VERSION, Library, version_field
-from neurovis_spec.language.located import FormulaField, IdentifierField, Leaf, Located, TextField, TextsField
-from neurovis_spec.language.model import Model, Named, NamedParameters, StandIns
+from neurovis_spec.language.located import FormulaField, IdentifierField, TextField
+from neurovis_spec.language.model import Model, Named, NamedParameters
 from neurovis_spec.language.sections import ConnectionsField, GroupModel, InputModel
 from neurovis_spec.language.values import ParameterField
 
 #: the sections of an included file
 INCLUDED = ("modules", "activations", "models", "rules")
-#: sections of a spec that say something of a network of its own
-_OF_A_NETWORK = frozenset({"name", "time", "seed", "parameters", "inputs", "neurons", "instances", "connections"})
-_OF_A_NETWORK |= {"outputs", "events", "layout", "render", "ros"}
 
 
 class InstanceModel(Model):
@@ -66,28 +62,3 @@ class ModuleModel(Model):
     )
     connections: ConnectionsField = Field(default=(), description="FROM -> TO: a weight or a body.")
     layout: ModuleLayoutModel | None = Field(None, description="How every instance is laid out.")
-
-
-class IncludedModel(Library):
-    """A file that a spec includes: modules, definitions and metadata, nothing else."""
-
-    PLACE: ClassVar[str] = "an included file"
-    STAND_INS: ClassVar[StandIns] = {}
-
-    neurovis: Annotated[Located[int], Leaf(version_field, VERSION)] | None = Field(  # type: ignore[assignment]
-        None, description="The version of the language: 1."
-    )
-    authors: TextsField | None = Field(None, description="Who wrote it.")
-    license: TextsField | None = Field(None, description="Under which licence.")
-    references: TextsField | None = Field(None, description="What it goes back to.")
-    include: TextsField = Field(default=(), description="Files whose modules and definitions are used here.")
-    modules: Annotated[Named[ModuleModel], declaring("module")] = Field(
-        default_factory=dict, description="Networks to be used several times."
-    )
-
-    @classmethod
-    def _foreign(cls, name: str) -> tuple[str, str] | None:
-        if name not in _OF_A_NETWORK:
-            return None
-        message = f"'{name}' is of a network of its own; an included file holds modules and definitions"
-        return message, "leave it to the specs that include this file, or make a module of it"

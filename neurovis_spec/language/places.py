@@ -15,8 +15,8 @@ from pydantic.fields import FieldInfo
 from neurovis_spec.language.grammar import Either, Map, Plain, Role, Shape
 from neurovis_spec.language.located import Leaf
 from neurovis_spec.language.model import Model, Short
-from neurovis_spec.language.modules import INCLUDED, IncludedModel
-from neurovis_spec.language.spec import Spec
+from neurovis_spec.language.modules import INCLUDED
+from neurovis_spec.language.spec import IncludedModel, Spec
 
 #: Keys and indices from the root.
 Path: TypeAlias = tuple[str | int, ...]

@@ -5,11 +5,8 @@ In: the pydantic models. Out: a JSON Schema 2020-12 as plain data, with the desc
 
 from __future__ import annotations
 
-from neurovis_spec.language.grammar import FORMULA
 from neurovis_spec.language.model import Model
-from neurovis_spec.language.modules import IncludedModel
-from neurovis_spec.language.sections import ConnectionModel
-from neurovis_spec.language.spec import Spec
+from neurovis_spec.language.spec import IncludedModel, Spec
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -19,24 +16,6 @@ def json_schema(included: bool = False) -> dict[str, object]:
     are by the compiler."""
     model: type[Model] = IncludedModel if included else Spec
     schema: dict[str, object] = model.model_json_schema(by_alias=True)
-    body: dict[str, object] = ConnectionModel.model_json_schema(by_alias=True)
-    below = body.pop("$defs", {})
-    definitions = schema.setdefault("$defs", {})
-    assert isinstance(definitions, dict)
-    assert isinstance(below, dict)
-    definitions.update({**below, "ConnectionModel": body})
-    entries = {
-        "type": "object",
-        "propertyNames": {"pattern": "^[^>]*->[^>]*$"},
-        "additionalProperties": {"anyOf": [FORMULA.schema, {"type": "null"}, {"$ref": "#/$defs/ConnectionModel"}]},
-    }
-    definitions["Connections"] = {"anyOf": [entries, {"type": "array", "items": entries}]}
-    for holder in (schema, definitions["ModuleModel"]):  # a module has connections of the same shape
-        properties = holder["properties"]
-        assert isinstance(properties, dict)
-        if "connections" in properties:
-            described = properties["connections"]["description"]
-            properties["connections"] = {"$ref": "#/$defs/Connections", "description": described}
     closed = {"$schema": DIALECT, **_closed(schema)}
     closed["title"] = "NeuroVis file to be included, version 1" if included else "NeuroVis spec, version 1"
     return closed

@@ -9,8 +9,9 @@ from collections.abc import Iterator
 from contextlib import suppress
 from typing import Annotated, ClassVar
 
-from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
-from pydantic_core import PydanticCustomError
+from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, ValidationInfo, WithJsonSchema
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import PydanticCustomError, core_schema
 
 from neurovis_spec.diagnostics import shorten
 from neurovis_spec.language.grammar import (
@@ -386,10 +387,25 @@ def _body(entry: Entry, info: ValidationInfo) -> Mapping:
     return Mapping((Entry(Scalar("weight", node.span, None), node),), node.span)
 
 
+class _FromTo:
+    """Says in the schema that connections are a mapping from FROM -> TO to bodies, or a list of such."""
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        body = handler(schema)["items"]["prefixItems"][1]
+        entries = {
+            "type": "object",
+            "propertyNames": {"pattern": "^[^>]*->[^>]*$"},
+            "additionalProperties": {"anyOf": [*body["anyOf"], {"type": "null"}]},
+        }
+        return {"anyOf": [entries, {"type": "array", "items": entries}]}
+
+
 ConnectionsField = Annotated[
     tuple[tuple[Annotated[Located[str], Leaf(_as_it_is, TEXT)], Annotated[ConnectionModel, Short("weight")]], ...],
     ENDS,
     BeforeValidator(_connections),
-    WithJsonSchema({"title": "Connections"}),
+    _FromTo(),
 ]
 EventsField = Annotated[tuple[EventModel, ...], BeforeValidator(_events)]

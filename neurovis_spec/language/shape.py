@@ -15,8 +15,7 @@ from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.library import Library
 from neurovis_spec.language.located import REPORTED
 from neurovis_spec.language.model import Model, opening
-from neurovis_spec.language.modules import IncludedModel
-from neurovis_spec.language.spec import Spec
+from neurovis_spec.language.spec import IncludedModel, Spec
 from neurovis_spec.language.yaml.source import Mapping, SourceDocument
 
 M = TypeVar("M", bound=Model)

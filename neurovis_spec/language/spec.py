@@ -12,8 +12,8 @@ from pydantic import Field
 
 from neurovis_spec.language.drawing import LayoutModel, RenderModel
 from neurovis_spec.language.grammar import declaring
-from neurovis_spec.language.library import LANGUAGE_VERSION, Library
-from neurovis_spec.language.located import IdentifierField, IntegerField, TextsField
+from neurovis_spec.language.library import LANGUAGE_VERSION, VERSION, Library, version_field
+from neurovis_spec.language.located import IdentifierField, IntegerField, Leaf, Located, TextsField
 from neurovis_spec.language.model import Named, NamedParameters, StandIns
 from neurovis_spec.language.modules import INCLUDED, InstanceModel, ModuleModel
 from neurovis_spec.language.ros import RosModel
@@ -72,6 +72,31 @@ class Spec(Library):
         if name == "neurovis":
             return f"add the version of the language: neurovis: {LANGUAGE_VERSION}"
         return None
+
+
+class IncludedModel(Library):
+    """A file that a spec includes: modules, definitions and metadata, nothing else."""
+
+    PLACE: ClassVar[str] = "an included file"
+    STAND_INS: ClassVar[StandIns] = {}
+
+    neurovis: Annotated[Located[int], Leaf(version_field, VERSION)] | None = Field(  # type: ignore[assignment]
+        None, description="The version of the language: 1."
+    )
+    authors: TextsField | None = Field(None, description="Who wrote it.")
+    license: TextsField | None = Field(None, description="Under which licence.")
+    references: TextsField | None = Field(None, description="What it goes back to.")
+    include: TextsField = Field(default=(), description="Files whose modules and definitions are used here.")
+    modules: Annotated[Named[ModuleModel], declaring("module")] = Field(
+        default_factory=dict, description="Networks to be used several times."
+    )
+
+    @classmethod
+    def _foreign(cls, name: str) -> tuple[str, str] | None:
+        if name not in Spec.model_fields:
+            return None
+        message = f"'{name}' is of a network of its own; an included file holds modules and definitions"
+        return message, "leave it to the specs that include this file, or make a module of it"
 
 
 def is_library(data: Mapping) -> bool:
