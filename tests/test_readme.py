@@ -71,3 +71,20 @@ def test_links_lead_somewhere(page: Path) -> None:
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_nobody_is_sent_to_another_project(page: Path) -> None:
     assert not re.search(r"pip install neurovis(?!-spec)", page.read_text(encoding="utf-8"))
+
+
+def test_what_is_somewhere_is_there() -> None:
+    """Each row of the table names something, and a module in which it stands."""
+    page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    table = page.partition("## Where is")[2].partition("A new key is")[0]
+    rows = [line for line in table.splitlines() if line.startswith("| ")][2:]
+    assert len(rows) >= 10
+    for row in rows:
+        paths = re.findall(r"`([a-z_/]+(?:\.py|/))`", row)
+        source = "".join(
+            (ROOT / "neurovis_spec" / path).read_text(encoding="utf-8") for path in paths if path[-1] != "/"
+        )
+        assert source
+        assert all((ROOT / "neurovis_spec" / path).exists() for path in paths), row
+        for name in re.findall(r"`((?:\w+\.)?\w+)`", row.replace(".py`", "")):
+            assert name.rpartition(".")[2] in source, f"{name} in {row}"
