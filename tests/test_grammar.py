@@ -16,7 +16,7 @@ from neurovis_spec.cli.topics import text_of
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Diagnostic, Findings
 from neurovis_spec.language import places, schema, shape
-from neurovis_spec.language.grammar import NOISE, Needs, NotWith, declaring
+from neurovis_spec.language.grammar import ENDS, NOISE, Needs, NotWith, declaring
 from neurovis_spec.language.located import Formula, FormulaField, Located
 from neurovis_spec.language.model import Named
 from neurovis_spec.language.places import formula_at, role_of
@@ -126,6 +126,12 @@ def test_the_language_server_offers_and_explains_it() -> None:
     told = hover(*marked(f"{HEAD}neurons:\n  K: {{mood: no¦rmal(0, 1)}}\n"))
     assert told is not None
     assert "random number" in told.markdown
+
+
+def test_a_word_of_the_language_is_no_name_of_the_author() -> None:
+    assert role_of(("render", "figure", 0), False) is None
+    assert role_of(("render", "figure", 0, "traces"), False) == ENDS
+    assert role_of(("neurons", "K", "initial", "activity"), True) is None
 
 
 def test_a_parameter_is_renamed_in_it() -> None:

@@ -18,6 +18,7 @@ from neurovis_spec.language.grammar import (
     ENDS,
     FORMULA,
     NULL,
+    REFERENCE,
     REFERENCES,
     TEXT,
     TWO,
@@ -25,6 +26,7 @@ from neurovis_spec.language.grammar import (
     Key,
     ListOf,
     Map,
+    Plain,
     Role,
     Shape,
 )
@@ -45,7 +47,7 @@ from neurovis_spec.language.located import (
 )
 from neurovis_spec.language.model import Keyed, Model
 from neurovis_spec.language.theme import ThemeField
-from neurovis_spec.language.values import SEVERAL, PointField, Reference, ReferenceField, TitleField, as_reference
+from neurovis_spec.language.values import PointField, Reference, ReferenceField, TitleField, as_reference
 from neurovis_spec.language.views import VIEWS
 from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence
 
@@ -293,16 +295,18 @@ def _panel(node: Node, info: ValidationInfo) -> PanelModel | None:
     return None
 
 
+_PART = Plain(REFERENCE.written, ENDS)
+_PARTS = Either((_PART, ListOf(_PART, least=1)))
 _PANEL = Either(
     (
         grammar.words(*VIEWS),
         Map(
-            {"network": Key(NULL, "The network."), **dict.fromkeys(VIEWS[1:], Key(SEVERAL, "What it shows."))},
+            {"network": Key(NULL, "The network."), **dict.fromkeys(VIEWS[1:], Key(_PARTS, "What it shows."))},
             one=True,
         ),
     )
 )
-FigureField = Annotated[tuple[PanelModel, ...], Leaf(_figure, Either((_PANEL, ListOf(_PANEL)))), ENDS]
+FigureField = Annotated[tuple[PanelModel, ...], Leaf(_figure, Either((_PANEL, ListOf(_PANEL))))]
 
 
 class RenderModel(Model):
