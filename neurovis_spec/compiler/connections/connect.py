@@ -6,23 +6,21 @@ matrix or pattern row by row), and for each plastic entry what it learns by.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from neurovis_spec.arrays import IntArray, frozen
-from neurovis_spec.compiler.connections.entries import Bundle, EntryBuilder, Place
+from neurovis_spec.compiler.connections.entries import Bundle, EntryBuilder, Surroundings
 from neurovis_spec.compiler.connections.plasticity import title_of
 from neurovis_spec.compiler.limits import Limits
 from neurovis_spec.compiler.names.references import Directory, arrow_of, resolve_sum
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import Connections
 from neurovis_spec.compiler.neurons.populate import Population
-from neurovis_spec.compiler.values.constants import Constants
+from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.located import Located
-from neurovis_spec.language.references import Sum
-from neurovis_spec.language.sections import ConnectionModel, written
+from neurovis_spec.language.sections import written
 
 
 class Connected(NamedTuple):
@@ -47,73 +45,43 @@ _NONE = np.zeros(0, dtype=np.int64)
 
 def connect(scopes: tuple[Scope, ...], population: Population, limits: Limits, seed: int) -> Connected:
     """The entries of all scopes, a scope's own before those of the instances within it. What is invalid in one instance
-    of a module is so in all: it is said once."""
+    of a module is so in all: it is said once. Of an invalid entry all that does not depend on that is checked."""
     result: list[Bundle] = []
     total = 0
     failed: set[str | None] = set()
     for scope, directory in zip(scopes, population.directories, strict=True):
         if scope.module is not None and scope.module in failed:
             continue
-        made = Connector(scope, directory, population, limits, seed).connect(total)
-        if not made.complete:
+        section, findings = scope.section, scope.constants.findings
+        if "connections" in section.lost_keys or written(section.source) > len(section.connections):
             failed.add(scope.module)
-        result += made.bundles
-        total += sum(len(bundle.sources) for bundle in made.bundles)
+        number: dict[str, int] = {}
+        for key, body in section.connections:
+            before = findings.errors
+            name, sources, targets = _ends(key, directory, findings)
+            number[name] = number.get(name, 0) + 1
+            if number[name] > 1:
+                name = f"{name} ({number[name]})"
+            if body.contradictory:  # which key is meant is not known: nothing is held against the sizes of the ends
+                sources = targets = None
+            around = Surroundings(scope, directory, population, limits, seed, limits.connections - total)
+            bundle = EntryBuilder(around, key, body, name, sources, targets).build()
+            if bundle is None or findings.errors > before:
+                failed.add(scope.module)
+            else:
+                total += len(bundle.sources)
+                result.append(bundle)
     return Connected(tuple(result), not failed)
 
 
-@dataclass(frozen=True)
-class Connector:
-    """Makes the connections of every entry of one scope."""
-
-    scope: Scope
-    directory: Directory
-    population: Population
-    limits: Limits
-    seed: int
-
-    @property
-    def constants(self) -> Constants:
-        """What evaluates the formulas of the scope."""
-        return self.scope.constants
-
-    def connect(self, total: int) -> Connected:
-        """All entries, behind ``total`` connections."""
-        result: list[Bundle] = []
-        failed = False
-        seen: dict[str, int] = {}
-        for key, body in self.scope.section.connections:
-            bundle = self._entry(key, body, seen, total)
-            if bundle is None:
-                failed = True
-                continue
-            total += len(bundle.sources)
-            result.append(bundle)
-        return Connected(tuple(result), not failed and not self._left_out())
-
-    def _left_out(self) -> bool:
-        """Whether there are entries that could not be read at all."""
-        section = self.scope.section
-        return "connections" in section.lost_keys or written(section.source) > len(section.connections)
-
-    def _entry(self, key: Located[str], body: ConnectionModel, seen: dict[str, int], total: int) -> Bundle | None:
-        """One entry; None where it is invalid, and then all that does not depend on that is still looked at."""
-        before = self.constants.findings.errors
-        arrow = arrow_of(key, self.constants.findings)
-        sources = None if arrow is None else self._end(arrow.sources, key)
-        targets = None if arrow is None else self._end(arrow.targets, key)
-        name = key.value if arrow is None else arrow.normal
-        seen[name] = seen.get(name, 0) + 1
-        if seen[name] > 1:
-            name = f"{name} ({seen[name]})"
-        room = self.limits.connections - total
-        place = Place(self.scope, self.directory, self.population, self.limits, self.seed, room)
-        bundle = EntryBuilder(place, key, body, name, sources, targets).build()
-        return bundle if self.constants.findings.errors == before else None
-
-    def _end(self, end: Sum, key: Located[str]) -> IntArray | None:
-        found = resolve_sum(end, key, self.directory, self.constants.findings)
-        return None if found is None else np.array(found, dtype=np.int64)
+def _ends(key: Located[str], directory: Directory, findings: Findings) -> tuple[str, IntArray | None, IntArray | None]:
+    """What an entry is called, and the neurons of its ends, None where an end is invalid."""
+    arrow = arrow_of(key, findings)
+    if arrow is None:
+        return key.value, None, None
+    ends = [resolve_sum(end, key, directory, findings) for end in (arrow.sources, arrow.targets)]
+    sources, targets = (None if end is None else np.array(end, dtype=np.int64) for end in ends)
+    return arrow.normal, sources, targets
 
 
 def join(bundles: tuple[Bundle, ...], rules: IntArray) -> Connections:

@@ -20,7 +20,7 @@ from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import Span, shorten, suggest
-from neurovis_spec.language.located import Formula, formula_of
+from neurovis_spec.language.located import formula_of
 from neurovis_spec.language.values import EdgeRows, FileReference
 from neurovis_spec.language.yaml.source import NULL, TEXT
 
@@ -129,7 +129,7 @@ class EdgeReader:
             key = int(cells.kinds[cell]), float(cells.numbers[cell]) if cells.kinds[cell] != NULL else 0.0
             if key not in found:
                 formula = formula_of(cells.node(cell), self.constants.findings)
-                found[key] = None if formula is None else delay_of(formula, self.constants)
+                found[key] = None if formula is None else self.constants.integer(formula, "a delay", 0, LONGEST_DELAY)
             result[place] = found[key] or 0
         return None if None in found.values() else result
 
@@ -166,8 +166,3 @@ class EdgeReader:
         for name in sorted(unknown, key=unknown.__getitem__)[:PATIENCE]:
             self._outside(name, span, end, what, f" (row {unknown[name]} of the file)")
         return None if unknown or end.perhaps is not None else positions
-
-
-def delay_of(formula: Formula, constants: Constants) -> int | None:
-    """A delay in steps; None, and a finding, where it is none."""
-    return constants.integer(formula, "a delay", 0, LONGEST_DELAY)

@@ -6,19 +6,19 @@ every part is still looked at, whatever is wrong with the others.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
-from neurovis_spec.compiler.connections.edges import EdgeReader, End, delay_of
+from neurovis_spec.compiler.connections.edges import EdgeReader, End
 from neurovis_spec.compiler.connections.ends import Ends
 from neurovis_spec.compiler.connections.patterns import all_to_all, is_drawn, pairs_of
 from neurovis_spec.compiler.connections.plasticity import Learning, Wired, learning_of
 from neurovis_spec.compiler.connections.weight_scale import Scaled, check_scale, scaled
 from neurovis_spec.compiler.events.settable import Assembled, Distance, Part
-from neurovis_spec.compiler.limits import Limits, amount
+from neurovis_spec.compiler.limits import LONGEST_DELAY, Limits, amount
 from neurovis_spec.compiler.names.references import Directory
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.neurons.populate import Population
@@ -71,7 +71,7 @@ class _Shape(NamedTuple):
     parts: tuple[Part, ...] = ()
 
 
-class Place(NamedTuple):
+class Surroundings(NamedTuple):
     """Where an entry stands: its scope, what is called how there, how many connections it may make."""
 
     scope: Scope
@@ -89,7 +89,7 @@ class EntryBuilder:
     ``name`` is what it is called in its scope.
     """
 
-    place: Place
+    around: Surroundings
     key: Located[str]
     body: ConnectionModel
     name: str
@@ -99,10 +99,10 @@ class EntryBuilder:
     @property
     def constants(self) -> Constants:
         """What evaluates the formulas of the scope."""
-        return self.place.scope.constants
+        return self.around.scope.constants
 
     def _stream(self, purpose: str) -> Stream:
-        return Stream(self.place.seed, purpose, self.place.scope.declares(self.name))
+        return Stream(self.around.seed, purpose, self.around.scope.declares(self.name))
 
     def _kept(self, *keys: str) -> bool:
         """Whether nothing was lost that these keys may have said."""
@@ -110,28 +110,15 @@ class EntryBuilder:
 
     def build(self) -> Bundle | None:
         """The connections; None where anything of the entry is invalid, which is reported."""
-        before = self.constants.findings.errors
-        if not self.body.contradictory:
-            return self._built(before)
-        # which of the keys is meant is not known, so nothing is held against the sizes of the ends
-        return replace(self, sources=None, targets=None)._built(before)
-
-    def _built(self, before: int) -> Bundle | None:
         body, findings = self.body, self.constants.findings
-        delay = 1 if body.delay is None else delay_of(body.delay, self.constants)
+        before = findings.errors
+        delay = 1 if body.delay is None else self.constants.integer(body.delay, "a delay", 0, LONGEST_DELAY)
         sound = findings.errors
         with self.constants.following() as centre_cells:
             centre = self._grid(body.centre, "centre") if isinstance(body.centre, (Rows, FileReference)) else None
         shape = self._shape(centre)
         if shape is not None and findings.errors == sound and not len(shape.i):
-            # whether a spec is valid must not depend on its seed
-            if body.pattern is not None and is_drawn(body.pattern, self.constants):
-                message = "this entry draws no connection at all"
-                findings.warning(
-                    "nothing-drawn", self.key.span, message, "another seed, or a larger probability, draws some"
-                )
-            else:
-                findings.error("no-connection", self.key.span, "this entry makes no connection at all")
+            self._report_empty()
         if findings.errors > sound or (shape is not None and not self._fits(len(shape.i))):
             shape = None
         with self.constants.following() as weighted:
@@ -153,7 +140,7 @@ class EntryBuilder:
         if shape.delays is not None:
             delays = np.where(shape.delays >= 0, shape.delays, delays)
         return Bundle(
-            self.place.scope.called(self.name),
+            self.around.scope.called(self.name),
             self.key.span,
             self.sources[shape.i],
             self.targets[shape.j],
@@ -174,9 +161,18 @@ class EntryBuilder:
             None if body.label is None else body.label.value,
         )
 
+    def _report_empty(self) -> None:
+        """Say that there are no connections: an error but for drawn ones, as validity must not depend on the seed."""
+        pattern, findings = self.body.pattern, self.constants.findings
+        if pattern is not None and is_drawn(pattern, self.constants):
+            message, hint = "this entry draws no connection at all", "another seed, or a larger probability, draws some"
+            findings.warning("nothing-drawn", self.key.span, message, hint)
+        else:
+            findings.error("no-connection", self.key.span, "this entry makes no connection at all")
+
     def _fits(self, count: int) -> bool:
         """Whether there is room for so many connections; a finding where there is not."""
-        room, limit = self.place.room, self.place.limits.connections
+        room, limit = self.around.room, self.around.limits.connections
         if count <= room:
             return True
         message = f"this makes {amount(limit - room + count)} connections; the limit is {limit:,}"
@@ -187,7 +183,7 @@ class EntryBuilder:
         by_target = self.body.rows is not None and self.body.rows.value == "to"
         n = None if self.sources is None or not self._kept("rows") else len(self.sources)
         m = None if self.targets is None or not self._kept("rows") else len(self.targets)
-        return grid_of(matrix, n, m, by_target, self.constants, self.place.scope.files, self._stream(purpose))
+        return grid_of(matrix, n, m, by_target, self.constants, self.around.scope.files, self._stream(purpose))
 
     def _cells(self, grid: Grid | None, parts: list[Part], shape: _Shape | None) -> tuple[Part, ...]:
         """What of a matrix follows parameters, by connections instead of by cells as they are written."""
@@ -229,7 +225,7 @@ class EntryBuilder:
             return None
         loops: bool | None = True if len(self.sources) == len(self.targets) == 1 else None
         loops = loops if self.body.self is None else self.body.self.value
-        position = self.place.population.neurons.position
+        position = self.around.population.neurons.position
         return Ends(self.sources, self.targets, loops, position[self.sources], position[self.targets])
 
     def _pattern(self) -> _Shape | None:
@@ -237,7 +233,7 @@ class EntryBuilder:
         ends = None if self._misplaced() else self._ends()
         pairs = pairs_of(self.body.pattern, ends, self.constants, self._stream("edges"), self._fits)
         if ends is not None and self.body.pattern.name.value == "nearest":
-            self.place.population.go_by_position(np.concatenate((ends.sources, ends.targets)))
+            self.around.population.go_by_position(np.concatenate((ends.sources, ends.targets)))
         return None if pairs is None else _Shape(*pairs)
 
     def _all(self) -> _Shape | None:
@@ -263,7 +259,7 @@ class EntryBuilder:
     def _edges(self) -> _Shape | None:
         assert self.body.edges is not None
         ends = (self._named(self.sources), self._named(self.targets))
-        reader = EdgeReader(*ends, self.constants, self.place.scope.files, self._stream("weight"), self.place.room)
+        reader = EdgeReader(*ends, self.constants, self.around.scope.files, self._stream("weight"), self.around.room)
         with self.constants.following() as parts:
             edges = reader.read(self.body.edges)
         return None if edges is None else _Shape(edges.i, edges.j, edges.weights, edges.delays, tuple(parts))
@@ -271,9 +267,9 @@ class EntryBuilder:
     def _named(self, neurons: IntArray | None) -> End:
         """The places of an end's neurons by the names that they have in the scope."""
         if neurons is None:
-            directory = self.place.directory
+            directory = self.around.directory
             return End(directory.neurons, lambda name: directory.find(name) is not None or directory.covers(name))
-        called, own = self.place.population.neurons.names, len(self.place.scope.called(""))
+        called, own = self.around.population.neurons.names, len(self.around.scope.called(""))
         return End({called[neuron][own:]: place for place, neuron in enumerate(neurons.tolist())})
 
     def _values(self, formula: Formula, shape: _Shape | None, purpose: str) -> FloatArray | None:
@@ -293,7 +289,7 @@ class EntryBuilder:
             if tree is None:
                 return None
         if tree is not None and "distance" in names(tree):
-            position = self.place.population.neurons.position
+            position = self.around.population.neurons.position
             ends = position[self.sources[shape.i]], position[self.targets[shape.j]]
             if self._misplaced() or not all(np.isfinite(end).all() for end in ends):
                 if not self._misplaced():
@@ -308,7 +304,7 @@ class EntryBuilder:
             value = self.constants.value(formula, extra, randomness)
         if tree is not None and "distance" in extra:
             pairs = self.sources[shape.i], self.targets[shape.j]
-            distance = Distance(self.place.population.moving, *pairs)
+            distance = Distance(self.around.population.moving, *pairs)
             if distance.slots:
                 parts = [Part(self.constants.bound(tree, {**extra, "distance": distance}, randomness))]
         self.constants.follow(parts)
@@ -316,7 +312,7 @@ class EntryBuilder:
 
     def _misplaced(self) -> bool:
         """Whether what the spec says of a position of these neurons is invalid."""
-        misplaced = self.place.population.misplaced
+        misplaced = self.around.population.misplaced
         return any(end is not None and bool(misplaced[end].any()) for end in (self.sources, self.targets))
 
     def _weights(self, shape: _Shape | None) -> FloatArray | None:
@@ -363,7 +359,7 @@ class EntryBuilder:
 
     def _measures_distance(self) -> bool:
         """Whether any of the targets combines by distance, or may, where what it says of that is invalid."""
-        return self.targets is None or bool(self.place.population.by_distance[self.targets].any())
+        return self.targets is None or bool(self.around.population.by_distance[self.targets].any())
 
     def _bounds(self, weights: FloatArray | None) -> tuple[float, float] | None:
         bounds = self.body.bounds
@@ -403,9 +399,9 @@ class EntryBuilder:
             self.body.plasticity,
             wired,
             None if self.targets is None else len(self.targets),
-            self.place.scope,
-            self.place.directory,
-            len(self.place.population.neurons),
+            self.around.scope,
+            self.around.directory,
+            len(self.around.population.neurons),
         )
 
 
