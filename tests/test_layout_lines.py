@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from neurovis_layouts.routing.channel_routing import channels
-from neurovis_layouts.routing.lines import Lines, crossed
+from neurovis_layouts.routing.lines import CutLines, crossed
 
 import neurovis_spec as nv
 from neurovis_spec.layout import LayoutEdge
@@ -21,7 +21,7 @@ points = st.tuples(st.integers(-9, 9), st.integers(-9, 9)).map(lambda p: (float(
 @given(st.lists(points, min_size=2, max_size=8), st.floats(-9, 9), st.floats(-9, 9))
 def test_lines_pass_heights_where_they_are(line: list[tuple[float, float]], one: float, other: float) -> None:
     top, bottom = min(one, other), max(one, other)
-    lines = Lines()
+    lines = CutLines()
     lines.add(line)
     above, below = lines.between(top, bottom)
     # by hand: the line as runs that go one way, each of which passes both heights or not
@@ -56,7 +56,7 @@ def test_a_way_takes_the_longer_side_of_a_disc_rather_than_cross_a_line() -> Non
 
 
 def test_a_line_that_is_dropped_is_not_there_any_more() -> None:
-    lines = Lines()
+    lines = CutLines()
     first = lines.add([(0.0, 0.0), (0.0, 9.0)])
     lines.add([(1.0, 0.0), (1.0, 9.0), (2.0, 3.0)])
     assert lines.between(4.0, 6.0)[0].tolist()[:2] == [0, 1]
@@ -74,7 +74,7 @@ def test_ways_are_found_anew_when_all_are_known() -> None:
     ends = [
         [centres[edge.source], *((way.x, way.y) for way in along[i]), centres[edge.target]] for i, edge in edges.items()
     ]
-    lines = Lines()
+    lines = CutLines()
     lines.add(ends[0])
     steps = [(a, b) for a, b in pairwise(ends[1])]
     total = sum(

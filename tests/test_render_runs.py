@@ -13,7 +13,7 @@ import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.progress import Progress
-from neurovis_spec.runtime.record import Course, Rows, go
+from neurovis_spec.runtime.record import Course, RowSink, go
 from neurovis_spec.runtime.state import State
 
 
@@ -21,7 +21,7 @@ def test_a_picture_takes_one_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     """The step and the gains are of the same run, and gains that are stated need none."""
     runs: list[int] = []
 
-    def counted(of: Network, state: State, course: Course, rows: Rows, progress: Progress | None = None) -> None:
+    def counted(of: Network, state: State, course: Course, rows: RowSink, progress: Progress | None = None) -> None:
         runs.append(course.steps)
         go(of, state, course, rows, progress)
 

@@ -22,7 +22,7 @@ from neurovis_spec.scene.encode import encode
 from neurovis_spec.scene.film import film
 from neurovis_spec.scene.gains import choose_gains
 from neurovis_spec.scene.geometry import Rect, overlap, sample, samples
-from neurovis_spec.scene.legend_entry import Entry
+from neurovis_spec.scene.legend_entry import LegendEntry
 from neurovis_spec.scene.legend_scales import nice_weights
 from neurovis_spec.scene.lines import trimmed
 
@@ -276,7 +276,7 @@ def test_the_legend_explains_what_there_is_and_nothing_else() -> None:
 
 
 def test_the_rows_of_a_legend_are_even() -> None:
-    items = [Entry((), float(width)) for width in (250, 250, 100, 100, 100, 100)]
+    items = [LegendEntry((), float(width)) for width in (250, 250, 100, 100, 100, 100)]
     made = legend.flow([replace(one, shapes=(Text((0, 0), str(one.width), 9, "#000000"),)) for one in items], 890, 0, 0)
     rows = [shape.point[1] for shape in made.shapes if isinstance(shape, Text)]
     assert [rows.count(row) for row in sorted(set(rows))] == [2, 4]  # not 5 and 1, which 890 would hold

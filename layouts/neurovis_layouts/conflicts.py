@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 
-from neurovis_layouts.pins import Cells
+from neurovis_layouts.pins import CentreCells
 from neurovis_spec.layout.model import RADIUS, LayoutMirror, LayoutModule, LayoutProblem, Point
 
 #: Differences up to this are rounding.
@@ -137,7 +137,7 @@ def _mirrored(one: Point, other: Point, twice: float, across: int) -> bool:
 
 def _on_each_other(put: AbstractSet[int], where: Mapping[int, Point], pins: Mapping[int, Point]) -> Iterator[int]:
     """Those put somewhere whose discs would overlap, such as an instance moved on to the axis, and its image."""
-    cells = Cells()
+    cells = CentreCells()
     for point in pins.values():
         cells.add(point)
     for i in sorted(put):

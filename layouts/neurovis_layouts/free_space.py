@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, takewhile
 
-from neurovis_layouts.pins import Cells
+from neurovis_layouts.pins import CentreCells
 from neurovis_spec.layout.frames import Frames, Rect, bounds, meet, padded, titled, united, untitled
 from neurovis_spec.layout.geometry import sampled, snap
 from neurovis_spec.layout.model import RADIUS, Point, Route
@@ -101,7 +101,7 @@ class Room:
     ) -> None:
         self.placed = dict(placed)
         self._frames, self._rects, self._sides = frames, list(rects), sides
-        self._cells, self._discs, self._walls = Cells(), _Field(), _Field()
+        self._cells, self._discs, self._walls = CentreCells(), _Field(), _Field()
         self._bounds: Rect | None = None
         for neuron, point in placed.items():
             self._enter(neuron, point)
@@ -116,7 +116,7 @@ class Room:
         }
         self._steps: list[Point] = []
         points = [point for route in routes for point in sampled(route, _STEP)]
-        self._lines = Cells()
+        self._lines = CentreCells()
         for point in points if len(points) <= _MOST else ():
             self._lines.add(point)
 
@@ -187,7 +187,7 @@ class Room:
 
     def _free(self, piece: Sequence[Copy], anchor: Point, rules: _Rules) -> bool:
         """Whether all copies of a piece have room where they would stand."""
-        inside = Cells()
+        inside = CentreCells()
         points: list[tuple[int, Point]] = []
         for copy in piece:
             side = self._sides.get(copy.offsets[0][0])

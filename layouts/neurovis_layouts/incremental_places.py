@@ -15,8 +15,8 @@ from neurovis_layouts.alike import Alike, Move
 from neurovis_layouts.conflicts import resolved, whole
 from neurovis_layouts.free_space import Copy, Room, Side
 from neurovis_layouts.manual_edits import by_hand, giving_way, moved_routes
-from neurovis_layouts.pins import Cells
-from neurovis_layouts.rows import Rows
+from neurovis_layouts.pins import CentreCells
+from neurovis_layouts.rows import GroupRows
 from neurovis_spec.layout.frames import Frames, Rect, bounds
 from neurovis_spec.layout.geometry import snap
 from neurovis_spec.layout.model import RADIUS, LayoutMirror, LayoutModule, LayoutProblem, Point, Route
@@ -61,7 +61,7 @@ def remembered(problem: LayoutProblem, fresh: Sequence[Point], routes: Mapping[i
 def _apart(problem: LayoutProblem, placed: dict[int, Point]) -> dict[int, Point]:
     """Without what stands on a pin, or in a file edited by hand on one before it: that has to find another place, like
     what is new."""
-    taken = Cells()
+    taken = CentreCells()
     for point in problem.pins.values():
         taken.add(point)
     found: dict[int, Point] = {}
@@ -90,7 +90,7 @@ class _Wishes:
                 self._near.setdefault(edge.source, []).append(edge.target)
                 self._near.setdefault(edge.target, []).append(edge.source)
         self._own = _innermost(problem)
-        self._rows = Rows(problem, fresh)
+        self._rows = GroupRows(problem, fresh)
         #: by axis and coordinate in the fresh layout: how many are placed, and on which lines
         self._ranks: dict[tuple[int, float], tuple[int, set[float]]] = {}
         for neuron, point in placed.items():

@@ -28,7 +28,7 @@ def fit(free: Sequence[Point], pins: Mapping[int, Point]) -> tuple[list[Point], 
         snap(math.fsum(x - free[i][0] for i, (x, _) in sorted(pins.items())) / count),
         snap(math.fsum(y - free[i][1] for i, (_, y) in sorted(pins.items())) / count),
     )
-    cells = Cells()
+    cells = CentreCells()
     placed: dict[int, Point] = dict(pins)
     for point in pins.values():
         cells.add(point)
@@ -58,7 +58,7 @@ def with_origins(problem: LayoutProblem, free: Sequence[Point]) -> dict[int, Poi
 
     The origin of an instance whose module pins nothing is where its smallest x and y are.
     """
-    taken = Cells()
+    taken = CentreCells()
     for point in problem.pins.values():
         taken.add(point)
     found: dict[int, Point] = {}
@@ -77,7 +77,7 @@ def with_origins(problem: LayoutProblem, free: Sequence[Point]) -> dict[int, Poi
     return dict(sorted({**found, **problem.pins}.items()))
 
 
-class Cells:
+class CentreCells:
     """Centres in square cells, to ask whether a place is free."""
 
     def __init__(self) -> None:

@@ -14,7 +14,7 @@ from neurovis_spec.layout.model import RADIUS, LayoutProblem, Point
 _SLACK = 1 / 512
 
 
-class Rows:
+class GroupRows:
     """The rows of groups."""
 
     def __init__(self, problem: LayoutProblem, fresh: Sequence[Point]) -> None:

@@ -19,7 +19,7 @@ from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.network import Input, Network
 from neurovis_spec.runtime.backend import Availability, Capabilities, Stepper, prepare
 from neurovis_spec.runtime.columns import ALL, columns_of
-from neurovis_spec.runtime.record import Course, InMemory, Last, Rows, go
+from neurovis_spec.runtime.record import Course, InMemory, Last, RowSink, go
 from neurovis_spec.runtime.recording import RecordingError
 from neurovis_spec.runtime.rows import Steps
 from neurovis_spec.runtime.simulation import Simulation
@@ -133,7 +133,7 @@ class Trials:
         return rows.numbers(Steps(self.steps, 1, self.start)).activity
 
 
-def _go(network: Network, state: State, course: Course, rows: Rows) -> None:
+def _go(network: Network, state: State, course: Course, rows: RowSink) -> None:
     """Make the steps. What is no longer finite is seen in the numbers: hundreds of trials need not warn of it each."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)

@@ -107,7 +107,7 @@ class FileReference(NamedTuple):
     span: Span
 
 
-class Rows(NamedTuple):
+class MatrixRows(NamedTuple):
     """Dense rows as written: every row a list of formulas or nulls (checked when they are evaluated)."""
 
     node: Sequence | Packed
@@ -118,7 +118,7 @@ class Rows(NamedTuple):
         return self.node.span
 
 
-Matrix: TypeAlias = Rows | FileReference
+Matrix: TypeAlias = MatrixRows | FileReference
 
 
 def as_file(node: Mapping, info: ValidationInfo) -> FileReference:
@@ -146,7 +146,7 @@ def as_matrix(node: Node, info: ValidationInfo) -> Matrix:
         for row in node.items:
             if not isinstance(row, (Sequence, Packed)):
                 refuse(info, row, "a row, that is a list", "a matrix is a list of lists: [[1, 2], [3, 4]]")
-    return Rows(node)
+    return MatrixRows(node)
 
 
 #: ``{file: path}``.

@@ -34,7 +34,7 @@ _SHOWN = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Wishes:
+class Requirements:
     """What is asked of an engine. Neurons are meant by their place in ``neurons``; ``known`` are those whose data say
     where they are."""
 
@@ -51,9 +51,9 @@ class Wishes:
     memory: bool
 
 
-def asked_by(problem: LayoutProblem) -> Wishes:
+def asked_by(problem: LayoutProblem) -> Requirements:
     """What a problem asks for."""
-    return Wishes(
+    return Requirements(
         problem.neurons,
         len(problem.edges),
         problem.pins,
@@ -68,10 +68,10 @@ def asked_by(problem: LayoutProblem) -> Wishes:
     )
 
 
-def asked_of(network: Network, memory: bool) -> Wishes:
+def asked_of(network: Network, memory: bool) -> Requirements:
     """What the settings of a network ask for, with a ``memory`` of an earlier layout or without."""
     settings = network.layout
-    return Wishes(
+    return Requirements(
         network.neurons.names,
         len(network.connections),
         settings.positions,
@@ -86,51 +86,51 @@ def asked_of(network: Network, memory: bool) -> Wishes:
     )
 
 
-def refuse(wishes: Wishes, name: str, can: Capabilities) -> None:
+def refuse(wanted: Requirements, name: str, can: Capabilities) -> None:
     """Raise LayoutRefusalError for the first thing that is asked for beyond what the engine of this name can do, or
     that contradicts itself."""
-    _refuse_size(wishes, name, can)
-    _refuse_without_place(wishes, name, can)
+    _refuse_size(wanted, name, can)
+    _refuse_without_place(wanted, name, can)
     asked: Sequence[tuple[str, bool, Callable[[Capabilities], bool], str]] = (
-        ("layout-pins-unsupported", bool(wishes.pins), lambda it: it.pins, "keep pinned positions (layout.positions)"),
-        ("layout-arrange-unsupported", bool(wishes.arrange), lambda it: it.arrange, "arrange groups (layout.arrange)"),
-        ("layout-boxes-unsupported", wishes.boxes, lambda it: it.boxes, "keep the members of a box together"),
-        ("layout-mirror-unsupported", wishes.mirrors, lambda it: it.mirrors, "draw mirror images (layout.mirror)"),
-        ("layout-align-unsupported", bool(wishes.align), lambda it: it.align, "put neurons on one line (layout.align)"),
-        ("layout-plan-unsupported", wishes.plan, lambda it: it.plan, "put cells in rows and columns (layout.plan)"),
-        ("layout-memory-unsupported", wishes.memory, lambda it: it.memory, "remember a layout (layout.file)"),
+        ("layout-pins-unsupported", bool(wanted.pins), lambda it: it.pins, "keep pinned positions (layout.positions)"),
+        ("layout-arrange-unsupported", bool(wanted.arrange), lambda it: it.arrange, "arrange groups (layout.arrange)"),
+        ("layout-boxes-unsupported", wanted.boxes, lambda it: it.boxes, "keep the members of a box together"),
+        ("layout-mirror-unsupported", wanted.mirrors, lambda it: it.mirrors, "draw mirror images (layout.mirror)"),
+        ("layout-align-unsupported", bool(wanted.align), lambda it: it.align, "put neurons on one line (layout.align)"),
+        ("layout-plan-unsupported", wanted.plan, lambda it: it.plan, "put cells in rows and columns (layout.plan)"),
+        ("layout-memory-unsupported", wanted.memory, lambda it: it.memory, "remember a layout (layout.file)"),
         (
             "layout-direction-unsupported",
-            wishes.direction != "down",
+            wanted.direction != "down",
             lambda it: it.direction,
             "draw in another direction",
         ),
     )
-    for code, wanted, does, words in asked:
-        if wanted and not does(can):
+    for code, needed, does, words in asked:
+        if needed and not does(can):
             hint = they_can(engines_that(does))
             raise LayoutRefusalError(code, f"the engine '{name}' cannot {words}", hint)
-    _refuse_contradictions(wishes)
-    _refuse_close_pins(wishes)
+    _refuse_contradictions(wanted)
+    _refuse_close_pins(wanted)
 
 
-def _refuse_contradictions(wishes: Wishes) -> None:
+def _refuse_contradictions(wanted: Requirements) -> None:
     """Raise LayoutRefusalError where a neuron is arranged twice, or a line holds neurons that an arrangement keeps off
     it."""
     arranged: dict[int, tuple[int, str]] = {}
-    for number, (whole, how) in enumerate(wishes.arrange):
-        for member in _together(wishes, whole):
+    for number, (whole, how) in enumerate(wanted.arrange):
+        for member in _together(wanted, whole):
             if member in arranged:
-                name = wishes.neurons[member]
+                name = wanted.neurons[member]
                 raise LayoutRefusalError("arranged-twice", f"'{name}' is arranged twice", "arrange it once", (name,))
             arranged[member] = number, how
-    along = "column" if wishes.direction in ("down", "up") else "row"
-    for line in wishes.align:
+    along = "column" if wanted.direction in ("down", "up") else "row"
+    for line in wanted.align:
         first: dict[int, int] = {}
         for member in line:
             number, how = arranged.get(member, (-1, ""))
             if how == along and (mate := first.setdefault(number, member)) != member:
-                names = wishes.neurons[mate], wishes.neurons[member]
+                names = wanted.neurons[mate], wanted.neurons[member]
                 raise LayoutRefusalError(
                     "align-conflict",
                     f"'{names[0]}' and '{names[1]}' cannot stand on one line: what they belong to holds them apart",
@@ -138,10 +138,10 @@ def _refuse_contradictions(wishes: Wishes) -> None:
                 )
 
 
-def _together(wishes: Wishes, members: Sequence[int]) -> Sequence[int]:
+def _together(wanted: Requirements, members: Sequence[int]) -> Sequence[int]:
     """Those of the members of an arrangement that it arranges: they stand in no instance that is within what all have
     in common."""
-    paths = [wishes.neurons[member].split(".")[:-1] for member in members]
+    paths = [wanted.neurons[member].split(".")[:-1] for member in members]
     if not any(paths):
         return members
     both = zip(min(paths), max(paths), strict=False)
@@ -149,8 +149,8 @@ def _together(wishes: Wishes, members: Sequence[int]) -> Sequence[int]:
     return [member for member, path in zip(members, paths, strict=True) if len(path) == common]
 
 
-def _refuse_size(wishes: Wishes, name: str, can: Capabilities) -> None:
-    neurons, edges = len(wishes.neurons), wishes.connections
+def _refuse_size(wanted: Requirements, name: str, can: Capabilities) -> None:
+    neurons, edges = len(wanted.neurons), wanted.connections
     if neurons > can.neurons or edges > can.edges:
         raise LayoutRefusalError(
             "layout-too-large",
@@ -159,13 +159,13 @@ def _refuse_size(wishes: Wishes, name: str, can: Capabilities) -> None:
         )
 
 
-def _refuse_without_place(wishes: Wishes, name: str, can: Capabilities) -> None:
+def _refuse_without_place(wanted: Requirements, name: str, can: Capabilities) -> None:
     if can.free and not can.places:
         return
-    known = wishes.known if can.places else frozenset[int]()
-    if can.places and (known or wishes.pins):
+    known = wanted.known if can.places else frozenset[int]()
+    if can.places and (known or wanted.pins):
         return
-    free = [n for i, n in enumerate(wishes.neurons) if i not in wishes.pins and i not in known]
+    free = [n for i, n in enumerate(wanted.neurons) if i not in wanted.pins and i not in known]
     if not free:
         return
     free.sort(key=natural_key)
@@ -181,21 +181,21 @@ def _refuse_without_place(wishes: Wishes, name: str, can: Capabilities) -> None:
     raise LayoutRefusalError("position-missing", message, hint, tuple(free))
 
 
-def _refuse_close_pins(wishes: Wishes) -> None:
+def _refuse_close_pins(wanted: Requirements) -> None:
     """Two pins whose discs would overlap, found through cells as wide as a disc."""
     cells: dict[tuple[int, int], list[int]] = {}
-    for index, (x, y) in sorted(wishes.pins.items()):
+    for index, (x, y) in sorted(wanted.pins.items()):
         if not (math.isfinite(x) and math.isfinite(y)):
-            name = wishes.neurons[index]
+            name = wanted.neurons[index]
             raise LayoutRefusalError("pin-not-finite", f"the pin of '{name}' is not finite", about=(name,))
         column, row = math.floor(x / (2 * RADIUS)), math.floor(y / (2 * RADIUS))
         for near in ((column + i, row + j) for i in (-1, 0, 1) for j in (-1, 0, 1)):
             for other in cells.get(near, ()):
-                if distance(wishes.pins[other], (x, y)) < 2 * RADIUS - _SLACK:
+                if distance(wanted.pins[other], (x, y)) < 2 * RADIUS - _SLACK:
                     raise LayoutRefusalError(
                         "pins-too-close",
-                        f"the pins of '{wishes.neurons[other]}' and '{wishes.neurons[index]}' are closer than "
+                        f"the pins of '{wanted.neurons[other]}' and '{wanted.neurons[index]}' are closer than "
                         f"{2 * RADIUS:g}: their discs would overlap",
-                        about=(wishes.neurons[other], wishes.neurons[index]),
+                        about=(wanted.neurons[other], wanted.neurons[index]),
                     )
         cells.setdefault((column, row), []).append(index)

@@ -22,7 +22,7 @@ from neurovis_spec.live.appearance import Appearance
 from neurovis_spec.live.pins import Compile, Saving, SavingError, saving
 from neurovis_spec.live.placing import Placed, placed
 from neurovis_spec.live.protocol import file_message, moved_message, placed_message, refused_message, saving_message
-from neurovis_spec.live.requests import Fetch, Place, Request, Save, Unplace, Write
+from neurovis_spec.live.requests import Fetch, PlaceNeuron, Request, Save, Unplace, Write
 from neurovis_spec.live.run import Run, Stage
 from neurovis_spec.live.saving import film, picture, recording, steps_for
 from neurovis_spec.live.source import Seen, Source, SourceError
@@ -123,10 +123,10 @@ class Desk:
 
     def _carry_out(self, request: Request, answer: Answer) -> None:
         match request:
-            case Place(done=False):
+            case PlaceNeuron(done=False):
                 view = self._shown()
                 answer(moved_message(view.moved(self._placed.put(request.neuron, request.at).layout)))
-            case Place():
+            case PlaceNeuron():
                 before, self._placed = self._placed, self._placed.put(request.neuron, request.at)
                 self._before.append(before)
                 self._show(answer)
@@ -208,6 +208,6 @@ class Desk:
 
 def _replaces(request: Request, before: Request) -> bool:
     """Whether a request makes one that waits superfluous: a neuron is dragged on."""
-    if not (isinstance(request, Place) and isinstance(before, Place)):
+    if not (isinstance(request, PlaceNeuron) and isinstance(before, PlaceNeuron)):
         return False
     return not before.done and before.neuron == request.neuron

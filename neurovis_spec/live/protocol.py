@@ -24,7 +24,7 @@ from neurovis_spec.live.clock import SPEEDS
 from neurovis_spec.live.commands import Branch, Command, Draw, Event, Pause, Play, Restart, Seek, Speed, Step
 from neurovis_spec.live.history import Bins, Range
 from neurovis_spec.live.moved import Moved
-from neurovis_spec.live.requests import Fetch, Place, Request, Save, Unplace, Write
+from neurovis_spec.live.requests import Fetch, PlaceNeuron, Request, Save, Unplace, Write
 from neurovis_spec.live.run import Status
 from neurovis_spec.live.saving import MOST_SECONDS
 from neurovis_spec.live.source import Reach, Turned
@@ -342,7 +342,7 @@ _MESSAGES: Final[Mapping[str, tuple[Mapping[str, Check], Callable[..., Command |
     "lesion": ({"part": _name}, Lesion),
     "mend": ({"part": _name}, Mend),
     "learn": ({"connections": _name, "on": _truth}, Learn),
-    "place": ({"neuron": _name, "at": _point, "done": _truth}, Place),
+    "place": ({"neuron": _name, "at": _point, "done": _truth}, PlaceNeuron),
     "unplace": ({}, Unplace),
     "save": ({"into": _one_of("spec", "file")}, Save),
     "write": ({}, Write),

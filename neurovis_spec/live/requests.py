@@ -16,7 +16,7 @@ What: TypeAlias = Literal["svg", "film", "npz"]
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class PlaceNeuron:
     """Put a neuron here (units of the layout); until ``done`` only the places and routes that follow are told."""
 
     neuron: str
@@ -49,6 +49,6 @@ class Fetch:
     seconds: float
 
 
-Request: TypeAlias = Place | Unplace | Save | Write | Fetch
+Request: TypeAlias = PlaceNeuron | Unplace | Save | Write | Fetch
 #: the messages that ask for them
 REQUESTS: Final = frozenset(("place", "unplace", "save", "write", "fetch"))

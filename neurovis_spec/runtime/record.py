@@ -110,7 +110,7 @@ def after(network: Network, state: State) -> After:
     )
 
 
-class Rows(Protocol):
+class RowSink(Protocol):
     """Where rows go, a stretch of the run at a time."""
 
     def begin(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -220,7 +220,7 @@ def checked_steps(network: Network, steps: int | None, every: int) -> int:
     return steps
 
 
-def go(network: Network, state: State, course: Course, rows: Rows, progress: Progress | None = None) -> None:
+def go(network: Network, state: State, course: Course, rows: RowSink, progress: Progress | None = None) -> None:
     """Run a network from a state, and hand on the rows that are kept."""
     every, steps = course.every, course.steps
     watched = None if course.until is None else course.until.watch(rows, state, steps)
@@ -252,7 +252,7 @@ class _Make(Protocol):
     """A way to make the steps of a stretch."""
 
     def steps(
-        self, state: State, first: int, stop: int, every: int, rows: Rows, reader: InputReader, watch: Watch
+        self, state: State, first: int, stop: int, every: int, rows: RowSink, reader: InputReader, watch: Watch
     ) -> bool:
         """Make the steps from ``first`` to ``stop``; False where the rows say that the run is over."""
         ...
@@ -266,7 +266,7 @@ class _OneByOne:
     stepper: Stepper
 
     def steps(
-        self, state: State, first: int, stop: int, every: int, rows: Rows, reader: InputReader, watch: Watch
+        self, state: State, first: int, stop: int, every: int, rows: RowSink, reader: InputReader, watch: Watch
     ) -> bool:
         step, look, due, columns = self.stepper.step, watch.look, rows.due, self.columns
         changing, chosen = subscript(columns.weights), columns.neurons
@@ -305,7 +305,7 @@ class _Together:
     watched: Watched | None = None
 
     def steps(
-        self, state: State, first: int, stop: int, every: int, rows: Rows, reader: InputReader, watch: Watch
+        self, state: State, first: int, stop: int, every: int, rows: RowSink, reader: InputReader, watch: Watch
     ) -> bool:
         wanted, most = _kept(first, stop, every), self.runner.at_once
         activity, weights, _ = rows.begin(wanted)

@@ -17,7 +17,7 @@ from neurovis_spec.runtime.measures import Measure, Meter, measure_of
 from neurovis_spec.runtime.state import State
 
 if TYPE_CHECKING:
-    from neurovis_spec.runtime.record import Rows
+    from neurovis_spec.runtime.record import RowSink
 
 LABEL = "<until>"
 
@@ -45,7 +45,7 @@ class Until:
         self.measure: Measure = measure_of(text, network, LABEL, bounded=True)
         self.ending: Ending | None = None
 
-    def watch(self, rows: Rows, state: State, steps: int) -> Watched:
+    def watch(self, rows: RowSink, state: State, steps: int) -> Watched:
         """Rows that ask after each step whether the run is to end. Raises SpecError where there are fewer steps than a
         window has."""
         self.measure.check_steps(steps)
@@ -56,7 +56,7 @@ class Until:
 class Watched:
     """Rows as they are handed on, and the meter: it is asked after each step (``due``), or behind many (``made``)."""
 
-    def __init__(self, until: Until, rows: Rows, state: State) -> None:
+    def __init__(self, until: Until, rows: RowSink, state: State) -> None:
         self._until, self._rows, self._state = until, rows, state
         self._meter = Meter(until.measure, state.k)
         self._met = False

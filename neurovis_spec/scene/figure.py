@@ -23,7 +23,7 @@ from neurovis_spec.scene.model import Film, Group, shifted
 from neurovis_spec.scene.parts import Page, Part, stacked
 from neurovis_spec.scene.shots import Shots
 from neurovis_spec.scene.themes import theme_of
-from neurovis_spec.scene.views import AXIS, Block, Drawing, Maker, Place, span_of
+from neurovis_spec.scene.views import AXIS, Block, BlockSpace, Drawing, Maker, span_of
 
 #: How wide a page without a picture of the network is, and the least with one (user units).
 _WIDTH = 760.0
@@ -86,7 +86,7 @@ def figure(
     top = head
     for number, block in enumerate(blocks):
         axis = block.timed and not (number + 1 < len(blocks) and blocks[number + 1].timed)
-        part = block.part(Place(sheet.width, span, share, axis, theme, f"p{number}:"))
+        part = block.part(BlockSpace(sheet.width, span, share, axis, theme, f"p{number}:"))
         parts.append((top, part))
         top += part.height + _GAP
     captions = _captions(network, shots)

@@ -61,7 +61,7 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True)
-class Wishes:
+class Margins:
     """What stands around the layout: a header (width and height), a footer as high as ``footer(width)``, and how wide
     the picture should be for their sake; and the margin on either side."""
 
@@ -82,28 +82,28 @@ def unit_for(radius: float, widths: FloatArray) -> float:
     return float(np.max(needed[needed <= _FINEST], initial=1.0))
 
 
-def fit(extent: Rect, wishes: Wishes, size: tuple[int, int] | None) -> Frame:
+def fit(extent: Rect, margins: Margins, size: tuple[int, int] | None) -> Frame:
     """Fit ``extent`` (layout units) between header and footer, into ``size`` pixels or what it needs."""
     x0, y0, x1, y1 = extent
     across, down = max(x1 - x0, 1e-9), max(y1 - y0, 1e-9)
     if size is None:
-        wide, high, scale, density = _natural(across, down, wishes)
+        wide, high, scale, density = _natural(across, down, margins)
     else:
-        wide, high, scale, density = _within(across, down, wishes, (float(size[0]), float(size[1])))
-    free = high - wishes.header[1] - wishes.footer(wide) - down * scale
-    left, top = (wide - across * scale) / 2, wishes.header[1] + max(free, 0.0) / 2
+        wide, high, scale, density = _within(across, down, margins, (float(size[0]), float(size[1])))
+    free = high - margins.header[1] - margins.footer(wide) - down * scale
+    left, top = (wide - across * scale) / 2, margins.header[1] + max(free, 0.0) / 2
     return Frame(wide, high, scale, left - x0 * scale, top - y0 * scale, density)
 
 
-def _natural(across: float, down: float, wishes: Wishes) -> tuple[float, float, float, float]:
+def _natural(across: float, down: float, margins: Margins) -> tuple[float, float, float, float]:
     """Width, height, scale and density from the layout."""
     wide = MOST[0]
     scale = UNIT
     for _ in range(3):  # the footer's height depends on the width, the width on the scale, the scale on the height left
-        scale = min(UNIT, _scale(across, down, wishes, (MOST[0], MOST[1]), wishes.footer(wide)))
-        natural = max(across * scale + 2 * wishes.margin, wishes.header[0] + 2 * MARGIN, wishes.narrowest)
+        scale = min(UNIT, _scale(across, down, margins, (MOST[0], MOST[1]), margins.footer(wide)))
+        natural = max(across * scale + 2 * margins.margin, margins.header[0] + 2 * MARGIN, margins.narrowest)
         wide = min(MOST[0], whole(natural))
-    high = min(MOST[1], whole(wishes.header[1] + down * scale + wishes.footer(wide) + 2 * MARGIN))
+    high = min(MOST[1], whole(margins.header[1] + down * scale + margins.footer(wide) + 2 * MARGIN))
     density = next(d for d in DENSITIES if d == 1 or (wide * d <= MOST[0] and high * d <= MOST[1]))
     return wide, high, scale, density
 
@@ -113,14 +113,16 @@ def whole(value: float) -> float:
     return float(np.ceil(value / _WHOLE)) * _WHOLE
 
 
-def _within(across: float, down: float, wishes: Wishes, size: tuple[float, float]) -> tuple[float, float, float, float]:
+def _within(
+    across: float, down: float, margins: Margins, size: tuple[float, float]
+) -> tuple[float, float, float, float]:
     """Width, height, scale and density for this many pixels: as dense as leaves the layout its usual size."""
 
     def at(density: float) -> float:
         wide, high = size[0] / density, size[1] / density
-        return _scale(across, down, wishes, (wide, high), wishes.footer(wide))
+        return _scale(across, down, margins, (wide, high), margins.footer(wide))
 
-    low, high = 1.0, max(1.0, min(DENSEST, size[0] / wishes.narrowest))
+    low, high = 1.0, max(1.0, min(DENSEST, size[0] / margins.narrowest))
     if at(high) >= UNIT:
         low = high
     for _ in range(24):
@@ -129,7 +131,7 @@ def _within(across: float, down: float, wishes: Wishes, size: tuple[float, float
     return size[0] / low, size[1] / low, min(_LARGEST * UNIT, at(low)), low
 
 
-def _scale(across: float, down: float, wishes: Wishes, room: tuple[float, float], footer: float) -> float:
+def _scale(across: float, down: float, margins: Margins, room: tuple[float, float], footer: float) -> float:
     """The most page units for a layout unit."""
-    left = room[1] - wishes.header[1] - footer - 2 * MARGIN
-    return max(1e-9, min(max(room[0] - 2 * wishes.margin, 8.0) / across, max(left, 8.0) / down))
+    left = room[1] - margins.header[1] - footer - 2 * MARGIN
+    return max(1e-9, min(max(room[0] - 2 * margins.margin, 8.0) / across, max(left, 8.0) / down))

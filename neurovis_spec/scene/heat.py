@@ -18,7 +18,7 @@ from neurovis_spec.scene import strips, texts
 from neurovis_spec.scene.cut import Cut
 from neurovis_spec.scene.model import Group, Image, Polyline, Shape, Text, Theme
 from neurovis_spec.scene.parts import Changes, Part
-from neurovis_spec.scene.scales import Scale
+from neurovis_spec.scene.scales import ScaleLabel
 from neurovis_spec.scene.strips import SMALL, TITLE, Span
 from neurovis_spec.scene.themes import blend, channels
 
@@ -68,7 +68,7 @@ class Heat:
     #: the groups, and what they are in: the instance, if they are in one
     groups: tuple[Band, ...]
     outer: tuple[Band, ...]
-    scale: Scale
+    scale: ScaleLabel
 
     @property
     def natural(self) -> float:

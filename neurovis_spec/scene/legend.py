@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from neurovis_spec.scene import legend_scales, texts
 from neurovis_spec.scene.delays import bead
 from neurovis_spec.scene.gains import Gains
-from neurovis_spec.scene.legend_entry import FIRST_Y, SAMPLE_Y, SECOND_Y, SMALL, Entry, heading, stroke
+from neurovis_spec.scene.legend_entry import FIRST_Y, SAMPLE_Y, SECOND_Y, SMALL, LegendEntry, heading, stroke
 from neurovis_spec.scene.lesions import FAINT
 from neurovis_spec.scene.model import Arrowhead, Disc, Group, Shape, Spline, Text, Theme, ended, shifted
 from neurovis_spec.scene.teachers import dash
@@ -40,7 +40,7 @@ class Contents:
     traces: tuple[float, ...] = ()
 
 
-def entries(contents: Contents, gains: Gains, theme: Theme, *, brief: bool = False) -> list[Entry]:
+def entries(contents: Contents, gains: Gains, theme: Theme, *, brief: bool = False) -> list[LegendEntry]:
     """The entries that this picture needs; a ``brief`` legend has the first scale of each sort alone."""
     if brief:
         gains = gains.brief
@@ -62,31 +62,31 @@ def entries(contents: Contents, gains: Gains, theme: Theme, *, brief: bool = Fal
     return result
 
 
-def row_width(items: Sequence[Entry]) -> float:
+def row_width(items: Sequence[LegendEntry]) -> float:
     """How wide the entries are side by side."""
     return sum(item.width for item in items) + _ENTRY_GAP * max(len(items) - 1, 0)
 
 
-def widest_row(items: Sequence[Entry], width: float) -> float:
+def widest_row(items: Sequence[LegendEntry], width: float) -> float:
     """How wide the longest row is when they flow into rows of this width."""
     return max((row_width(row) for row in _rows(items, width)), default=0.0)
 
 
-def height(items: Sequence[Entry], width: float) -> float:
+def height(items: Sequence[LegendEntry], width: float) -> float:
     """How high the entries are when they flow into rows of this width; 0 without entries."""
     rows = _rows(items, width)
     return _in_all(rows) + (len(rows) - 1) * _ROW_GAP if rows else 0.0
 
 
-def _in_all(rows: Sequence[Sequence[Entry]]) -> float:
+def _in_all(rows: Sequence[Sequence[LegendEntry]]) -> float:
     return sum(map(_high, rows))
 
 
-def _high(row: Sequence[Entry]) -> float:
+def _high(row: Sequence[LegendEntry]) -> float:
     return max(item.height for item in row)
 
 
-def flow(items: Sequence[Entry], width: float, left: float, top: float) -> Group:
+def flow(items: Sequence[LegendEntry], width: float, left: float, top: float) -> Group:
     """The entries in rows of at most ``width``, from the corner (left, top) on."""
     shapes: list[Shape] = []
     y = top
@@ -99,7 +99,7 @@ def flow(items: Sequence[Entry], width: float, left: float, top: float) -> Group
     return Group(tuple(shapes), id="legend")
 
 
-def _rows(items: Sequence[Entry], width: float) -> list[list[Entry]]:
+def _rows(items: Sequence[LegendEntry], width: float) -> list[list[LegendEntry]]:
     """As few rows as fit into a width, and as even as they can be without getting higher: none has a lone entry at the
     end while the others are full."""
     full = _filled(items, width)
@@ -113,9 +113,9 @@ def _rows(items: Sequence[Entry], width: float) -> list[list[Entry]]:
     return full
 
 
-def _filled(items: Sequence[Entry], width: float) -> list[list[Entry]]:
+def _filled(items: Sequence[LegendEntry], width: float) -> list[list[LegendEntry]]:
     """Rows of which each has as many entries as fit into it."""
-    rows: list[list[Entry]] = []
+    rows: list[list[LegendEntry]] = []
     used = 0.0
     for entry in items:
         if rows and used + _ENTRY_GAP + entry.width <= width:
@@ -127,7 +127,7 @@ def _filled(items: Sequence[Entry], width: float) -> list[list[Entry]]:
     return rows
 
 
-def _ends_in(theme: Theme) -> Entry:
+def _ends_in(theme: Theme) -> LegendEntry:
     """Lines that end in an arrowhead, and in a bar."""
     words = "line: sign of w"
     across = max(2 * _STROKE + _STROKE_GAP, texts.width(words, SMALL))
@@ -139,10 +139,10 @@ def _ends_in(theme: Theme) -> Entry:
         shapes += [stroke(x, end.notch[0] - x, theme.muted, 2.0), end]
         shapes.append(Text((x + _STROKE / 2, FIRST_Y), sign, SMALL, theme.muted, "middle"))
     shapes.append(Text((across / 2, SECOND_Y), words, SMALL, theme.muted, "middle"))
-    return Entry(tuple(shapes), across)
+    return LegendEntry(tuple(shapes), across)
 
 
-def _dotted(words: str, theme: Theme) -> Entry:
+def _dotted(words: str, theme: Theme) -> LegendEntry:
     first, second = "guides learning", words
     across = max(texts.width(first, SMALL), texts.width(second, SMALL))
     line = Spline(((0, SAMPLE_Y), (21, SAMPLE_Y), (43, SAMPLE_Y), (64, SAMPLE_Y)), theme.muted, 1.6, dash(1.6))
@@ -152,10 +152,10 @@ def _dotted(words: str, theme: Theme) -> Entry:
         Text((0, FIRST_Y), first, SMALL, theme.muted),
         Text((0, SECOND_Y), second, SMALL, theme.muted),
     )
-    return Entry(shapes, across)
+    return LegendEntry(shapes, across)
 
 
-def _bead(words: str, theme: Theme) -> Entry:
+def _bead(words: str, theme: Theme) -> LegendEntry:
     first = "signal is delayed"
     across = max(texts.width(first, SMALL), texts.width(words, SMALL))
     shapes = (
@@ -165,20 +165,20 @@ def _bead(words: str, theme: Theme) -> Entry:
         Text((0, FIRST_Y), first, SMALL, theme.muted),
         Text((0, SECOND_Y), words, SMALL, theme.muted),
     )
-    return Entry(shapes, across)
+    return LegendEntry(shapes, across)
 
 
-def _trace(seconds: tuple[float, ...], theme: Theme) -> Entry:
+def _trace(seconds: tuple[float, ...], theme: Theme) -> LegendEntry:
     """A disc, and how it fades."""
     first, second = "activity fades", f"to 1/e in {' … '.join(texts.number(one) for one in seconds)} s"
     across = max(64.0, texts.width(first, SMALL), texts.width(second, SMALL))
     fills = colours(theme, [1.0, 0.6, 0.3, 0.1])
     discs = [Disc((6 + 17.0 * place, SAMPLE_Y), 6, fill, theme.ring, 0.8) for place, fill in enumerate(fills)]
     words = [Text((0, FIRST_Y), first, SMALL, theme.muted), Text((0, SECOND_Y), second, SMALL, theme.muted)]
-    return Entry((heading("Trace", theme), *discs, *words), across)
+    return LegendEntry((heading("Trace", theme), *discs, *words), across)
 
 
-def _faint(theme: Theme) -> Entry:
+def _faint(theme: Theme) -> LegendEntry:
     first, second = "removed", "by a lesion"
     across = max(64.0, texts.width(first, SMALL), texts.width(second, SMALL))
     shapes = (
@@ -187,4 +187,4 @@ def _faint(theme: Theme) -> Entry:
         Text((0, FIRST_Y), first, SMALL, theme.muted),
         Text((0, SECOND_Y), second, SMALL, theme.muted),
     )
-    return Entry(shapes, across)
+    return LegendEntry(shapes, across)

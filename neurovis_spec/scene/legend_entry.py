@@ -16,7 +16,7 @@ LINE = SECOND_Y - FIRST_Y
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class LegendEntry:
     """Shapes with their corner at the origin, and how wide and high they are."""
 
     shapes: tuple[Shape, ...]

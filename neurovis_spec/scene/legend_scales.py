@@ -15,7 +15,17 @@ import numpy as np
 from neurovis_spec.scene import texts
 from neurovis_spec.scene.encoding import FAINTEST, THINNEST, glow_width
 from neurovis_spec.scene.gains import Gains, Scale
-from neurovis_spec.scene.legend_entry import FIRST_Y, LINE, SAMPLE_Y, SECOND_Y, SMALL, Entry, heading, high, stroke
+from neurovis_spec.scene.legend_entry import (
+    FIRST_Y,
+    LINE,
+    SAMPLE_Y,
+    SECOND_Y,
+    SMALL,
+    LegendEntry,
+    heading,
+    high,
+    stroke,
+)
 from neurovis_spec.scene.model import Ramp, Shape, Text, Theme
 from neurovis_spec.scene.themes import colours
 
@@ -31,7 +41,7 @@ _NAMES = 132.0
 _BEYOND = 1.05
 
 
-def colour(gains: Gains, lines: bool, theme: Theme) -> list[Entry]:
+def colour(gains: Gains, lines: bool, theme: Theme) -> list[LegendEntry]:
     """The scales of activities and, if there are ``lines``, of signals: in one entry, or two where one has several."""
     neurons = _rows("neuron: activity", gains.activity_scales)
     signals = _rows("line: signal w·a", gains.signal_scales) if lines else []
@@ -43,7 +53,7 @@ def colour(gains: Gains, lines: bool, theme: Theme) -> list[Entry]:
     return result
 
 
-def thickness(gains: Gains, theme: Theme) -> list[Entry]:
+def thickness(gains: Gains, theme: Theme) -> list[LegendEntry]:
     """What weights the widths of lines stand for; only widths that occur."""
     shown = [
         (scale, weights)
@@ -69,7 +79,7 @@ def thickness(gains: Gains, theme: Theme) -> list[Entry]:
         words, x = named(scale), columns * step
         shapes.append(Text((x, y), words, SMALL, theme.muted))
         across = max(across, x + texts.width(words, SMALL))
-    return [Entry(tuple(shapes), across, max(high(1), _TABLE_Y + _PITCH * (len(shown) - 1) + 3.0))]
+    return [LegendEntry(tuple(shapes), across, max(high(1), _TABLE_Y + _PITCH * (len(shown) - 1) + 3.0))]
 
 
 def _wide(scale: Scale, weight: float) -> float:
@@ -77,7 +87,7 @@ def _wide(scale: Scale, weight: float) -> float:
     return max(THINNEST, abs(scale.gain) * weight)
 
 
-def glow(gains: Gains, theme: Theme) -> list[Entry]:
+def glow(gains: Gains, theme: Theme) -> list[LegendEntry]:
     """How far what changes glows, if anything does: a sample at full intensity."""
     shown = [scale for scale in gains.change_scales if scale.gain * scale.reaches >= FAINTEST]
     if not shown:
@@ -90,7 +100,7 @@ def glow(gains: Gains, theme: Theme) -> list[Entry]:
     across = max(texts.width(line, SMALL) for line in lines)
     shapes: list[Shape] = [heading("Glow", theme), stroke(0, 64, theme.glow, lit), stroke(0, 64, theme.muted, width)]
     shapes += [Text((0, FIRST_Y + LINE * place), line, SMALL, theme.muted) for place, line in enumerate(lines)]
-    return [Entry(tuple(shapes), across, high(len(lines)))]
+    return [LegendEntry(tuple(shapes), across, high(len(lines)))]
 
 
 def named(scale: Scale) -> str:
@@ -156,7 +166,7 @@ def _beyond(scale: Scale) -> str:
     return "(and beyond)" if scale.centre else f"(up to {texts.number(scale.reaches, 2)})"
 
 
-def _ramp(words: str, rows: Sequence[tuple[str, str, str]], theme: Theme) -> Entry:
+def _ramp(words: str, rows: Sequence[tuple[str, str, str]], theme: Theme) -> LegendEntry:
     # the words stand in the middle, so the longer end counts twice
     needed = [
         texts.width(middle, SMALL) + 2 * max(texts.width(low, SMALL), texts.width(right, SMALL)) + 14
@@ -172,10 +182,10 @@ def _ramp(words: str, rows: Sequence[tuple[str, str, str]], theme: Theme) -> Ent
             Text((across / 2, y), middle, SMALL, theme.muted, "middle"),
             Text((across, y), right, SMALL, theme.muted, "end"),
         ]
-    return Entry(tuple(shapes), across, high(len(rows)))
+    return LegendEntry(tuple(shapes), across, high(len(rows)))
 
 
-def _strokes(scale: Scale, weights: Sequence[float], theme: Theme) -> Entry:
+def _strokes(scale: Scale, weights: Sequence[float], theme: Theme) -> LegendEntry:
     shapes: list[Shape] = [heading("Thickness", theme)]
     strokes, words = len(weights) * (_STROKE + _STROKE_GAP) - _STROKE_GAP, "line: weight |w|"
     if scale.names:
@@ -186,4 +196,4 @@ def _strokes(scale: Scale, weights: Sequence[float], theme: Theme) -> Entry:
         shapes.append(stroke(x, _STROKE, theme.muted, _wide(scale, value)))
         shapes.append(Text((x + _STROKE / 2, FIRST_Y), texts.number(value), SMALL, theme.muted, "middle"))
     shapes.append(Text((across / 2, SECOND_Y), words, SMALL, theme.muted, "middle"))
-    return Entry(tuple(shapes), across)
+    return LegendEntry(tuple(shapes), across)

@@ -20,7 +20,7 @@ from neurovis_spec.scene.cut import Cut
 from neurovis_spec.scene.heat import Band, bands_of
 from neurovis_spec.scene.model import Group, Image, Polyline, Rectangle, Shape, Text, Theme
 from neurovis_spec.scene.parts import Changes, Part
-from neurovis_spec.scene.scales import Scale
+from neurovis_spec.scene.scales import ScaleLabel
 from neurovis_spec.scene.themes import blend, channels, colours
 
 #: The side of a cell at most, the side of the whole where there is room.
@@ -89,7 +89,7 @@ def _ways(group: str) -> list[str]:
 
 
 @dataclass(frozen=True)
-class Cells:
+class MatrixCells:
     """The cells of a matrix: colour values in −1…1 of each connection shown, (frames, k); ``connections`` (k,)."""
 
     network: Network
@@ -97,7 +97,7 @@ class Cells:
     columns: Order
     connections: IntArray
     values: FloatArray
-    scale: Scale
+    scale: ScaleLabel
     titles: Sequence[str]
     title: str
 

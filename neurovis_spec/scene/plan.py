@@ -23,14 +23,14 @@ from neurovis_spec.scene.beside import beyond
 from neurovis_spec.scene.boxes import Box, boxes_of
 from neurovis_spec.scene.collapse import Gathered
 from neurovis_spec.scene.fading import seconds_of
-from neurovis_spec.scene.frame import MARGIN, MOST, UNIT, Frame, Wishes, fit, unit_for
+from neurovis_spec.scene.frame import MARGIN, MOST, UNIT, Frame, Margins, fit, unit_for
 from neurovis_spec.scene.gains import Gains, in_pages
 from neurovis_spec.scene.gathered_layout import radius_of
 from neurovis_spec.scene.geometry import Point, Rect, batches, bounds, samples
 from neurovis_spec.scene.glyphs import raised
 from neurovis_spec.scene.heading import CAPTION, CAPTION_Y, HEADER, TITLE, caption_text, title_text
 from neurovis_spec.scene.labels import Ground, Label, labels_of, margin_beside, room_beside
-from neurovis_spec.scene.legend_entry import Entry
+from neurovis_spec.scene.legend_entry import LegendEntry
 from neurovis_spec.scene.lesions import Lesions, lesions_of
 from neurovis_spec.scene.line_labels import line_labels
 from neurovis_spec.scene.lines import Line, routes_of, trimmed
@@ -279,7 +279,7 @@ class _Wanted:
 
 def _framed(
     wanted: _Wanted, smallest: float, widths: FloatArray
-) -> tuple[str | None, list[Entry], Frame, float, float]:
+) -> tuple[str | None, list[LegendEntry], Frame, float, float]:
     """The title (None: no header), the legend's entries, the frame in page units, the user units in one of these,
     and the margin: none of the ``widths`` is wider than the discs of the ``smallest`` radius (layout units). A picture
     that is part of another has the units of that."""
@@ -296,13 +296,13 @@ def _framed(
     return title, items, frame, unit, margin
 
 
-def _frame(wanted: _Wanted, gains: Gains, delayed: str, margin: float) -> tuple[str | None, list[Entry], Frame]:
+def _frame(wanted: _Wanted, gains: Gains, delayed: str, margin: float) -> tuple[str | None, list[LegendEntry], Frame]:
     """The title, the legend's entries, and the frame. In a picture too small for them both go."""
     network, settings, theme = wanted.network, wanted.settings, wanted.theme
     words = settings.title if isinstance(settings.title, str) else network.title or network.name
     title = words if settings.title is not False and words else None
     wide, high = MOST if settings.size is None else settings.size
-    items: list[Entry] = []
+    items: list[LegendEntry] = []
     if settings.legend:
         contents = legend.Contents(
             lines=len(network.connections) > 0,
@@ -331,8 +331,8 @@ def _frame(wanted: _Wanted, gains: Gains, delayed: str, margin: float) -> tuple[
     fitting = min(max(legend.widest_row(items, _ROOM - 2 * MARGIN) + 2 * MARGIN, 120.0), _ROOM)
     narrowest = max(fitting, wanted.narrowest)
     header = (min(across, _ROOM - 2 * MARGIN), _top(title is not None, len(wanted.notes)))
-    wishes = Wishes(header, footer, narrowest, margin)
-    return title, items, fit(wanted.extent, wishes, settings.size)
+    margins = Margins(header, footer, narrowest, margin)
+    return title, items, fit(wanted.extent, margins, settings.size)
 
 
 def _top(titled: bool, notes: int) -> float:

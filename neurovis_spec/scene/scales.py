@@ -21,7 +21,7 @@ _SIZE, _RAMP, _STRIPES, _GAP = 10.5, 84.0, 42, 5.0
 
 
 @dataclass(frozen=True, slots=True)
-class Scale:
+class ScaleLabel:
     """``low`` and ``high`` are written at the ends of the ramp, ``name`` before it; none where ``high`` is empty."""
 
     name: str
@@ -52,17 +52,17 @@ class Scale:
         ]
 
 
-def scale_of(name: str, used: Sequence[tuple[Own, float]]) -> Scale:
+def scale_of(name: str, used: Sequence[tuple[Own, float]]) -> ScaleLabel:
     """What full colours mean: of one scale its ends, of several how far each goes. ``used``: the scales, each with the
     distance from its centre at which its colour is full."""
     if not used:
-        return Scale(name)
+        return ScaleLabel(name)
     if len(used) == 1:
         ((own, full),) = used
         if not math.isfinite(full):
-            return Scale(name, "−∞", "+∞")
+            return ScaleLabel(name, "−∞", "+∞")
         low, high = (texts.number(own.centre + side * full, 3, sign=True) for side in (-1, 1))
-        return Scale(name, low, high)
+        return ScaleLabel(name, low, high)
     parts = [f"{named(own)} ±{texts.number(full)}" + (f" around {texts.number(own.centre)}" if own.centre else "")
              for own, full in used]  # fmt: skip
-    return Scale(f"{name} of {' · '.join(parts)}" if name else " · ".join(parts), "−", "+")
+    return ScaleLabel(f"{name} of {' · '.join(parts)}" if name else " · ".join(parts), "−", "+")

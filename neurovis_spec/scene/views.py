@@ -24,11 +24,11 @@ from neurovis_spec.scene.frame import MARGIN
 from neurovis_spec.scene.gains import Gains
 from neurovis_spec.scene.gains import Scale as Own
 from neurovis_spec.scene.heat import Heat, bands_of
-from neurovis_spec.scene.matrix import Cells, order_of
+from neurovis_spec.scene.matrix import MatrixCells, order_of
 from neurovis_spec.scene.model import Film, Group, Text, Theme
 from neurovis_spec.scene.palette import MOST as MOST_COLOURS
 from neurovis_spec.scene.parts import Part
-from neurovis_spec.scene.scales import Scale, scale_of
+from neurovis_spec.scene.scales import ScaleLabel, scale_of
 from neurovis_spec.scene.series import chosen, full_name, kind_of, short_name, values_of
 from neurovis_spec.scene.shots import Shots
 from neurovis_spec.scene.strips import SMALL, Span
@@ -44,7 +44,7 @@ _MOST = 0.9
 
 
 @dataclass(frozen=True)
-class Place:
+class BlockSpace:
     """Where a block is drawn: a page of this width, on it the time; plots ``share`` times as high as by themselves,
     the axis of the time beneath them or not; ``prefix`` begins the ids of its groups."""
 
@@ -73,7 +73,7 @@ class Block(Protocol):
         """What of its height cannot change, and what can."""
         ...
 
-    def part(self, place: Place) -> Part:
+    def part(self, place: BlockSpace) -> Part:
         """What it draws."""
         ...
 
@@ -90,7 +90,7 @@ class Note:
         """A line of text."""
         return 22.0, 0.0
 
-    def part(self, place: Place) -> Part:
+    def part(self, place: BlockSpace) -> Part:
         """The words alone."""
         return Part((Group((Text((MARGIN, 15.0), self.words, SMALL, place.theme.muted),)),), 22.0)
 
@@ -112,7 +112,7 @@ class Curves:
         count = len(self.traces.strips)
         return self.traces.height(0.0), count * PLOT
 
-    def part(self, place: Place) -> Part:
+    def part(self, place: BlockSpace) -> Part:
         """The strips."""
         return self.traces.part(place.span, PLOT * place.share, place.axis, place.theme, place.prefix)
 
@@ -133,7 +133,7 @@ class Raster:
         """A title, and the cells."""
         return self.heat.height(0.0), self.heat.natural
 
-    def part(self, place: Place) -> Part:
+    def part(self, place: BlockSpace) -> Part:
         """The strip."""
         return self.heat.part(place.span, self.heat.natural * place.share, place.axis, place.theme, place.prefix)
 
@@ -142,7 +142,7 @@ class Raster:
 class Grid:
     """The matrix."""
 
-    cells: Cells
+    cells: MatrixCells
     timed = False
     sides = (0.0, 0.0)
 
@@ -150,7 +150,7 @@ class Grid:
         """Title and names, and the cells."""
         return self.cells.heights(width - 2 * MARGIN)
 
-    def part(self, place: Place) -> Part:
+    def part(self, place: BlockSpace) -> Part:
         """The cells, as large as there is room."""
         width = place.width - 2 * MARGIN
         fixed, free = self.cells.heights(width)
@@ -169,7 +169,7 @@ class Drawing:
         """None of it changes."""
         return self.film.scene.height, 0.0
 
-    def part(self, place: Place) -> Part:
+    def part(self, place: BlockSpace) -> Part:
         """Its groups; the film itself says how they change."""
         return Part(self.film.scene.groups, self.film.scene.height)
 
@@ -265,7 +265,7 @@ class Maker:
 
         own = set(np.unique(gains.activity[neurons]).tolist())
         used = [(one, 1 / abs(one.gain or 1e-9)) for one in gains.activity_scales if one.gain in own]
-        scale = Scale("") if self.explained else scale_of("", used)
+        scale = ScaleLabel("") if self.explained else scale_of("", used)
         names = tuple(short_name(curve, network) for curve in curves if curve.of == "neuron")
         return Raster(Heat("activity", activity, colour, stateful[neurons], names, *bands, scale))
 
@@ -303,7 +303,7 @@ class Maker:
         titles = tooltips(network, self.gains, activity, np.stack([low, high]))[1]
         scale = scale_of("weight", used)
         rows, columns = (order_of(network, self.layout, some) for some in (sources, targets))
-        return Grid(Cells(network, rows, columns, connections, np.nan_to_num(values), scale, titles, title))
+        return Grid(MatrixCells(network, rows, columns, connections, np.nan_to_num(values), scale, titles, title))
 
 
 def _full_at(

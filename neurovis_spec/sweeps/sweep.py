@@ -56,7 +56,7 @@ class Source:
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class CheckedSweep:
     """A sweep that has been checked, as far as the ends of its grid show what is wrong; ``network`` is that of one of
     its points."""
 
@@ -117,7 +117,7 @@ def planned(
     backend: str | None = None,
     root: str | Path | None = None,
     limit: int | None = None,
-) -> Plan:
+) -> CheckedSweep:
     """A sweep before anything is run. Raises what ``sweep`` raises."""
     grid = axes(over)
     spec = source if isinstance(source, Source) else _read(source)
@@ -140,11 +140,11 @@ def planned(
         limit,
     )
     every = tuple(points(grid))
-    return Plan(job, columns, every, _checked(job, grid, every))
+    return CheckedSweep(job, columns, every, _checked(job, grid, every))
 
 
 def carried_out(
-    plan: Plan,
+    plan: CheckedSweep,
     inputs: Mapping[str, npt.ArrayLike] | None = None,
     *,
     jobs: int = 1,
@@ -177,7 +177,7 @@ def carried_out(
     return Table(plan.columns, tuple(rows[point] for point in plan.points))
 
 
-def _by_itself(plan: Plan) -> Job:
+def _by_itself(plan: CheckedSweep) -> Job:
     """The job with all that the spec includes and reads in its text: other machines need not have these files. Raises
     SweepError, SpecError where one of them is gone meanwhile."""
     made = plan.network

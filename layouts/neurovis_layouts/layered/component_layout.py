@@ -29,7 +29,7 @@ from neurovis_spec.layout.model import LayoutProblem, Point
 
 
 @dataclass(slots=True)
-class Plan:
+class ComponentLayout:
     """Places in the engine's frame: neurons by index, waypoints by edge; the first neurons of frames that are drawn as
     their mirror images."""
 
@@ -48,7 +48,7 @@ class Plan:
         ys = [y for _, y in points]
         return (min(xs), min(ys)), (max(xs), max(ys))
 
-    def add(self, other: Plan, shift: Point) -> None:
+    def add(self, other: ComponentLayout, shift: Point) -> None:
         """Put another beside it."""
         dx, dy = shift
         self.places.update({i: (x + dx, y + dy) for i, (x, y) in other.places.items()})
@@ -65,7 +65,7 @@ def planned(
     bonds: Sequence[int],
     pair: Mapping[int, int],
     columns: AbstractSet[int] = frozenset(),
-) -> Plan:
+) -> ComponentLayout:
     """All components laid out and packed; units without connections beside the last rank of the largest component.
 
     ``bonds`` are numbers that units of one rank share. With ``pair`` (mirror images, both ways) all is one component,
@@ -75,7 +75,7 @@ def planned(
         return _component(problem, units, bonds, (), range(len(problem.edges)), pair, frozenset())
     connected, alone = components_of(problem, units, bonds)
     largest = max(connected, key=lambda part: sum(len(units[u].members) for u in part), default=None)
-    parts: list[Plan] = []
+    parts: list[ComponentLayout] = []
     hosts = _hosts(problem, units, connected, alone)
     few = sum(len(units[u].members) for u in alone) <= 6
     owner = {m: u for u, unit in enumerate(units) for m in unit.members}
@@ -90,7 +90,7 @@ def planned(
         parts.append(_component(problem, own, tied, guests, edges.get(k, []), {}, columns))
     if alone and not (few and connected):
         parts.append(_unconnected(problem, [units[u] for u in alone]))
-    plan = Plan()
+    plan = ComponentLayout()
     for part_plan, shift in zip(parts, packed([part.extent() for part in parts]), strict=True):
         plan.add(part_plan, shift)
     return plan
@@ -118,7 +118,7 @@ def _component(
     edges: Sequence[int],
     pair: Mapping[int, int],
     columns: AbstractSet[int],
-) -> Plan:
+) -> ComponentLayout:
     everyone = [*units, *guests]
     here = {m for unit in units for m in unit.members}
     columns = {box for box in columns if here.issuperset(problem.boxes[box][1])}
@@ -146,7 +146,7 @@ def _component(
         stacked(levels, folds), order, problem.neuron_spacing, problem.rank_spacing, partner, columns, folds.ranks
     )
     _draw_in(levels, order, places, {m for unit in guests for m in unit.members}, problem.neuron_spacing)
-    plan = Plan(turned=flipped)
+    plan = ComponentLayout(turned=flipped)
     for node, (x, y) in zip(levels.nodes, places, strict=True):
         for member, dx, dy in node.members:
             plan.places[member] = (x + dx, y + dy)
@@ -227,9 +227,9 @@ def _draw_in(
                 )
 
 
-def _unconnected(problem: LayoutProblem, units: Sequence[Unit]) -> Plan:
+def _unconnected(problem: LayoutProblem, units: Sequence[Unit]) -> ComponentLayout:
     """Neurons that nothing connects: in a row, or a grid where they are many."""
     members = sorted(m for unit in units for m in unit.members)
     width = len(members) if len(members) <= 12 else columns(len(members))
     points = grid(len(members), width, max(problem.neuron_spacing, 0.65))
-    return Plan({m: (snap(x), snap(y)) for m, (x, y) in zip(members, points, strict=True)})
+    return ComponentLayout({m: (snap(x), snap(y)) for m, (x, y) in zip(members, points, strict=True)})

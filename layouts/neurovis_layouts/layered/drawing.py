@@ -38,7 +38,7 @@ class Drawing:
 
 
 @dataclass(frozen=True, slots=True)
-class Move:
+class FrameMove:
     """A point p becomes shift + p, reflected on the line along the direction through 0 before that if ``flip``."""
 
     shift: Point

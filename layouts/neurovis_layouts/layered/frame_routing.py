@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
-from neurovis_layouts.layered.component_layout import Plan
+from neurovis_layouts.layered.component_layout import ComponentLayout
 from neurovis_layouts.layered.pinning import Settled
 from neurovis_layouts.layered.templates import Key
 from neurovis_layouts.layered.units import Unit
@@ -30,7 +30,7 @@ def linked(
     problem: LayoutProblem,
     links: Sequence[int],
     keys: Sequence[Key],
-    plan: Plan,
+    plan: ComponentLayout,
     rests: Settled,
     units: Sequence[Unit],
     frames: Sequence[tuple[tuple[int, ...], Rect]],
@@ -125,7 +125,7 @@ def _bowed(edges: Sequence[LayoutEdge], units: Sequence[Unit]) -> frozenset[int]
     return frozenset(i for i, e in enumerate(edges) if e.source in block and block[e.source] == block.get(e.target))
 
 
-def _passing(problem: LayoutProblem, plan: Plan, rests: Settled) -> dict[int, list[Waypoint]]:
+def _passing(problem: LayoutProblem, plan: ComponentLayout, rests: Settled) -> dict[int, list[Waypoint]]:
     """The plan's waypoints, of edges whose ends stand where the plan has them."""
     ways: dict[int, list[Waypoint]] = {}
     dx, dy = rests.shift

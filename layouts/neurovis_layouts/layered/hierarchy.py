@@ -12,8 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
 
-from neurovis_layouts.layered.component_layout import Plan, planned
-from neurovis_layouts.layered.drawing import Drawing, Move, Piece
+from neurovis_layouts.layered.component_layout import ComponentLayout, planned
+from neurovis_layouts.layered.drawing import Drawing, FrameMove, Piece
 from neurovis_layouts.layered.frame_routing import linked
 from neurovis_layouts.layered.mirror_units import symmetric_units
 from neurovis_layouts.layered.page_plan import facing, in_direction, parts_by_cell
@@ -56,7 +56,7 @@ class Composer:
                 continue
             drawing = self.kind(int(module.template), problem.direction)
             flip = not drawing.fixed and module.members[0] in second
-            places = [Move((0.0, 0.0), flip).point(place) for place in drawing.places]
+            places = [FrameMove((0.0, 0.0), flip).point(place) for place in drawing.places]
             x, y = module.origin
             if not drawing.fixed:
                 first = max if problem.direction in ("up", "left") else min
@@ -150,7 +150,7 @@ class Composer:
 
         parts, where = parts_by_cell(problem, pair)
         pieces = facing(problem, parts, where, pair, drawn)
-        plan = Plan()
+        plan = ComponentLayout()
         for piece, move in pieces:
             plan.places.update(zip(piece.part.members, map(move.point, piece.drawing.places), strict=True))
         rests = settled(problem, plan, pieces, pair, redraw)
@@ -203,13 +203,13 @@ def _unit(piece: Piece, kin: int, pair: Mapping[int, int]) -> Unit:
     return Unit(part.members, places, reach, kin, alone)
 
 
-def _resting(plan: Plan, piece: Piece) -> tuple[Piece, Move]:
+def _resting(plan: ComponentLayout, piece: Piece) -> tuple[Piece, FrameMove]:
     """Where a piece has come to stand."""
     first = piece.part.members[0]
     flip = (piece.part.image_of >= 0) != (min(piece.part.members) in plan.turned)
     x, y = plan.places[first]
-    dx, dy = Move((0.0, 0.0), flip).point(piece.drawing.places[0])
-    return piece, Move((x - dx, y - dy), flip)
+    dx, dy = FrameMove((0.0, 0.0), flip).point(piece.drawing.places[0])
+    return piece, FrameMove((x - dx, y - dy), flip)
 
 
 def _boxed(problem: LayoutProblem, part: Part, pair: Mapping[int, int]) -> LayoutProblem:
@@ -234,7 +234,7 @@ def _boxed(problem: LayoutProblem, part: Part, pair: Mapping[int, int]) -> Layou
 
 def _joined(
     problem: LayoutProblem,
-    plan: Plan,
+    plan: ComponentLayout,
     rests: Settled,
     units: Sequence[Unit],
     pair: Mapping[int, int],
@@ -269,7 +269,7 @@ def _joined(
     )
 
 
-def _boxes_within(rests: Settled) -> Iterator[tuple[tuple[int, ...], Move, Rect]]:
+def _boxes_within(rests: Settled) -> Iterator[tuple[tuple[int, ...], FrameMove, Rect]]:
     for piece, move in rests.pieces:
         for own, rect in piece.drawing.boxes:
             yield tuple(piece.part.members[m] for m in own), move, rect

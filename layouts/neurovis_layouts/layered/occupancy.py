@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from neurovis_layouts.pins import Cells
+from neurovis_layouts.pins import CentreCells
 from neurovis_spec.layout.frames import Rect
 from neurovis_spec.layout.model import RADIUS, LayoutRefusalError, Point
 
@@ -45,7 +45,7 @@ class Ground:
     """What has been put somewhere."""
 
     def __init__(self) -> None:
-        self._cells = Cells()
+        self._cells = CentreCells()
         self._points: list[Point] = []
         self._frames: list[tuple[Rect, Rect, Body]] = []
         self._bodies: list[tuple[Body, Point]] = []

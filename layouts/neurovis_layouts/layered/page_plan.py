@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 from neurovis_layouts.frame import from_picture, to_picture
-from neurovis_layouts.layered.drawing import Drawing, Move, Piece
+from neurovis_layouts.layered.drawing import Drawing, FrameMove, Piece
 from neurovis_layouts.layered.parts import Part, imaged
 from neurovis_spec.layout.frames import Rect
 from neurovis_spec.layout.geometry import distance, snap
@@ -131,7 +131,7 @@ def _together(problem: LayoutProblem, seat: Mapping[_Members, int]) -> dict[_Mem
 
 def facing(
     problem: LayoutProblem, parts: Sequence[Part], where: Mapping[int, int], pair: Mapping[int, int], drawn: Drawn
-) -> list[tuple[Piece, Move]]:
+) -> list[tuple[Piece, FrameMove]]:
     """Each part in the direction, and as the mirror image, in which the connections between parts are short and the
     page has its proportions, and where it stands. Copies of one instance are drawn in one direction, so that they are
     alike. Raises LayoutRefusalError where mirror images do not stand in mirrored cells."""
@@ -336,14 +336,14 @@ def _placed(
     parts: Sequence[Part],
     pieces: Sequence[Piece],
     flips: Sequence[bool],
-) -> list[tuple[Piece, Move]]:
+) -> list[tuple[Piece, FrameMove]]:
     """Columns as wide and rows as high as what stands in them, with streets between for connections; parts in the
     middle of theirs."""
     sizes = [_size(slot, pieces) for slot in slots]
     street = problem.neuron_spacing
     across = _edges([(slot.across, size[0]) for slot, size in zip(slots, sizes, strict=True)], street, True)
     along = _edges([(slot.along, size[1]) for slot, size in zip(slots, sizes, strict=True)], street, False)
-    moves: dict[int, Move] = {}
+    moves: dict[int, FrameMove] = {}
     for slot, size in zip(slots, sizes, strict=True):
         x = _middle(across, slot.across)
         y = _middle(along, slot.along) - size[1] / 2
@@ -351,13 +351,13 @@ def _placed(
             piece = pieces[line[0]]
             height = piece.rect[3] - piece.rect[1]
             offset = (piece.rect[2] - piece.rect[0] + _BESIDE) / 2 if len(line) > 1 else 0.0
-            mx, my = Move((0.0, 0.0), flips[line[0]]).point(piece.middle)
-            moves[line[0]] = Move((snap(x - offset - mx), snap(y + height / 2 - my)), flips[line[0]])
+            mx, my = FrameMove((0.0, 0.0), flips[line[0]]).point(piece.middle)
+            moves[line[0]] = FrameMove((snap(x - offset - mx), snap(y + height / 2 - my)), flips[line[0]])
             y += height + _BESIDE
     for k, part in enumerate(parts):
         if part.image_of >= 0:
             (dx, dy), flipped = moves[part.image_of].shift, moves[part.image_of].flip
-            moves[k] = Move((-dx + 0.0, dy), not flipped)
+            moves[k] = FrameMove((-dx + 0.0, dy), not flipped)
     return [(piece, moves[k]) for k, piece in enumerate(pieces)]
 
 

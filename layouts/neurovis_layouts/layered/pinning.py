@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 from neurovis_layouts.layered.axes import axes, imaged, shift_of
-from neurovis_layouts.layered.component_layout import Plan
-from neurovis_layouts.layered.drawing import Drawing, Move, Piece
+from neurovis_layouts.layered.component_layout import ComponentLayout
+from neurovis_layouts.layered.drawing import Drawing, FrameMove, Piece
 from neurovis_layouts.layered.occupancy import Body, Ground
 from neurovis_layouts.layered.overlap_removal import arranged
 from neurovis_layouts.layered.parts import images_of
@@ -39,7 +39,7 @@ class Settled:
     follow, and the axis."""
 
     places: list[Point]
-    pieces: list[tuple[Piece, Move]]
+    pieces: list[tuple[Piece, FrameMove]]
     shift: Point = (0.0, 0.0)
     moved: frozenset[int] = frozenset()
     axis: float = 0.0
@@ -55,7 +55,7 @@ class _Trial:
     pins: Mapping[int, Point]
     shift: Point
     held: list[Piece]
-    moves: list[Move]
+    moves: list[FrameMove]
     bodies: list[Body]
     shifted: AbstractSet[int]
     crowd: tuple[float, float]
@@ -63,8 +63,8 @@ class _Trial:
 
 def settled(
     problem: LayoutProblem,
-    plan: Plan,
-    pieces: Sequence[tuple[Piece, Move]],
+    plan: ComponentLayout,
+    pieces: Sequence[tuple[Piece, FrameMove]],
     pair: Mapping[int, int],
     redraw: Redraw,
 ) -> Settled:
@@ -110,7 +110,7 @@ def _remembering(redraw: Redraw) -> Redraw:
 def _best(
     problem: LayoutProblem,
     free: Sequence[Point],
-    pieces: Sequence[tuple[Piece, Move]],
+    pieces: Sequence[tuple[Piece, FrameMove]],
     pair: Mapping[int, int],
     redraw: Redraw,
 ) -> tuple[_Trial, list[Point]]:
@@ -140,7 +140,9 @@ def _best(
     return best
 
 
-def _turning(problem: LayoutProblem, pieces: Sequence[tuple[Piece, Move]], pair: Mapping[int, int]) -> Iterator[int]:
+def _turning(
+    problem: LayoutProblem, pieces: Sequence[tuple[Piece, FrameMove]], pair: Mapping[int, int]
+) -> Iterator[int]:
     """The pieces of which one neuron is pinned, itself or by its image, and that may be drawn as their mirror images
     instead."""
     pinned = problem.pins.keys() | {pair[i] for i in problem.pins if i in pair}
@@ -155,7 +157,7 @@ def _turning(problem: LayoutProblem, pieces: Sequence[tuple[Piece, Move]], pair:
 def _tried(
     problem: LayoutProblem,
     free: Sequence[Point],
-    pieces: Sequence[tuple[Piece, Move]],
+    pieces: Sequence[tuple[Piece, FrameMove]],
     pair: Mapping[int, int],
     redraw: Redraw,
     axis: float,
@@ -183,20 +185,20 @@ def _tried(
 
 def _held(
     problem: LayoutProblem,
-    pieces: Sequence[tuple[Piece, Move]],
+    pieces: Sequence[tuple[Piece, FrameMove]],
     pins: Mapping[int, Point],
     shift: Point,
     axis: float,
     redraw: Redraw,
     turned: AbstractSet[int],
-) -> tuple[list[Piece], list[Move]]:
+) -> tuple[list[Piece], list[FrameMove]]:
     """Every piece with its move; those with pins moved to them, or drawn anew. The pieces ``turned``, and their images,
     are drawn as their mirror images if the pins allow that."""
     found: list[Piece] = []
-    moves: list[Move] = []
+    moves: list[FrameMove] = []
     for number, (piece, move) in enumerate(pieces):
         own = {place: pins[m] for place, m in enumerate(piece.part.members) if m in pins}
-        wish = Move((move.shift[0] + shift[0], move.shift[1] + shift[1]), move.flip)
+        wish = FrameMove((move.shift[0] + shift[0], move.shift[1] + shift[1]), move.flip)
         if own:
             fitting = [
                 at for flip in (move.flip, not move.flip) if (at := _fitted(piece.drawing, own, flip)) is not None
@@ -206,17 +208,19 @@ def _held(
                 wish = fitting[-1 if original in turned else 0]
             elif piece.part.image_of >= 0:
                 piece = replace(found[piece.part.image_of], part=piece.part)
-                wish = Move((2 * axis - moves[piece.part.image_of].shift[0], 0.0), not moves[piece.part.image_of].flip)
+                wish = FrameMove(
+                    (2 * axis - moves[piece.part.image_of].shift[0], 0.0), not moves[piece.part.image_of].flip
+                )
             else:
-                piece, wish = redraw(piece, own), Move((0.0, 0.0))
+                piece, wish = redraw(piece, own), FrameMove((0.0, 0.0))
         found.append(piece)
         moves.append(wish)
     return found, moves
 
 
-def _fitted(drawing: Drawing, pins: Mapping[int, Point], flip: bool) -> Move | None:
+def _fitted(drawing: Drawing, pins: Mapping[int, Point], flip: bool) -> FrameMove | None:
     """The move that takes a drawing to its pins, if one does."""
-    turned = Move((0.0, 0.0), flip)
+    turned = FrameMove((0.0, 0.0), flip)
     apart = []
     for place, (x, y) in sorted(pins.items()):
         px, py = turned.point(drawing.places[place])
@@ -224,12 +228,12 @@ def _fitted(drawing: Drawing, pins: Mapping[int, Point], flip: bool) -> Move | N
     x, y = apart[0]
     if any(abs(x - dx) > _SLACK or abs(y - dy) > _SLACK for dx, dy in apart):
         return None
-    return Move((snap(x), snap(y)), flip)
+    return FrameMove((snap(x), snap(y)), flip)
 
 
-def _frames(pieces: Sequence[Piece], moves: Sequence[Move]) -> Iterator[Body]:
+def _frames(pieces: Sequence[Piece], moves: Sequence[FrameMove]) -> Iterator[Body]:
     for piece, move in zip(pieces, moves, strict=True):
-        turned = Move((0.0, 0.0), move.flip)
+        turned = FrameMove((0.0, 0.0), move.flip)
         offsets = tuple(turned.point(place) for place in piece.drawing.places)
         yield Body(piece.part.members, offsets, turned.rect(piece.rect), move.shift)
 

@@ -15,7 +15,7 @@ from itertools import pairwise
 from neurovis_layouts.routing.channel_search import WALLED, knots, straight, through, way
 from neurovis_layouts.routing.curves import Waypoint
 from neurovis_layouts.routing.ends import by_ends
-from neurovis_layouts.routing.rows import Rows
+from neurovis_layouts.routing.rows import OccupiedRows
 from neurovis_layouts.routing.walls import Frame
 from neurovis_spec.layout.geometry import sampled
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
@@ -103,8 +103,8 @@ class _Network:
         # what was planned to run where there is a foreign frame now finds its way round that
         self._gates = {i: line for i, line in gates.items() if i in edges and not _walled(edges[i], line, frames)}
         across = [(own, (r[1], r[0], r[3], r[2])) for own, r in frames]
-        self._down = Rows(centres, frames, len(edges), True)
-        self._side = Rows([(y, x) for x, y in centres], across, len(edges))
+        self._down = OccupiedRows(centres, frames, len(edges), True)
+        self._side = OccupiedRows([(y, x) for x, y in centres], across, len(edges))
         self._ways: dict[int, _Way] = {}
         self._between = by_ends(sorted(edges.items()))
         self.careful = len(edges) <= _MOST_CROSSED

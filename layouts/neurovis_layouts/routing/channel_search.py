@@ -16,7 +16,7 @@ import numpy as np
 
 from neurovis_layouts.routing.curves import Waypoint
 from neurovis_layouts.routing.lines import crossed
-from neurovis_layouts.routing.rows import Own, Rows, Span
+from neurovis_layouts.routing.rows import OccupiedRows, Own, Span
 from neurovis_spec.layout import FloatArray, IntArray
 from neurovis_spec.layout.model import Point
 
@@ -41,7 +41,7 @@ def straight(a: Point, b: Point) -> float:
     return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2) * (1 - 1e-9)
 
 
-def way(rows: Rows, ends: tuple[int, int], crossing: float = _CROSSING) -> tuple[float, list[Point]]:
+def way(rows: OccupiedRows, ends: tuple[int, int], crossing: float = _CROSSING) -> tuple[float, list[Point]]:
     """The cost of the best way, infinite where the ends are level, and its points: both ends, one in each row.
     ``crossing`` is what it costs to cross a line."""
     start, end = rows.centres[ends[0]], rows.centres[ends[1]]
@@ -54,7 +54,7 @@ def way(rows: Rows, ends: tuple[int, int], crossing: float = _CROSSING) -> tuple
     return _down(rows, start, end, own, crossing)
 
 
-def through(rows: Rows, ends: tuple[int, int], gates: Sequence[Waypoint]) -> list[Point]:
+def through(rows: OccupiedRows, ends: tuple[int, int], gates: Sequence[Waypoint]) -> list[Point]:
     """The points of the best way through these gates, from above to below or the other way round."""
     start, end = rows.centres[ends[0]], rows.centres[ends[1]]
     if start[1] > end[1]:
@@ -70,7 +70,9 @@ def through(rows: Rows, ends: tuple[int, int], gates: Sequence[Waypoint]) -> lis
     return [*path, *_down(rows, path[-1], end, own)[1][1:]]
 
 
-def _down(rows: Rows, start: Point, end: Point, own: Own, crossing: float = _CROSSING) -> tuple[float, list[Point]]:
+def _down(
+    rows: OccupiedRows, start: Point, end: Point, own: Own, crossing: float = _CROSSING
+) -> tuple[float, list[Point]]:
     """The cost of the best way down from one point to another, and its points: both ends, one in each row."""
     heights = [*rows.between(start[1], end[1], own), end[1]]
     line = [(_at(start, end, y), y) for y in heights]
@@ -103,7 +105,7 @@ def _down(rows: Rows, start: Point, end: Point, own: Own, crossing: float = _CRO
     return float(cost[0]), [start, *path[::-1]]
 
 
-def _open(rows: Rows, line: Sequence[Point], own: Own) -> bool:
+def _open(rows: OccupiedRows, line: Sequence[Point], own: Own) -> bool:
     """Whether a straight line runs through rows with room on both sides."""
     for x, y in line[1:-1]:
         free = rows.free(y, own)
@@ -215,7 +217,7 @@ def _step(a: FloatArray, b: FloatArray, dy: float) -> FloatArray:
     return result
 
 
-def knots(rows: Rows, path: Sequence[Point], ends: tuple[int, int], alone: bool) -> list[Waypoint]:
+def knots(rows: OccupiedRows, path: Sequence[Point], ends: tuple[int, int], alone: bool) -> list[Waypoint]:
     """The points of a way at which it bends; what lies on a line that is free is left out. One that is not ``alone``
     between its ends has two at least, so that it does not bulge across the others."""
     own = rows.own(*ends)
@@ -241,7 +243,7 @@ def _span(free: Sequence[Span], x: float) -> Span:
     return free[number] if free[number][0] <= x else (math.inf, -math.inf)
 
 
-def _reach(rows: Rows, path: FloatArray, limits: FloatArray, at: int) -> int:
+def _reach(rows: OccupiedRows, path: FloatArray, limits: FloatArray, at: int) -> int:
     """The farthest point of a way that can be reached straight from another: clear of what stands in the rows between,
     of other ways, and close to the way."""
     last = min(len(path) - 1, at + _FARTHEST)

@@ -17,7 +17,7 @@ from neurovis_spec.layout.model import Point
 _FEW = 64
 
 
-class Lines:
+class CutLines:
     """Lines, cut where they turn back."""
 
     def __init__(self) -> None:

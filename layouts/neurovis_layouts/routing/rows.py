@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from neurovis_layouts.routing.lines import Lines
+from neurovis_layouts.routing.lines import CutLines
 from neurovis_layouts.routing.walls import Frame
 from neurovis_spec.layout.model import Point
 
@@ -37,7 +37,7 @@ class _Row:
     free: dict[Own, list[Span]] = field(default_factory=dict)
 
 
-class Rows:
+class OccupiedRows:
     """Discs and frames by rows, and where ways run already."""
 
     def __init__(self, centres: Sequence[Point], frames: Sequence[Frame], ways: int, lined: bool = False) -> None:
@@ -45,7 +45,7 @@ class Rows:
         self.centres = centres
         self._lined = lined
         #: what is to be crossed as little as can be
-        self.lines = Lines()
+        self.lines = CutLines()
         self._frames = frames
         self._sorted = sorted((y, x, i) for i, (x, y) in enumerate(centres))
         self._ys = [y for y, _, _ in self._sorted]

@@ -30,7 +30,7 @@ from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import ConnectionModel
-from neurovis_spec.language.values import FileReference, Rows
+from neurovis_spec.language.values import FileReference, MatrixRows
 from neurovis_spec.language.yaml.source import Scalar
 
 #: Keys of a body that say which connections there are.
@@ -115,7 +115,7 @@ class EntryBuilder:
         delay = 1 if body.delay is None else self.constants.integer(body.delay, "a delay", 0, LONGEST_DELAY)
         sound = findings.errors
         with self.constants.following() as centre_cells:
-            centre = self._grid(body.centre, "centre") if isinstance(body.centre, (Rows, FileReference)) else None
+            centre = self._grid(body.centre, "centre") if isinstance(body.centre, (MatrixRows, FileReference)) else None
         shape = self._shape(centre)
         if shape is not None and findings.errors == sound and not len(shape.i):
             self._report_empty()
@@ -179,7 +179,7 @@ class EntryBuilder:
         self.constants.findings.error("too-many", self.key.span, message, "raise it with --limit")
         return False
 
-    def _grid(self, matrix: Rows | FileReference, purpose: str) -> Grid | None:
+    def _grid(self, matrix: MatrixRows | FileReference, purpose: str) -> Grid | None:
         by_target = self.body.rows is not None and self.body.rows.value == "to"
         n = None if self.sources is None or not self._kept("rows") else len(self.sources)
         m = None if self.targets is None or not self._kept("rows") else len(self.targets)
@@ -213,7 +213,7 @@ class EntryBuilder:
             i, j = np.nonzero(present)
             shape = _Shape(i, j, np.ascontiguousarray(grid.values[i, j]))
             return shape._replace(parts=self._cells(grid, cells, shape))
-        if isinstance(body.centre, (Rows, FileReference)):
+        if isinstance(body.centre, (MatrixRows, FileReference)):
             if centre is None:
                 return None
             i, j = np.nonzero(centre.present)

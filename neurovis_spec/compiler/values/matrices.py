@@ -17,7 +17,7 @@ from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import Findings, Span
-from neurovis_spec.language.values import FileReference, Matrix, Rows
+from neurovis_spec.language.values import FileReference, Matrix, MatrixRows
 from neurovis_spec.language.yaml.source import NULL
 
 
@@ -54,7 +54,7 @@ def grid_of(
 
 
 def _written(
-    matrix: Rows, n: int | None, m: int | None, by_target: bool, constants: Constants, stream: Stream
+    matrix: MatrixRows, n: int | None, m: int | None, by_target: bool, constants: Constants, stream: Stream
 ) -> Grid | None:
     findings = constants.findings
     cells = cells_of(matrix.node, findings, "a row of a matrix is a list")
