@@ -182,7 +182,7 @@ def _list_backends() -> None:
 def _check_format(output: Path | None) -> None:
     """Refuse a suffix that no format has before anything is run."""
     if output is not None:
-        from neurovis_spec.runtime.formats import for_path
+        from neurovis_spec.runtime.recording import for_path
 
         for_path(output)
 

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import AbstractContextManager, suppress
 from io import FileIO
 from pathlib import Path
-from typing import Protocol, TypeVar, runtime_checkable
+from typing import Protocol, runtime_checkable
 
-from neurovis_spec import plugins
 from neurovis_spec.runtime.csv_file import csv_size, finish_csv, held_csv, read_csv, recover_csv, stream_csv, write_csv
 from neurovis_spec.runtime.mcap_file import (
     finish_mcap,
@@ -35,29 +34,8 @@ from neurovis_spec.runtime.npz_file import (
     write_npz,
 )
 from neurovis_spec.runtime.parts import beside, is_written, rest, seize, shown, target_of
-from neurovis_spec.runtime.recording import Recording, RecordingError
+from neurovis_spec.runtime.recording import Format, Readable, Recording, RecordingError, for_path, read_by
 from neurovis_spec.runtime.rows import RowWriter, Steps
-
-
-@runtime_checkable
-class Readable(Protocol):
-    """What can be read: ``load`` raises RecordingError for what is no such recording. The suffix of a folder is ''."""
-
-    name: str
-    suffixes: frozenset[str]
-
-    def load(self, path: Path) -> Recording:
-        """Read a recording."""
-        ...
-
-
-@runtime_checkable
-class Format(Readable, Protocol):
-    """A file format: ``save`` writes all or nothing."""
-
-    def save(self, recording: Recording, path: Path) -> None:
-        """Write a recording."""
-        ...
 
 
 @runtime_checkable
@@ -207,29 +185,6 @@ class McapFormat:
         return read_mcap(path, run)
 
 
-_F = TypeVar("_F", bound=Readable)
-
-
-def for_path(path: str | os.PathLike[str]) -> Format:
-    """The format to write that the suffix names. Raises RecordingError where there is none."""
-    return _named(path, (made for made in plugins.working(plugins.FORMATS) if isinstance(made, Format)))
-
-
-def _named(path: str | os.PathLike[str], formats: Iterable[_F]) -> _F:
-    suffix = Path(path).suffix.lower()
-    known: set[str] = set()
-    for made in formats:
-        if suffix in made.suffixes:
-            return made
-        known |= made.suffixes - {""}
-    raise RecordingError(f"{os.fspath(path)}: no format has the suffix '{suffix}'; known: {', '.join(sorted(known))}")
-
-
-def save(recording: Recording, path: str | os.PathLike[str]) -> None:
-    """Write a recording in the format of the suffix. Raises RecordingError, OSError."""
-    for_path(path).save(recording, Path(path))
-
-
 def load(path: str | os.PathLike[str], run: int | None = None) -> Recording:
     """Read a recording in the format of the suffix, or a part of one, whose run has not come to its end; of several
     runs in one file the one with this number, from 1, by default the last.
@@ -242,7 +197,7 @@ def load(path: str | os.PathLike[str], run: int | None = None) -> Recording:
         format_ = for_path(target)
         if isinstance(format_, StreamingFormat):
             return format_.recover(path)
-    found = _named(path, (made for made in plugins.working(plugins.FORMATS) if isinstance(made, Readable)))
+    found = read_by(path)
     if isinstance(found, StreamingFormat):
         parts = beside(Path(os.path.realpath(path)), "part")
         if path.exists():

@@ -10,11 +10,12 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
-from neurovis_spec import arguments
+from neurovis_spec import arguments, plugins
 from neurovis_spec.arrays import FloatArray, IntArray, frozen
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import listed
@@ -282,9 +283,8 @@ class Recording:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a file of the format that the suffix names. Raises RecordingError, OSError."""
-        from neurovis_spec.runtime import formats
-
-        formats.save(self, arguments.path("path", path))
+        place = arguments.path("path", path)
+        for_path(place).save(self, place)
 
     def to_xarray(self) -> xr.Dataset:
         """A Dataset with the coordinates ``step``, ``seconds``, ``neuron``, ``connection``, ``state_name`` (see
@@ -339,6 +339,50 @@ class Recording:
         from neurovis_spec.runtime.traces import traces
 
         return traces(self)
+
+
+@runtime_checkable
+class Readable(Protocol):
+    """What can be read: ``load`` raises RecordingError for what is no such recording. The suffix of a folder is ''."""
+
+    name: str
+    suffixes: frozenset[str]
+
+    def load(self, path: Path) -> Recording:
+        """Read a recording."""
+        ...
+
+
+@runtime_checkable
+class Format(Readable, Protocol):
+    """A file format: ``save`` writes all or nothing."""
+
+    def save(self, recording: Recording, path: Path) -> None:
+        """Write a recording."""
+        ...
+
+
+_F = TypeVar("_F", bound=Readable)
+
+
+def for_path(path: str | os.PathLike[str]) -> Format:
+    """The format to write that the suffix names. Raises RecordingError where there is none."""
+    return _named(path, (made for made in plugins.working(plugins.FORMATS) if isinstance(made, Format)))
+
+
+def read_by(path: str | os.PathLike[str]) -> Readable:
+    """The format to read that the suffix names. Raises RecordingError where there is none."""
+    return _named(path, (made for made in plugins.working(plugins.FORMATS) if isinstance(made, Readable)))
+
+
+def _named(path: str | os.PathLike[str], formats: Iterable[_F]) -> _F:
+    suffix = Path(path).suffix.lower()
+    known: set[str] = set()
+    for made in formats:
+        if suffix in made.suffixes:
+            return made
+        known |= made.suffixes - {""}
+    raise RecordingError(f"{os.fspath(path)}: no format has the suffix '{suffix}'; known: {', '.join(sorted(known))}")
 
 
 def unknown(what: str, name: str, known: Iterable[str]) -> UnknownNameError:

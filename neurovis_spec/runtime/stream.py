@@ -20,11 +20,11 @@ from neurovis_spec.interrupts import Asked, Ended, deferred
 from neurovis_spec.progress import Progress
 from neurovis_spec.runtime.checkpoint import save_state
 from neurovis_spec.runtime.columns import Columns, columns_of
-from neurovis_spec.runtime.formats import StreamingFormat, for_path, settle
+from neurovis_spec.runtime.formats import StreamingFormat, settle
 from neurovis_spec.runtime.inputs import STRETCH
 from neurovis_spec.runtime.memory import check_disk
 from neurovis_spec.runtime.record import Course, InMemory, after, checked_steps, first_state, go, record_course
-from neurovis_spec.runtime.recording import After, Recording, recording_of
+from neurovis_spec.runtime.recording import After, Recording, for_path, recording_of
 from neurovis_spec.runtime.rows import RowWriter, Steps
 from neurovis_spec.runtime.state import State
 
@@ -57,7 +57,7 @@ def record_to(
     progress: Progress | None = None,
     checkpoint: Path | None = None,
 ) -> None:
-    """Run a network and write what ``record_course`` returns to a file. Raises what it and ``formats.save`` raise, and
+    """Run a network and write what ``record_course`` returns to a file. Raises what it and ``Recording.save`` raise,
     StoppedError after a signal, when the steps until then are in the file; KeyboardInterrupt where there are none, and
     after a second signal, which ends everything at once."""
     format_ = for_path(path)
