@@ -43,12 +43,12 @@ if TYPE_CHECKING:  # what only some stages need is imported there: a spec is val
 
 def read(path: Path, name: str, findings: Findings) -> SourceDocument | None:
     """YAML becomes values that know their line."""
-    return read_file(path, name, findings, mend=True)
+    return read_file(path, name, findings)
 
 
 def read_string(text: str, name: str, findings: Findings) -> SourceDocument | None:
     """The same for a text in memory."""
-    return read_text(text, name, findings, mend=True)
+    return read_text(text, name, findings)
 
 
 def shape(document: SourceDocument, findings: Findings) -> Spec | None:

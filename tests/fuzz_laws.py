@@ -32,7 +32,7 @@ from neurovis_spec.language.expressions.emit import emit
 from neurovis_spec.language.expressions.evaluate import evaluate
 from neurovis_spec.language.expressions.parser import ExpressionError, parse
 from neurovis_spec.language.expressions.tree import Binary, Call, Conditional, Draw, Tree, names, walk
-from neurovis_spec.language.format.format import format_read, format_text
+from neurovis_spec.language.format.canonical import format_read, format_text
 from neurovis_spec.language.yaml.characters import Lines
 from neurovis_spec.language.yaml.reader import read_text
 from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence

@@ -9,8 +9,8 @@ import pytest
 import yaml
 
 import neurovis_spec as nv
+from neurovis_spec.language.format.canonical import format_read
 from neurovis_spec.language.format.edit import put
-from neurovis_spec.language.format.format import format_read
 
 SPECS = Path(__file__).parents[1] / "specs"
 PIN, OTHER = ("layout", "positions", "O"), ("layout", "positions", "Q")

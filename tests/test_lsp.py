@@ -16,7 +16,7 @@ from pytest_lsp import ClientServerConfig, LanguageClient
 from test_lsp_answers import BASE, REST
 
 from neurovis_spec.diagnostics import Findings
-from neurovis_spec.language.format.format import format_text
+from neurovis_spec.language.format.canonical import format_text
 
 SPEC = BASE + REST
 

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from lsp_marks import MARK, marked
 
 from neurovis_spec.diagnostics import Findings, Span
-from neurovis_spec.language.yaml.reader import read_text
-from neurovis_spec.lsp.outline import Item, item_at, outline
+from neurovis_spec.language.yaml.reader import read_any, read_text
+from neurovis_spec.lsp.cursor import where
+from neurovis_spec.lsp.outline import item_at, outline
 from neurovis_spec.lsp.rename import apply, rename
 from neurovis_spec.lsp.text import Place, Text, holds
-from neurovis_spec.lsp.tolerant import outline_of_text, where
 
 ROOT = Path(__file__).parents[1]
 SPECS = sorted([*ROOT.glob("specs/**/*.yaml"), *ROOT.glob("neurovis_spec/library/*.yaml")])
@@ -56,21 +56,12 @@ def test_a_span_holds_its_end() -> None:
     assert not holds(span, Place(1, 4))
 
 
-def plain(items: list[Item]) -> set[tuple[object, ...]]:
-    """What can be compared: a description may be folded, which the tolerant scan does not read."""
-    return {
-        (item.path, item.is_key, item.text, item.span)
-        for item in items
-        if item.span.line == item.span.end_line and item.path[-1] != "description"
-    }
-
-
 @pytest.mark.parametrize("path", SPECS, ids=lambda path: path.name)
-def test_the_tolerant_outline_of_a_sound_text_is_the_exact_one(path: Path) -> None:
+def test_of_a_sound_text_there_is_all(path: Path) -> None:
     source = path.read_text(encoding="utf-8")
     document = read_text(source, "x", Findings())
     assert document is not None
-    assert plain(list(outline_of_text(Text(source), "x"))) == plain(list(outline(document.root)))
+    assert read_any(source, "x") == document.root
 
 
 @pytest.mark.parametrize("path", SPECS, ids=lambda path: path.name)
@@ -101,8 +92,9 @@ def test_long_lists_of_edges_are_packed_and_still_found() -> None:
 @given(TEXTS, st.integers(1, 6), st.integers(1, 12))
 def test_no_text_is_too_broken_to_look_at(source: str, line: int, column: int) -> None:
     text = Text(source)
-    for item in outline_of_text(text, "x"):
-        assert text.part(item.span) != ""
+    root = read_any(text.text, "x")
+    for item in () if root is None else outline(root):
+        assert text.part(item.span) or item.scalar.value is None
     where(text, Place(min(line, len(text.lines.starts)), column))
 
 
@@ -136,4 +128,4 @@ def test_nothing_is_looked_for_in_a_block_of_text() -> None:
     document, place = marked("description: |\n  K ¦ text\nname: x")
     assert where(document.text, place) is None
     assert MARK not in document.source
-    assert [item.path for item in outline_of_text(document.text, "x")] == [("description",), ("name",), ("name",)]
+    assert [item.path for item in document.items if item.is_key] == [("description",), ("name",)]

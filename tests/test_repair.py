@@ -9,9 +9,8 @@ import pytest
 
 import neurovis_spec as nv
 from neurovis_spec.diagnostics import Findings
-from neurovis_spec.language.yaml.characters import Lines
 from neurovis_spec.language.yaml.reader import read_text
-from neurovis_spec.language.yaml.repair import LARGEST_MENDED, MOST_MENDED, faulty_value, left_out
+from neurovis_spec.language.yaml.source import Scalar
 
 SPECS = sorted((Path(__file__).parent.parent / "specs").glob("*.yaml"))
 #: What the reader itself says of characters that begin no text.
@@ -41,7 +40,7 @@ def test_what_stands_before_and_behind_is_found_too() -> None:
         ),
         ("neurons:\n  A: {bias: 'one\n  B: {bias: 2}\nconnections: {A -> B: 1, B -> A: x}", ["4:13", "6:34"]),
         ("neurons: {A: {bias: 1}}\nconnections:\n  A -> A: [[1, 2], [3 4]", ["5:11 yaml-syntax"]),
-        ("neurons:\n  A:{bias: 1, size: 2}\n  B: {bais: 1}\nconnections: {A -> B: 1}", ["4:19 yaml", "5:7"]),
+        ("neurons:\n  A:{bias: 1, size: 2}\n  B: {bais: 1}\nconnections: {A -> B: 1}", ["4:4 yaml", "5:7"]),
         ("neurons: {A: {bias: 1}}\nevents:\n  - {at: 1, lesion: A\n  - {at: 2, lesion: B}", ["5:5", "6:21"]),
         ("neurons: {A: {bias: 1}}\nlayout: [\n", ["4:9 yaml-syntax"]),
     ],
@@ -84,53 +83,38 @@ def test_one_slip_in_a_sound_spec_is_all_that_is_said(path: Path) -> None:
     assert slips > 5
 
 
-def test_both_parsers_leave_out_the_same() -> None:
-    text = 'a: 1\nb: [1, 2\nc: {d: @e}\nf: "x\n  - y\ng: 3\n'
-    results = []
-    for pure in (False, True):
-        findings = Findings()
-        document = read_text(text, "x", findings, pure=pure, mend=True)
-        assert document is not None
-        assert [entry.name for entry in document.root.entries] == ["a", "b", "c", "f", "g"]
-        results.append((document, findings.sorted()))
-    assert results[0] == results[1]
-    assert [item.span.line for item in results[0][1]] == [2, 3, 4]
-
-
-def test_who_does_not_ask_for_it_gets_no_document() -> None:
+def lost(text: str) -> tuple[list[str], list[str]]:
+    """The keys of a text at the top, a lost value marked by a ``?`` behind its key, and the places of its findings."""
     findings = Findings()
-    assert read_text("a: [1\nb: 2\n", "x", findings) is None
-    assert [item.code for item in findings.sorted()] == ["yaml-syntax"]
-
-
-def test_there_is_an_end_to_it() -> None:
-    findings = Findings()
-    many = "".join(f"k{number}: @\n" for number in range(MOST_MENDED + 5))
-    assert read_text(many, "x", findings, mend=True) is None
-    assert len(findings.sorted()) == MOST_MENDED + 1
-    findings = Findings()
-    large = "a: @\n" + "# \n" * (LARGEST_MENDED // 3 + 1)
-    assert read_text(large, "x", findings, mend=True) is None
-    assert len(findings.sorted()) == 1
+    document = read_text(text, "x", findings)
+    places = [f"{item.span.line}:{item.span.column}" for item in findings.sorted()]
+    entries = () if document is None else document.root.entries
+    return [entry.name + "?" * (entry.value == Scalar(True, entry.value.span, None)) for entry in entries], places
 
 
 @pytest.mark.parametrize(
-    ("text", "line", "expected"),
+    ("text", "names", "places"),
     [
-        ("a: [1\nb: 2\n", 1, "a: ~ \nb: 2\n"),
-        ("a:\n  - {b: [\n     1}\n  - c\n", 2, "a:\n  - ~    \n       \n  - c\n"),
-        ("  time:{dt: 1}\n", 1, "  time: ~     \n"),
-        ("  time  {dt: 1}\n", 1, "  time: ~      \n"),
-        ('"k: l": @x\n', 1, '"k: l": ~ \n'),
+        ('a: 1\nb: [1, 2\nc: {d: @e}\nf: "x\n  - y\ng: 3\n', ["a", "b?", "c?", "f?", "g"], ["2:4", "3:8", "4:4"]),
+        ("a: [1\nb: 2\n", ["a?", "b"], ["1:4"]),
+        ("a: {b: 1 c: 2,\n  d: [3}\n}\ne: 4\n", ["a?", "e"], ["1:11"]),
+        ("a:\n  - {b: [\n     1}\n  - c\nd: @\n", ["a", "d?"], ["3:7", "5:4"]),
+        ("time:{dt: 1, size: 2}\nb: 1\n", ["time?", "b"], ["1:5"]),
+        ('"k: l": @x\nb: 1\n', ["k: l?", "b"], ["1:9"]),
+        ("a: 'one\nb: it's\nc: 'two'\n", ["a?", "b", "c"], ["1:4"]),
+        ("a:\n  'b: 1\n  c: 2\nd: 3\n", ["a?", "d"], ["2:3"]),
     ],
 )
-def test_the_stretch_that_is_left_out(text: str, line: int, expected: str) -> None:
-    stretch = faulty_value(Lines(text), line)
-    assert stretch is not None
-    assert left_out(text, stretch) == expected
-    assert expected[stretch.unread] == "~"
+def test_what_a_syntax_error_costs(text: str, names: list[str], places: list[str]) -> None:
+    assert lost(text) == (names, places)
 
 
-@pytest.mark.parametrize("text", ["just a text\n", "# a: b\n", "\n", "a: ~\n", "a:\n"])
-def test_where_no_value_can_be_told(text: str) -> None:
-    assert faulty_value(Lines(text), 1) is None
+@pytest.mark.parametrize("text", ["a: 1\nb 2\nc: @\n", "a:\n    b: 1\n  c: 2\n", "a: 1\n- b\nc: @\n", "  a: 1\nb: 2\n"])
+def test_where_nobody_can_tell_what_is_missing_that_alone_is_said(text: str) -> None:
+    names, places = lost(text)
+    assert (names, len(places)) == ([], 1)
+
+
+def test_all_syntax_errors_are_said() -> None:
+    names, places = lost("".join(f"k{number}: @\n" for number in range(300)))
+    assert (len(names), len(places)) == (300, 300)

@@ -80,7 +80,7 @@ def _read(spec: str) -> str:
 
 
 def _formatted(spec: str, text: str) -> str:
-    from neurovis_spec.language.format.format import FormattingError, format_read
+    from neurovis_spec.language.format.canonical import FormattingError, format_read
 
     try:
         return format_read(text)

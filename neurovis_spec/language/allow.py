@@ -1,23 +1,20 @@
 """Comments that silence: ``# neurovis: allow CODE`` at the end of a line, or several codes with commas between.
 
 In: the findings, with the texts that were read. Out: the same without the warnings that are allowed on their line, and
-with a warning for each allow that allows nothing. What a comment is the YAML scanner says: a text that holds these
-words is none. Behind another ``#`` the comment may say why.
+with a warning for each allow that allows nothing. What a comment is the reader says: a text that holds these words is
+none. Behind another ``#`` the comment may say why.
 """
 
 from __future__ import annotations
 
 import re
-from bisect import bisect_right
-from collections.abc import Iterator
 from itertools import islice
 from typing import Final, NamedTuple
 
-import yaml
-
 from neurovis_spec.codes import VALIDATE, catalogue
 from neurovis_spec.diagnostics import Diagnostic, Findings, Span, suggest
-from neurovis_spec.language.yaml.characters import FORBIDDEN, REPLACEMENT, Lines
+from neurovis_spec.language.yaml.characters import Lines
+from neurovis_spec.language.yaml.reader import comments
 
 USELESS: Final = "useless-allow"
 _MOST: Final = 1000  # of these in a spec; nobody reads what more would say
@@ -39,55 +36,28 @@ def allows(text: str, file: str) -> tuple[Allow, ...]:
     >>> [(allow.code, allow.span.line) for allow in allows("a: '# neurovis: allow x'  # neurovis: allow y, z", "f")]
     [('y', 1), ('z', 1)]
     """
-    matches = list(islice(_ALLOW.finditer(text), _MOST))
-    if not matches:
+    if _ALLOW.search(text) is None:
         return ()
     lines = Lines(text)
-    texts = _Texts(text)
     result: list[Allow] = []
-    for match in matches:
-        line, column = lines.place(match.start())
-        if (line, column) in texts:
-            continue
-        offset = match.start("codes") - match.start()
-        found = [
-            Allow(code.group(), _on(file, line, column + offset + code.start(), len(code.group())))
-            for code in islice(_CODE.finditer(match["codes"]), _MOST)
-        ]
-        result += found or [Allow("", _on(file, line, column, len(match.group().rstrip())))]
+    for begin in comments(text):
+        for match in _ALLOW.finditer(lines.line(lines.place(begin)[0]), lines.place(begin)[1] - 1):
+            result += _codes(match, file, lines.place(begin)[0])
         if len(result) >= _MOST:
             break
     return tuple(result[:_MOST])
 
 
+def _codes(match: re.Match[str], file: str, line: int) -> list[Allow]:
+    """The codes that a comment on a line names."""
+    begin = match.start("codes") + 1
+    found = islice(_CODE.finditer(match["codes"]), _MOST)
+    codes = [Allow(code.group(), _on(file, line, begin + code.start(), len(code.group()))) for code in found]
+    return codes or [Allow("", _on(file, line, match.start() + 1, len(match.group().rstrip())))]
+
+
 def _on(file: str, line: int, column: int, length: int) -> Span:
     return Span(file, line, column, line, column + length)
-
-
-class _Texts:
-    """The places of a YAML text that lie in a value or a key, where ``#`` begins no comment."""
-
-    def __init__(self, text: str) -> None:
-        self._ranges = list(_scalars(FORBIDDEN.sub(REPLACEMENT, text)))
-
-    def __contains__(self, place: tuple[int, int]) -> bool:
-        at = bisect_right(self._ranges, place, key=lambda ends: ends[0]) - 1
-        return at >= 0 and place < self._ranges[at][1]
-
-
-def _scalars(text: str) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
-    """First and last place (exclusive) of each scalar, as far as the text can be scanned. The line on which a block
-    scalar is announced belongs to it no more than its indentation does."""
-    loader = yaml.CLoader if yaml.__with_libyaml__ else yaml.Loader
-    try:
-        for token in yaml.scan(text, Loader=loader):
-            if isinstance(token, yaml.ScalarToken):
-                first, last = token.start_mark, token.end_mark
-                block = token.style in ("|", ">")
-                begin = (first.line + 2, 1) if block else (first.line + 1, first.column + 1)
-                yield begin, (last.line + 1, last.column + 1)
-    except yaml.YAMLError:
-        return
 
 
 def silence(findings: Findings) -> None:

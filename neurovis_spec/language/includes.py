@@ -95,7 +95,7 @@ class _Reader:
             self.findings.error(data.code, path.span, f"the file '{shorten(path.value)}' {data.reason}")
             return False
         name = os.path.normpath(Path(file).parent / path.value)
-        document = read_content(data, name, self.findings, mend=True)
+        document = read_content(data, name, self.findings)
         model = None if document is None else read_included(document, self.findings)
         if model is None:
             return False

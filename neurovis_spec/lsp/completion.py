@@ -1,7 +1,7 @@
 """What may be written at a place: keys with what they mean, names that fit there, words.
 
 In: a Document and a place in it. Out: Completions, each with the stretch of the text that it replaces. The text is most
-often broken when somebody types, so all goes by ``tolerant.where``.
+often broken when somebody types, so all goes by ``cursor.where``.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from neurovis_spec.language.patterns import PATTERNS
 from neurovis_spec.language.places import keys_at, role_of, words_at
 from neurovis_spec.language.ros_types import all_types, numbers_of
 from neurovis_spec.language.templates import Hole, pieces
+from neurovis_spec.lsp.cursor import Where, where
 from neurovis_spec.lsp.definitions import Definition, known
 from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.index import Index
@@ -27,7 +28,6 @@ from neurovis_spec.lsp.names import Name
 from neurovis_spec.lsp.outline import Path
 from neurovis_spec.lsp.scopes import Scope, scope_of
 from neurovis_spec.lsp.text import Place
-from neurovis_spec.lsp.tolerant import Where, where
 from neurovis_spec.lsp.words import THEMES, functions
 
 _WORD = re.compile(r"(?:(?<![\w.])[A-Za-z_]\w*\.(?!\.))*(?:(?<!\w)[A-Za-z_]\w*)?$", re.ASCII)

@@ -6,7 +6,7 @@ In: a Document. Out: one edit of the whole text; none where the text cannot be r
 from __future__ import annotations
 
 from neurovis_spec.diagnostics import Findings
-from neurovis_spec.language.format.format import format_text
+from neurovis_spec.language.format.canonical import format_text
 from neurovis_spec.lsp.document import Document
 from neurovis_spec.lsp.rename import Edit
 

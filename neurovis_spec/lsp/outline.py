@@ -1,7 +1,7 @@
 """The outline of a document: every key and every text in it, with the keys that lead there.
 
-In: a SourceDocument, or the text of one that cannot be read at this moment (``tolerant``). Out: Items in the order of
-the document. Numbers in long packed lists are left out: nobody asks for their names.
+In: what was read of a text. Out: Items in the order of the document. Numbers in long packed lists are left out: nobody
+asks for their names.
 """
 
 from __future__ import annotations
@@ -63,29 +63,41 @@ def outline(node: Node, path: Path = (), edges: bool = True) -> Iterator[Item]:
             yield Item(path, node, False, node.span)
 
 
-def item_at(node: Node, place: Place, path: Path = ()) -> Item | None:
-    """The key or the text at a place; only the nodes around it are checked."""
-
-    def _first(parts: Iterable[tuple[Node, str | int]]) -> Item | None:
-        # A block ends where the next begins, so that a place may be in two.
-        found = (item_at(part, place, (*path, name)) for part, name in parts if holds(part.span, place))
-        return next((item for item in found if item is not None), None)
-
+def nodes_at(node: Node, place: Place, path: Path = ()) -> list[tuple[Path, Node, bool]]:
+    """The values around a place, from the outermost to the key or the text there, each with the keys that lead to it
+    and whether it is a key; nothing where there is none. Only the nodes around the place are checked."""
+    here: tuple[Path, Node, bool] = path, node, False
     match node:
         case Mapping(entries=entries):
             for entry in entries:
                 if holds(entry.key.span, place):
-                    return Item((*path, entry.name), entry.key, True, entry.key.span)
-            return _first((entry.value, entry.name) for entry in entries)
+                    return [here, ((*path, entry.name), entry.key, True)]
+            return _below(here, ((entry.value, entry.name) for entry in entries), place)
         case Sequence(items=items):
-            return _first((item, index) for index, item in enumerate(items))
+            return _below(here, ((item, index) for index, item in enumerate(items)), place)
         case Packed(lines=lines):
             for cell in range(bisect_left(lines, place.line), bisect_right(lines, place.line)):
                 if node.columns[cell] <= place.column <= node.ends[cell]:
-                    return Item((*path, *_indices(node, cell)), node.cell(cell), False, node.cell(cell).span)
-        case Scalar():
-            return Item(path, node, False, node.span)
-    return None
+                    return [here, ((*path, *_indices(node, cell)), node.cell(cell), False)]
+            return []
+    return [here]
+
+
+def _below(
+    here: tuple[Path, Node, bool], parts: Iterable[tuple[Node, str | int]], place: Place
+) -> list[tuple[Path, Node, bool]]:
+    # A block ends where the next begins, so that a place may be in two.
+    found = (nodes_at(part, place, (*here[0], name)) for part, name in parts if holds(part.span, place))
+    return next(([here, *below] for below in found if below), [])
+
+
+def item_at(root: Node, place: Place) -> Item | None:
+    """The key or the text at a place."""
+    found = nodes_at(root, place)
+    if not found:
+        return None
+    path, node, is_key = found[-1]
+    return Item(path, node, is_key, node.span) if isinstance(node, Scalar) else None
 
 
 def _indices(node: Packed, cell: int) -> Path:

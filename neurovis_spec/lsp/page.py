@@ -1,24 +1,22 @@
 """A text by itself: what is written in it, sound or not, without what it includes.
 
-In: a text and the name of its file. Out: the Items and Names, exact where the text can be read, guessed where it
-cannot. What other files declare is joined to it in ``document``.
+In: a text and the name of its file. Out: the Items and Names. What other files declare is joined to it in ``document``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
+from collections.abc import Mapping as Values
 from dataclasses import dataclass
 from functools import cached_property
 
-from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.places import LIBRARY_ALONE, SPEC_ALONE
-from neurovis_spec.language.yaml.reader import read_text
-from neurovis_spec.language.yaml.source import SourceDocument
+from neurovis_spec.language.yaml.reader import read_any
+from neurovis_spec.language.yaml.source import Mapping, Node
 from neurovis_spec.lsp.definitions import builtin_signals
 from neurovis_spec.lsp.index import Index
 from neurovis_spec.lsp.outline import Item, item_at, outline
-from neurovis_spec.lsp.text import Place, Text, holds
-from neurovis_spec.lsp.tolerant import outline_of_text
+from neurovis_spec.lsp.text import Place, Text
 
 
 @dataclass(frozen=True)
@@ -35,21 +33,20 @@ class Page:
         return Text(self.source, self.encoding)
 
     @cached_property
-    def read(self) -> SourceDocument | None:
-        """The values that know their places; None where the text cannot be read at this moment."""
-        return read_text(self.text.text, self.file, Findings())
+    def root(self) -> Node | None:
+        """The values that know their places, as far as the text can be read at this moment."""
+        root = read_any(self.text.text, self.file)
+        return root if isinstance(root, Mapping) else None
 
     @cached_property
     def items(self) -> tuple[Item, ...]:
         """All keys and texts, but those in lists of edges."""
-        if self.read is None:
-            return outline_of_text(self.text, self.file)
-        return tuple(outline(self.read.root, edges=False))
+        return () if self.root is None else tuple(outline(self.root, edges=False))
 
     @cached_property
     def whole(self) -> tuple[Item, ...]:
         """All keys and texts."""
-        return self.items if self.read is None else tuple(outline(self.read.root))
+        return () if self.root is None else tuple(outline(self.root))
 
     @cached_property
     def includes(self) -> tuple[Item, ...]:
@@ -67,13 +64,11 @@ class Page:
         """What it declares, without other files: enough to look declarations up in it."""
         return self.index(())
 
-    def index(self, others: Iterable[Index], sizes: Mapping[str, int] | None = None, *, whole: bool = False) -> Index:
+    def index(self, others: Iterable[Index], sizes: Values[str, int] | None = None, *, whole: bool = False) -> Index:
         """All names of the text, which may lead to those of others; without ``whole`` not those in lists of edges."""
         items = self.whole if whole else self.items
         return Index(items, self.text, self.file, sizes or {}, builtin_signals(), tuple(others))
 
     def item_at(self, place: Place) -> Item | None:
         """The key or the text at a place."""
-        if self.read is not None:
-            return item_at(self.read.root, place)
-        return next((item for item in self.items if holds(item.span, place)), None)
+        return None if self.root is None else item_at(self.root, place)

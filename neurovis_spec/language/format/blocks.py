@@ -6,12 +6,28 @@ In: a text as written. Out: its lines, from which a text of the same value can b
 from __future__ import annotations
 
 import re
-from typing import Final
+from typing import Final, NamedTuple
 
-from neurovis_spec.language.format.between import Comment
-from neurovis_spec.language.format.tree import Block, Lines
+from neurovis_spec.language.format.gaps import Comment
 
 _HEADER: Final = re.compile(r"([|>])([-+0-9]*)([ \t]*)(#[^\n]*)?")
+_BLANK_LINES: Final = re.compile(r"[ \t]*(?:\n *(?=\n|\Z))*")
+
+
+class Lines(NamedTuple):
+    """A plain or quoted text over several lines, each without the blanks around it; a blank line is empty."""
+
+    lines: tuple[str, ...]
+
+
+class Block(NamedTuple):
+    """A text behind | or >: the header, a comment on its line, the lines without their common indentation, and the
+    index behind it."""
+
+    header: str
+    comment: Comment | None
+    lines: tuple[str, ...]
+    end: int
 
 
 def read_lines(written: str) -> Lines:
@@ -34,33 +50,25 @@ def _without_blanks(line: str, escapes: bool) -> str:
     return bare
 
 
-def read_block(text: str, start: int, stop: int, column: int) -> tuple[Block, int]:
-    """A text behind | or >, in a collection that stands in ``column``. Returns it and the index behind it.
-
-    That is behind its last line with something on it; with ``+`` (all line breaks count) behind its last line break.
-    """
+def read_block(text: str, start: int, stop: int, column: int) -> Block:
+    """A text behind | or >, whose last line with something on it ends at ``stop``, in a collection that stands in
+    ``column``. With ``+``, where all line breaks count, the blank lines below belong to it."""
     header = _HEADER.match(text, start)
     assert header is not None
     comment = None
     if header.group(4) is not None:
         place = header.start(4) - text.rfind("\n", 0, start) - 1
         comment = Comment(header.group(4).rstrip(), place, len(header.group(3)))
-    head_end = text.index("\n", start)
-    raw = text[head_end + 1 : stop].split("\n")
-    if raw[-1].strip(" ") == "":
-        raw.pop()  # what is behind the last line break is no line of the text
+    sign = "".join(re.findall("[-+]", header.group(2)))
+    if sign == "+":
+        blank = _BLANK_LINES.match(text, stop)
+        assert blank is not None
+        stop = blank.end()
+    raw = text[header.end() + 1 : stop].split("\n")
     digit = re.sub("[-+]", "", header.group(2))
     indent = column + int(digit) if digit else _common(raw)
-    lines = [line[indent:] for line in raw]
-    sign = "".join(re.findall("[-+]", header.group(2)))
-    written = header.group(1) + ("2" if digit else "") + sign
-    if sign == "+":
-        behind = head_end + 1 + sum(len(line) + 1 for line in raw) if raw else head_end
-        return Block(written, comment, tuple(lines)), behind
-    while lines and not lines[-1]:
-        lines.pop()
-    end = head_end + sum(len(line) + 1 for line in raw[: len(lines)])
-    return Block(written, comment, tuple(lines)), end
+    lines = tuple(line[indent:] for line in raw) if stop > header.end() else ()
+    return Block(header.group(1) + ("2" if digit else "") + sign, comment, lines, stop)
 
 
 def _common(lines: list[str]) -> int:

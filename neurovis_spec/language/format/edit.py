@@ -1,26 +1,38 @@
 """Editing a spec as an author would: values are put where keys lead, and every comment stays.
 
-In: the text of a spec and values by their keys. Out: the text, canonically formatted, in which they stand.
+In: the text of a spec and values by their keys. Out: the text, canonically formatted, in which they stand. Stretches of
+the text are replaced; where blanks and line breaks belong is the formatter's concern.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from collections.abc import Mapping as Values
-from typing import Final, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
-from neurovis_spec.language.format.between import NONE, Comment, Gap, joined
-from neurovis_spec.language.format.layout import print_document
-from neurovis_spec.language.format.parse import TreeReader
-from neurovis_spec.language.format.tree import Entry, Flow, Item, Lines, Listing, Mapping, Node, Row
-from neurovis_spec.language.yaml.reader import event_source
+from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.format.canonical import format_read, with_line_feeds
+from neurovis_spec.language.format.gaps import read_gap
+from neurovis_spec.language.format.printer import Source, is_empty
+from neurovis_spec.language.yaml.reader import read_text
+from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence
 
 #: The keys that lead to a value.
 Path: TypeAlias = tuple[str, ...]
 #: A value as it is written: a scalar, or the cells of a list.
 Value: TypeAlias = "str | tuple[str, ...]"
+#: Values by their keys, and by the keys below these.
+_Tree: TypeAlias = "dict[str, _Tree | Value]"
 
-_BLANK: Final = Gap(None, (), True, True)
 _STEP: Final = 2
+
+
+class _Edit(NamedTuple):
+    """A text in place of the characters from one index to another."""
+
+    start: int
+    stop: int
+    text: str
 
 
 def put(text: str, values: Values[Path, Value]) -> str:
@@ -34,107 +46,134 @@ def put(text: str, values: Values[Path, Value]) -> str:
       positions:
         O: [1, 0.5]
     """
-    plain = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
-    plain += "" if plain.endswith("\n") else "\n"
-    document = TreeReader(plain, event_source(plain)).document()
+    tree: _Tree = {}
     for path, value in values.items():
-        root, taken = _put(document.root, path, value, 0, document.end.trailing)
-        document = document._replace(root=root, end=_without(document.end, taken))
-    return print_document(document)
+        below = tree
+        for key in path[:-1]:
+            inner = below.setdefault(key, {})
+            assert isinstance(inner, dict)
+            below = inner
+        below[path[-1]] = value
+    plain = with_line_feeds(text)
+    document = read_text(plain, "", Findings())
+    assert document is not None
+    edits = sorted(_Editor(Source(plain)).edits(document.root, tree))
+    for start, stop, written in reversed(edits):
+        plain = plain[:start] + written + plain[stop:]
+    return format_read(plain)
 
 
-def _put(node: Node, path: Path, value: Value, column: int, behind: Comment | None) -> tuple[Node, bool]:
-    """The node with the value; ``column`` is where a block in its place would stand, ``behind`` a comment behind it on
-    its last line. Also gives whether that comment is now within the node, on the line that it was about."""
-    if not path:
-        return _replaced(node, value), False
-    if isinstance(node, Mapping):
-        return _put_in_block(node, path, value, behind)
-    if isinstance(node, Flow) and node.brackets[0] == "{":
-        if _commented(node) or column == 0:
-            return _put_in_braces(node, path, value), False
-        block, comment = _block(node, column), behind
-    else:  # nothing, or what cannot be meant
-        block, comment = Mapping(column, ()), behind
-    found, _ = _put_in_block(block, path, value, None)
-    first = found.entries[0]
-    return found._replace(entries=(_after(first, comment), *found.entries[1:])), comment is not None
+class _Editor:
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        self._text = source.text
+
+    def edits(self, root: Mapping, tree: _Tree) -> Iterator[_Edit]:
+        """What is to change in the text."""
+        if self._source.is_block(root):
+            yield from self._in_block(root, tree)
+        else:
+            yield from self._in_braces(root, tree)
+
+    def _in_block(self, node: Mapping, tree: _Tree) -> Iterator[_Edit]:
+        column = node.span.column - 1
+        for name, value in tree.items():
+            entry = node.entry(name)
+            if entry is not None:
+                yield from self._replaced(entry.key, entry.value, value, column)
+        new = {name: value for name, value in tree.items() if node.entry(name) is None}
+        if new:
+            apart = "\n" if column == 0 and self._has_blank_lines(node) else ""
+            yield self._below(self._source.end(node), apart + _block(new, column))
+
+    def _has_blank_lines(self, node: Mapping) -> bool:
+        """Whether some entries stand apart from those above them."""
+        ends = (self._source.end(entry.value) for entry in node.entries)
+        begins = (self._source.begin(entry.key) for entry in node.entries[1:])
+        return any(read_gap(self._text, end, begin).blank for end, begin in zip(ends, begins, strict=False))
+
+    def _below(self, at: int, lines: str) -> _Edit:
+        """Lines below that of an index."""
+        end = self._text.index("\n", at) + 1
+        return _Edit(end, end, lines)
+
+    def _replaced(self, key: Scalar, node: Node, value: _Tree | Value, column: int) -> Iterator[_Edit]:
+        """A value in place of that of a key which stands in a column of a block."""
+        begin, end = self._source.begin(node), self._source.end(node)
+        if not isinstance(value, dict):
+            yield from self._written(node, value)
+        elif isinstance(node, Mapping) and self._source.is_block(node):
+            yield from self._in_block(node, value)
+        elif isinstance(node, Mapping) and self._commented(node):
+            yield from self._in_braces(node, value)
+        else:  # braces become a block; what is no mapping cannot be meant
+            entries = _block_of(node, self._source, value, column + _STEP)
+            while self._text[begin - 1] == " ":
+                begin -= 1
+            yield _Edit(begin, end, "")
+            yield self._below(end, entries)
+
+    def _written(self, node: Node, value: Value) -> Iterator[_Edit]:
+        """A value that is written out; comments between the items of a list stay."""
+        begin, end = self._source.begin(node), self._source.end(node)
+        items = node.items if isinstance(node, Sequence | Packed) else ()
+        if isinstance(value, tuple) and len(items) == len(value):
+            for item, cell in zip(items, value, strict=True):
+                yield _Edit(self._source.begin(item), self._source.end(item), cell)
+        else:
+            yield _Edit(begin, end, (" " if is_empty(node) else "") + _flow(value))
+
+    def _in_braces(self, node: Mapping, tree: _Tree) -> Iterator[_Edit]:
+        for name, value in tree.items():
+            entry = node.entry(name)
+            if entry is not None and isinstance(value, dict) and isinstance(entry.value, Mapping):
+                yield from self._in_braces(entry.value, value)
+            elif entry is not None and isinstance(value, dict):
+                yield _Edit(self._source.begin(entry.value), self._source.end(entry.value), " " + _flow(value))
+            elif entry is not None and not isinstance(value, dict):
+                yield from self._written(entry.value, value)
+        new = {name: value for name, value in tree.items() if node.entry(name) is None}
+        items = self._source.flow(node).items
+        if not new:
+            return
+        end = self._source.end(items[-1].value) if items else self._source.begin(node) + 1
+        apart = ",\n" if items and items[-1].gap.broken else ", "
+        parts = [f"{name}: {_flow(value)}" for name, value in new.items()]
+        yield _Edit(end, end, (apart if items else "") + apart.join(parts))
+
+    def _commented(self, node: Node) -> bool:
+        """Whether a comment stands within brackets."""
+        if isinstance(node, Scalar):
+            return False
+        flow = self._source.flow(node)
+        return bool(flow.end.comments) or any(item.gap.comments or self._commented(item.value) for item in flow.items)
 
 
-def _put_in_block(node: Mapping, path: Path, value: Value, behind: Comment | None) -> tuple[Mapping, bool]:
-    entries, (key, *rest) = list(node.entries), path
-    place = next((place for place, entry in enumerate(entries) if _bare(entry.key) == key), None)
-    if place is None:
-        gap = _BLANK if node.column == 0 and any(entry.gap.blank for entry in entries[1:]) else NONE
-        made, _ = _put("", tuple(rest), value, node.column + _STEP, None)
-        return node._replace(entries=(*entries, _after(Entry(gap, key, NONE, made), behind))), behind is not None
-    last = place == len(entries) - 1
-    after = behind if last else entries[place + 1].gap.trailing
-    found, taken = _put(entries[place].value, tuple(rest), value, node.column + _STEP, after)
-    inner = entries[place].inner
-    if isinstance(found, Mapping) and inner.comments:  # a block has no gap before it
-        first, *others = found.entries
-        found = found._replace(entries=(first._replace(gap=joined(inner, first.gap)), *others))
-        inner = NONE
-    entries[place] = entries[place]._replace(inner=inner, value=found)
-    if not last:
-        entries[place + 1] = entries[place + 1]._replace(gap=_without(entries[place + 1].gap, taken))
-    return node._replace(entries=tuple(entries)), taken and last
+def _block(tree: _Tree, column: int) -> str:
+    """Lines of a block that stands in a column."""
+    lines = ""
+    for name, value in tree.items():
+        lines += " " * column + f"{name}:"
+        lines += "\n" + _block(value, column + _STEP) if isinstance(value, dict) else f" {_flow(value)}\n"
+    return lines
 
 
-def _put_in_braces(node: Flow, path: Path, value: Value) -> Flow:
-    items, (key, *rest) = list(node.items), path
-    place = next((place for place, item in enumerate(items) if _bare(item.key) == key), None)
-    if place is None:
-        gap = Gap(None, (), False, bool(items) and items[-1].gap.broken)
-        return node._replace(items=(*items, Item(gap, key, True, _in_braces("", tuple(rest), value))))
-    items[place] = items[place]._replace(colon=True, value=_in_braces(items[place].value, tuple(rest), value))
-    return node._replace(items=tuple(items))
+def _block_of(node: Node, source: Source, tree: _Tree, column: int) -> str:
+    """What stands in braces, with the values, as a block."""
+    rest, lines = dict(tree), ""
+    for entry in node.entries if isinstance(node, Mapping) else ():
+        key = source.written(entry.key)
+        value = rest.pop(entry.name, None)
+        lines += " " * column + f"{key}:"
+        if isinstance(value, dict):
+            lines += "\n" + _block_of(entry.value, source, value, column + _STEP)
+        else:
+            lines += f" {source.written(entry.value) if value is None else _flow(value)}\n"
+    return lines + _block(rest, column)
 
 
-def _in_braces(node: Node, path: Path, value: Value) -> Node:
-    if not path:
-        return _replaced(node, value)
-    return _put_in_braces(node if isinstance(node, Flow) else Flow(("{", "}"), (), NONE), path, value)
-
-
-def _replaced(node: Node, value: Value) -> Node:
-    """A value in place of another; comments between the items of a list stay."""
-    if isinstance(value, str):
-        return value
-    if isinstance(node, Flow) and len(node.items) == len(value) and node.brackets[0] == "[":
-        items = zip(node.items, value, strict=True)
-        return node._replace(items=tuple(item._replace(value=cell) for item, cell in items))
-    if isinstance(node, Listing) and len(node.items) == len(value):
-        dashes = zip(node.items, value, strict=True)
-        return node._replace(items=tuple(dash._replace(value=cell) for dash, cell in dashes))
-    return Row(value)
-
-
-def _block(node: Flow, column: int) -> Mapping:
-    """What stood in braces as a block."""
-    return Mapping(column, tuple(Entry(NONE, item.key or "", NONE, item.value) for item in node.items))
-
-
-def _commented(node: Node) -> bool:
-    """Whether a comment stands within brackets."""
-    if not isinstance(node, Flow):
-        return False
-    return bool(node.end.comments) or any(item.gap.comments or _commented(item.value) for item in node.items)
-
-
-def _after(entry: Entry, comment: Comment | None) -> Entry:
-    """An entry behind a comment on the line before."""
-    if comment is None:
-        return entry
-    return entry._replace(gap=entry.gap._replace(trailing=comment, broken=True))
-
-
-def _without(gap: Gap, taken: bool) -> Gap:
-    return gap._replace(trailing=None) if taken else gap
-
-
-def _bare(key: object) -> str:
-    if isinstance(key, Lines):
-        return " ".join(key.lines)
-    return key.strip("'\"") if isinstance(key, str) else ""
+def _flow(value: _Tree | Value) -> str:
+    """A value in one line."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{name}: {_flow(inner)}" for name, inner in value.items()) + "}"
+    return value if isinstance(value, str) else "[" + ", ".join(value) + "]"

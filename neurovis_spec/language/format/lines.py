@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from neurovis_spec.language.format.between import Comment
+from neurovis_spec.language.format.gaps import Comment
 
 _BLANKS: Final = 2  # before a comment behind code
 

@@ -1,7 +1,8 @@
-"""Long plain lists without a node an item: the parser's events go straight into arrays.
+"""Long plain lists without a node an item: values and their places go straight into arrays.
 
-In: scalar events, or the nodes of a list's first items. Out: a Packed. What an array cannot hold (truth values, texts
-over several lines or with escapes, integers that a float would round) is not taken, and the list stays one of nodes.
+In: values with their places, or the nodes of a list's first items. Out: a Packed. What an array cannot hold (truth
+values, texts over several lines or with escapes, integers that a float would round) is not taken, and the list stays
+one of nodes.
 """
 
 from __future__ import annotations
@@ -9,10 +10,7 @@ from __future__ import annotations
 from array import array
 from collections.abc import Sequence as Many
 
-from yaml.events import ScalarEvent
-
 from neurovis_spec.diagnostics import Span
-from neurovis_spec.language.yaml.scalars import NumberRangeError, resolve
 from neurovis_spec.language.yaml.source import NULL, NUMBER, TEXT, Node, Packed, Scalar, ScalarValue, Sequence
 
 _EXACT = 2**53  # beyond it a float skips integers
@@ -34,18 +32,21 @@ class Packer:
     def of(cls, items: Many[Node], file: str) -> Packer | None:
         """A packer that holds these items already, or None where they do not fit."""
         packer = cls(file, not isinstance(items[0], Scalar))
-        return packer if all(packer._add_node(item) for item in items) else None
+        return packer if all(packer.add_node(item) for item in items) else None
 
     def __len__(self) -> int:
         """The number of cells."""
         return len(self._arrays.kinds)
 
-    def _add_node(self, node: Node) -> bool:
+    def add_node(self, node: Node) -> bool:
+        """Take an item; False, and nothing taken, where it does not fit."""
         if isinstance(node, Scalar):
             return not self.in_rows and self._add_scalar(node)
         if not self.in_rows or not isinstance(node, Sequence | Packed) or len(node) == 0:
             return False
+        first = len(self)
         if not all(isinstance(cell, Scalar) and self._add_scalar(cell) for cell in node.items):
+            self._forget(first)
             return False
         self.end_row(node.span.end_line, node.span.end_column)
         return True
@@ -56,33 +57,25 @@ class Packer:
             return False
         return self._put(scalar.value, span.line, span.column, span.end_column, scalar.inner)
 
-    def add(self, event: ScalarEvent) -> bool:
-        """Take a cell straight from its event; False, and nothing taken, where it does not fit."""
-        if event.anchor is not None or event.tag is not None:
+    def add_cells(self, cells: Many[tuple[ScalarValue, int, int]], line: int) -> bool:
+        """Take values that stand on a line, each with the columns at which it begins and ends; False where one does not
+        fit, and the list cannot be packed."""
+        return all(self._put(value, line, begin, end, 0) for value, begin, end in cells)
+
+    def add_row(self, cells: Many[tuple[ScalarValue, int, int]], line: int, column: int) -> bool:
+        """Take a row whose bracket closes before a column; False, and nothing taken, where it does not fit."""
+        first = len(self)
+        if not self.add_cells(cells, line):
+            self._forget(first)
             return False
-        start, end = event.start_mark, event.end_mark
-        assert start is not None
-        assert end is not None
-        line, column = start.line, start.column
-        if end.line != line:
-            return False
-        text: str = event.value
-        if not event.implicit[0]:
-            # A quoted text stands character by character in the source if its length says so.
-            if event.style not in ("'", '"') or end.column - column - 2 != len(text):
-                return False
-            return self._put(text, line + 1, column + 1, end.column + 1, 1)
-        try:
-            value = resolve(text)
-        except NumberRangeError:
-            return False
-        return self._put(value, line + 1, column + 1, end.column + 1, 0)
+        self.end_row(line, column)
+        return True
 
     def _put(self, value: ScalarValue, line: int, column: int, end: int, quoted: int) -> bool:
         arrays = self._arrays
         integer = 0
         if type(value) is str:
-            if "(" in value and is_open(value):  # perhaps a text that a comma has cut: the composer's concern
+            if "(" in value and is_open(value):  # perhaps a text that a comma has cut
                 return False
             texts = self._texts
             kind, number = TEXT, float(texts.setdefault(value, len(texts)))
@@ -110,15 +103,11 @@ class Packer:
         self._row_ends.append(len(self))
         self._closed = line, column
 
-    def take_back(self, first: int) -> list[Node]:
-        """The cells from ``first`` on, as nodes; the packer forgets them."""
-        whole = self.finish(self._arrays.span)
-        nodes: list[Node] = [whole.cell(index) for index in range(first, len(self))]
+    def _forget(self, first: int) -> None:
         arrays = self._arrays
         for cells in (arrays.kinds, arrays.lines, arrays.columns, arrays.ends, arrays.integers, arrays.quoted):
             del cells[first:]
         del arrays.numbers[first:]
-        return nodes
 
     def take_back_items(self) -> list[Node]:
         """All items, as nodes, for a list that has to go on without packing."""

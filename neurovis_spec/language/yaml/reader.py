@@ -12,21 +12,12 @@ from itertools import islice
 from pathlib import Path
 from typing import Final
 
-import yaml
-from yaml.events import Event
-from yaml.parser import Parser
-from yaml.reader import Reader
-from yaml.scanner import Scanner, ScannerError
-
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.gc_paused import uncollected
 from neurovis_spec.language.yaml.characters import FORBIDDEN, REPLACEMENT, Lines, character_name
-from neurovis_spec.language.yaml.composer import Composer, EventSource
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
-from neurovis_spec.language.yaml.refusals import ComposingStoppedError
-from neurovis_spec.language.yaml.repair import LARGEST_MENDED, MOST_MENDED, faulty_value, left_out
+from neurovis_spec.language.yaml.parser import Parser
 from neurovis_spec.language.yaml.source import Mapping, Node, Scalar, SourceDocument, describe
-from neurovis_spec.language.yaml.syntax_errors import explain
 
 LARGEST: Final = 64 << 20  # bytes
 _MOST_CHARACTERS: Final = 20
@@ -37,107 +28,59 @@ _ALLOWED_DIRECTIVE: Final = re.compile(r"%YAML[ \t]+1\.2[ \t]*(#.*)?")
 _PROLOGUE_LINE: Final = re.compile(r"(?:[ \t]*(?:#[^\r\n]*)?|%[^\r\n]*)(?:\r\n|\n|\r|\Z)")
 
 
-if yaml.__with_libyaml__:
-    from yaml._yaml import CParser as _CParser
-
-
-class _PythonStages(Reader, Scanner, Parser):
-    """PyYAML's parser in pure Python, for where its C one is not installed."""
-
-    def __init__(self, text: str) -> None:
-        Reader.__init__(self, text)
-        Scanner.__init__(self)
-        Parser.__init__(self)
-
-
-class _PythonParser:
-    """The same, with an error of its own for an escape beyond Unicode, which the scanner does not check."""
-
-    def __init__(self, text: str) -> None:
-        self._stages = _PythonStages(text)
-        self._source: EventSource = self._stages
-
-    def get_event(self) -> Event | None:
-        """The next event, None past the end. Raises yaml.YAMLError."""
-        try:
-            return self._source.get_event()
-        except (ValueError, OverflowError) as error:
-            context = "while scanning a double-quoted scalar"
-            mark = self._stages.get_mark()
-            raise ScannerError(context, None, "found invalid Unicode character escape code", mark) from error
-
-
-def read_file(path: Path, name: str, findings: Findings, *, mend: bool = False) -> SourceDocument | None:
+def read_file(path: Path, name: str, findings: Findings) -> SourceDocument | None:
     """Read a file; ``name`` is what findings call it. Never raises for what is in the file or in its stead."""
     data = read_bytes(path, LARGEST)
     if isinstance(data, FileFault):
         findings.error(data.code, Span(name, 1, 1, 1, 1), f"the file {data.reason}")
         return None
-    return read_content(data, name, findings, mend=mend)
+    return read_content(data, name, findings)
 
 
-def read_content(data: bytes, name: str, findings: Findings, *, mend: bool = False) -> SourceDocument | None:
+def read_content(data: bytes, name: str, findings: Findings) -> SourceDocument | None:
     """Read the bytes of a file that findings call ``name``."""
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
         _refuse_bytes(data, error.start, name, findings)
         return None
-    return read_text(text, name, findings, mend=mend)
+    return read_text(text, name, findings)
 
 
-def read_text(
-    text: str, file: str, findings: Findings, *, pure: bool = False, mend: bool = False
-) -> SourceDocument | None:
-    """Read a text; ``file`` is what findings call it, ``pure`` takes the Python parser though there is a C one.
+def read_text(text: str, file: str, findings: Findings) -> SourceDocument | None:
+    """Read a text; ``file`` is what findings call it.
 
-    Never raises for what is in the text. None means that it has no root that is a mapping, or could not be read to its
-    end; a document is returned also where there were findings that reading could get past. With ``mend`` these are
-    syntax errors, too, where it is clear which value is invalid: it is left out.
+    Never raises for what is in the text. None means that it has no root that is a mapping, or that nobody can tell what
+    a syntax error has cost; a document is returned also where there were findings that reading could get past.
     """
     text = text.removeprefix(_BOM)
     findings.sources[file] = text
-    start = Span(file, 1, 1, 1, 1)
     if len(text) > LARGEST or (4 * len(text) > LARGEST and len(text.encode("utf-8", "replace")) > LARGEST):
-        findings.error("too-large", start, f"the text is larger than {LARGEST >> 20} MiB")
+        findings.error("too-large", Span(file, 1, 1, 1, 1), f"the text is larger than {LARGEST >> 20} MiB")
         return None
     lines = Lines(text)
     clean = _without_forbidden(text, file, lines, findings)
     clean = _without_directives(clean, file, findings)
-    if not clean.endswith(("\n", "\r")):
-        clean += "\n"  # without it the parsers differ about the place of what is missing at the end
-    unread: set[int] = set()
-    for _ in range(MOST_MENDED + 1):
-        refused = Findings()
-        composer = Composer(clean, file, refused, event_source(clean, pure=pure), unread)
-        try:
-            with uncollected():
-                root = composer.document()
-        except ComposingStoppedError:
-            findings.take(refused)
-            return None
-        except yaml.YAMLError as error:
-            syntax = explain(error, lines, composer.open_brackets)
-        else:
-            findings.take(refused)
-            return _document(root, file, findings)
-        findings.error(syntax.code, syntax.span(file, lines), syntax.message, syntax.hint)
-        opened = composer.open_brackets[0][0] if composer.open_brackets else syntax.line
-        found = faulty_value(Lines(clean), min(opened, syntax.line)) if mend and len(clean) <= LARGEST_MENDED else None
-        if found is None:
-            findings.take(refused)
-            return None
-        clean = left_out(clean, found)
-        unread = {start for start in unread if not found.start <= start < found.end} | {found.unread}
-        findings.unread(Span(file, found.line, found.column, found.line, found.column + 1))
-    return None
+    errors = findings.errors
+    with uncollected():
+        root = Parser(clean, file).document(findings)
+    if root is None and findings.errors > errors:
+        return None
+    return _document(root, file, findings)
 
 
-def event_source(text: str, *, pure: bool = False) -> EventSource:
-    """A parser over a text: the C one where it is installed, unless the ``pure`` Python one is wanted."""
-    if pure or not yaml.__with_libyaml__:
-        return _PythonParser(text)
-    return _CParser(text)
+def read_any(text: str, file: str) -> Node | None:
+    """What there is of a text, sound or not: the parts of values with syntax errors, too."""
+    with uncollected():
+        return Parser(FORBIDDEN.sub(REPLACEMENT, text), file, partial=True).document(Findings())
+
+
+def comments(text: str) -> list[int]:
+    """Where the comments of a text begin."""
+    parser = Parser(FORBIDDEN.sub(REPLACEMENT, text), "", partial=True)
+    with uncollected():
+        parser.document(Findings())
+    return parser.comments
 
 
 def _document(root: Node | None, file: str, findings: Findings) -> SourceDocument | None:

@@ -1,25 +1,21 @@
 """What the language refuses though YAML allows it: the findings and their words.
 
-In: an event invalid. Out: a finding at the very characters. Ends the reading where there are too many to be of use.
+In: what is refused, and where it stands. Out: findings at the very characters. Ends the reading where there are too
+many to be of use.
 """
 
 from __future__ import annotations
 
-import re
 from typing import Final
 
-from yaml.events import AliasEvent, DocumentStartEvent, Event, NodeEvent
-
-from neurovis_spec.diagnostics import Findings, Span
-from neurovis_spec.language.yaml import marks
+from neurovis_spec.diagnostics import Diagnostic, Findings, Span
 from neurovis_spec.language.yaml.characters import FORBIDDEN, REPLACEMENT, Lines, character_name
+from neurovis_spec.language.yaml.faults import Fault
 from neurovis_spec.language.yaml.scalars import NumberRangeError
 from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Scalar, Sequence
 
 DEEPEST: Final = 64
 _MOST_FINDINGS: Final = 1000
-_PROPERTY: Final = re.compile(r"!<[^>\s]*>|[!&][^\s,\[\]{}]*")
-_GAP: Final = re.compile(r"(?:[ \t]+|#[^\r\n]*|\r\n|\n|\r)*")
 
 _USE_NAMES = "a constant used in several places belongs in `parameters`, a part used in several places in `modules`"
 
@@ -29,63 +25,43 @@ class ComposingStoppedError(Exception):
 
 
 class Refusals:
-    """Notes refusals in one text."""
+    """What was found in one text; the last of it may be forgotten again, where it is read once more."""
 
-    def __init__(self, text: str, file: str, findings: Findings) -> None:
-        self._text = text
+    def __init__(self, file: str) -> None:
         self._file = file
-        self._findings = findings
-        self._noted = 0
+        self.found: list[Diagnostic] = []
+
+    def report(self, findings: Findings) -> None:
+        """Report all of it."""
+        for item in self.found:
+            findings.error(item.code, item.span, item.message, item.hint)
 
     def _error(self, code: str, span: Span, message: str, hint: str | None = None) -> None:
-        self._findings.error(code, span, message, hint)
-
-    def nothing_left(self, span: Span) -> None:
-        """A mapping all of whose keys are refused: that it is empty follows from that."""
-        self._findings.unread(span)
-        self._noted += 1
-        if self._noted >= _MOST_FINDINGS:
+        self.found.append(Diagnostic(code, message, span, "error", hint))
+        if len(self.found) >= _MOST_FINDINGS:
             raise ComposingStoppedError
 
-    def _event_span(self, event: Event) -> Span:
-        return marks.span(event, event, self._file)
+    def syntax(self, fault: Fault, lines: Lines) -> None:
+        """Report a syntax error."""
+        self._error(fault.code, fault.span(self._file, lines), fault.message, fault.hint)
 
-    def properties(self, event: NodeEvent) -> tuple[int, int, int]:
-        """Refuse a node's tag and anchor. Returns index, line and column (from 1) at which the node itself begins."""
-        first = index = marks.begin(event).index
-        line, column = marks.begin(event).line + 1, marks.begin(event).column + 1
-        last = marks.end(event)
-        while (match := _PROPERTY.match(self._text, index)) and index < max(last.index, first + 1):
-            written = match.group()
-            span = Span(self._file, line, column, line, column + len(written))
-            if written.startswith("!"):
-                self._error("tag", span, f"tags such as '{_short(written)}' are not allowed", "leave it out")
-            else:
-                self._error("anchor", span, f"anchors such as '{_short(written)}' are not allowed", _USE_NAMES)
-            gap = _GAP.match(self._text, match.end())
-            index = gap.end() if gap else match.end()
-            lines, columns = Lines(self._text[first:index]).place(index - first)
-            line = marks.begin(event).line + lines
-            column = columns + (marks.begin(event).column if lines == 1 else 0)
-        if index > last.index:  # a value that is not there does not begin behind the gap
-            return last.index, last.line + 1, last.column + 1
-        return index, line, column
+    def property(self, written: str, span: Span) -> None:
+        """Refuse a tag or an anchor."""
+        if written.startswith("!"):
+            self._error("tag", span, f"tags such as '{_short(written)}' are not allowed", "leave it out")
+        else:
+            self._error("anchor", span, f"anchors such as '{_short(written)}' are not allowed", _USE_NAMES)
 
-    def alias(self, event: AliasEvent) -> Span:
-        """Refuse an alias; returns its place."""
-        span = self._event_span(event)
-        self._error("alias", span, f"aliases such as '*{_short(str(event.anchor))}' are not allowed", _USE_NAMES)
-        return span
+    def alias(self, written: str, span: Span) -> None:
+        """Refuse an alias."""
+        self._error("alias", span, f"aliases such as '{_short(written)}' are not allowed", _USE_NAMES)
 
-    def second_document(self, event: DocumentStartEvent) -> None:
+    def second_document(self, span: Span) -> None:
         """Refuse all that follows the first document."""
-        message = "a file holds one document; a second one begins here"
-        self._error("several-documents", self._event_span(event), message)
+        self._error("several-documents", span, "a file holds one document; a second one begins here")
 
-    def too_deep(self, event: Event) -> None:
+    def too_deep(self, span: Span) -> None:
         """Refuse a collection below the deepest level."""
-        begin = marks.begin(event)
-        span = Span(self._file, begin.line + 1, begin.column + 1, begin.line + 1, begin.column + 2)
         self._error("too-deep", span, f"lists and mappings are nested more than {DEEPEST} deep")
 
     def number(self, error: NumberRangeError, span: Span) -> None:

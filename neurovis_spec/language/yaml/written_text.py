@@ -13,11 +13,12 @@ from collections.abc import Iterator
 from functools import lru_cache
 from typing import Final, NamedTuple
 
+from neurovis_spec.language.yaml.texts import ESCAPED
+
 _BREAK: Final = re.compile("\r\n|\n|\r")
 #: An escape of a text in double quotes: one behind which the line goes on, one with a number, any other.
 _ESCAPE: Final = re.compile(r"\\(?:\r\n|[\r\n]|x([0-9A-Fa-f]{2})|u([0-9A-Fa-f]{4})|U([0-9A-Fa-f]{8})|(.))", re.DOTALL)
 _DOUBLED: Final = re.compile("''")
-_ESCAPED: Final = {"0": "\0", "a": "\a", "b": "\b", "v": "\v", "f": "\f", "e": "\x1b", '"': '"', "/": "/", "\\": "\\"}
 
 
 class Written(NamedTuple):
@@ -109,4 +110,4 @@ def _unescaped(match: re.Match[str]) -> str:
         return chr(int(number, 16)) if int(number, 16) <= 0x10FFFF else "?"
     if match[4] is None:
         return ""
-    return _ESCAPED.get(match[4], " ")
+    return ESCAPED.get(match[4], " ")

@@ -1,6 +1,6 @@
-"""What stands between two tokens of a spec: comments, line breaks, blank lines.
+"""What stands between two values of a spec: comments, line breaks, blank lines.
 
-In: a text and the stretch from the end of one token to the begin of the next. Out: a Gap. No value begins or ends in
+In: a text and the stretch from the end of one value to the begin of the next. Out: a Gap. No value begins or ends in
 such a stretch, so whatever begins with # in it is a comment; commas, colons and dashes in it are passed over.
 """
 
