@@ -12,6 +12,7 @@ from small_specs import codes, compiled
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiler.values.builtin import builtin_definitions, libraries
 from neurovis_spec.language.expressions.evaluate import evaluate
+from neurovis_spec.language.unknown import UNKNOWN
 
 PRINTED = """\
 activations:
@@ -97,10 +98,12 @@ def test_the_built_in_ones_are_those_of_the_tables_with_their_parameters_and_sig
     known = builtin_definitions()
     found: dict[str, dict[str, float]] = {}
     for section in (known.activations, known.models, known.rules):
-        for name, (_, defaults) in section.items():
-            found[name] = {default.name: evaluate(default.value, {}) for default in defaults}
+        for name, (_, defaults) in section.known().items():
+            found[name] = {
+                default.name: evaluate(default.value, {}) for default in defaults if default.value is not UNKNOWN
+            }
     assert found == DEFAULTS
-    assert {name: rule.signals for name, (rule, _) in known.rules.items() if rule.signals} == SIGNALS
+    assert {name: rule.signals for name, (rule, _) in known.rules.known().items() if rule.signals} == SIGNALS
 
 
 def described() -> dict[str, str]:

@@ -22,6 +22,7 @@ from neurovis_spec.language.model import Named
 from neurovis_spec.language.places import formula_at, role_of
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.spec import Spec
+from neurovis_spec.language.unknown import Names
 from neurovis_spec.language.yaml.reader import read_text
 from neurovis_spec.language.yaml.source import Scalar
 from neurovis_spec.lsp.completion import complete
@@ -107,7 +108,7 @@ def test_its_formulas_see_what_it_says() -> None:
     findings = Findings()
     for text in ("normal(0, i*k)", "j"):
         formula: Formula = Located(text, Scalar(text, read_text(HEAD, "x", findings).root.span))  # type: ignore[union-attr]
-        Constants({}, 1.0, findings).tree(formula, role.sees, role.draws)
+        Constants(Names(), 1.0, findings).tree(formula, role.sees, role.draws)
     assert [(item.code, item.message) for item in findings.sorted()] == [("unknown-name", "unknown name 'j'")]
 
 

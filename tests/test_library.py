@@ -387,7 +387,7 @@ connections: {{X -> Y: {{weight: 0.3 - 0.5*i, delay: {delay}, plasticity: {rule}
 @pytest.mark.parametrize("delay", [0, 1, 3])
 @pytest.mark.parametrize(("learner", "parameters"), RULES)
 def test_a_rule(learner: Learner, parameters: dict[str, float], delay: int) -> None:
-    names = builtin_definitions().rules[learner.__name__][0].signals
+    names = builtin_definitions().rules.known()[learner.__name__][0].signals
     given = [f"{name}: {value}" for name, value in parameters.items()]
     given += [f"{name}: {source}" for name, source in zip(names, ("one", "Z"), strict=False)]
     episode = f", episode: {EPISODE}" if learner is reward_modulated else ""

@@ -17,6 +17,7 @@ from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.parameters import make_parameters
 from neurovis_spec.diagnostics import Diagnostic, Findings
 from neurovis_spec.language.includes import read_includes
+from neurovis_spec.language.unknown import Names
 from neurovis_spec.language.yaml.reader import read_text
 from neurovis_spec.pipeline import shape
 
@@ -52,11 +53,11 @@ def counted(text: str, most: int = 10**6) -> tuple[int | None, tuple[Diagnostic,
     spec = shape(document, findings)
     assert spec is not None
     folder = Path()
-    constants = Constants({}, 1.0, findings)
+    constants = Constants(Names(), 1.0, findings)
     library = library_of(spec, read_includes(spec, folder, folder, findings), folder, 1.0, findings)
     make_parameters(spec, constants, {})
     assert not findings.failed
-    return SizeEstimate(library.modules, 1.0, most).instances(spec, constants, findings), findings.sorted()
+    return SizeEstimate(library.modules.known(), 1.0, most).instances(spec, constants, findings), findings.sorted()
 
 
 @settings(max_examples=60, deadline=None)

@@ -32,7 +32,6 @@ from neurovis_spec.compiler.names.outputs import make_outputs
 from neurovis_spec.compiler.names.references import other_parameter
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.names.state_references import singles
-from neurovis_spec.compiler.names.unresolved import Gaps, gaps_of
 from neurovis_spec.compiler.network import Input, Instance, Network, Output
 from neurovis_spec.compiler.neurons.noise import make_noises
 from neurovis_spec.compiler.neurons.populate import Population, populate, without_neurons
@@ -44,8 +43,9 @@ from neurovis_spec.compiler.values.parameters import make_parameters
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.includes import Includes, ReadBytes
-from neurovis_spec.language.model import opening
+from neurovis_spec.language.model import names_of, opening
 from neurovis_spec.language.spec import Spec, is_library
+from neurovis_spec.language.unknown import UNKNOWN, known
 from neurovis_spec.language.yaml.opening import read_bytes
 
 if TYPE_CHECKING:
@@ -71,10 +71,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
     """The network of a spec; None where it is invalid (the findings say why)."""
     before = findings.errors
     seed = request.seed if request.seed is not None else 0 if spec.seed is None else spec.seed.value
-    gaps = gaps_of(spec)
-    constants = Constants(
-        {}, 1.0, findings, broken=set(gaps.names["parameters"]), incomplete="parameters" in gaps.sections
-    )
+    constants = Constants(names_of(spec, "parameters", {}), 1.0, findings)
     _step_length(spec, constants)
     library = library_of(spec, request.includes, request.base, constants.dt, findings)
     make_parameters(spec, constants, request.parameters)
@@ -98,8 +95,8 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
         from neurovis_spec.compiler.drawing.figure import figure_of
 
         render = replace(render, figure=figure_of(spec, population, outputs, finder))
-    ros = _ros(spec, inputs, outputs, scopes[0].gaps, constants)
-    noises = make_noises(scopes, population, sum(entry.size for entry in inputs))
+    ros = _ros(spec, inputs, outputs, scopes[0], constants)
+    noises = make_noises(population, sum(entry.size for entry in inputs))
     expansion.depend()
     if not made.complete or findings.errors > before or not _under_way(bundles, findings):
         _check_cycles(made, population, findings)
@@ -165,20 +162,20 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
 
 
 def _ros(
-    spec: Spec, inputs: tuple[Input, ...], outputs: tuple[Output, ...], gaps: Gaps, constants: Constants
+    spec: Spec, inputs: tuple[Input, ...], outputs: tuple[Output, ...], root: Scope, constants: Constants
 ) -> RosSettings:
     """The ``ros`` section. Most specs have none: nothing that reads it is imported then."""
     if spec.ros is None:
         return RosSettings(rate=1 / constants.dt)
     from neurovis_spec.compiler.ros import Surroundings, ros_settings
 
-    return ros_settings(spec.ros, Surroundings(spec, inputs, outputs, gaps), constants)
+    return ros_settings(spec.ros, Surroundings(spec, root, inputs, outputs), constants)
 
 
 def _check_unused(expander: Expander, limits: Limits, seed: int) -> None:
     """A module that nobody uses is checked by itself, with its own parameters: mistakes are found at once. Modules
     that others hold come last, since they are checked in these; and together they may be as large as a network."""
-    modules = expander.library.modules
+    modules = expander.library.modules.known()
     inner = {instance.module.value for module in modules.values() for instance in module.model.instances.values()}
     neurons, connections = limits.neurons, limits.connections
     for name in sorted(modules, key=inner.__contains__):
@@ -190,7 +187,7 @@ def _check_unused(expander: Expander, limits: Limits, seed: int) -> None:
         scopes = expander.expand(module.model, constants, module.folder, name).scopes
         population = populate(scopes, limits, seed)
         made = connect(scopes, population, limits, seed)
-        make_noises(scopes, population, 0)
+        make_noises(population, 0)
         layout_settings(None, scopes, population, expander.findings)
         neurons -= len(population.neurons)
         connections -= sum(len(bundle.sources) for bundle in made.bundles)
@@ -229,10 +226,8 @@ def _read_events(spec: Spec, finder: Finder, constants: Constants) -> tuple[Even
 
 def _report_no_neurons(spec: Spec, population: Population, findings: Findings) -> None:
     """Without neurons nothing else can be checked; if that is because groups are invalid, it is said already."""
-    for directory in population.directories:
-        gaps = directory.gaps
-        if gaps.sections & {"neurons", "instances"} or gaps.names["neurons"] or gaps.names["instances"]:
-            return
+    if any(directory.invalid or directory.invalid.is_open for directory in population.directories):
+        return
     node = spec.source.entry("neurons")
     span = opening(spec.source) if node is None else node.key.span
     message, hint = "a network needs at least one neuron", "add a group under 'neurons'"
@@ -270,13 +265,15 @@ def _step_length(spec: Spec, constants: Constants) -> None:
     if spec.time is None or spec.time.dt is None:
         return
     known = "'dt' comes before the parameters, which may use it; known here"
-    if parse_formula(spec.time.dt, CONSTANTS, constants.findings, what=known) is None:
+    if parse_formula(spec.time.dt, CONSTANTS, constants.findings, what=known) is UNKNOWN:
         return
     dt = constants.scalar(spec.time.dt)
-    if dt is not None and not dt > 0:
+    if dt is UNKNOWN:
+        return
+    if not dt > 0:
         message = f"'dt' is seconds a step and above 0, this is {dt:g}"
         constants.findings.error("out-of-range", spec.time.dt.span, message)
-    elif dt is not None:
+    else:
         constants.dt = dt
 
 
@@ -293,11 +290,12 @@ def _check_given(spec: Spec, constants: Constants, given: Mapping[str, float]) -
 def _clock(spec: Spec, constants: Constants) -> tuple[int, int | None]:
     """The default run length and the length of an episode."""
     time = spec.time
-    steps = None
+    steps, episode = 1000, None
     if time is not None and time.steps is not None:
-        steps = constants.integer(time.steps, "'steps'", 1, structural=False)
-    episode = None if time is None or time.episode is None else constants.integer(time.episode, "'episode'", 1)
-    return (1000 if steps is None else steps), episode
+        steps = known(constants.integer(time.steps, "'steps'", 1, structural=False), steps)
+    if time is not None and time.episode is not None:
+        episode = known(constants.integer(time.episode, "'episode'", 1), None)
+    return steps, episode
 
 
 def _report_cycle(

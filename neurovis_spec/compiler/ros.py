@@ -8,20 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, Literal, cast
 
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.names.references import key_of, known_inputs
-from neurovis_spec.compiler.names.unresolved import Gaps
+from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import Input, Output
 from neurovis_spec.compiler.ros_settings import NAMESPACE, Publication, RosSettings, Subscription, absolute
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, shorten, suggest
 from neurovis_spec.language.located import Located
-from neurovis_spec.language.model import lost_names
+from neurovis_spec.language.model import names_of
 from neurovis_spec.language.ros import PublishModel, QosModel, RosModel, SubscribeModel
 from neurovis_spec.language.ros_types import Field, all_types, fields_of, misspelt, numbers_of, plain
 from neurovis_spec.language.spec import Spec
+from neurovis_spec.language.unknown import known
 
 #: Where a message has its numbers if nothing else is said.
 _DATA: Final = "data"
@@ -34,12 +36,12 @@ _DEEPEST: Final = 1_000_000
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What the section may name: the inputs and outputs of the network, and what could not be read of these."""
+    """What the section may name: the inputs of the network, or of the spec itself, and its outputs."""
 
     spec: Spec
+    scope: Scope
     inputs: tuple[Input, ...]
     outputs: tuple[Output, ...]
-    gaps: Gaps
 
 
 def ros_settings(model: RosModel, around: Surroundings, constants: Constants) -> RosSettings:
@@ -73,11 +75,11 @@ def _check_topics(model: RosModel, settings: RosSettings, name: str, findings: F
         if other != f"the output '{output.output}'":
             message = f"{topic} is the topic of {other}, too: who listens cannot tell the messages apart"
             findings.error("topic-conflict", entry.topic.span, message, "take another topic")
-        elif "type" not in entry.lost_keys:
+        elif "type" not in entry.unknown:
             types[topic] = output.type
     for heard in settings.subscribe:
         source, topic = model.subscribe[heard.input], absolute(heard.topic, node)
-        if "type" not in source.lost_keys and types.setdefault(topic, heard.type) != heard.type:
+        if "type" not in source.unknown and types.setdefault(topic, heard.type) != heard.type:
             message = f"{topic} has messages of {types[topic]} elsewhere in this spec, here of {heard.type}"
             findings.error("topic-conflict", (source.type or source.topic).span, message, "a topic has one type")
 
@@ -90,8 +92,7 @@ def _quality(
         reliability = reliability if model.reliability is None else model.reliability.value
         durability = durability if model.durability is None else model.durability.value
         if model.depth is not None:
-            given = constants.integer(model.depth, "'depth'", 1, _DEEPEST, structural=False)
-            depth = depth if given is None else given
+            depth = known(constants.integer(model.depth, "'depth'", 1, _DEEPEST, structural=False), depth)
     return (
         cast(Literal["reliable", "best_effort"], reliability),
         cast(Literal["volatile", "transient_local"], durability),
@@ -100,7 +101,7 @@ def _quality(
 
 
 def _above_zero(formula: Located[int | float | str], what: str, constants: Constants) -> float | None:
-    value = constants.scalar(formula)
+    value = known(constants.scalar(formula), None)
     if value is not None and not value > 0:
         constants.findings.error("out-of-range", formula.span, f"{what} and above 0, this is {value:g}")
         return None
@@ -111,21 +112,23 @@ def _subscriptions(model: RosModel, around: Surroundings, constants: Constants) 
     findings = constants.findings
     inputs = {entry.name: entry for entry in around.inputs}
     for name, entry in model.subscribe.items():
-        found = inputs.get(name)
+        found = inputs.get(name) or around.scope.input(name)
         if found is None:
-            _report_input(name, model, tuple(inputs), around.gaps, findings)
+            span = key_of(model.source, "subscribe", name).span
+            hint = partial(known_inputs, name, tuple(inputs))
+            findings.error("unknown-input", span, f"there is no input '{shorten(name)}'", hint)
         timeout = (
             None
             if entry.timeout is None
             else _above_zero(entry.timeout, "'timeout' is seconds without a message", constants)
         )
-        if entry.on_timeout is not None and entry.timeout is None and "timeout" not in entry.lost_keys:
+        if entry.on_timeout is not None and entry.timeout is None and "timeout" not in entry.unknown:
             message = "'on_timeout' has no effect without 'timeout'"
             findings.warning("no-effect", entry.on_timeout.span, message, "add timeout: SECONDS")
-        size = None if found is None else found.size
+        size = found.size if isinstance(found, Input) else None
         _check_numbers(entry, size, f"the input '{name}' takes", findings)
         _check_joints(entry, size, name, findings)
-        if found is not None:
+        if isinstance(found, Input):
             yield Subscription(
                 input=name,
                 topic=entry.topic.value,
@@ -145,7 +148,7 @@ def _publications(model: RosModel, around: Surroundings, constants: Constants) -
         output = outputs.get(name)
         if output is None:
             _report_output(name, model, around.spec, constants.findings)
-        safe = None if entry.safe is None else constants.scalar(entry.safe)
+        safe = None if entry.safe is None else known(constants.scalar(entry.safe), None)
         size = None if output is None else output.size
         _check_numbers(entry, size, f"the output '{name}' has", constants.findings)
         if output is not None:
@@ -160,16 +163,9 @@ def _type(entry: SubscribeModel | PublishModel, size: int) -> str:
     return "std_msgs/Float64" if size == 1 else "std_msgs/Float64MultiArray"
 
 
-def _report_input(name: str, model: RosModel, known: tuple[str, ...], gaps: Gaps, findings: Findings) -> None:
-    if gaps.cover("inputs", name) or ("." in name and findings.failed):  # that of an instance may be missing therefore
-        return
-    span = key_of(model.source, "subscribe", name).span
-    findings.error("unknown-input", span, f"there is no input '{shorten(name)}'", lambda: known_inputs(name, known))
-
-
 def _report_output(name: str, model: RosModel, spec: Spec, findings: Findings) -> None:
-    declared = {**spec.outputs, **dict.fromkeys(lost_names(spec.source, "outputs", spec.outputs))}
-    if name in declared or "outputs" in spec.lost_keys:
+    declared = names_of(spec, "outputs", spec.outputs)
+    if name in declared:
         return
     findings.error(
         "unknown-output",
@@ -182,7 +178,7 @@ def _report_output(name: str, model: RosModel, spec: Spec, findings: Findings) -
 def _check_numbers(entry: SubscribeModel | PublishModel, size: int | None, who: str, findings: Findings) -> None:
     """Whether messages of the type have numbers at the field, and may have as many; ``size`` is how many ``who`` has,
     None where that is not known."""
-    if not entry.lost_keys.isdisjoint(("type", "field")):
+    if not entry.unknown.isdisjoint(("type", "field")):
         return
     name = _type(entry, size or 1)
     fields = fields_of(name)
@@ -235,7 +231,7 @@ def _check_joints(entry: SubscribeModel, size: int | None, name: str, findings: 
     assert key is not None
     type_ = _type(entry, size or 1)
     fields = fields_of(type_)
-    if fields is not None and "name" not in fields and "type" not in entry.lost_keys:
+    if fields is not None and "name" not in fields and "type" not in entry.unknown:
         message = f"'names' has no effect: messages of type {type_} name no joints"
         findings.error("useless-key", key.key.span, message, "sensor_msgs/JointState does")
         return

@@ -40,9 +40,9 @@ def contradictory(rules: Rules, data: Mapping) -> bool:
     )
 
 
-def check_rules(rules: Rules, data: Mapping, perhaps: Collection[str], findings: Findings) -> None:
-    """Report keys that exclude each other, each once, and those that miss another one, unless an unknown key may be
-    meant for that (``perhaps``)."""
+def check_rules(rules: Rules, data: Mapping, unknown: Collection[str], findings: Findings) -> None:
+    """Report keys that exclude each other, each once, and those that miss another one, unless that is ``unknown``, as
+    an unknown key may be meant for it."""
     for own, rule in rules:
         entry = data.entry(own)
         if entry is None:
@@ -52,7 +52,7 @@ def check_rules(rules: Rules, data: Mapping, perhaps: Collection[str], findings:
             if other is not None:
                 hint = None if rule.hint is None else rule.hint.format(own=own, other=other)
                 findings.error(rule.code, entry.key.span, rule.why.format(own=own, other=other), hint)
-        elif not any(_key(other) in perhaps or _is_there(other, data) for other in rule.others):
+        elif not any(_key(other) in unknown or _is_there(other, data) for other in rule.others):
             findings.error(rule.code, entry.key.span, rule.why, rule.hint)
 
 

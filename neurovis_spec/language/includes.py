@@ -51,7 +51,7 @@ def read_includes(spec: Spec, folder: Path, root: Path, findings: Findings, read
     reader = _Reader(root, findings, read)
     own = folder / Path(spec.source.span.file).name
     reader.follow(spec.include, spec.source.span.file, folder, (own.resolve(),))
-    return Includes(tuple(reader.found), reader.complete and "include" not in spec.lost)
+    return Includes(tuple(reader.found), reader.complete and "include" not in spec.unknown)
 
 
 @dataclass

@@ -10,15 +10,20 @@ from collections.abc import Callable, Collection, Iterator
 from typing import NamedTuple
 
 from neurovis_spec.diagnostics import Findings, did_you_mean, meant, nearest, shorten, slips, suggest
+from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.yaml.source import Entry, Mapping
 
 
 class Keys(NamedTuple):
-    """A mapping whose unknown keys are reported; ``perhaps`` are the known ones that those still unknown may be meant
-    for."""
+    """A mapping whose unknown keys are reported; ``unknown`` are the known ones that these may be meant for, so that
+    nobody knows what they say."""
 
     mapping: Mapping
-    perhaps: frozenset[str]
+    unknown: frozenset[str]
+
+    def lack(self, name: str) -> bool:
+        """Whether a key is surely not there."""
+        return self.mapping.entry(name) is None and name not in self.unknown
 
 
 class Words(NamedTuple):
@@ -33,13 +38,13 @@ def read_keys(data: Mapping, known: Collection[str], findings: Findings, words: 
     """Report the unknown keys of a mapping."""
     if all(entry.name in known for entry in data.entries):
         return Keys(data, frozenset())
-    perhaps: set[str] = set()
-    mapping = Mapping(tuple(_read(data, known, findings, words or Words(), perhaps)), data.span)
-    return Keys(mapping, frozenset(perhaps))
+    unknown: set[str] = set()
+    mapping = Mapping(tuple(_read(data, known, findings, words or Words(), unknown)), data.span)
+    return Keys(mapping, frozenset(unknown))
 
 
 def _read(
-    data: Mapping, known: Collection[str], findings: Findings, words: Words, perhaps: set[str]
+    data: Mapping, known: Collection[str], findings: Findings, words: Words, unknown: set[str]
 ) -> Iterator[Entry]:
     free = {name: None for name in known if data.entry(name) is None}  # what is there already is not meant
     for entry in data.entries:
@@ -48,7 +53,7 @@ def _read(
         right = None
         if foreign is not None:
             findings.error("unknown-key", span, *foreign)
-            perhaps.update({name.partition(":")[0]} & set(known))
+            unknown.update({name.partition(":")[0]} & set(known))
         elif name not in known and findings.many:
             findings.error("unknown-key", span, _unknown(name))
         elif name not in known:
@@ -60,10 +65,28 @@ def _read(
                 hint = did_you_mean(sorted(close, key=lambda one: one not in free))
             findings.error("unknown-key", span, _unknown(name), hint or suggest(name, known, "known here"))
             if right is None:
-                perhaps.update(close)
+                unknown.update(close)
         if right is not None:
             del free[right]
         yield entry if right is None else Entry(entry.key._replace(value=right, inner=None, written=None), entry.value)
+
+
+def settings_of(
+    entries: tuple[Entry, ...], known: Collection[str], what: str, none: str, findings: Findings
+) -> Names[Entry]:
+    """The settings of a definition or a pattern by the names that it knows. An unknown one (of ``what``; ``none``
+    is said where none are known) is reported, and taken for the one that it can only be meant for; those that it may
+    be meant for are UNKNOWN."""
+    found: dict[str, Entry | Unknown] = {entry.name: entry for entry in entries if entry.name in known}
+    for entry in entries:
+        if entry.name in known:
+            continue
+        hint = suggest(entry.name, known, "known here") or none
+        findings.error("unknown-parameter", entry.key.span, f"there is no {what} '{shorten(entry.name)}'", hint)
+        free = [name for name in known if found.get(name, UNKNOWN) is UNKNOWN]
+        right = meant(entry.name, free)
+        found.update(dict.fromkeys(nearest(entry.name, free), UNKNOWN) if right is None else {right: entry})
+    return Names(found)
 
 
 def _joined(name: str, known: Collection[str]) -> tuple[str, str] | None:

@@ -9,6 +9,7 @@ look at. What was left out is what stands in ``source`` and not in the model (``
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
+from collections.abc import Mapping as AnyMapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Annotated, ClassVar, TypeAlias, TypeVar
@@ -19,6 +20,7 @@ from pydantic import (
     Field,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
+    PrivateAttr,
     ValidationError,
     ValidationInfo,
     WrapValidator,
@@ -28,12 +30,13 @@ from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue, SkipJsonSchema
 from pydantic_core import core_schema
 
-from neurovis_spec.diagnostics import Findings, Span, nearest
+from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.exclusions import Rules, check_rules, contradictory, schema_of
 from neurovis_spec.language.expressions.given import RESERVED
 from neurovis_spec.language.grammar import Needs, NotWith, OneOf
-from neurovis_spec.language.keys import Words, read_keys
+from neurovis_spec.language.keys import Keys, Words, read_keys
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Leaf, bad_name, findings_of, give_up, refuse
+from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Scalar, ScalarValue, Sequence
 
 V = TypeVar("V")
@@ -60,6 +63,8 @@ class Model(BaseModel):
     #: what is said of a key without a value
     UNSAID: ClassVar[str] = "leave the key out, or give it a value"
 
+    #: the keys that an unknown one may be meant for
+    _meant: frozenset[str] = PrivateAttr(frozenset())
     source: SkipJsonSchema[Annotated[Mapping, Leaf(_as_it_is, {})]] = Field(alias="$", exclude=True, repr=False)
 
     @model_validator(mode="wrap")
@@ -71,11 +76,15 @@ class Model(BaseModel):
             refuse(info, data, "a mapping", hint)  # type: ignore[arg-type]
         keys = read_keys(data, cls._fields(), findings_of(info), Words(cls._foreign, _home))
         data = keys.mapping
-        cls._check_rules(data, keys.perhaps, findings_of(info))
-        values = cls._keys(data, keys.perhaps, findings_of(info))
+        cls._check_rules(data, keys.unknown, findings_of(info))
+        values = cls._keys(keys, findings_of(info))
         for _ in range(2):
             try:
-                return handler(values)
+                result = handler(values)
+                result._meant = keys.unknown.union(
+                    key for key, node in values.items() if key != "$" and node is not data.get(key)
+                )
+                return result
             except ValidationError as error:
                 faulty = _first_parts(error)
                 for key in map(str, faulty):
@@ -105,8 +114,8 @@ class Model(BaseModel):
         )
 
     @classmethod
-    def _check_rules(cls, data: Mapping, perhaps: Collection[str], findings: Findings) -> None:
-        check_rules(cls._rules(), data, perhaps, findings)
+    def _check_rules(cls, data: Mapping, unknown: Collection[str], findings: Findings) -> None:
+        check_rules(cls._rules(), data, unknown, findings)
         one_of, there = cls.ONE_OF, {entry.name for entry in data.entries}
         if one_of is not None and there.isdisjoint(one_of.keys) and there <= cls._fields().keys():
             findings.error(one_of.code, opening(data), one_of.why, one_of.hint)
@@ -128,10 +137,9 @@ class Model(BaseModel):
         return {name: field.alias or name for name, field in cls.model_fields.items()}
 
     @classmethod
-    def _keys(cls, data: Mapping, perhaps: Collection[str], findings: Findings) -> dict[str, object]:
-        """The values by key, under ``$`` the Mapping itself; what is missing is reported, unless an unknown key is
-        ``perhaps`` meant for it."""
-        fields = cls._fields()
+    def _keys(cls, keys: Keys, findings: Findings) -> dict[str, object]:
+        """The values by key, under ``$`` the Mapping itself; what is missing is reported."""
+        fields, data = cls._fields(), keys.mapping
         result: dict[str, object] = {"$": data}
         for entry in data.entries:
             field = fields.get(entry.name)
@@ -147,7 +155,7 @@ class Model(BaseModel):
         told = findings.is_invalid(opening(data))
         for name, field in fields.items():
             if field.is_required() and name not in result:
-                if name not in perhaps and not told:
+                if keys.lack(name) and not told:
                     message = f"the key '{name}' is missing"
                     findings.error("missing-key", opening(data), message, cls._without(name, data), key=name)
                 if name in cls.STAND_INS:
@@ -169,18 +177,21 @@ class Model(BaseModel):
         return None
 
     @cached_property
-    def lost(self) -> frozenset[str]:
+    def _left_out(self) -> frozenset[str]:
         """The keys of the source that are not in the model: unknown ones, and those whose value is invalid."""
-        written = self._written()
-        return frozenset(entry.name for entry in self.source.entries).difference(
-            written[name] for name in self.model_fields_set
-        )
+        read = {self._written()[name] for name in self.model_fields_set}
+        return frozenset(entry.name for entry in self.source.entries if entry.name not in read)
+
+    @property
+    def sound(self) -> bool:
+        """Whether all that stands there is in the model, and nothing is missing."""
+        return not (self._left_out or self.unknown)
 
     @cached_property
-    def lost_keys(self) -> frozenset[str]:
-        """The known keys that were lost, or that an unknown one may be meant for."""
-        fields = self._fields()
-        return frozenset(key for name in self.lost for key in ((name,) if name in fields else nearest(name, fields)))
+    def unknown(self) -> frozenset[str]:
+        """The keys of which it is not known what they say: invalid ones, and those that an unknown key may be meant
+        for."""
+        return self._meant | self._left_out.intersection(self._fields())
 
 
 def _standing_in(value: ScalarValue | dict[str, ScalarValue], span: Span) -> Node:
@@ -217,11 +228,17 @@ def opening(mapping: Mapping) -> Span:
     return Span(span.file, span.line, span.column, span.line, span.column + 1)
 
 
-def lost_names(source: Mapping, section: str, kept: dict[str, V]) -> tuple[str, ...]:
-    """The names of a section that were left out because what they name is invalid."""
-    node = source.get(section)
+def names_of(model: Model, key: str, made: AnyMapping[str, V | Unknown]) -> Names[V]:
+    """What the names mean that are declared under a key: what was ``made`` of each, UNKNOWN where it could not be read.
+    The table is open where the whole of it could not be."""
+    return Names({**unread(model, key), **made}, key in model.unknown)
+
+
+def unread(model: Model, key: str) -> dict[str, Unknown]:
+    """The names under a key whose declarations could not be read."""
+    node, kept = model.source.get(key), getattr(model, key)
     entries = node.entries if isinstance(node, Mapping) else ()
-    return tuple(entry.name for entry in entries if entry.name not in kept)
+    return {entry.name: UNKNOWN for entry in entries if entry.name not in kept}
 
 
 def _named(node: Node, handler: Callable[[object], dict[str, V]], info: ValidationInfo) -> dict[str, V]:

@@ -127,7 +127,7 @@ def as_file(node: Mapping, info: ValidationInfo) -> FileReference:
     node = keys.mapping
     path = node.get("file")
     if path is None:
-        if "file" not in keys.perhaps:
+        if keys.lack("file"):
             findings_of(info).error("missing-key", opening(node), "the key 'file' is missing")
         give_up()
     key = node.get("key")
@@ -257,7 +257,7 @@ class ParameterModel(Model):
     @property
     def failed(self) -> bool:
         """Whether something of it is invalid, which is reported; of a value that is, 0 stands in."""
-        return bool(self.lost) or self.source.get("value") is None
+        return not self.sound
 
 
 ParameterField = Annotated[ParameterModel, Short("value", "a number or an expression")]

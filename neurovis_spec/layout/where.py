@@ -66,7 +66,7 @@ class _Sections:
         self._paths = {instance.path: instance.module for instance in network.instances}
         if self._paths:
             library = library_of(spec, request.includes, request.base, network.dt, Findings())
-            self._modules = {name: module.model for name, module in library.modules.items()}
+            self._modules = {name: module.model for name, module in library.modules.known().items()}
 
     def around(self, name: str) -> Iterator[tuple[Section, str]]:
         """The sections that may speak of a neuron, outer ones first, and how each calls it."""

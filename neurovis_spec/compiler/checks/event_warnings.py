@@ -20,6 +20,7 @@ from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.references import Arrow, Sum, parse
 from neurovis_spec.language.sections import EventModel
+from neurovis_spec.language.unknown import known
 
 
 class _Clamp(NamedTuple):
@@ -70,7 +71,7 @@ class _Reader:
 
     def step(self, formula: Formula | None) -> float | None:
         """A step, which may be an expression."""
-        return None if formula is None else self.constants.scalar(formula)
+        return None if formula is None else known(self.constants.scalar(formula), None)
 
     def neurons(self, text: Located[str]) -> IntArray:
         """The neurons of a reference."""

@@ -100,7 +100,7 @@ def _is_one(name: str, compiled: Compiled, place: int) -> bool:
     if not dot:
         return name in compiled.population.directories[place].neurons
     scope = compiled.scopes[place]
-    inside = scope.children.get(head, ())
+    inside = scope.children.known().get(head, ())
     counted = head in scope.section.instances and scope.section.instances[head].count is not None
     return len(inside) == 1 and not counted and _is_one(rest, compiled, inside[0])
 

@@ -12,11 +12,13 @@ import numpy as np
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.checks.unused_parts import Part, parts_of, reached, read
 from neurovis_spec.compiler.program import Rule
+from neurovis_spec.compiler.values.constants import value_of
 from neurovis_spec.compiler.values.definitions import Defaults
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.expressions.arrays import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.tree import Tree
+from neurovis_spec.language.unknown import UNKNOWN
 
 _ACTIVE = frozenset({"pre", "sent", "post"})
 
@@ -26,7 +28,7 @@ def check_replaced_weights(compiled: Compiled, findings: Findings) -> None:
     for library in (*compiled.included, compiled.spec):
         for name, model in library.rules.items():
             parts = parts_of(model)
-            rule, defaults = compiled.library.definitions.rules[name]
+            rule, defaults = compiled.library.definitions.rules.known()[name]
             formulas = ((model.weight.each_step, rule.each_step), (model.weight.each_episode, rule.each_episode))
             for formula, tree in formulas:
                 if formula is None or tree is None:
@@ -50,7 +52,8 @@ def _in_silence(tree: Tree, rule: Rule, defaults: Defaults) -> Value:
     values: dict[str, Value] = {**CONSTANTS, "dt": 1.0, "k": 1.0, "t": 1.0, "weight": 0.0}
     values |= dict.fromkeys((*_ACTIVE, *rule.signals), 0.0)
     for default in defaults:
-        values[default.name] = evaluate_array(default.value, values)
+        value = value_of(default.value, values)
+        values[default.name] = 0.0 if value is UNKNOWN else value
     values |= {state.name: evaluate_array(state.initial, values) for state in rule.state}
     for name, let in rule.let:
         values[name] = evaluate_array(let, values)

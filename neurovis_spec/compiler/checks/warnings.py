@@ -87,7 +87,7 @@ def _inputs(compiled: Compiled, findings: Findings) -> None:
     for section, scopes in compiled.sections():
         handed = {outer.value for instance in section.instances.values() for outer in instance.inputs.values()}
         for name in section.inputs.keys() - handed:
-            made = [scope.inputs[name] for scope in scopes if name in scope.inputs]
+            made = [scope.inputs.known()[name] for scope in scopes if name in scope.inputs]
             if all(read.isdisjoint(range(entry.start, entry.start + entry.size)) for entry in made):
                 message = f"nothing reads the input '{name}'"
                 findings.warning("unused-input", key_span(section, "inputs", name), message, _READ.format(name))
@@ -136,10 +136,10 @@ def _modules(compiled: Compiled, findings: Findings) -> None:
     """Modules of the spec's own that have no instance; those of an included file may be there for others."""
     inside = {
         instance.module.value
-        for module in compiled.library.modules.values()
+        for module in compiled.library.modules.known().values()
         for instance in module.model.instances.values()
     }
-    for name, module in compiled.library.modules.items():
+    for name, module in compiled.library.modules.known().items():
         if module.own and name not in compiled.used and name not in inside:
             message = f"the module '{name}' has no instance"
             findings.warning("unused-module", key_span(compiled.spec, "modules", name), message, _INSTANCE)

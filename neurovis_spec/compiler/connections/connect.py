@@ -53,7 +53,7 @@ def connect(scopes: tuple[Scope, ...], population: Population, limits: Limits, s
         if scope.module is not None and scope.module in failed:
             continue
         section, findings = scope.section, scope.constants.findings
-        if "connections" in section.lost_keys or written(section.source) > len(section.connections):
+        if "connections" in section.unknown or written(section.source) > len(section.connections):
             failed.add(scope.module)
         number: dict[str, int] = {}
         for key, body in section.connections:

@@ -6,7 +6,7 @@ an edge names none), in the order written. Long plain lists go from the reader's
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -14,13 +14,14 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.limits import LONGEST_DELAY, PATIENCE
-from neurovis_spec.compiler.names.references import few
+from neurovis_spec.compiler.names.references import Directory, few
 from neurovis_spec.compiler.values.cells import Cells, Pairs, cells_of, values_of
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import Span, shorten, suggest
 from neurovis_spec.language.located import formula_of
+from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
 from neurovis_spec.language.values import EdgeRows, FileReference
 from neurovis_spec.language.yaml.source import NULL, TEXT
 
@@ -38,16 +39,27 @@ class EdgeList(NamedTuple):
 
 @dataclass(frozen=True)
 class End:
-    """The positions within an end of the neurons that belong to it, by name. ``perhaps``: the end is invalid, and this
-    says which other names may belong to it."""
+    """The positions within an end of the neurons that belong to it, by name. Of an end that is UNKNOWN, the neurons of
+    its ``directory`` may belong to it."""
 
-    positions: Mapping[str, int]
-    perhaps: Callable[[str], bool] | None = None
+    positions: Mapping[str, int] | Unknown
+    directory: Directory
 
-    def position(self, name: str) -> int:
-        """The position of a neuron; −1 where it cannot belong to the end."""
-        found = self.positions.get(name, -1)
-        return 0 if found < 0 and self.perhaps is not None and self.perhaps(name) else found
+    def indices(self, names: tuple[str, ...]) -> IntArray:
+        """The position of each of these neurons; −1 where one cannot belong to the end, 0 where it may."""
+        if self.positions is UNKNOWN:
+            return np.array([-1 if self.directory.find(name) is None else 0 for name in names], dtype=np.int64)
+        return np.array([self.positions.get(name, -1) for name in names], dtype=np.int64)
+
+    @property
+    def names(self) -> Collection[str]:
+        """The neurons that may belong to it."""
+        return self.directory.neurons if self.positions is UNKNOWN else self.positions
+
+    @property
+    def size(self) -> float | Unknown:
+        """How many belong to it."""
+        return UNKNOWN if self.positions is UNKNOWN else float(len(self.positions))
 
 
 @dataclass(frozen=True)
@@ -107,18 +119,18 @@ class EdgeReader:
             findings.error("wrong-type", cells.node(cell).span, f"the {what} of an edge is the name of a neuron")
         which = which[cells.kinds[which] == TEXT]
         texts = cells.numbers[which].astype(np.int64)
-        positions = np.array([end.position(text) for text in cells.texts], dtype=np.int64)[texts]
+        positions = end.indices(cells.texts)[texts]
         unknown = np.flatnonzero(positions < 0)
         _, once = np.unique(texts[unknown], return_index=True)
         for place in sorted(unknown[once].tolist())[:PATIENCE]:
             self._outside(cells.texts[int(texts[place])], cells.node(int(which[place])).span, end, what)
-        return None if len(unknown) or len(no_names) or end.perhaps is not None else positions
+        return None if len(unknown) or len(no_names) or end.positions is UNKNOWN else positions
 
     def _given(self, cells: Cells, which: IntArray, ends: tuple[IntArray, IntArray] | None) -> FloatArray | None:
         """The weights in these cells, 1 for a null; they are checked even if their ends are invalid."""
-        sizes = {"n_from": float(len(self.sources.positions)), "n_to": float(len(self.targets.positions))}
-        i, j = ends or (which, which)
-        values = values_of(cells, which, self.constants, Pairs(i, j, sizes, self.stream, vague=ends is None))
+        sizes = {"n_from": self.sources.size, "n_to": self.targets.size}
+        pairs = Pairs(UNKNOWN, UNKNOWN, sizes, self.stream) if ends is None else Pairs(*ends, sizes, self.stream)
+        values = values_of(cells, which, self.constants, pairs)
         return None if values is None else np.where(cells.kinds[which] == NULL, 1.0, values)
 
     def _delays(self, cells: Cells, which: IntArray) -> IntArray | None:
@@ -129,7 +141,11 @@ class EdgeReader:
             key = int(cells.kinds[cell]), float(cells.numbers[cell]) if cells.kinds[cell] != NULL else 0.0
             if key not in found:
                 formula = formula_of(cells.node(cell), self.constants.findings)
-                found[key] = None if formula is None else self.constants.integer(formula, "a delay", 0, LONGEST_DELAY)
+                found[key] = (
+                    None
+                    if formula is None
+                    else known(self.constants.integer(formula, "a delay", 0, LONGEST_DELAY), None)
+                )
             result[place] = found[key] or 0
         return None if None in found.values() else result
 
@@ -138,7 +154,7 @@ class EdgeReader:
             message = f"the {what} of an edge is the name of a neuron, this is empty"
             self.constants.findings.error("wrong-type", span, message)
             return
-        hint = suggest(name, few(name, end.positions), f"{what}s of this entry" if end.perhaps is None else "neurons")
+        hint = suggest(name, few(name, end.names), "neurons" if end.positions is UNKNOWN else f"{what}s of this entry")
         message = f"'{shorten(name)}'{where} is not among the {what}s of this entry"
         self.constants.findings.error("edge-outside", span, message, hint, key=(what, where) if where else None)
 
@@ -161,8 +177,8 @@ class EdgeReader:
         return EdgeList(i, j, table.weights, table.delays)
 
     def _named(self, names: tuple[str, ...], rows: IntArray, end: End, what: str, span: Span) -> IntArray | None:
-        positions = np.array([end.position(name) for name in names], dtype=np.int64)
+        positions = end.indices(names)
         unknown = {names[place]: int(rows[place]) for place in reversed(np.flatnonzero(positions < 0).tolist())}
         for name in sorted(unknown, key=unknown.__getitem__)[:PATIENCE]:
             self._outside(name, span, end, what, f" (row {unknown[name]} of the file)")
-        return None if unknown or end.perhaps is not None else positions
+        return None if unknown or end.positions is UNKNOWN else positions

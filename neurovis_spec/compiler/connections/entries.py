@@ -22,7 +22,7 @@ from neurovis_spec.compiler.limits import LONGEST_DELAY, Limits, amount
 from neurovis_spec.compiler.names.references import Directory
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.neurons.populate import Population
-from neurovis_spec.compiler.values.constants import Constants, Randomness
+from neurovis_spec.compiler.values.constants import Constants, Randomness, Value
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.compiler.values.matrices import Grid, grid_of
 from neurovis_spec.diagnostics import Span
@@ -30,6 +30,7 @@ from neurovis_spec.language.expressions.tree import names
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import ConnectionModel
+from neurovis_spec.language.unknown import UNKNOWN, known
 from neurovis_spec.language.values import FileReference, MatrixRows
 from neurovis_spec.language.yaml.source import Scalar
 
@@ -106,7 +107,7 @@ class EntryBuilder:
 
     def _kept(self, *keys: str) -> bool:
         """Whether nothing was lost that these keys may have said."""
-        return self.body.lost_keys.isdisjoint(keys)
+        return self.body.unknown.isdisjoint(keys)
 
     def build(self) -> Bundle | None:
         """The connections; None where anything of the entry is invalid, which is reported."""
@@ -132,11 +133,11 @@ class EntryBuilder:
             learning = self._learning(shape)
         if shape is None or weights is None or centres is None or bounds is None or findings.errors > before:
             return None
-        if self.sources is None or self.targets is None or body.lost:
+        if self.sources is None or self.targets is None or not body.sound:
             return None
         if not len(shape.i):  # there is nothing that a rule would change
             learning = None
-        delays = np.full(len(shape.i), 0 if delay is None else delay, dtype=np.int64)
+        delays = np.full(len(shape.i), known(delay, 0), dtype=np.int64)
         if shape.delays is not None:
             delays = np.where(shape.delays >= 0, shape.delays, delays)
         return Bundle(
@@ -267,28 +268,26 @@ class EntryBuilder:
     def _named(self, neurons: IntArray | None) -> End:
         """The places of an end's neurons by the names that they have in the scope."""
         if neurons is None:
-            directory = self.around.directory
-            return End(directory.neurons, lambda name: directory.find(name) is not None or directory.covers(name))
+            return End(UNKNOWN, self.around.directory)
         called, own = self.around.population.neurons.names, len(self.around.scope.called(""))
-        return End({called[neuron][own:]: place for place, neuron in enumerate(neurons.tolist())})
+        places = {called[neuron][own:]: place for place, neuron in enumerate(neurons.tolist())}
+        return End(places, self.around.directory)
 
     def _values(self, formula: Formula, shape: _Shape | None, purpose: str) -> FloatArray | None:
         """A formula of i, j, n_from, n_to (and distance) for every pair."""
         if shape is None or self.sources is None or self.targets is None:
-            self.constants.look(formula, _WEIGHT.sees, _WEIGHT.draws)
+            self.constants.value(formula, dict.fromkeys(_WEIGHT.sees, UNKNOWN), UNKNOWN)
             return None
-        extra: dict[str, float | FloatArray] = {
+        extra: dict[str, Value] = {
             "i": shape.i.astype(np.float64),
             "j": shape.j.astype(np.float64),
             "n_from": float(len(self.sources)),
             "n_to": float(len(self.targets)),
         }
-        tree = None
-        if isinstance(formula.value, str):
-            tree = self.constants.tree(formula, _WEIGHT.sees, _WEIGHT.draws)
-            if tree is None:
-                return None
-        if tree is not None and "distance" in names(tree):
+        tree = self.constants.tree(formula, _WEIGHT.sees, _WEIGHT.draws)
+        if tree is UNKNOWN:
+            return None
+        if "distance" in names(tree):
             position = self.around.population.neurons.position
             ends = position[self.sources[shape.i]], position[self.targets[shape.j]]
             if self._misplaced() or not all(np.isfinite(end).all() for end in ends):
@@ -302,13 +301,13 @@ class EntryBuilder:
         randomness = Randomness(self._stream(purpose), shape.i, shape.j)
         with self.constants.following() as parts:
             value = self.constants.value(formula, extra, randomness)
-        if tree is not None and "distance" in extra:
+        if "distance" in extra:
             pairs = self.sources[shape.i], self.targets[shape.j]
             distance = Distance(self.around.population.moving, *pairs)
             if distance.slots:
                 parts = [Part(self.constants.bound(tree, {**extra, "distance": distance}, randomness))]
         self.constants.follow(parts)
-        return None if value is None else np.broadcast_to(np.asarray(value, dtype=np.float64), shape.i.shape).copy()
+        return None if value is UNKNOWN else np.broadcast_to(np.asarray(value, dtype=np.float64), shape.i.shape).copy()
 
     def _misplaced(self) -> bool:
         """Whether what the spec says of a position of these neurons is invalid."""
@@ -372,13 +371,13 @@ class EntryBuilder:
             low = self.constants.scalar(bounds[0])
         with self.constants.following() as upper:
             high = self.constants.scalar(bounds[1])
-        if low is not None and high is not None and (lower or upper):  # what is below the other one must stay there
+        if low is UNKNOWN or high is UNKNOWN:
+            return None
+        if lower or upper:  # what is below the other one must stay there
             above = Assembled(np.array(high), tuple(upper))
             lower = lower or [Part(Assembled(np.array(low), ()))]
             self.constants.follow(part._replace(field="low", high=above) for part in lower)
             self.constants.follow(part._replace(field="high") for part in upper)
-        if low is None or high is None:
-            return None
         if low > high:
             findings.error("out-of-range", entry.value.span, f"the lower bound {low:g} is above the upper one {high:g}")
             return None

@@ -19,9 +19,10 @@ from neurovis_spec.compiler.values.arguments import check_settings
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import Findings, Span, meant, shorten, suggest
-from neurovis_spec.diagnostics import nearest as nearest_names
+from neurovis_spec.language.keys import settings_of
 from neurovis_spec.language.located import Formula, formula_of
 from neurovis_spec.language.patterns import PATTERNS
+from neurovis_spec.language.unknown import UNKNOWN, Unknown, known
 from neurovis_spec.language.values import Choice
 
 
@@ -122,27 +123,17 @@ def is_drawn(choice: Choice, constants: Constants) -> bool:
     if choice.name.value != "random":
         return False
     formulas = [formula_of(entry.value, constants.findings) for entry in choice.settings]
-    return any(formula is not None and constants.scalar(formula) for formula in formulas)
+    return any(formula is not None and known(constants.scalar(formula), 0.0) for formula in formulas)
 
 
 def _settings(name: str, choice: Choice, findings: Findings) -> dict[str, Formula]:
     """The formulas of the settings; each of them has to be there."""
     allowed = PATTERNS[name].settings
-    entries = {entry.name: entry for entry in choice.settings if entry.name in allowed}
-    perhaps: set[str] = set()
-    for entry in choice.settings:
-        if entry.name not in allowed:
-            hint = suggest(entry.name, allowed, "known here") or f"'{name}' has no settings"
-            findings.error("unknown-parameter", entry.key.span, f"there is no setting '{shorten(entry.name)}'", hint)
-            free = [setting for setting in allowed if setting not in entries]
-            right = meant(entry.name, free)
-            perhaps.update(nearest_names(entry.name, free))
-            if right is not None:
-                entries[right] = entry
-    for missing in [setting for setting in allowed if setting not in entries and setting not in perhaps][:1]:
+    entries = settings_of(choice.settings, allowed, "setting", f"'{name}' has no settings", findings)
+    for missing in [setting for setting in allowed if setting not in entries][:1]:
         message = f"'{name}' needs a {missing}"
         findings.error("missing-key", choice.name.span, message, f"write {PATTERNS[name].use}")
-    formulas = {setting: formula_of(entry.value, findings) for setting, entry in entries.items()}
+    formulas = {setting: formula_of(entry.value, findings) for setting, entry in entries.known().items()}
     return {setting: formula for setting, formula in formulas.items() if formula is not None}
 
 
@@ -158,25 +149,25 @@ class _Sized:
     def values(self) -> dict[str, float]:
         """What the settings are, without those invalid."""
         found = {setting: self._value(setting, formula) for setting, formula in self.settings.items()}
-        return {setting: value for setting, value in found.items() if value is not None}
+        return {setting: value for setting, value in found.items() if value is not UNKNOWN}
 
-    def _value(self, setting: str, formula: Formula) -> float | None:
+    def _value(self, setting: str, formula: Formula) -> float | Unknown:
         if setting in ("probability", "rewire"):
             return self._probability(formula)
         least = {"width": 0, "degree": 2, "count": 1}[setting]
         value = self.constants.integer(formula, f"a {setting}", least)
-        if setting != "degree" or value is None or not value % 2:
+        if setting != "degree" or value is UNKNOWN or not value % 2:
             return value
         self._too_many("degree", f"a degree is even, half of it on each side of the ring; this is {value}")
-        return None
+        return UNKNOWN
 
-    def _probability(self, formula: Formula) -> float | None:
+    def _probability(self, formula: Formula) -> float | Unknown:
         value = self.constants.scalar(formula, structural=True)
-        if value is None or 0 <= value <= 1:
+        if value is UNKNOWN or 0 <= value <= 1:
             return value
         message = f"a probability lies between 0 and 1, this is {value:g}"
         self.constants.findings.error("out-of-range", formula.span, message)
-        return None
+        return UNKNOWN
 
     def _too_many(self, setting: str, message: str) -> None:
         self.constants.findings.error("out-of-range", self.settings[setting].span, message)

@@ -15,12 +15,14 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.limits import PATIENCE
 from neurovis_spec.compiler.names.references import Directory, few, resolve_end
 from neurovis_spec.compiler.names.scope import Scope
+from neurovis_spec.compiler.network import Input
 from neurovis_spec.compiler.program import Rule
 from neurovis_spec.compiler.values.arguments import Each, check_initials, check_settings, choose, parameters, settle
 from neurovis_spec.diagnostics import shorten, suggest
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import ConnectionModel
+from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.language.values import Choice
 from neurovis_spec.language.yaml.source import Entry, Node, Packed, Scalar, Sequence
 
@@ -64,24 +66,24 @@ def learning_of(
     ``directory`` says what the names of the scope mean, ``neurons`` is how many the network has.
     """
     constants, definitions = scope.constants, scope.definitions
-    found = choose(choice, definitions.rules, "rule", definitions, constants.findings)
-    if found is None:
+    found = choose(choice, definitions.rules, "rule", constants.findings)
+    if found is UNKNOWN:
         check_settings(choice, constants, _SETTING.sees)
         return None
     rule, defaults = found
     known = (*(default.name for default in defaults), *rule.signals)
     settled = settle(choice, known, constants.findings)
     targets = None if wired is None else wired.j
-    each = Each("connection", _SETTING.sees, None if wired is None else wired._asdict())
-    values = parameters(choice, defaults, None if targets is None else len(targets), constants, settled, each)
+    each = Each("connection", dict.fromkeys(_SETTING.sees, UNKNOWN) if wired is None else wired._asdict())
+    values = parameters(choice, defaults, UNKNOWN if targets is None else len(targets), constants, settled, each)
     signals: dict[str, IntArray] = {}
-    failed = values is None
+    failed = values is UNKNOWN
     told = constants.findings.is_invalid(choice.name.span)
     for signal in rule.signals:
-        entry = settled.entries.get(signal)
-        if entry is None:
+        entry = settled.get(signal)
+        if entry is None or entry is UNKNOWN:
             failed = True
-            if signal not in settled.perhaps and not told:
+            if entry is None and not told:
                 message = f"the rule '{rule.name}' needs the signal '{signal}'"
                 hint = f"write {{{rule.name}: {{{signal}: NEURON_OR_INPUT}}}}"
                 constants.findings.error("missing-signal", choice.name.span, message, hint, key=signal)
@@ -91,9 +93,9 @@ def learning_of(
             failed = True
         else:
             signals[signal] = where
-    if failed or values is None or not check_initials(rule.state, values, choice, constants):
+    if failed or values is UNKNOWN or not check_initials(rule.state, values, choice, constants):
         return None
-    return Learning(rule, values, signals, {name: _text(settled.entries[name].value) for name in rule.signals})
+    return Learning(rule, values, signals, {name: _text(settled.known()[name].value) for name in rule.signals})
 
 
 def _signal(
@@ -133,17 +135,17 @@ def _signal(
 
 def _place(signal: str, node: Node, scope: Scope, directory: Directory, neurons: int) -> IntArray | None:
     """Where a name of a signal is found, in all activities followed by all inputs."""
-    findings, inputs = scope.constants.findings, scope.inputs
+    findings = scope.constants.findings
     if not isinstance(node, Scalar) or not isinstance(node.value, str):
         message = f"the signal '{signal}' is the name of a neuron, a group or an input, or a list of these"
         findings.error("wrong-type", node.span, message)
         return None
     name = node.value.strip()
-    if name in inputs:
-        source = inputs[name]
+    source = scope.input(name)
+    if isinstance(source, Input):
         first = neurons + source.start
         return np.arange(first, first + source.size, dtype=np.int64)
-    if scope.gaps.cover("inputs", name) or directory.covers(name):
+    if source is UNKNOWN or directory.find(name) is UNKNOWN:
         return None
     if directory.find(name) is None and not any(mark in name for mark in (".", "+")):
         names = (*scope.section.inputs, *directory.known)

@@ -17,6 +17,7 @@ from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.located import Formula
 from neurovis_spec.language.sections import ScaleModel
+from neurovis_spec.language.unknown import Names, known
 
 #: Most neurons whose spectral radius is computed: all eigenvalues of a dense matrix are found.
 MOST = 3000
@@ -45,7 +46,7 @@ class Scaled:
         """The scaled weights with these parameters; NaN where there is nothing to scale."""
         given = self.constants
         values = given.parameters | {name: float(parameters[slot]) for name, slot in given.settable.items()}
-        quiet = Constants(values, given.dt, Findings())
+        quiet = Constants(Names(values), given.dt, Findings())
         weights = self.weights.values(parameters)
         result = scaled(self.model, weights, self.ends, self.pairs, quiet) if np.isfinite(weights).all() else None
         return np.full(len(weights), np.nan) if result is None else result
@@ -87,12 +88,12 @@ def check_scale(model: ScaleModel, constants: Constants) -> float | None:
     for formula, what in ((model.spectral_radius, "spectral radius"), (model.norm, "norm")):
         if formula is None:
             continue
-        value = constants.scalar(formula)
+        value = known(constants.scalar(formula), None)
         if value is not None and value < 0:
             constants.findings.error("out-of-range", formula.span, f"a {what} is not negative, this is {value:g}")
             value = None
         result.append(value)
-    if model.lost or model.contradictory:  # without what is invalid in it, it would be another one
+    if not model.sound or model.contradictory:  # without what is invalid in it, it would be another one
         return None
     return result[0] if result else None
 

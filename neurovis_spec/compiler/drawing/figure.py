@@ -82,7 +82,7 @@ class _Reader:
     def _part(self, view: str, part: Part, text: Located[str]) -> Iterator[Curve]:
         name = part.text
         output = self.outputs.get(name)
-        known = self.directory.find(name) is not None
+        known = self.directory.holds(name)
         if not known and output is None and name in self.declared:
             return
         state = None if known else self.finder.name_of_state(part)
@@ -104,7 +104,7 @@ class _Reader:
     def _neurons(self, part: Part, text: Located[str], output: Output | None) -> tuple[int, ...]:
         """Those of a reference, of an output, of an instance, or those that take in an input."""
         directory, name = self.directory, part.text
-        if directory.find(name) is None:
+        if not directory.holds(name):
             if output is not None:
                 return tuple(output.neurons.tolist())
             inside = directory.instance(name)

@@ -16,6 +16,7 @@ from neurovis_spec.diagnostics import Span, shorten
 from neurovis_spec.language.drawing import GainValue, Range
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.references import Sum, parse
+from neurovis_spec.language.unknown import UNKNOWN
 
 Sort = Literal["activity", "signal", "thickness", "change"]
 
@@ -44,7 +45,7 @@ def _value(one: GainValue, constants: Constants) -> tuple[float, float] | None:
     findings = constants.findings
     if isinstance(one.value, Range):
         low, high = (constants.scalar(end) for end in (one.value.low, one.value.high))
-        if low is None or high is None:
+        if low is UNKNOWN or high is UNKNOWN:
             return None
         gain = 2 / (high - low) if high > low else math.inf
         if not math.isfinite(gain):
@@ -52,8 +53,8 @@ def _value(one: GainValue, constants: Constants) -> tuple[float, float] | None:
             findings.error("out-of-range", one.span, message, "write [low, high]")
             return None
         return gain, low / 2 + high / 2
-    value = None if one.value is None else constants.scalar(one.value)
-    if value is None:
+    value = UNKNOWN if one.value is None else constants.scalar(one.value)
+    if value is UNKNOWN:
         return None
     if value < 0:
         findings.error("out-of-range", one.span, f"a gain is not negative, this is {value:g}")

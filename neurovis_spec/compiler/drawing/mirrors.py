@@ -70,12 +70,10 @@ def _mirror(
 ) -> Mirror | None:
     left, right = reference.parts
     sides = directory.instance(left.value), directory.instance(right.value)
-    if bool(sides[0]) != bool(sides[1]) and not (directory.covers(left.value) or directory.covers(right.value)):
-        known = directory.find((right if sides[0] else left).value)
-        if known is not None:
-            message = "a mirror pairs instances with instances, and neurons with neurons"
-            findings.error("bad-mirror", reference.span, message)
-            return None
+    if bool(sides[0]) != bool(sides[1]) and directory.holds((right if sides[0] else left).value):
+        message = "a mirror pairs instances with instances, and neurons with neurons"
+        findings.error("bad-mirror", reference.span, message)
+        return None
     if sides[0] and sides[1]:
         return _of_instances(scope, reference, sides, names, paths, findings)
     pair = _members(left, directory, findings), _members(right, directory, findings)

@@ -70,12 +70,14 @@ def _members(
     inside = directory.instance(name)
     if inside:
         return tuple(index for one in inside for index in one.members)
-    found = directory.find(name) or boxes.get(name)
-    if found is None and not directory.covers(name):
+    found = directory.find(name)
+    if not directory.holds(name):
+        found = boxes.get(name, found)
+    if found is None:
         known = [*directory.instances, *directory.groups, *boxes]
         message = f"there is no instance, group or box '{shorten(name)}'"
         findings.error("unknown-cell", cell.span, message, lambda: suggest(name, known, "known here"))
-    return found or ()
+    return found if isinstance(found, tuple) else ()
 
 
 def check_plan(

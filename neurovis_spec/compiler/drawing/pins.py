@@ -18,6 +18,7 @@ from neurovis_spec.compiler.neurons.populate import Population
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel
 from neurovis_spec.language.located import Located
+from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.language.values import Point
 
 Place: TypeAlias = tuple[float, float]
@@ -131,7 +132,7 @@ def _said(scope: Scope, directory: Directory, findings: Findings) -> _Said:
     check_keys(model.source, "positions", model.positions, directory, findings)
     for key, point in _points(model):
         x, y = scope.constants.scalar(point.x), scope.constants.scalar(point.y)
-        if x is None or y is None:
+        if x is UNKNOWN or y is UNKNOWN:
             if not directory.instance(key.value):
                 _neuron(key, directory, findings)
             continue

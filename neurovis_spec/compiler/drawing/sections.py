@@ -24,6 +24,7 @@ from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel, Rende
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.references import Sum, parse
 from neurovis_spec.language.theme import ThemeModel
+from neurovis_spec.language.unknown import UNKNOWN, known
 from neurovis_spec.language.values import Reference
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 from neurovis_spec.themes import COLOURS
@@ -104,8 +105,8 @@ def _plans(
 
 
 def _spacing(formula: Formula | None, default: float, constants: Constants) -> float:
-    value = None if formula is None else constants.scalar(formula)
-    if formula is None or value is None:
+    value = UNKNOWN if formula is None else constants.scalar(formula)
+    if formula is None or value is UNKNOWN:
         return default
     if not DIAMETER <= value <= FARTHEST:
         message = f"a spacing lies between {DIAMETER}, the diameter of a neuron, and {FARTHEST:g}; this is {value:g}"
@@ -174,7 +175,7 @@ def render_settings(model: RenderModel | None, finder: Finder, constants: Consta
             message = f"a picture has at most {_MOST_PIXELS:,} pixels, this one {size[0] * size[1]:,}"
             hint = "an '.svg' can be shown as large as one likes"
             constants.findings.error("out-of-range", model.size[1].span, message, hint)
-    least = None if model.min_weight is None else constants.scalar(model.min_weight)
+    least = None if model.min_weight is None else known(constants.scalar(model.min_weight), None)
     if least is not None and model.min_weight is not None and least < 0:
         message = f"'min_weight' is not negative, this is {least:g}"
         constants.findings.error("out-of-range", model.min_weight.span, message)
@@ -190,7 +191,7 @@ def render_settings(model: RenderModel | None, finder: Finder, constants: Consta
         labels=model.labels is None or model.labels.value,
         legend=model.legend is None or model.legend.value,
         title=True if model.title is None else model.title.value,
-        window=None if model.window is None else constants.integer(model.window, "a window of steps", 1),
+        window=None if model.window is None else known(constants.integer(model.window, "a window of steps", 1), None),
         collapse=tuple(_collapsed(model.collapse, finder.directory, constants.findings)),
         min_weight=least,
     )
@@ -206,10 +207,12 @@ def _traces(model: RenderModel, finder: Finder, constants: Constants) -> tuple[S
             constants.findings.error("wrong-type", key.span, message, "lines show the traces of their sources")
             continue
         members = finder.neurons(key)
-        if seconds is not None and seconds < 0:
+        if seconds is UNKNOWN:
+            continue
+        if seconds < 0:
             message = f"a trace lasts for 0 seconds or more, this is {seconds:g}"
             constants.findings.error("out-of-range", formula.span, message)
-        elif seconds is not None and members is not None:
+        elif members is not None:
             found.append(StatedTrace(seconds, tuple(members.tolist())))
     return tuple(sorted(found, key=lambda one: -len(one.members)))
 
@@ -227,7 +230,7 @@ def _changes(theme: ThemeModel) -> tuple[tuple[str, str], ...]:
 def _side(formula: Formula, constants: Constants) -> int | None:
     """The width or the height of a picture, in pixels."""
     value = constants.scalar(formula)
-    if value is None:
+    if value is UNKNOWN:
         return None
     if not value.is_integer():
         message = f"a side of a picture must be an integer, this is {value:g}"

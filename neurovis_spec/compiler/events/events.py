@@ -15,9 +15,10 @@ from neurovis_spec.compiler.names.references import check_keys, key_of, other_pa
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.located import Formula, Located
-from neurovis_spec.language.model import lost_names
+from neurovis_spec.language.model import names_of
 from neurovis_spec.language.references import Sum, parse
 from neurovis_spec.language.sections import EventModel
+from neurovis_spec.language.unknown import UNKNOWN
 
 
 @dataclass(frozen=True)
@@ -61,14 +62,13 @@ class EventReader:
         begin = model.at if model.at is not None else model.from_
         at = None if begin is None else self.constants.integer(begin, "the step of an event", 0)
         to = None if model.to is None else self.constants.integer(model.to, "the end of a clamp", 1)
-        if at is not None and to is not None and model.to is not None and to <= at:
+        if isinstance(at, int) and isinstance(to, int) and model.to is not None and to <= at:
             message = f"the clamp ends before it begins: from {at} to {to}, which is exclusive"
             self.findings.error("out-of-range", model.to.span, message)
-        for name in lost_names(model.source, "set", dict(model.set)):
+        for name, formula in names_of(model, "set", model.set).items():
             self._check_set(model, name)
-        for name, formula in model.set.items():
-            self._check_set(model, name)
-            self.constants.scalar(formula)
+            if formula is not UNKNOWN:
+                self.constants.scalar(formula)
         check_keys(model.source, "clamp", model.clamp, self.finder.directory, self.findings)
         clamps = [one for name, formula in model.clamp.items() for one in self._clamp(model, name, formula)]
         neurons, connections = self._parts(model.lesion)
@@ -78,7 +78,7 @@ class EventReader:
             for name, on in model.learning.items()
             for one in self._learning(key_of(model.source, "learning", name), on.value)
         ]
-        if at is None or model.contradictory or self.findings.errors > before:
+        if at is None or at is UNKNOWN or to is UNKNOWN or model.contradictory or self.findings.errors > before:
             return None
         keys = {name: key_of(model.source, "set", name).span for name in model.set}
         return Event(at, to, model.set, tuple(clamps), neurons, connections, mended, joined, tuple(learning), keys)
@@ -86,9 +86,9 @@ class EventReader:
     def _check_set(self, model: EventModel, name: str) -> None:
         span = key_of(model.source, "set", name).span
         constants = self.constants
-        if name not in constants.parameters and name not in constants.broken and not constants.incomplete:
+        if name not in constants.names:
             message = f"there is no parameter '{shorten(name)}' to be set"
-            known = (*constants.parameters, *constants.broken)
+            known = constants.names
             self.findings.error("unknown-parameter", span, message, lambda: other_parameter(name, known))
         elif name in self.constants.structural:
             message = f"'{name}' cannot be set in a run: the structure of the network depends on it"
@@ -97,7 +97,7 @@ class EventReader:
     def _clamp(self, model: EventModel, name: str, formula: Formula) -> list[tuple[IntArray, Formula]]:
         neurons = self.finder.neurons(key_of(model.source, "clamp", name))
         value = self.constants.scalar(formula)
-        return [] if neurons is None or value is None else [(neurons, formula)]
+        return [] if neurons is None or value is UNKNOWN else [(neurons, formula)]
 
     def _parts(self, texts: Iterable[Located[str]]) -> tuple[tuple[IntArray, ...], tuple[IntArray, ...]]:
         """The neurons and the connections that are lesioned or mended."""

@@ -27,6 +27,7 @@ from neurovis_spec.compiler.values.constants import Constants, check_finite
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.tree import Number
 from neurovis_spec.language.located import Formula
+from neurovis_spec.language.unknown import UNKNOWN
 
 
 def with_changes(network: Network, events: tuple[Event, ...], constants: Constants) -> Network:
@@ -96,7 +97,7 @@ def _indices(found: Sequence[IntArray]) -> IntArray:
 def _formula(formula: Formula, constants: Constants) -> ParameterFormula:
     """A formula of an event over the parameters, whatever these are by then."""
     tree = constants.tree(formula) if isinstance(formula.value, str) else Number(float(formula.value))
-    return constants.bound(tree or Number(0.0))
+    return constants.bound(Number(0.0) if tree is UNKNOWN else tree)
 
 
 class _Written(NamedTuple):

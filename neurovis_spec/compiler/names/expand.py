@@ -7,7 +7,7 @@ anew, with what ``set`` gives them; its inputs are those of the scope around it,
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -19,7 +19,6 @@ from neurovis_spec.compiler.names.modules import Library, Module
 from neurovis_spec.compiler.names.references import Section, key_of, key_span
 from neurovis_spec.compiler.names.scope import Expansion, Scope
 from neurovis_spec.compiler.names.size_estimate import SizeEstimate
-from neurovis_spec.compiler.names.unresolved import Gaps
 from neurovis_spec.compiler.network import Input
 from neurovis_spec.compiler.neurons.inputs import make_input
 from neurovis_spec.compiler.values.constants import Constants
@@ -28,9 +27,10 @@ from neurovis_spec.compiler.values.parameters import make_parameters
 from neurovis_spec.diagnostics import Findings, shorten, suggest
 from neurovis_spec.language.expressions.tree import Number, names, substitute
 from neurovis_spec.language.located import NAME_RULE, too_long
-from neurovis_spec.language.model import lost_names
-from neurovis_spec.language.modules import INCLUDED, InstanceModel
+from neurovis_spec.language.model import names_of, unread
+from neurovis_spec.language.modules import InstanceModel
 from neurovis_spec.language.places import formula_at
+from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 
 #: What ``set`` knows beside the parameters: the number of the instance, from 0, and how many its entry makes.
 COUNTED = formula_at(InstanceModel, "set", "PARAMETER").sees
@@ -67,12 +67,11 @@ class Expander:
     #: how many scopes were made, and whether there would have been too many
     made: int = 0
     stopped: bool = False
-    gaps: dict[str | None, Gaps] = field(default_factory=dict)
     limits: Limits = field(default_factory=Limits)
 
     @cached_property
     def _size_estimate(self) -> SizeEstimate:
-        return SizeEstimate(self.library.modules, self.dt, self.limits.neurons)
+        return SizeEstimate(self.library.modules.known(), self.dt, self.limits.neurons)
 
     def expand(self, section: Section, constants: Constants, folder: Path, module: str | None = None) -> Expansion:
         """The scopes of a section whose parameters are known, and the inputs of the network. ``module``: it is a module
@@ -83,8 +82,7 @@ class Expander:
             self._unit(section, constants, folder, _Place(path, path, 0, 0, 1), (), module=module)
         except _StoppedError:  # which instances there are is not known then
             root = self._at(0)
-            gaps = root.gaps.with_section("instances")
-            self.scopes = [replace(root, definitions=replace(root.definitions, gaps=gaps))]
+            self.scopes = [replace(root, children=root.children.opened())]
         self.made += len(self.scopes)
         return Expansion(tuple(map(self._at, range(len(self.scopes)))), tuple(self.inputs))
 
@@ -110,17 +108,14 @@ class Expander:
         self.scopes.append(None)
         files = self.files_in(folder)
         own = self._inputs(section, constants, files, place, bound or {})
-        lost = section.inputs.keys() - own.keys()
-        gaps = self._gaps(module)
-        if lost:
-            gaps = gaps.with_names("inputs", gaps.names["inputs"] | lost)
         scope = Scope(
             path=place.path,
             section=section,
             constants=constants,
-            definitions=replace(self.library.definitions, gaps=gaps),
+            definitions=self.library.definitions,
             files=files,
             inputs=own,
+            children=names_of(section, "instances", {}),  # those within are not known yet
             module=module,
             parent=way[-1] if way else -1,
             declared=place.declared,
@@ -132,35 +127,18 @@ class Expander:
             self._count(scope)
         if not section.instances:
             return index
-        children: dict[str, tuple[int, ...]] = {}
-        absent: set[str] = set()
+        made: dict[str, tuple[int, ...] | Unknown] = {}
         for name, model in section.instances.items():
-            made = self._instances(name, model, scope, (*way, index))
-            if made is None:
-                absent.add(name)
-            else:
-                children.update(made)
+            made.update(self._instances(name, model, scope, (*way, index)))
+        children = names_of(section, "instances", made)
         inner = {
             f"{name}.{key}": found
-            for name, places in children.items()
+            for name, places in children.known().items()
             if len(places) == 1
             for key, found in self._at(places[0]).inputs.items()
         }
-        gaps = gaps.with_names("instances", gaps.names["instances"] | absent)
-        self.scopes[index] = replace(
-            scope, children=children, inputs={**own, **inner}, definitions=replace(scope.definitions, gaps=gaps)
-        )
+        self.scopes[index] = replace(scope, children=children, inputs=Names({**own, **inner}, own.is_open))
         return index
-
-    def _gaps(self, module: str | None) -> Gaps:
-        """What could not be read of the spec or of a module, and of the definitions."""
-        if module not in self.gaps:
-            everywhere = self.library.definitions.gaps
-            own = everywhere if module is None else self.library.modules[module].gaps
-            if module is not None:
-                own = replace(own, sections=own.sections - {"modules"}).joined(everywhere.only(INCLUDED))
-            self.gaps[module] = own
-        return self.gaps[module]
 
     def _count(self, scope: Scope) -> None:
         """Refuse more instances, or neurons, than there may be before any of them is made. Modules that are checked
@@ -186,18 +164,14 @@ class Expander:
         files: Files,
         place: _Place,
         bound: Mapping[str, Binding],
-    ) -> dict[str, Input]:
+    ) -> Names[Input]:
         """The inputs of a scope by their names in it; those that are not bound are inputs of the network."""
-        result: dict[str, Input] = {}
+        result: dict[str, Input | Unknown] = {}
         for name, model in section.inputs.items():
             start = 0 if not self.inputs else self.inputs[-1].start + self.inputs[-1].size
             made = make_input(name, model, start, section, constants, files)
-            if made is None:
-                continue
-            if name in bound:
-                shared = shared_out(made, bound[name], place.position, place.count)
-                if shared is not None:
-                    result[name] = shared
+            if made is UNKNOWN or name in bound:
+                result[name] = made if made is UNKNOWN else shared_out(made, bound[name], place.position, place.count)
                 continue
             if place.path:
                 tree = made.expression
@@ -211,19 +185,17 @@ class Expander:
                 made = replace(made, name=f"{place.path}.{name}", expression=tree)
             self.inputs.append(made)
             result[name] = made
-        return result
+        return names_of(section, "inputs", result)
 
     def _instances(
         self, name: str, model: InstanceModel, scope: Scope, way: tuple[int, ...]
-    ) -> dict[str, tuple[int, ...]] | None:
-        """The places of the instances that one entry makes, by name; None where it is not known which these are."""
+    ) -> Mapping[str, tuple[int, ...] | Unknown]:
+        """The places of the instances that one entry makes, by name."""
         module = self._module(model)
-        count = None
-        if model.count is not None:
-            count = scope.constants.integer(model.count, "'count'", 1)
-        if module is None or "count" in model.lost or (model.count is not None and count is None):
+        count = None if model.count is None else scope.constants.integer(model.count, "'count'", 1)
+        if module is UNKNOWN or count is UNKNOWN or "count" in model.unknown:
             self._check(model, scope)
-            return None
+            return {name: UNKNOWN}
         if len(way) > DEEPEST:
             span = key_span(scope.section, "instances", name)
             self.findings.error("too-deep", span, f"modules are nested at most {DEEPEST} deep")
@@ -232,10 +204,10 @@ class Expander:
         called = [name] if count is None else [f"{name}{number}" for number in range(1, count + 1)]
         if len(called[-1]) > 64:
             self.findings.error("bad-name", key_span(scope.section, "instances", name), too_long(called[-1]), NAME_RULE)
-            return None
+            return {name: UNKNOWN}
         self.used.add(module.name)
         self._check_keys(model, module)
-        bound = bindings_of(model, scope.section, scope.inputs, scope.gaps, self.findings)
+        bound = bindings_of(model, scope, self.findings)
         result: dict[str, tuple[int, ...]] = {}
         for position, own in enumerate(called):
             number = 0 if count is None else position + 1
@@ -251,35 +223,34 @@ class Expander:
             result[name] = tuple(result[own][0] for own in called)
         return result
 
-    def _module(self, model: InstanceModel) -> Module | None:
-        name = model.module.value
-        found = self.library.modules.get(name)
-        if found is None and not self.library.definitions.gaps.cover("modules", name):
-            known = self.library.modules
+    def _module(self, model: InstanceModel) -> Module | Unknown:
+        name, known = model.module.value, self.library.modules
+        found = known.get(name)
+        if found is None:
             self.findings.error(
                 "unknown-module",
                 model.module.span,
                 f"there is no module '{shorten(name)}'",
                 lambda: suggest(name, known, "modules") or "there are no modules; add it under 'modules'",
             )
-        return found
+        return UNKNOWN if found is None else found
 
     def _check(self, model: InstanceModel, scope: Scope) -> None:
         """What can be said of an instance whose module or count is not known."""
         for formula in model.set.values():
-            scope.constants.tree(formula, COUNTED)
-        bindings_of(model, scope.section, scope.inputs, scope.gaps, self.findings)
+            scope.constants.value(formula, dict.fromkeys(COUNTED, UNKNOWN))
+        bindings_of(model, scope, self.findings)
 
     def _check_keys(self, model: InstanceModel, module: Module) -> None:
         """What ``set`` and ``inputs`` name must be the module's."""
-        gaps = module.gaps
-        parts: tuple[tuple[str, Mapping[str, object], str, Mapping[str, object]], ...] = (
-            ("set", model.set, "parameter", module.model.parameters),
-            ("inputs", model.inputs, "input", module.model.inputs),
+        inner = module.model
+        parts: tuple[tuple[str, Mapping[str, object], str, Collection[str]], ...] = (
+            ("set", model.set, "parameter", names_of(inner, "parameters", inner.parameters)),
+            ("inputs", model.inputs, "input", names_of(inner, "inputs", inner.inputs)),
         )
         for part, given, what, known in parts:
             for name in given:
-                if name not in known and not gaps.cover(f"{what}s", name):
+                if name not in known:
                     message = f"the module '{module.name}' has no {what} '{shorten(name)}'"
                     hint = suggest(name, known, f"{what}s of '{module.name}'")
                     self.findings.error(f"unknown-{what}", key_of(model.source, part, name).span, message, hint)
@@ -298,16 +269,16 @@ class Expander:
             value = scope.constants.value(formula, extra)
             if name not in module.model.parameters:
                 continue
-            if value is None:
-                constants.broken.add(name)
+            if value is UNKNOWN:
+                constants.names.declared[name] = UNKNOWN
                 continue
             given[name] = float(value)
-            tree = scope.constants.tree(formula, COUNTED) if isinstance(formula.value, str) else None
-            settings[name] = frozenset() if tree is None else names(tree)
-            if tree is not None and not names(tree).isdisjoint(outer.settable):
+            tree = scope.constants.tree(formula, COUNTED) if isinstance(formula.value, str) else UNKNOWN
+            settings[name] = frozenset() if tree is UNKNOWN else names(tree)
+            if tree is not UNKNOWN and not names(tree).isdisjoint(outer.settable):
                 following[name] = outer.bound(tree, extra)
         constants.settings = following
-        constants.broken.update(lost_names(model.source, "set", dict(model.set)))
+        constants.names.declared.update(unread(model, "set"))
         places = {name: formula.span for name, formula in model.set.items()}
         make_parameters(module.model, constants, given, places)
         return constants, settings
@@ -315,5 +286,4 @@ class Expander:
 
 def constants_of(module: Module, dt: float, findings: Findings) -> Constants:
     """Constants for the parameters of a module, before these are known."""
-    lost, incomplete = set(module.gaps.names["parameters"]), "parameters" in module.gaps.sections
-    return Constants({}, dt, findings, broken=lost, incomplete=incomplete)
+    return Constants(names_of(module.model, "parameters", {}), dt, findings)

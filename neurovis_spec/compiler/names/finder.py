@@ -90,7 +90,7 @@ class Finder:
         name = state_of(part)
         if name is None or isinstance(name.owner, Arrow):
             return name
-        if self.directory.find(part.text) is not None or self.directory.instance(part.text):
+        if self.directory.holds(part.text) or self.directory.instance(part.text):
             return None
         owner = name.owner.text
         return None if self.directory.instance(owner) or owner in self.directory.instances else name
@@ -128,7 +128,7 @@ def _models(population: Population) -> tuple[Holder, ...]:
     """The states of the models of groups; nothing is known of a group whose model is invalid."""
     result = []
     for group, kind, written in zip(population.neurons.groups, population.kinds, population.models, strict=True):
-        if "model" in written.lost or (written.model is not None and written.model.name.value != kind.model.name):
+        if "model" in written.unknown or (written.model is not None and written.model.name.value != kind.model.name):
             continue
         states = tuple(quantity.name for quantity in kind.model.state)
         result.append(Holder(np.array(group.indices, dtype=np.int64), kind.model.name, states))

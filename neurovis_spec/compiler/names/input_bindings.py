@@ -6,18 +6,19 @@ input that one instance gets.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
 from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.names.references import Section, known_inputs
-from neurovis_spec.compiler.names.unresolved import Gaps
+from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import Input
 from neurovis_spec.diagnostics import Findings, Hint, Span, shorten
 from neurovis_spec.language.located import Located
-from neurovis_spec.language.model import lost_names
+from neurovis_spec.language.model import unread
 from neurovis_spec.language.modules import InstanceModel
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
 
 #: Sizes that are told of.
 _FEW = 3
@@ -25,29 +26,27 @@ _FEW = 3
 
 @dataclass(frozen=True)
 class Binding:
-    """What an entry of instances says an input of its module is, where, and what it is; None where that is invalid.
+    """What an entry of instances says an input of its module is, where, and what it is.
 
     ``wanted`` notes how many components the module's own input has, in each of the instances.
     """
 
     name: str
     span: Span
-    input: Input | None
+    input: Input | Unknown
     wanted: list[int] = field(default_factory=list)
 
 
-def bindings_of(
-    model: InstanceModel, section: Section, inputs: Mapping[str, Input], gaps: Gaps, findings: Findings
-) -> dict[str, Binding]:
-    """The inputs of the scope around that an instance names; None for one that is invalid."""
+def bindings_of(model: InstanceModel, scope: Scope, findings: Findings) -> dict[str, Binding]:
+    """The inputs of the scope around that an instance names."""
     result: dict[str, Binding] = {}
     for name, outer in model.inputs.items():
-        found = inputs.get(outer.value)
-        if found is None and not gaps.cover("inputs", outer.value):
-            _unknown(outer, section, findings)
-        result[name] = Binding(outer.value, outer.span, found)
-    for name in lost_names(model.source, "inputs", dict(model.inputs)):
-        result[name] = Binding("", model.source.span, None)
+        found = scope.input(outer.value)
+        if found is None:
+            _unknown(outer, scope.section, findings)
+        result[name] = Binding(outer.value, outer.span, UNKNOWN if found is None else found)
+    for name, value in unread(model, "inputs").items():
+        result[name] = Binding(name, model.source.span, value)
     return result
 
 
@@ -60,24 +59,25 @@ def _unknown(outer: Located[str], section: Section, findings: Findings) -> None:
     findings.error("unknown-input", outer.span, message, hint)
 
 
-def shared_out(made: Input, bound: Binding, position: int, count: int) -> Input | None:
-    """What one of ``count`` instances gets of an input around it; None where the sizes do not fit (``check_sizes``)."""
+def shared_out(made: Input, bound: Binding, position: int, count: int) -> Input | Unknown:
+    """What one of ``count`` instances gets of an input around it; sizes that do not fit are found later
+    (``check_sizes``)."""
     outer = bound.input
     bound.wanted.append(made.size)
-    if outer is None:
-        return None
+    if outer is UNKNOWN:
+        return UNKNOWN
     if outer.size == made.size:
         return Input(outer.name, outer.start, made.size)
     if outer.size == count * made.size:
         return Input(outer.name, outer.start + position * made.size, made.size)
-    return None
+    return UNKNOWN
 
 
 def check_sizes(bound: Binding, called: Sequence[str], findings: Findings) -> None:
     """A finding where an input does not fit the instances of an entry, which are ``called`` so: it goes to each of
     them, or is shared out among them in equal parts."""
     outer, count = bound.input, len(called)
-    if outer is None or len(bound.wanted) < count or set(bound.wanted) in ({outer.size}, {outer.size / count}):
+    if outer is UNKNOWN or len(bound.wanted) < count or set(bound.wanted) in ({outer.size}, {outer.size / count}):
         return  # of an input that is invalid itself all is said
     has = f"the input '{bound.name}' has {plural(outer.size, 'component')}"
     sizes = dict.fromkeys(bound.wanted)

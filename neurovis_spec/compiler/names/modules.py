@@ -7,23 +7,20 @@ definitions of the spec and its included files. Two definitions of one name are 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
-from neurovis_spec.compiler.names.unresolved import Gaps, gaps_of
 from neurovis_spec.compiler.values.builtin import builtin_definitions
 from neurovis_spec.compiler.values.definitions import Definitions, define
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.includes import Includes
 from neurovis_spec.language.library import Library as LanguageLibrary
-from neurovis_spec.language.model import opening
+from neurovis_spec.language.model import names_of, opening
 from neurovis_spec.language.modules import INCLUDED, ModuleModel
 from neurovis_spec.language.spec import Spec
+from neurovis_spec.language.unknown import UNKNOWN, Names
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -35,16 +32,11 @@ class Module:
     folder: Path
     own: bool
 
-    @cached_property
-    def gaps(self) -> Gaps:
-        """What of it could not be read."""
-        return gaps_of(self.model)
-
 
 class Library(NamedTuple):
-    """All modules and definitions in reach, and what of them could not be read (``definitions.gaps``)."""
+    """All modules and definitions in reach."""
 
-    modules: Mapping[str, Module]
+    modules: Names[Module]
     definitions: Definitions
 
 
@@ -52,49 +44,29 @@ def library_of(spec: Spec, includes: Includes, folder: Path, dt: float, findings
     """The modules and definitions of a spec and of its included files, on top of the built-in definitions."""
     _duplicates(spec, includes, findings)
     builtin = builtin_definitions()
-    gaps = gaps_of(spec)
-    definitions = builtin
-    modules: dict[str, Module] = {}
+    definitions = define(spec, findings, builtin, dt).over(builtin)
+    own = {name: Module(name, model, folder, own=True) for name, model in spec.modules.items()}
+    modules = names_of(spec, "modules", own)
+    is_open = not includes.complete
     for included in includes.files:
-        definitions = _joined(definitions, define(included.model, findings, builtin, dt))
-        gaps = gaps.joined(gaps_of(included.model).only(INCLUDED))
-        for name, model in included.model.modules.items():
-            modules.setdefault(name, Module(name, model, included.folder, own=False))
-    definitions = _joined(definitions, define(spec, findings, builtin, dt))
-    modules.update({name: Module(name, model, folder, own=True) for name, model in spec.modules.items()})
-    if not includes.complete:
-        gaps = replace(gaps, sections=gaps.sections.union(INCLUDED))
-    gaps = gaps.joined(definitions.gaps.only(INCLUDED))
-    cyclic = set(_cyclic(modules, findings))
-    gaps = gaps.with_names("modules", gaps.names["modules"] | cyclic)
-    kept = {name: module for name, module in modules.items() if name not in cyclic}
-    for module in modules.values():
+        file = included.model
+        definitions = definitions.over(define(file, findings, builtin, dt))
+        others = {name: Module(name, model, included.folder, own=False) for name, model in file.modules.items()}
+        modules = modules.over(names_of(file, "modules", others))
+        is_open = is_open or "include" in file.unknown
+    for module in modules.known().values():
         _check_filled(module, findings)
-    return Library(kept, replace(definitions, gaps=gaps))
+    cyclic = dict.fromkeys(_cyclic(modules.known(), findings), UNKNOWN)
+    return Library(Names({**modules, **cyclic}, modules.is_open).opened(is_open), definitions.opened(is_open))
 
 
 def _check_filled(module: Module, findings: Findings) -> None:
     """A module has neurons, or instances of modules that have some."""
     model = module.model
-    lost = module.gaps.names["neurons"] or module.gaps.names["instances"]  # there are some, which are invalid
-    if not model.neurons and not model.instances and not model.lost and not lost:
+    declared = names_of(model, "neurons", model.neurons), names_of(model, "instances", model.instances)
+    if not any(declared) and model.sound:
         message = f"the module '{module.name}' has no neurons"
         findings.error("no-neurons", opening(model.source), message, "add a group under its 'neurons'")
-
-
-def _joined(one: Definitions, other: Definitions) -> Definitions:
-    """The definitions of both. What is in the built-in ones alone must not hide another file's."""
-    builtin = builtin_definitions()
-
-    def over(first: Mapping[str, T], second: Mapping[str, T], below: Mapping[str, T]) -> dict[str, T]:
-        return {**first, **{name: made for name, made in second.items() if below.get(name) is not made}}
-
-    return Definitions(
-        over(one.activations, other.activations, builtin.activations),
-        over(one.models, other.models, builtin.models),
-        over(one.rules, other.rules, builtin.rules),
-        one.gaps.joined(other.gaps),
-    )
 
 
 def _duplicates(spec: Spec, includes: Includes, findings: Findings) -> None:

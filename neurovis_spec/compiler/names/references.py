@@ -9,17 +9,17 @@ import re
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import islice
+from itertools import chain, islice
 from typing import TypeAlias
 
 from neurovis_spec.compiler.limits import PATIENCE
-from neurovis_spec.compiler.names.unresolved import Gaps
 from neurovis_spec.compiler.network import Group
 from neurovis_spec.diagnostics import Findings, Span, did_you_mean, listed, meant, nearest, shorten, suggest
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.modules import ModuleModel
 from neurovis_spec.language.references import Arrow, Fault, NeuronRange, Part, Sum, parse, parse_sum
 from neurovis_spec.language.spec import Spec
+from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 from neurovis_spec.language.yaml.source import Scalar
 
@@ -35,13 +35,14 @@ _QUOTED = re.compile(r"'([^']*)'")
 @dataclass(frozen=True)
 class Directory:
     """Who is called what in a spec, or in an instance of a module: groups, neurons and instances by the names that they
-    have there."""
+    have there. What may be named by an invalid declaration is UNKNOWN."""
 
     groups: Mapping[str, Group]
     neurons: Mapping[str, int]
     #: the number of the first neuron of each counted group
     first: Mapping[str, int]
-    gaps: Gaps = field(default_factory=Gaps)
+    #: the groups and instances of which it is not known which neurons they have
+    invalid: Names[Group] = field(default_factory=Names)
     #: the instances of a name: all of a counted one, each also by its own name
     instances: Mapping[str, tuple[Directory, ...]] = field(default_factory=dict)
     #: all neurons, those of the instances behind its own
@@ -77,7 +78,7 @@ class Directory:
 
     def _hint_of_instance(self, head: str, rest: str) -> str:
         """What ``head`` in ``head.rest`` may be meant for."""
-        if self.find(head) is not None:
+        if self.holds(head):
             return f"'{head}' is no instance, nothing is in it"
         if not self.instances:
             return "there are no instances here"
@@ -85,22 +86,28 @@ class Directory:
         if stem in self.instances and f"{stem}1" in self.instances:
             return f"'{stem}' has the numbers 1 to {len(self.instances[stem])}"
         close = nearest(head, few(head, tuple(self.instances)))
-        whole = [f"{name}.{rest}" for name in close if self.find(f"{name}.{rest}") is not None]
+        whole = [f"{name}.{rest}" for name in close if self.holds(f"{name}.{rest}")]
         return did_you_mean(whole) if whole else suggest(head, few(head, tuple(self.instances)), "instances") or ""
 
-    def find(self, name: str) -> tuple[int, ...] | None:
-        """The neurons of a group, or one neuron; ``left.K`` is K in all instances that ``left`` names."""
+    def find(self, name: str) -> tuple[int, ...] | Unknown | None:
+        """The neurons of a group, or one neuron; ``left.K`` is K in all instances that ``left`` names. None where there
+        is nothing of that name."""
         head, dot, rest = name.partition(".")
-        if dot:
-            found = [inner.find(rest) for inner in self.instances.get(head, ())]
-            if not found or any(one is None for one in found):
-                return None
-            return tuple(index for one in found if one is not None for index in one)
-        group = self.groups.get(name)
-        if group is not None:
-            return tuple(group.indices)
-        neuron = self.neurons.get(name)
-        return None if neuron is None else (neuron,)
+        if dot and head in self.instances:
+            found = [inner.find(rest) for inner in self.instances[head]]
+            known = [one for one in found if isinstance(one, tuple)]
+            if len(known) == len(found):
+                return tuple(chain.from_iterable(known))
+            return UNKNOWN if UNKNOWN in found else None
+        if name in self.groups:
+            return tuple(self.groups[name].indices)
+        if name in self.neurons:
+            return (self.neurons[name],)
+        return UNKNOWN if self.invalid.may_make(head) else None
+
+    def holds(self, name: str) -> bool:
+        """Whether neurons are called so, and it is known which."""
+        return isinstance(self.find(name), tuple)
 
     def meant(self, name: str) -> str | None:
         """The name that an unknown one can only be meant for."""
@@ -109,7 +116,7 @@ class Directory:
             return meant(name, few(name, self.known))
         if head not in self.instances:
             right = meant(head, few(head, tuple(self.instances)))
-            return None if right is None or self.find(f"{right}.{rest}") is None else f"{right}.{rest}"
+            return f"{right}.{rest}" if right is not None and self.holds(f"{right}.{rest}") else None
         right = self.instances[head][0].meant(rest)
         return None if right is None else f"{head}.{right}"
 
@@ -124,20 +131,17 @@ class Directory:
         head, dot, rest = name.partition(".")
         return any(inner.feeds(rest) for inner in self.instances.get(head, ())) if dot else name in self.inputs
 
-    def covers(self, name: str) -> bool:
-        """Whether an unknown name may be one whose declaration is invalid."""
-        head, dot, rest = name.partition(".")
-        if dot and head in self.instances:
-            return any(inner.covers(rest) for inner in self.instances[head])
-        return self.gaps.cover_reference(name)
-
-    def range(self, low: str, high: str) -> tuple[int, ...] | str:
+    def range(self, low: str, high: str) -> tuple[int, ...] | Unknown | str:
         """The neurons of a counted group from one of its numbers to another; a text says why not."""
+        found = self._range(low, high)
+        return UNKNOWN if isinstance(found, str) and self.find(low) is UNKNOWN else found
+
+    def _range(self, low: str, high: str) -> tuple[int, ...] | str:
         head, dot, rest = low.partition(".")
         if dot:
             if head not in self.instances:
                 return f"there is no instance '{shorten(head)}'"
-            found = [inner.range(rest, high.removeprefix(f"{head}.")) for inner in self.instances[head]]
+            found = [inner._range(rest, high.removeprefix(f"{head}.")) for inner in self.instances[head]]
             wrong = next((one for one in found if isinstance(one, str)), None)
             return wrong or tuple(index for one in found if not isinstance(one, str) for index in one)
         for name in sorted((g for g in self.first if low.startswith(g)), key=len, reverse=True):
@@ -209,16 +213,14 @@ def resolve_part(part: Part, text: Located[str], directory: Directory, findings:
     if isinstance(part, NeuronRange):
         found = directory.range(part.low.text, part.high.text)
         if isinstance(found, str):
-            if not directory.covers(part.low.text):
-                findings.error("bad-range", span, f"'{shorten(part.text)}' is no range: {found}")
-            return None
-        return found
+            findings.error("bad-range", span, f"'{shorten(part.text)}' is no range: {found}")
+        return found if isinstance(found, tuple) else None
     result = directory.find(part.text)
-    if result is None and not directory.covers(part.text):
+    if result is None:
         right = None if findings.many else directory.meant(part.text)
         _unknown(part.text, span, directory, findings)
-        return None if right is None else directory.find(right)
-    return result
+        result = None if right is None else directory.find(right)
+    return result if isinstance(result, tuple) else None
 
 
 def _unknown(name: str, span: Span, directory: Directory, findings: Findings) -> None:

@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from neurovis_spec.compiler.names.references import Section
-from neurovis_spec.compiler.names.unresolved import Gaps
 from neurovis_spec.compiler.network import Input
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.definitions import Definitions
+from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 
 
 @dataclass(frozen=True)
@@ -31,13 +31,18 @@ class Scope:
     constants: Constants
     definitions: Definitions
     files: Files
-    inputs: Mapping[str, Input]
+    inputs: Names[Input]
     module: str | None = None
     parent: int = -1
     declared: str = ""
     number: int = 0
-    children: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    children: Names[tuple[int, ...]] = field(default_factory=Names)
     settings: Mapping[str, frozenset[str]] = field(default_factory=dict)
+
+    def input(self, name: str) -> Input | Unknown | None:
+        """The input that is called so, here or in an instance; None where there is none."""
+        head, dot, _ = name.partition(".")
+        return UNKNOWN if dot and self.children.may_make(head) else self.inputs.get(name)
 
     def called(self, name: str) -> str:
         """The name that something of this scope has in the whole network."""
@@ -48,11 +53,6 @@ class Scope:
         left1. It is another one than that of the entry ``left1.K -> O`` around it, as no name and no path has a
         slash."""
         return f"{self.path}/{entry}" if self.path else entry
-
-    @property
-    def gaps(self) -> Gaps:
-        """What could not be read, in this scope and among the definitions."""
-        return self.definitions.gaps
 
 
 class Expansion(NamedTuple):

@@ -24,6 +24,7 @@ from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.located import Formula
 from neurovis_spec.language.modules import InstanceModel
 from neurovis_spec.language.sections import GroupModel
+from neurovis_spec.language.unknown import UNKNOWN, Names
 
 #: The instances of one module: for each entry that makes some how many these are, and what is set in each of them.
 _Made: TypeAlias = list[tuple[int, Mapping[str, FloatArray]]]
@@ -98,13 +99,13 @@ class SizeEstimate:
             rows = sum(size for size, _ in made)
             if not rows or instances > MOST_INSTANCES:
                 continue
-            own = Constants({}, self._dt, Findings())
+            own = Constants(Names(), self._dt, Findings())
             known: dict[str, FloatArray] = {}
             for key, parameter in model.parameters.items():
                 given = np.concatenate([values.get(key, np.full(size, np.nan)) for size, values in made])
                 if np.isnan(given).any():
                     value = own.unchecked(parameter.value, known)
-                    given = np.where(np.isnan(given), np.nan if value is None else value, given)
+                    given = np.where(np.isnan(given), np.nan if value is UNKNOWN else value, given)
                 known[key] = given
             for group in model.neurons.values():
                 sizes = size_of(group, own, known, rows)
@@ -140,7 +141,7 @@ class SizeEstimate:
             given: dict[str, FloatArray] = {}
             for key, formula in model.set.items():
                 value = constants.unchecked(formula, around)
-                given[key] = np.broadcast_to(np.nan if value is None else value, scopes.shape)
+                given[key] = np.broadcast_to(np.nan if value is UNKNOWN else value, scopes.shape)
             made.append((len(scopes), given))
         return instances
 
@@ -155,7 +156,7 @@ def size_of(group: GroupModel, constants: Constants, known: Mapping[str, FloatAr
 def _counted(formula: Formula | None, constants: Constants, known: Mapping[str, FloatArray], rows: int) -> FloatArray:
     """A count, in each row; 0 where it is none."""
     value = 1.0 if formula is None else constants.unchecked(formula, known)
-    counts = np.broadcast_to(np.asarray(0.0 if value is None else value, dtype=np.float64), (rows,))
+    counts = np.broadcast_to(np.asarray(0.0 if value is UNKNOWN else value, dtype=np.float64), (rows,))
     with np.errstate(invalid="ignore"):
         right = (counts >= 1) & (counts <= 2**53) & (np.abs(counts - np.rint(counts)) <= NEAR_INTEGER)
         return np.where(right, np.rint(counts), 0.0)

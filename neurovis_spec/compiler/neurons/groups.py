@@ -18,21 +18,23 @@ from neurovis_spec.compiler.limits import PATIENCE, Limits, amount, plural
 from neurovis_spec.compiler.names.references import key_span, known_inputs
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.names.state_references import no_state
-from neurovis_spec.compiler.network import Group, Role
+from neurovis_spec.compiler.network import Group, Input, Role
 from neurovis_spec.compiler.neurons.labels import labels_of
+from neurovis_spec.compiler.neurons.noise import noise_of
 from neurovis_spec.compiler.neurons.positions import positions_of
 from neurovis_spec.compiler.program import Activation, Combine, Model
 from neurovis_spec.compiler.values.arguments import check_initials, check_settings, choose, parameters, spread
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.definitions import Defaults, Definitions
 from neurovis_spec.compiler.values.draws import Stream
-from neurovis_spec.diagnostics import meant, shorten
-from neurovis_spec.language.expressions.tree import Call, walk
+from neurovis_spec.diagnostics import meant, nearest, shorten
+from neurovis_spec.language.expressions.tree import Call, Tree, walk
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, Located, bad_name, too_long
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import GroupModel
+from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.values import Choice, FormulaList, Initial
-from neurovis_spec.language.yaml.source import Scalar
+from neurovis_spec.language.yaml.source import Packed, Scalar, Sequence
 
 _SETTING = formula_at(GroupModel, "model", "NAME", "SETTING")
 
@@ -61,10 +63,11 @@ class Built(NamedTuple):
     bias: FloatArray
     initial: FloatArray
     input: IntArray
-    position: FloatArray | None
+    position: FloatArray | Unknown
     first: int | None
     #: what states of its model begin with
     starts: Mapping[str, FloatArray]
+    noise: Tree | Unknown
     #: what of it follows parameters: ``bias``, ``position`` (x, then y), and those of its kind
     parts: tuple[Part, ...] = ()
 
@@ -109,28 +112,27 @@ class Builder:
         """The definitions that the scope sees."""
         return self.scope.definitions
 
-    def group(self, name: str, model: GroupModel, start: int) -> Built | None:
-        """One group; None where it is not known which neurons it has."""
+    def group(self, name: str, model: GroupModel, start: int) -> Built | Unknown:
+        """One group; UNKNOWN where it is not known which neurons it has."""
         findings = self.constants.findings
         if name in self.scope.section.inputs and IDENTIFIER.fullmatch(name):
             first = key_span(self.scope.section, "inputs", name)
             message = f"'{name}' is an input already (line {first.line}); groups and inputs share their names"
             findings.error("duplicate-name", key_span(self.scope.section, "neurons", name), message)
-        names, first_number = None, None
-        if name not in self.definitions.gaps.names["neurons"]:
-            names, first_number = self._names(name, model, start)
-        if names is None:
-            self._check(name, model)
-            return None
-        n = len(names)
+        names, first_number = (UNKNOWN, None) if _unsure(model) else self._names(name, model, start)
+        n = UNKNOWN if names is UNKNOWN else len(names)
         kind = self._kind(name, model, n)
         with self.constants.following() as biased:
-            bias = None if model.bias is None else self._drawn(model.bias, n, "bias", name)
+            bias = UNKNOWN if model.bias is None else self._drawn(model.bias, n, "bias", name)
         given = model.initial or Initial(None)
-        initial = None if given.activity is None else self._drawn(given.activity, n, "initial", name)
+        initial = UNKNOWN if given.activity is None else self._drawn(given.activity, n, "initial", name)
+        starts = self._starts(given, n, name, kind, model)
         input_index = self._input(model, n)
         with self.constants.following() as placed:
             position = positions_of(model.position, n, self.constants, self.scope.files)
+        noise = UNKNOWN if model.noise is None else noise_of(model.noise, self.constants)
+        if names is UNKNOWN or n is UNKNOWN:
+            return UNKNOWN
         labels = self._labels(model, names)
         group = Group(
             name=self.scope.called(name),
@@ -155,12 +157,13 @@ class Builder:
             model=model,
             names=names,
             labels=labels or names,
-            bias=_unsaid(n).bias if bias is None else bias,
-            initial=_unsaid(n).initial if initial is None else initial,
-            input=_unsaid(n).input if input_index is None else input_index,
+            bias=_unsaid(n).bias if bias is UNKNOWN else bias,
+            initial=_unsaid(n).initial if initial is UNKNOWN else initial,
+            input=_unsaid(n).input if input_index is UNKNOWN else input_index,
             position=position,
             first=first_number,
-            starts=self._starts(given, n, name, kind, model),
+            starts=starts,
+            noise=noise,
             parts=(
                 *kind.parts,
                 *(part._replace(field="bias") for part in biased),
@@ -168,18 +171,9 @@ class Builder:
             ),
         )
 
-    def _check(self, name: str, model: GroupModel) -> None:
-        """What can be said of a group of which it is not known which neurons it has."""
-        kind = self._kind(name, model, None)
-        given = model.initial or Initial(None)
-        for formulas, purpose in ((model.bias, "bias"), (given.activity, "initial")):
-            if formulas is not None:
-                self._drawn(formulas, None, purpose, name)
-        self._starts(given, None, name, kind, model)
-        self._input(model, None)
-        positions_of(model.position, None, self.constants, self.scope.files)
-
-    def _starts(self, given: Initial, n: int | None, name: str, kind: Kind, model: GroupModel) -> dict[str, FloatArray]:
+    def _starts(
+        self, given: Initial, n: int | Unknown, name: str, kind: Kind, model: GroupModel
+    ) -> dict[str, FloatArray]:
         """What states of the model begin with."""
         result: dict[str, FloatArray] = {}
         sure = model.model is None or kind.model.name == model.model.name.value  # else it is invalid, and said so
@@ -189,7 +183,7 @@ class Builder:
                 found = no_state(f"the model '{kind.model.name}' of '{name}'", state.value, states)
                 self.constants.findings.error("unknown-state", state.span, *found)
             values = self._drawn(formulas, n, "initial", name, state.value)
-            if values is not None:
+            if values is not UNKNOWN:
                 result[state.value] = values
         return result
 
@@ -197,36 +191,35 @@ class Builder:
         """The network's name of the input of a group."""
         if model.input is None:
             return None
-        found = self.scope.inputs.get(model.input.value)
-        return model.input.value if found is None else found.name
+        found = self.scope.input(model.input.value)
+        return found.name if isinstance(found, Input) else model.input.value
 
-    def _names(self, name: str, model: GroupModel, start: int) -> tuple[tuple[str, ...] | None, int | None]:
+    def _names(self, name: str, model: GroupModel, start: int) -> tuple[tuple[str, ...] | Unknown, int | None]:
+        """The names of the neurons, and of a counted group the first number."""
         findings = self.constants.findings
-        count = None
-        if model.count is not None:
-            count = self.constants.integer(model.count, "'count'", 1)
-            if count is None:
-                return None, None
+        count = None if model.count is None else self.constants.integer(model.count, "'count'", 1)
+        if count is UNKNOWN:
+            return UNKNOWN, None
         span = key_span(self.scope.section, "neurons", name) if model.count is None else model.count.span
         total = start + (count or len(model.names or ()) or 1)
         if total > self.limits.neurons:
             message = f"this makes {amount(total)} neurons; the limit is {self.limits.neurons:,}"
             findings.error("too-many", span, message, "raise it with --limit")
-            return None, None
+            return UNKNOWN, None
         if model.names is not None:
             return self._listed(model, count), None
         if count is None:
             return (name,), None
         first = 1 if model.first is None else self.constants.integer(model.first, "'first'", 0)
-        if first is None:
-            return None, None
+        if first is UNKNOWN:
+            return UNKNOWN, None
         names = tuple(f"{name}{number}" for number in range(first, first + count))
         if len(names[-1]) > 64:
             findings.error("bad-name", key_span(self.scope.section, "neurons", name), too_long(names[-1]), NAME_RULE)
-            return None, None
+            return UNKNOWN, None
         return names, first
 
-    def _listed(self, model: GroupModel, count: int | None) -> tuple[str, ...] | None:
+    def _listed(self, model: GroupModel, count: int | None) -> tuple[str, ...] | Unknown:
         findings = self.constants.findings
         assert model.names is not None
         seen: dict[str, Located[str]] = {}
@@ -247,84 +240,85 @@ class Builder:
             node = model.source.get("names")
             span = model.names[0].span if model.names else model.source.span if node is None else node.span
             findings.error("wrong-size", span, f"'names' has {plural(len(seen), 'name')}, {wanted}")
-            return None
+            return UNKNOWN
         return tuple(seen)
 
-    def _choices(self, model: GroupModel) -> tuple[tuple[Activation, Defaults] | None, tuple[Model, Defaults] | None]:
+    def _choices(
+        self, model: GroupModel
+    ) -> tuple[tuple[Activation, Defaults] | Unknown, tuple[Model, Defaults] | Unknown]:
         """The definitions that a group names."""
         known, findings = self.definitions, self.constants.findings
         activation = model.activation or _default("identity", model)
         neuron = model.model or _default("static", model)
         return (
-            choose(activation, known.activations, "activation", known, findings),
-            choose(neuron, known.models, "model", known, findings),
+            choose(activation, known.activations, "activation", findings),
+            choose(neuron, known.models, "model", findings),
         )
 
-    def _kind(self, name: str, model: GroupModel, n: int | None) -> Kind:
+    def _kind(self, name: str, model: GroupModel, n: int | Unknown) -> Kind:
         """What the neurons are; identity and static in the place of what is invalid."""
-        if n is None or not (_fixed(model.activation) and _fixed(model.model)):
+        if n is UNKNOWN or not (_fixed(model.activation) and _fixed(model.model)):
             return self._made(model, n)
         key = self.scope.module, name, n
         if key not in self.kinds:
             self.kinds[key] = self._made(model, n)
         return self.kinds[key]
 
-    def _made(self, model: GroupModel, n: int | None) -> Kind:
+    def _made(self, model: GroupModel, n: int | Unknown) -> Kind:
         activation, neuron = self._choices(model)
-        activity: dict[str, FloatArray] | None = None
-        settings: dict[str, FloatArray] | None = None
+        activity: dict[str, FloatArray] | Unknown = UNKNOWN
+        settings: dict[str, FloatArray] | Unknown = UNKNOWN
         parts: list[Part] = []
-        if activation is not None:
+        if activation is not UNKNOWN:
             with self.constants.following() as found:
                 activity = parameters(model.activation or _default("identity", model), activation[1], n, self.constants)
             parts += (part._replace(field="activation") for part in found)
         elif model.activation is not None:
             check_settings(model.activation, self.constants, _SETTING.sees)
-        if neuron is None and model.model is not None:
+        if neuron is UNKNOWN and model.model is not None:
             check_settings(model.model, self.constants, _SETTING.sees)
-        if neuron is not None:
+        if neuron is not UNKNOWN:
             choice = model.model or _default("static", model)
             with self.constants.following() as found:
                 settings = parameters(choice, neuron[1], n, self.constants)
             parts += (part._replace(field="model") for part in found)
-            if settings is not None:
+            if settings is not UNKNOWN:
                 check_initials(neuron[0].state, settings, choice, self.constants)
-        if activation is None or activity is None:
-            activation, activity = self.definitions.activations["identity"], {}
-        if neuron is None or settings is None:
-            neuron, settings = self.definitions.models["static"], {}
+        if activation is UNKNOWN or activity is UNKNOWN:
+            activation, activity = self.definitions.activations.known()["identity"], {}
+        if neuron is UNKNOWN or settings is UNKNOWN:
+            neuron, settings = self.definitions.models.known()["static"], {}
         return Kind(activation[0], activity, neuron[0], settings, tuple(parts))
 
     def _drawn(
-        self, formulas: Formula | FormulaList, n: int | None, purpose: str, name: str, state: str | None = None
-    ) -> FloatArray | None:
+        self, formulas: Formula | FormulaList, n: int | Unknown, purpose: str, name: str, state: str | None = None
+    ) -> FloatArray | Unknown:
         """The values of a key, or those of a state in it, of the group's neurons."""
         called, what = self.scope.called(name), purpose
         if state is not None:
             called, what = f"{called}.{state}", state
         return spread(formulas, n, self.constants, f"'{what}'", Stream(self.seed, purpose, called))
 
-    def _input(self, model: GroupModel, n: int | None) -> IntArray | None:
+    def _input(self, model: GroupModel, n: int | Unknown) -> IntArray | Unknown:
         if model.input is None:
-            return None
+            return UNKNOWN
         name = model.input.value
-        found = self.scope.inputs.get(name)
+        found = self.scope.input(name)
         findings = self.constants.findings
         if found is None:
             known = tuple(self.scope.section.inputs)
-            if name not in known and not self.definitions.gaps.cover("inputs", name):
-                found = None if findings.many else self.scope.inputs.get(meant(name, known) or "")
-                message = f"there is no input '{shorten(name)}'"
-                findings.error("unknown-input", model.input.span, message, lambda: known_inputs(name, known))
-        if found is None or n is None:
-            return None
+            found = None if findings.many else self.scope.input(meant(name, known) or "")
+            message = f"there is no input '{shorten(name)}'"
+            findings.error("unknown-input", model.input.span, message, lambda: known_inputs(name, known))
+        if not isinstance(found, Input) or n is UNKNOWN:
+            return UNKNOWN
         if found.size == 1:
             return np.full(n, found.start, dtype=np.int64)
         if found.size == n:
             return np.arange(found.start, found.start + n, dtype=np.int64)
         message = f"the input '{name}' has {found.size} components, the group has {plural(n, 'neuron')}"
         findings.error("wrong-size", model.input.span, message, "an input has one component, or one for each neuron")
-        return None
+        return UNKNOWN
 
     def _labels(self, model: GroupModel, names: tuple[str, ...]) -> tuple[str, ...] | None:
         if model.label is None:
@@ -352,3 +346,29 @@ def _fixed(choice: Choice | None) -> bool:
     return choice is None or not any(
         not isinstance(entry.value, Scalar) or isinstance(entry.value.value, str) for entry in choice.settings
     )
+
+
+#: Keys that say which neurons a group has.
+_NAMING = frozenset({"count", "first", "names"})
+
+
+def _unsure(model: GroupModel) -> bool:
+    """Whether what could not be read of a group may have said which neurons there are."""
+    if not model.unknown.isdisjoint(_NAMING):
+        return True
+    if model.count is not None or model.names is not None:
+        return False
+    known = GroupModel.model_fields
+    foreign = [
+        entry.value for entry in model.source.entries if entry.name not in known and not nearest(entry.name, known)
+    ]
+    # in a key of some other language a number may be how many there are
+    return any(not isinstance(node, Scalar) or type(node.value) in (int, float) for node in foreign)
+
+
+def unread_neurons(model: GroupModel) -> Names[Group]:
+    """What the neurons of a group may be called of which it is not known which it has."""
+    node = model.source.get("names")
+    items = node.items if isinstance(node, (Sequence, Packed)) else ()
+    texts = {str(item.value): UNKNOWN for item in items if isinstance(item, Scalar)}
+    return Names(texts, "names" in model.unknown and not isinstance(node, (Sequence, Packed)))

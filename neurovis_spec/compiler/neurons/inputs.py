@@ -22,6 +22,7 @@ from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.language.located import Formula, Located, formula_of
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import InputModel
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.yaml.source import NULL, Packed, Sequence
 
 _SOURCES = ("expression", "file", "values", "size")
@@ -29,8 +30,8 @@ _SOURCES = ("expression", "file", "values", "size")
 
 def make_input(
     name: str, model: InputModel, start: int, section: Section, constants: Constants, files: Files
-) -> Input | None:
-    """One input of a section, from ``start`` on in the vector of all inputs; None where it is invalid."""
+) -> Input | Unknown:
+    """One input of a section, from ``start`` on in the vector of all inputs."""
     findings = constants.findings
     sources = {"expression": model.expression, "file": model.file, "values": model.values, "size": model.size}
     given = [key for key in _SOURCES if sources[key] is not None]
@@ -40,48 +41,54 @@ def make_input(
         None if model.values is None else _by_values(name, model.values, start, constants),
         None if given and model.size is None else _by_size(name, model, start, section, constants),
     ]
-    if model.contradictory or not model.lost_keys.isdisjoint(_SOURCES):
-        return None
-    return next((one for one in made if one is not None), None)
+    if model.contradictory or not model.unknown.isdisjoint(_SOURCES):
+        return UNKNOWN
+    return next(one for one in made if one is not None)
 
 
-def _by_expression(name: str, formula: Formula, start: int, constants: Constants) -> Input | None:
+def _by_expression(name: str, formula: Formula, start: int, constants: Constants) -> Input | Unknown:
     tree = _expression(formula, constants)
-    return None if tree is None else Input(name, start, 1, expression=tree, slots=places_of(tree, constants.settable))
+    return (
+        UNKNOWN
+        if tree is UNKNOWN
+        else Input(name, start, 1, expression=tree, slots=places_of(tree, constants.settable))
+    )
 
 
-def _by_file(name: str, path: Located[str], start: int, files: Files, findings: Findings) -> Input | None:
+def _by_file(name: str, path: Located[str], start: int, files: Files, findings: Findings) -> Input | Unknown:
     table = files.table_at(path)
     if table is None:
-        return None
+        return UNKNOWN
     gap = next(table.gaps(), None)
     if gap is not None:
         message = f"row {gap[0]}, column {gap[1]} of the file is empty; an input needs a number everywhere"
         findings.error("file-format", path.span, message)
-        return None
+        return UNKNOWN
     return _tabled(name, start, np.array(table.values, dtype=np.float64))
 
 
-def _by_values(name: str, node: Sequence | Packed, start: int, constants: Constants) -> Input | None:
+def _by_values(name: str, node: Sequence | Packed, start: int, constants: Constants) -> Input | Unknown:
     with constants.following() as parts:
         values = _inline(node, constants)
-    if values is None:
-        return None
+    if values is UNKNOWN:
+        return UNKNOWN
     return replace(_tabled(name, start, values), parts=tuple(part._replace(field="table") for part in parts))
 
 
-def _by_size(name: str, model: InputModel, start: int, section: Section, constants: Constants) -> Input | None:
+def _by_size(name: str, model: InputModel, start: int, section: Section, constants: Constants) -> Input | Unknown:
     size = 1 if model.size is None else constants.integer(model.size, "'size'", 1)
-    if size is not None and size > 1_000_000:
+    if size is UNKNOWN:
+        return UNKNOWN
+    if size > 1_000_000:
         span = key_span(section, "inputs", name) if model.size is None else model.size.span
         constants.findings.error("too-many", span, "an input has at most 1,000,000 components")
-        return None
-    return None if size is None else Input(name, start, size)
+        return UNKNOWN
+    return Input(name, start, size)
 
 
-def _expression(formula: Formula, constants: Constants) -> Tree | None:
+def _expression(formula: Formula, constants: Constants) -> Tree | Unknown:
     tree = constants.tree(formula, formula_at(InputModel, "expression").sees)
-    if tree is not None and is_constant(tree, (*ALWAYS, *constants.parameters)):
+    if tree is not UNKNOWN and is_constant(tree, (*ALWAYS, *constants.parameters)):
         constants.value(formula)
     return tree
 
@@ -91,16 +98,16 @@ def _tabled(name: str, start: int, table: FloatArray) -> Input:
     return Input(name, start, table.shape[1], table=table)
 
 
-def _inline(node: Sequence | Packed, constants: Constants) -> FloatArray | None:
+def _inline(node: Sequence | Packed, constants: Constants) -> FloatArray | Unknown:
     """Rows of numbers; a bare number is a row of one."""
     findings = constants.findings
     cells = cells_of(node, findings, "")
     if cells is None:
-        return None
+        return UNKNOWN
     widths = cells.widths
     if not len(widths):
         findings.error("wrong-size", node.span, "an input needs at least one row")
-        return None
+        return UNKNOWN
     missing = np.flatnonzero(cells.kinds == NULL)
     for cell in missing[:PATIENCE].tolist():
         formula_of(cells.node(cell), findings)  # once more where it is no cell: a finding counts once
@@ -111,5 +118,5 @@ def _inline(node: Sequence | Packed, constants: Constants) -> FloatArray | None:
         findings.error("wrong-size", cells.row_span(row), message)
     values = values_of(cells, np.arange(len(cells.kinds)), constants)
     if len(uneven) or len(missing) or cells.failed:
-        return None
-    return None if values is None else values.reshape(len(widths), int(widths[0]))
+        return UNKNOWN
+    return UNKNOWN if values is None else values.reshape(len(widths), int(widths[0]))

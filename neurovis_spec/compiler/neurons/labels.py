@@ -16,6 +16,7 @@ from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.values.constants import Value
 from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.templates import Hole, pieces
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
 
 
 def labels_of(texts: Sequence[Located[str]], n: int, scope: Scope) -> tuple[str, ...] | None:
@@ -51,12 +52,12 @@ def _values(text: Located[str], hole: Hole, i: FloatArray, n: int, scope: Scope)
         place = text.node.at(hole.start - 1, hole.start)
         constants.findings.error("unbalanced-parenthesis", place, "'{' is not closed", "write {{ for a brace")
         return None
-    extra: dict[str, Value] = {"i": i, "n": float(n)}
+    extra: dict[str, Value | Unknown] = {"i": i, "n": float(n)}
     if scope.module is not None and "number" not in constants.parameters:
         extra["number"] = float(scope.number or 1)
     formula: Formula = Located(text.value[hole.start : hole.end], text.node.part(hole.start, hole.end))
     value = constants.value(formula, extra)
-    return None if value is None else [_written(one) for one in np.broadcast_to(value, i.shape).tolist()]
+    return None if value is UNKNOWN else [_written(one) for one in np.broadcast_to(value, i.shape).tolist()]
 
 
 def _written(value: float) -> str:

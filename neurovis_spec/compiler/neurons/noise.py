@@ -6,14 +6,13 @@ In: the ``noise`` of the groups. Out: Noises, each with its place in the vector 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from neurovis_spec.arrays import frozen
 from neurovis_spec.compiler.events.settable import ParameterFormula, places_of
-from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import Noise
-from neurovis_spec.compiler.neurons.populate import Population
 from neurovis_spec.compiler.values.constants import Constants, Value, width_of
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
@@ -21,41 +20,41 @@ from neurovis_spec.language.expressions.tree import Chain, Conditional, Draw, Tr
 from neurovis_spec.language.located import Formula
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import GroupModel
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
+
+if TYPE_CHECKING:
+    from neurovis_spec.compiler.neurons.populate import Population
 
 _NOISE = formula_at(GroupModel, "noise")
 
 
-def make_noises(scopes: tuple[Scope, ...], population: Population, inputs: int) -> tuple[Noise, ...]:
+def make_noises(population: Population, inputs: int) -> tuple[Noise, ...]:
     """The noise of every group that has some; ``inputs`` is the length of the vector of all inputs."""
     result: list[Noise] = []
     start = inputs
-    for group, model, owner in zip(population.neurons.groups, population.models, population.owners, strict=True):
-        formula, constants = model.noise, scopes[owner].constants
-        if formula is None:
+    for number, group in enumerate(population.neurons.groups):
+        formula, tree = population.models[number].noise, population.noises[number]
+        if formula is None or tree is UNKNOWN:
             continue
-        tree = _tree(formula, constants)
-        if tree is None:
-            continue
+        constants = population.constants[population.owners[number]]
         widths = _check_deviations(tree, formula, group.count, constants)
         members = np.arange(group.start, group.start + group.count, dtype=np.int64)
         frozen(members)
         slots = places_of(tree, constants.settable)
         result.append(Noise(group.name, members, start, tree, dict(constants.parameters), slots, widths))
         start += group.count
-    for model, owner in population.lost:
-        if model.noise is not None:
-            _tree(model.noise, scopes[owner].constants)
     return tuple(result)
 
 
-def _tree(formula: Formula, constants: Constants) -> Tree | None:
+def noise_of(formula: Formula, constants: Constants) -> Tree | Unknown:
+    """The expression of a noise, which draws something."""
     tree = constants.tree(formula, _NOISE.sees, _NOISE.draws)
-    if tree is None or draws(tree):
+    if tree is UNKNOWN or draws(tree):
         return tree
     message = "this noise draws nothing: it is the same at each run"
     hint = "use normal(mean, deviation) or uniform(low, high); a constant belongs to 'bias'"
     constants.findings.error("no-draw", formula.span, message, hint)
-    return None
+    return UNKNOWN
 
 
 def _check_deviations(tree: Tree, formula: Formula, count: int, constants: Constants) -> tuple[ParameterFormula, ...]:

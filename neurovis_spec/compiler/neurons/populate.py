@@ -21,13 +21,15 @@ from neurovis_spec.compiler.events.settable import Assembled, Part
 from neurovis_spec.compiler.limits import Limits
 from neurovis_spec.compiler.names.references import Directory, key_span
 from neurovis_spec.compiler.names.scope import Scope
-from neurovis_spec.compiler.names.unresolved import Gaps
-from neurovis_spec.compiler.network import Neurons
-from neurovis_spec.compiler.neurons.groups import Builder, Built, Kind, Kinds
+from neurovis_spec.compiler.network import Group, Neurons
+from neurovis_spec.compiler.neurons.groups import Builder, Built, Kind, Kinds, unread_neurons
 from neurovis_spec.compiler.neurons.positions import depend_on_positions
 from neurovis_spec.compiler.values.constants import Constants
+from neurovis_spec.language.expressions.tree import Tree
 from neurovis_spec.language.located import IDENTIFIER
+from neurovis_spec.language.model import names_of
 from neurovis_spec.language.sections import GroupModel
+from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown, known
 
 #: Characters that no name has.
 _NO_LETTERS = re.compile(r"[^A-Za-z0-9_]+")
@@ -48,8 +50,8 @@ class Population:
     misplaced: npt.NDArray[np.bool_]
     #: what each scope's expressions may use
     constants: tuple[Constants, ...]
-    #: groups of which it is not known which neurons they have, each with the place of its scope
-    lost: tuple[tuple[GroupModel, int], ...] = ()
+    #: the expression of each group's noise, UNKNOWN where it has none
+    noises: tuple[Tree | Unknown, ...] = ()
     #: what of each group follows parameters
     parts: tuple[tuple[Part, ...], ...] = ()
 
@@ -69,7 +71,7 @@ class Population:
         """For each neuron whether it combines by distance, or may, where what the spec says of that is invalid."""
         result = np.zeros(len(self.neurons), dtype=np.bool_)
         for group, model in zip(self.neurons.groups, self.models, strict=True):
-            result[group.start : group.start + group.count] = group.combine == "distance" or "combine" in model.lost
+            result[group.start : group.start + group.count] = group.combine == "distance" or "combine" in model.unknown
         return result
 
     def go_by_position(self, neurons: IntArray) -> None:
@@ -88,13 +90,12 @@ class Population:
 
 
 class _Settled(NamedTuple):
-    """A scope with its groups: the neurons from ``start`` on, and what of their names could not be read."""
+    """A scope with its groups: the neurons from ``start`` on, and what may be the name of others."""
 
     scope: Scope
     built: tuple[Built, ...]
     start: int
-    gaps: Gaps
-    lost: tuple[GroupModel, ...]
+    invalid: Names[Group]
 
 
 def populate(scopes: tuple[Scope, ...], limits: Limits, seed: int) -> Population:
@@ -114,28 +115,30 @@ def populate(scopes: tuple[Scope, ...], limits: Limits, seed: int) -> Population
 def without_neurons(population: Population) -> Population:
     """A population without any neuron, in which nobody complains of a name: that there are none is said already."""
     first, *others = population.directories
-    return replace(population, directories=(replace(first, gaps=first.gaps.with_section("neurons")), *others))
+    return replace(population, directories=(replace(first, invalid=first.invalid.opened()), *others))
 
 
 def _settle(scope: Scope, start: int, limits: Limits, seed: int, kinds: Kinds) -> _Settled:
     builder = Builder(scope, limits, seed, kinds)
     built: list[Built] = []
-    gaps = scope.gaps
-    lost = set(gaps.names["neurons"])
-    models: list[GroupModel] = []
+    invalid: dict[str, Group | Unknown] = {
+        name: UNKNOWN for name, places in scope.children.items() if places is UNKNOWN
+    }
+    is_open = scope.children.is_open
     at = start
     for name, model in scope.section.neurons.items():
         group = builder.group(name, model, at)
-        if group is None:
-            lost.update((name, *(item.value for item in model.names or ())))
-            models.append(model)
+        if group is UNKNOWN:
+            invalid.update({name: UNKNOWN, **unread_neurons(model)})
+            is_open = is_open or unread_neurons(model).is_open
             continue
         built.append(group)
         for neuron in group.names if model.names is not None or not IDENTIFIER.fullmatch(name) else ():
             if not IDENTIFIER.fullmatch(neuron):
-                lost.update(_mended(neuron))
+                invalid.update(dict.fromkeys(_mended(neuron), UNKNOWN))
         at += group.group.count
-    return _Settled(scope, tuple(built), start, gaps.with_names("neurons", lost), tuple(models))
+    names: Names[Group] = names_of(scope.section, "neurons", invalid).opened(is_open)
+    return _Settled(scope, tuple(built), start, names)
 
 
 def _mended(name: str) -> tuple[str, str]:
@@ -175,7 +178,7 @@ def _instances(scope: Scope, owners: Mapping[str, str]) -> None:
     section, findings = scope.section, scope.constants.findings
     taken: dict[str, str] = {}
     for name, model in section.instances.items():
-        count = 0 if model.count is None else len(scope.children.get(name, ()))
+        count = 0 if model.count is None else len(scope.children.known().get(name, ()))
         for called in (name, *(f"{name}{number}" for number in range(1, count + 1))):
             other = taken.setdefault(called, name)
             what = None
@@ -216,12 +219,12 @@ def _join(settled: list[_Settled]) -> Population:
     kinds, models = tuple(item.kind for item in built), tuple(item.model for item in built)
     owners = tuple(place for place, one in enumerate(settled) for _ in one.built)
     sizes = [item.group.count for item in built]
-    wrong = [item.position is None or "position" in item.model.lost for item in built]
+    wrong = [item.position is UNKNOWN or "position" in item.model.unknown for item in built]
     misplaced = np.repeat(np.array(wrong, dtype=np.bool_), sizes)
-    lost = tuple((model, place) for place, one in enumerate(settled) for model in one.lost)
+    noises = tuple(item.noise for item in built)
     constants = tuple(one.scope.constants for one in settled)
     parts = tuple(item.parts for item in built)
-    return Population(neurons, directories, kinds, models, owners, misplaced, constants, lost, parts)
+    return Population(neurons, directories, kinds, models, owners, misplaced, constants, noises, parts)
 
 
 def _starts(built: list[Built], total: int) -> dict[str, FloatArray]:
@@ -236,7 +239,7 @@ def _starts(built: list[Built], total: int) -> dict[str, FloatArray]:
 
 def _placed(item: Built) -> FloatArray:
     """The positions of a group's neurons, NaN where there is none."""
-    return np.full((item.group.count, 2), np.nan) if item.position is None else item.position
+    return known(item.position, np.full((item.group.count, 2), np.nan))
 
 
 def _directories(settled: list[_Settled], total: int) -> tuple[Directory, ...]:
@@ -245,15 +248,15 @@ def _directories(settled: list[_Settled], total: int) -> tuple[Directory, ...]:
     ends: dict[int, int] = {}
     for index in range(len(settled) - 1, -1, -1):
         one = settled[index]
-        after = max([index + 1, *(ends[place] for places in one.scope.children.values() for place in places)])
+        after = max([index + 1, *(ends[place] for places in one.scope.children.known().values() for place in places)])
         ends[index] = after
         stop = settled[after].start if after < len(settled) else total
         made[index] = Directory(
             {item.name: item.group for item in one.built},
             dict(chain.from_iterable(zip(item.names, item.group.indices, strict=True) for item in one.built)),
             {item.name: item.first for item in one.built if item.first is not None},
-            one.gaps,
-            {name: tuple(made[place] for place in places) for name, places in one.scope.children.items()},
+            one.invalid,
+            {name: tuple(made[place] for place in places) for name, places in one.scope.children.known().items()},
             range(one.start, stop),
             one.scope.section.inputs,
             index,

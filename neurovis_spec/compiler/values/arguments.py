@@ -15,148 +15,115 @@ from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.events.settable import Assembled, Dependent, ParameterFormula, Part, Subset
 from neurovis_spec.compiler.limits import PATIENCE, plural
 from neurovis_spec.compiler.program import Quantity
-from neurovis_spec.compiler.values.constants import Constants, Randomness, Value, check_finite
-from neurovis_spec.compiler.values.definitions import Default, Defaults, Definitions, check_bounds
+from neurovis_spec.compiler.values.constants import Constants, Randomness, Value, value_of
+from neurovis_spec.compiler.values.definitions import Default, Defaults, check_bounds
 from neurovis_spec.compiler.values.draws import Stream
-from neurovis_spec.diagnostics import Findings, meant, nearest, shorten, suggest
+from neurovis_spec.diagnostics import Findings, meant, shorten, suggest
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
 from neurovis_spec.language.expressions.tree import Name, Tree, names
+from neurovis_spec.language.keys import settings_of
 from neurovis_spec.language.located import IDENTIFIER, Formula, formula_of
-from neurovis_spec.language.places import formula_at
-from neurovis_spec.language.sections import GroupModel
+from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.values import Choice, FormulaList
 from neurovis_spec.language.yaml.source import Entry, Packed, Scalar, Sequence
 
 T = TypeVar("T")
-_BIAS = formula_at(GroupModel, "bias")
 
 #: Values of a list that are checked where it is not known how many there should be.
-_MOST_LOOKS = 1000
-
-
-class Settled(NamedTuple):
-    """Settings by name; ``perhaps`` are names that an unknown one may be meant for. ``failed``: one was unknown."""
-
-    entries: Mapping[str, Entry]
-    perhaps: frozenset[str]
-    failed: bool
+_MOST_CHECKED = 1000
 
 
 class Each(NamedTuple):
-    """What values are for: ``known`` are the names that mean something of each of them, numbers or arrays of integers,
-    None where it is not known how many there are."""
+    """What values are for: ``names`` mean something of each of them, numbers or arrays of integers, UNKNOWN where it is
+    not known how many there are."""
 
     noun: str
-    names: tuple[str, ...]
-    known: Mapping[str, int | IntArray] | None = None
+    names: Mapping[str, int | IntArray | Unknown]
 
-    def extra(self, one: int | None = None) -> dict[str, Value]:
+    def extra(self, one: int | None = None) -> dict[str, Value | Unknown]:
         """The values of the names, for all or for one."""
-        result: dict[str, Value] = {}
-        for name, value in (self.known or {}).items():
+        result: dict[str, Value | Unknown] = {}
+        for name, value in self.names.items():
             if isinstance(value, np.ndarray):
                 result[name] = value.astype(np.float64) if one is None else float(value[one])
             else:
-                result[name] = float(value)
+                result[name] = UNKNOWN if value is UNKNOWN else float(value)
         return result
 
 
-def neurons(n: int | None) -> Each:
+def neurons(n: int | Unknown) -> Each:
     """n neurons of a group: ``i`` and ``n``."""
-    return Each("neuron", _BIAS.sees, None if n is None else {"i": np.arange(n, dtype=np.int64), "n": n})
+    return Each("neuron", {"i": UNKNOWN if n is UNKNOWN else np.arange(n, dtype=np.int64), "n": n})
 
 
 def choose(
-    choice: Choice, known: Mapping[str, tuple[T, Defaults]], what: str, definitions: Definitions, findings: Findings
-) -> tuple[T, Defaults] | None:
+    choice: Choice, known: Names[tuple[T, Defaults]], what: str, findings: Findings
+) -> tuple[T, Defaults] | Unknown:
     """The definition that a choice names; an unknown name is answered with the nearest ones, and taken for the one that
     it can only be meant for."""
     name = choice.name
     found = known.get(name.value)
-    if found is None and not definitions.gaps.cover(f"{what}s", name.value):
+    if found is None:
         right = None if findings.many else meant(name.value, known)
         message = f"there is no {what} '{shorten(name.value)}'"
         findings.error(f"unknown-{what}", name.span, message, lambda: suggest(name.value, known, "known"))
-        found = None if right is None else known[right]
+        found = UNKNOWN if right is None else known[right]
     return found
 
 
-def settle(choice: Choice, known: Collection[str], findings: Findings) -> Settled:
-    """The settings of a choice by the names of its definition. An unknown one is a finding, and is taken for the one
-    that it can only be meant for."""
-    entries = {entry.name: entry for entry in choice.settings if entry.name in known}
-    perhaps: set[str] = set()
-    failed = False
-    for entry in choice.settings:
-        if entry.name in known:
-            continue
-        failed = True
-        hint = suggest(entry.name, known, "known here") or "it has no parameters"
-        message = f"there is no parameter '{shorten(entry.name)}'"
-        findings.error("unknown-parameter", entry.key.span, message, hint)
-        free = [name for name in known if name not in entries]
-        right = meant(entry.name, free)
-        if right is None:
-            perhaps.update(nearest(entry.name, free))
-        else:
-            entries[right] = entry
-    return Settled(entries, frozenset(perhaps), failed)
+def settle(choice: Choice, known: Collection[str], findings: Findings) -> Names[Entry]:
+    """The settings of a choice by the names of its definition."""
+    return settings_of(choice.settings, known, "parameter", "it has no parameters", findings)
 
 
-def check_settings(choice: Choice, constants: Constants, extra: tuple[str, ...] = ()) -> None:
-    """What can be said of the settings of a definition that is not known: of those that are no names."""
+def check_settings(choice: Choice, constants: Constants, extra: Collection[str] = ()) -> None:
+    """Evaluate the settings of a definition that is UNKNOWN, as far as they are no names: these may be signals."""
     for entry in choice.settings:
         nodes = entry.value.items if isinstance(entry.value, (Sequence, Packed)) else (entry.value,)
-        for node in nodes[:_MOST_LOOKS]:
+        for node in nodes[:_MOST_CHECKED]:
             name = isinstance(node, Scalar) and isinstance(node.value, str) and IDENTIFIER.fullmatch(node.value.strip())
             formula = None if name else formula_of(node, constants.findings)
             if formula is not None:
-                constants.look(formula, extra)
+                constants.value(formula, dict.fromkeys(extra, UNKNOWN))
 
 
 def spread(
     formulas: Formula | FormulaList,
-    n: int | None,
+    n: int | Unknown,
     constants: Constants,
     what: str,
     stream: Stream | None = None,
     each: Each | None = None,
-) -> FloatArray | None:
+) -> FloatArray | Unknown:
     """One value for each of n neurons, or for ``each`` of n others: from one formula, or from a list of n. Where n is
-    not known, one value for all, or None.
+    UNKNOWN, one value that is the same for all.
 
     With a stream the formulas may draw random numbers; the counter of neuron i is (i, 0, 0, number of the draw).
     """
-    if n is None:
-        return _looked_at(formulas, constants, stream is not None, each or neurons(n))
+    each = each or neurons(n)
     if isinstance(formulas, FormulaList):
-        return _listed(formulas, n, constants, what, stream, each or neurons(n))
-    if not isinstance(formulas.value, str):
-        number = float(formulas.value)
-        return np.full(n, number) if check_finite(number, formulas, constants.findings) else None
-    randomness = None if stream is None else Randomness(stream, np.arange(n, dtype=np.int64))
-    value = constants.value(formulas, (each or neurons(n)).extra(), randomness)
-    return None if value is None else np.broadcast_to(np.asarray(value, dtype=np.float64), (n,)).copy()
-
-
-def _looked_at(formulas: Formula | FormulaList, constants: Constants, random: bool, each: Each) -> FloatArray | None:
-    """The value of a formula that is the same for each; the others are checked."""
-    if isinstance(formulas, FormulaList):
-        for item in formulas.items[:_MOST_LOOKS]:
-            constants.look(item, each.names, random)
-        return None
-    value = constants.look(formulas, each.names, random)
-    return None if value is None else np.array([value], dtype=np.float64)
+        return _listed(formulas, n, constants, what, stream, each)
+    randomness: Randomness | Unknown | None = None
+    if stream is not None:
+        randomness = UNKNOWN if n is UNKNOWN else Randomness(stream, np.arange(n, dtype=np.int64))
+    value = constants.value(formulas, each.extra(), randomness)
+    if value is UNKNOWN:
+        return UNKNOWN
+    return np.broadcast_to(np.asarray(value, dtype=np.float64), (1 if n is UNKNOWN else n,)).copy()
 
 
 def _listed(
-    formulas: FormulaList, n: int, constants: Constants, what: str, stream: Stream | None, each: Each
-) -> FloatArray | None:
+    formulas: FormulaList, n: int | Unknown, constants: Constants, what: str, stream: Stream | None, each: Each
+) -> FloatArray | Unknown:
+    if n is UNKNOWN:
+        for item in formulas.items[:_MOST_CHECKED]:
+            constants.value(item, each.extra(), None if stream is None else UNKNOWN)
+        return UNKNOWN
     if len(formulas.items) != n:
         message = f"{what} has {plural(len(formulas.items), 'value')} for {plural(n, each.noun)}"
         constants.findings.error("wrong-size", formulas.span, message)
-        return None
+        return UNKNOWN
     result: list[float] = []
     before = constants.findings.errors
     for position, item in enumerate(formulas.items):
@@ -166,17 +133,17 @@ def _listed(
         randomness = None if stream is None else Randomness(stream, position)
         place = np.array([position], dtype=np.int64)
         value = constants.value(item, each.extra(position), randomness, places=place)
-        if value is not None:
+        if value is not UNKNOWN:
             result.append(float(value))
         elif constants.findings.errors - before >= PATIENCE:
-            return None
-    return np.array(result, dtype=np.float64) if len(result) == n else None
+            return UNKNOWN
+    return np.array(result, dtype=np.float64) if len(result) == n else UNKNOWN
 
 
-def _formulas(entry: Entry, constants: Constants) -> Formula | FormulaList | None:
+def _formulas(entry: Entry, constants: Constants) -> Formula | FormulaList | Unknown:
     node = entry.value
     if not isinstance(node, (Sequence, Packed)):
-        return formula_of(node, constants.findings)
+        return formula_of(node, constants.findings) or UNKNOWN
     items: list[Formula] = []
     before = constants.findings.errors
     for item in node.items:
@@ -184,43 +151,44 @@ def _formulas(entry: Entry, constants: Constants) -> Formula | FormulaList | Non
         if formula is not None:
             items.append(formula)
         elif constants.findings.errors - before >= PATIENCE:
-            return None
-    return FormulaList(tuple(items), node.span) if len(items) == len(node) else None
+            return UNKNOWN
+    return FormulaList(tuple(items), node.span) if len(items) == len(node) else UNKNOWN
 
 
 def parameters(
     choice: Choice,
     defaults: Defaults,
-    n: int | None,
+    n: int | Unknown,
     constants: Constants,
-    settled: Settled | None = None,
+    settled: Names[Entry] | None = None,
     each: Each | None = None,
-) -> dict[str, FloatArray] | None:
-    """The value of every parameter of a definition for n neurons, or for ``each`` of n connections; None where one is
-    invalid, or where n is not known and one depends on it.
+) -> dict[str, FloatArray] | Unknown:
+    """The value of every parameter of a definition for n neurons, or for ``each`` of n connections; UNKNOWN where one
+    is.
 
     ``settled`` are its settings, where the caller has looked at them for more than the parameters.
     """
     findings = constants.findings
-    settled = settled or settle(choice, tuple(default.name for default in defaults), findings)
-    values: dict[str, Value] = {**CONSTANTS, "dt": constants.dt}
+    if settled is None:
+        settled = settle(choice, tuple(default.name for default in defaults), findings)
+    values: dict[str, Value | Unknown] = {**CONSTANTS, "dt": constants.dt}
     result: dict[str, FloatArray] = {}
     following: dict[str, list[Part]] = {}
     for default in defaults:
-        entry = settled.entries.get(default.name)
+        entry = settled.get(default.name)
         with constants.following() as parts:
             value = _default(default, n, values) if entry is None else _setting(entry, default.name, n, constants, each)
-        if value is None:
+        values[default.name] = value
+        if value is UNKNOWN:
             continue
         if entry is None and not np.isfinite(value).all():
             message = f"with these settings the default of '{default.name}' is not a finite number"
             findings.error("not-finite", choice.name.span, message)
-            return None
-        if entry is None and _follows(default.value, following):
+            return UNKNOWN
+        if entry is None and default.value is not UNKNOWN and not names(default.value).isdisjoint(following):
             parts = [Part(_assembled(default.value, values, following))]
-        values[default.name] = value
         low, high = (
-            None if bound is None or not _bounded(default, values) else _assembled(bound, values, following)
+            None if bound is None or value_of(bound, values) is UNKNOWN else _assembled(bound, values, following)
             for bound in (default.low, default.high)
         )
         if any(bound is not None and bound.slots for bound in (low, high)):
@@ -228,23 +196,26 @@ def parameters(
         if parts:
             following[default.name] = parts
             constants.follow(_between(part, low, high)._replace(name=default.name) for part in parts)
-        span = choice.name.span if entry is None else entry.value.span
+        span = choice.name.span if entry is None or entry is UNKNOWN else entry.value.span
         # A default that lies outside by itself is a finding of the definition.
-        if not settled.entries or (_bounded(default, values) and check_bounds(value, default, values, span, findings)):
+        if not settled or check_bounds(value, default, values, span, findings):
             result[default.name] = value
-    return None if settled.failed or len(result) < len(defaults) else result
+    return UNKNOWN if len(result) < len(defaults) else result
 
 
-def _setting(entry: Entry, name: str, n: int | None, constants: Constants, each: Each | None) -> FloatArray | None:
-    formulas = _formulas(entry, constants)
-    return None if formulas is None else spread(formulas, n, constants, f"'{name}'", each=each)
+def _setting(
+    entry: Entry | Unknown, name: str, n: int | Unknown, constants: Constants, each: Each | None
+) -> FloatArray | Unknown:
+    formulas = UNKNOWN if entry is UNKNOWN else _formulas(entry, constants)
+    return UNKNOWN if formulas is UNKNOWN else spread(formulas, n, constants, f"'{name}'", each=each)
 
 
-def _default(default: Default, n: int | None, values: Mapping[str, Value]) -> FloatArray | None:
-    """The value of a parameter that is not set; None where it depends on one that is invalid."""
-    if not names(default.value) <= values.keys():
-        return None
-    return np.broadcast_to(np.asarray(evaluate_array(default.value, values), dtype=np.float64), (n or 1,)).copy()
+def _default(default: Default, n: int | Unknown, values: Mapping[str, Value | Unknown]) -> FloatArray | Unknown:
+    """The value of a parameter that is not set."""
+    value = value_of(default.value, values)
+    if value is UNKNOWN:
+        return UNKNOWN
+    return np.broadcast_to(np.asarray(value, dtype=np.float64), (1 if n is UNKNOWN else n,)).copy()
 
 
 def _all_of(name: str, value: FloatArray, parts: list[Part]) -> list[Part]:
@@ -268,23 +239,16 @@ def _between(part: Part, low: Dependent | None, high: Dependent | None) -> Part:
     return part._replace(low=own[0], high=own[1])
 
 
-def _follows(tree: Tree, following: Mapping[str, list[Part]]) -> bool:
-    """Whether an expression over parameters of a definition depends on one that follows parameters of the run."""
-    return not names(tree).isdisjoint(following)
-
-
-def _assembled(tree: Tree, values: Mapping[str, Value], following: Mapping[str, list[Part]]) -> ParameterFormula:
-    """An expression over parameters of a definition, some of which follow parameters of the run."""
+def _assembled(
+    tree: Tree, values: Mapping[str, Value | Unknown], following: Mapping[str, list[Part]]
+) -> ParameterFormula:
+    """An expression over parameters of a definition, all known, some of which follow parameters of the run."""
     known: dict[str, Value | Dependent] = {}
     for name in names(tree):
         value = values[name]
+        assert value is not UNKNOWN
         known[name] = Assembled(np.asarray(value), tuple(following[name])) if name in following else value
     return ParameterFormula(tree, {}, known)
-
-
-def _bounded(default: Default, values: Mapping[str, Value]) -> bool:
-    """Whether the bounds of a parameter are known."""
-    return all(names(bound) <= values.keys() for bound in (default.low, default.high) if bound is not None)
 
 
 def check_initials(

@@ -92,6 +92,6 @@ def builtin_definitions() -> Definitions:
     definitions = Definitions()
     for library in libraries():
         findings = Findings()
-        definitions = define(library, findings, definitions)
+        definitions = definitions.over(define(library, findings, definitions))
         findings.check()
     return definitions

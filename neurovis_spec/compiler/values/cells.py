@@ -20,6 +20,7 @@ from neurovis_spec.compiler.values.constants import Constants, Randomness, Value
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.located import Located, formula_of
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.yaml.source import NULL, NUMBER, TEXT, Node, Packed, Scalar, Sequence
 
 
@@ -122,14 +123,13 @@ def _written(node: Sequence | Packed, findings: Findings, row: str, named: bool)
 
 
 class Pairs(NamedTuple):
-    """What the formulas of cells see: source ``i`` and target ``j``, which also count the numbers drawn, and more.
-    ``vague``: what these are is not known, as an end is invalid; a formula that depends on them has no value then."""
+    """What the formulas of cells see: source ``i`` and target ``j``, which also count the numbers drawn, and how many
+    there are (``sizes``)."""
 
-    i: IntArray
-    j: IntArray
-    known: Mapping[str, float]
+    i: IntArray | Unknown
+    j: IntArray | Unknown
+    sizes: Mapping[str, float | Unknown]
     stream: Stream
-    vague: bool = False
 
 
 def values_of(cells: Cells, which: IntArray, constants: Constants, pairs: Pairs | None = None) -> FloatArray | None:
@@ -163,17 +163,18 @@ def _evaluated(
     formula = formula_of(cells.node(int(which[places[0]])), constants.findings)
     if formula is None:
         return None
-    extra: dict[str, Value] = {}
-    randomness = None
-    if pairs is not None and pairs.vague:
-        constants.look(formula, ("i", "j", *pairs.known), random=True)
-        return None
+    extra: dict[str, Value | Unknown] = {}
+    randomness: Randomness | Unknown | None = None
     if pairs is not None:
-        i, j = pairs.i[places], pairs.j[places]
-        extra = {"i": i.astype(np.float64), "j": j.astype(np.float64), **pairs.known}
-        randomness = Randomness(pairs.stream, i, j)
+        extra, randomness = {"i": UNKNOWN, "j": UNKNOWN, **pairs.sizes}, UNKNOWN
+        if pairs.i is not UNKNOWN and pairs.j is not UNKNOWN:
+            i, j = pairs.i[places], pairs.j[places]
+            extra |= {"i": i.astype(np.float64), "j": j.astype(np.float64)}
+            randomness = Randomness(pairs.stream, i, j)
     values = constants.unchecked(formula, extra, randomness, places=places)
-    if values is None or np.isfinite(values).all():
+    if values is UNKNOWN:
+        return None
+    if np.isfinite(values).all():
         return values
     everywhere = np.broadcast_to(values, places.shape)
     wild = int(np.flatnonzero(~np.isfinite(everywhere))[0])

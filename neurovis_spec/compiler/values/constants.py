@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import chain
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -26,8 +26,10 @@ from neurovis_spec.language.expressions.given import GIVEN, meaning
 from neurovis_spec.language.expressions.parser import DRAWS, ExpressionError, parse, unknown_names
 from neurovis_spec.language.expressions.tree import Draw, Number, Tree, draws, names
 from neurovis_spec.language.located import Formula
+from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 
 Value: TypeAlias = float | FloatArray
+V = TypeVar("V")
 
 #: Names that an expression may always use.
 ALWAYS = (*CONSTANTS, "dt")
@@ -66,13 +68,11 @@ def parse_formula(
     random: bool = False,
     functions: Mapping[str, int] | None = None,
     what: str = "known here",
-    incomplete: bool = False,
     later: Collection[str] = (),
-) -> Tree | None:
+) -> Tree | Unknown:
     """The tree of a formula whose names are all known; else findings at the invalid characters.
 
-    ``incomplete``: not all known names could be read, so that an unknown one is no finding; the tree is None. ``later``
-    are names that are declared behind the formula.
+    ``later`` are names that are declared behind the formula.
     """
     if not isinstance(formula.value, str):
         return Number(float(formula.value))
@@ -90,13 +90,13 @@ def parse_formula(
             return tree
         unknown = unknown_names(tree, names(tree).difference(unused))
         used = [(node.name, node.start, node.end) for node in unknown]
-    for name, start, end in () if incomplete else used:
+    for name, start, end in used:
         few = () if findings.many else known
         message, hint = _unknown(name, few, functions or {}, what)
         if name in later:
             message, hint = f"'{name}' comes later", "a parameter sees those that are declared before it"
         findings.error("unknown-name", formula.node.at(start, end), message, hint)
-    return None
+    return UNKNOWN
 
 
 def _unknown(name: str, known: Collection[str], functions: Mapping[str, int], what: str) -> tuple[str, str | None]:
@@ -126,8 +126,18 @@ def check_finite(value: Value, formula: Formula, findings: Findings) -> bool:
     return False
 
 
+def value_of(tree: Tree | Unknown, values: Mapping[str, Value | Unknown]) -> Value | Unknown:
+    """The value of an expression over these names; UNKNOWN where it uses one that is."""
+    if tree is UNKNOWN:
+        return UNKNOWN
+    used = names(tree)
+    known = {name: value for name, value in values.items() if name in used and value is not UNKNOWN}
+    return evaluate_array(tree, known) if len(known) == len(used) else UNKNOWN
+
+
 class Randomness(NamedTuple):
-    """Where the numbers of a formula are drawn from: a stream and the counters i, j of each value."""
+    """Where the numbers of a formula are drawn from: a stream and the counters i, j of each value (UNKNOWN in the place
+    of a Randomness: it may draw, and nobody knows what)."""
 
     stream: Stream
     i: int | IntArray
@@ -136,9 +146,10 @@ class Randomness(NamedTuple):
 
 @dataclass
 class Constants:
-    """Evaluates formulas over the parameters of one spec."""
+    """Evaluates formulas over the parameters of one spec. An invalid formula gives UNKNOWN, and so does one that uses a
+    name which is UNKNOWN."""
 
-    parameters: dict[str, float]
+    names: Names[float]
     dt: float
     findings: Findings
     #: parameter → the parameters that its own formula uses
@@ -146,10 +157,6 @@ class Constants:
     structural: set[str] = field(default_factory=set)
     #: names that formulas read, whatever became of these
     read: set[str] = field(default_factory=set)
-    #: parameters whose own formulas are invalid: no follow-up findings about these
-    broken: set[str] = field(default_factory=set)
-    #: whether there may be parameters that could not be read at all
-    incomplete: bool = False
     #: the slots of the whole network, and for each parameter that can be set in a run, or follows one, its slot
     slots: list[Slot] = field(default_factory=list)
     settable: dict[str, int] = field(default_factory=dict)
@@ -159,27 +166,31 @@ class Constants:
     #: what follows parameters, of all that is evaluated while somebody asks for it
     _parts: list[Part] | None = None
 
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The parameters whose values are known."""
+        return self.names.known()
+
     def declare(
         self,
         name: str,
-        tree: Tree | None,
+        tree: Tree | Unknown,
         value: float,
-        low: float | Dependent | None,
-        high: float | Dependent | None,
+        low: float | Dependent,
+        high: float | Dependent,
         given: bool,
     ) -> None:
         """Give a parameter a slot, if it can be set or follows one that can. ``tree`` is its formula, which it follows
         unless its value is ``given`` from outside or it is given another one (``settings``)."""
-        own = None if tree is None or not given or self.path else self.bound(tree)
-        tree = None if given else tree
-        followed = None if tree is None or names(tree).isdisjoint(self.settable) else self.bound(tree)
+        own = None if tree is UNKNOWN or not given or self.path else self.bound(tree)
+        tree = UNKNOWN if given else tree
+        followed = None if tree is UNKNOWN or names(tree).isdisjoint(self.settable) else self.bound(tree)
         if self.path and name not in self.settings and followed is None:
             return
         formula = self.settings.get(name, followed)
-        least, most = -math.inf if low is None else low, math.inf if high is None else high
         self.settable[name] = len(self.slots)
         called = f"{self.path}.{name}" if self.path else name
-        self.slots.append(Slot(called, value, formula, least, most, given and not self.path, own))
+        self.slots.append(Slot(called, value, formula, low, high, given and not self.path, own))
 
     @contextmanager
     def following(self) -> Iterator[list[Part]]:
@@ -201,11 +212,12 @@ class Constants:
         extra: Mapping[str, Value | Dependent] | None = None,
         randomness: Randomness | None = None,
     ) -> ParameterFormula:
-        """An expression with what its names mean: slots of parameters that can be set, and values."""
+        """An expression, all of which is known, with what its names mean: slots of parameters that can be set, and
+        values."""
         used = names(tree)
         extra = extra or {}
         places = {name: slot for name, slot in places_of(tree, self.settable).items() if name not in extra}
-        known = {name: extra[name] if name in extra else self._known(name, {}) for name in sorted(used - places.keys())}
+        known = self._known(sorted(used - places.keys()), extra)
         draw = None if randomness is None or not draws(tree) else _Drawing(randomness)
         return ParameterFormula(tree, places, known, draw)
 
@@ -216,52 +228,63 @@ class Constants:
         random: bool = False,
         what: str = "known here",
         later: Collection[str] = (),
-    ) -> Tree | None:
+    ) -> Tree | Unknown:
         """The tree of a formula over the parameters and ``extra``, for a caller that evaluates it; else findings.
         ``later`` are parameters that it does not see."""
-        known = Scope((tuple(extra), self.parameters, self.broken, ALWAYS))
-        tree = parse_formula(
-            formula, known, self.findings, random=random, what=what, incomplete=self.incomplete, later=later
-        )
-        if tree is None:
-            return None
-        self.read |= names(tree)
-        return None if names(tree) & self.broken else tree
+        extra = tuple(extra)
+        known = Scope((extra, self.names, ALWAYS))
+        tree = parse_formula(formula, known, self.findings, random=random, what=what, later=later)
+        if tree is UNKNOWN:
+            return UNKNOWN
+        used = names(tree)
+        self.read |= used
+        return UNKNOWN if any(self.names[name] is UNKNOWN for name in used.difference(extra, ALWAYS)) else tree
 
     def unchecked(
         self,
         formula: Formula,
-        extra: Mapping[str, Value] | None = None,
-        randomness: Randomness | None = None,
+        extra: Mapping[str, Value | Unknown] | None = None,
+        randomness: Randomness | Unknown | None = None,
         structural: bool = False,
         places: IntArray | None = None,
-    ) -> Value | None:
+    ) -> Value | Unknown:
         """The value of a formula, finite or not: a float, or an array where ``extra`` or the draws hold arrays.
         ``places`` is where it is to stand, for who collects what follows parameters."""
-        extra = extra or {}
         if not isinstance(formula.value, str):
             return float(formula.value)
-        tree = self.tree(formula, extra, randomness is not None)
-        if tree is None:
-            return None
+        tree = self.tree(formula, extra or (), randomness is not None)
+        if tree is UNKNOWN:
+            return UNKNOWN
         if structural:
             self.depend(names(tree))
-        values = {name: self._known(name, extra) for name in names(tree)}
+        given = {name: value for name, value in (extra or {}).items() if name in names(tree)}
+        around = {name: value for name, value in given.items() if value is not UNKNOWN}
+        if len(around) < len(given) or (randomness is UNKNOWN and draws(tree)):
+            return UNKNOWN
+        values = self._known(names(tree), around)
+        randomness = None if randomness is UNKNOWN else randomness
         drawing = None if randomness is None else _Drawing(randomness)
         result = evaluate_array(tree, values, draw=drawing)
         if drawing is not None and drawing.wrong is not None and np.isnan(result).any():
             self.refuse_draw(formula, *drawing.wrong)
-            return None
+            return UNKNOWN
         if self._parts is not None and not structural and not names(tree).isdisjoint(self.settable):
-            self._parts.append(Part(self.bound(tree, extra, randomness), places))
+            self._parts.append(Part(self.bound(tree, around, randomness), places))
         return float(result) if np.ndim(result) == 0 else np.asarray(result, dtype=np.float64)
 
-    def _known(self, name: str, extra: Mapping[str, Value]) -> Value:
-        if name in CONSTANTS:
-            return CONSTANTS[name]
-        if name == "dt":
-            return self.dt
-        return extra[name] if name in extra else self.parameters[name]
+    def _known(self, used: Iterable[str], extra: Mapping[str, V]) -> dict[str, V | float]:
+        """What names mean, all of which are known."""
+        result: dict[str, V | float] = {}
+        for name in used:
+            if name in CONSTANTS:
+                result[name] = CONSTANTS[name]
+            elif name == "dt":
+                result[name] = self.dt
+            else:
+                value = extra[name] if name in extra else self.names[name]
+                assert value is not UNKNOWN
+                result[name] = value
+        return result
 
     def refuse_draw(self, formula: Formula, draw: Draw, second: float) -> None:
         """The finding about a draw from ``normal`` whose deviation is negative, or from ``uniform`` whose upper end is
@@ -278,43 +301,36 @@ class Constants:
     def value(
         self,
         formula: Formula,
-        extra: Mapping[str, Value] | None = None,
-        randomness: Randomness | None = None,
+        extra: Mapping[str, Value | Unknown] | None = None,
+        randomness: Randomness | Unknown | None = None,
         structural: bool = False,
         places: IntArray | None = None,
-    ) -> Value | None:
+    ) -> Value | Unknown:
         """The value of a formula, which must be finite everywhere."""
         result = self.unchecked(formula, extra, randomness, structural, places)
-        return result if result is not None and check_finite(result, formula, self.findings) else None
+        return result if result is not UNKNOWN and check_finite(result, formula, self.findings) else UNKNOWN
 
-    def look(self, formula: Formula, extra: Collection[str] = (), random: bool = False) -> float | None:
-        """The value of a formula where it is not known what ``extra`` are; None where it depends on these, or draws."""
-        tree = self.tree(formula, extra, random)
-        if tree is None or not names(tree).isdisjoint(extra) or draws(tree):
-            return None
-        return self.scalar(formula)
-
-    def scalar(self, formula: Formula, structural: bool = False) -> float | None:
+    def scalar(self, formula: Formula, structural: bool = False) -> float | Unknown:
         """The value of a formula that is one number."""
         value = self.value(formula, structural=structural)
-        return None if value is None else float(value)
+        return UNKNOWN if value is UNKNOWN else float(value)
 
     def integer(
         self, formula: Formula, what: str, least: int, most: int = 2**53, structural: bool = True
-    ) -> int | None:
+    ) -> int | Unknown:
         """The value of a formula that must be an integer from ``least`` to ``most``."""
         value = self.scalar(formula, structural=structural)
-        if value is None:
-            return None
+        if value is UNKNOWN:
+            return UNKNOWN
         nearest = round(value)
         if abs(value - nearest) > NEAR_INTEGER:  # 0.0003/dt is an integer up to rounding
             self.findings.error("not-an-integer", formula.span, f"{what} must be an integer, this is {value:.15g}")
-            return None
+            return UNKNOWN
         value = nearest
         if not least <= value <= most:
             bound = f"at least {least}" if value < least else f"at most {most:,}"
             self.findings.error("out-of-range", formula.span, f"{what} must be {bound}, this is {value:.15g}")
-            return None
+            return UNKNOWN
         return int(value)
 
     def depend(self, used: Iterable[str]) -> None:
@@ -322,7 +338,7 @@ class Constants:
         waiting = list(used)
         while waiting:
             name = waiting.pop()
-            if name in self.parameters and name not in self.structural:
+            if name in self.names and name not in self.structural:
                 self.structural.add(name)
                 waiting += self.uses.get(name, ())
 

@@ -7,16 +7,15 @@ the spec's parameters. It is checked even if nobody uses it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
 from neurovis_spec.compiler.limits import PATIENCE
-from neurovis_spec.compiler.names.unresolved import Gaps, gaps_of
 from neurovis_spec.compiler.program import Activation, Model, Quantity, Rule
-from neurovis_spec.compiler.values.constants import ALWAYS, Value, check_finite, is_constant, parse_formula
+from neurovis_spec.compiler.values.constants import ALWAYS, Value, check_finite, is_constant, parse_formula, value_of
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.expressions.arrays import evaluate_array
 from neurovis_spec.language.expressions.errors import ExpressionError
@@ -26,8 +25,9 @@ from neurovis_spec.language.expressions.tree import Name, Number, Tree, substitu
 from neurovis_spec.language.library import ActivationModel, Library, ModelModel, RuleModel, StateModel
 from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Formula, bad_name
 from neurovis_spec.language.model import Model as LanguageModel
-from neurovis_spec.language.model import lost_names
+from neurovis_spec.language.model import names_of
 from neurovis_spec.language.places import formula_at
+from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.values import ParameterModel
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
 
@@ -40,7 +40,7 @@ class Default(NamedTuple):
     """A parameter of a definition: its default and its bounds, which may use earlier parameters."""
 
     name: str
-    value: Tree
+    value: Tree | Unknown
     low: Tree | None = None
     high: Tree | None = None
 
@@ -50,12 +50,21 @@ Defaults: TypeAlias = tuple[Default, ...]
 
 @dataclass(frozen=True)
 class Definitions:
-    """All definitions in reach, with the defaults of their parameters, and those that could not be read."""
+    """All definitions in reach, with the defaults of their parameters."""
 
-    activations: Mapping[str, tuple[Activation, Defaults]] = field(default_factory=dict)
-    models: Mapping[str, tuple[Model, Defaults]] = field(default_factory=dict)
-    rules: Mapping[str, tuple[Rule, Defaults]] = field(default_factory=dict)
-    gaps: Gaps = field(default_factory=Gaps)
+    activations: Names[tuple[Activation, Defaults]] = field(default_factory=Names)
+    models: Names[tuple[Model, Defaults]] = field(default_factory=Names)
+    rules: Names[tuple[Rule, Defaults]] = field(default_factory=Names)
+
+    def over(self, other: Definitions) -> Definitions:
+        """These and others: of two of one name this one."""
+        return Definitions(
+            self.activations.over(other.activations), self.models.over(other.models), self.rules.over(other.rules)
+        )
+
+    def opened(self, is_open: bool) -> Definitions:
+        """The same; where it ``is_open``, there may be others that could not be read."""
+        return Definitions(self.activations.opened(is_open), self.models.opened(is_open), self.rules.opened(is_open))
 
 
 M = TypeVar("M", bound=LanguageModel)
@@ -68,114 +77,115 @@ _DECLARING = frozenset({"parameters", "signals", "let", "state"})
 class _Checker:
     """Checks one definition: the names that are taken, and the trees of its formulas."""
 
-    def __init__(
-        self, given: tuple[str, ...], source: SourceMapping, findings: Findings, dt: float, incomplete: bool
-    ) -> None:
-        self.source = source
+    def __init__(self, given: tuple[str, ...], model: LanguageModel, findings: Findings, dt: float) -> None:
+        self.model = model
         self.findings = findings
         self.constants = {**CONSTANTS, "dt": dt}
-        self.known: dict[str, Span | None] = dict.fromkeys((*ALWAYS, *given))
-        #: whether there may be names that could not be read at all
-        self.incomplete = incomplete
+        #: where each name is declared; nowhere those that are given
+        self.known = Names[Span | None](dict.fromkeys((*ALWAYS, *given)), not model.unknown.isdisjoint(_DECLARING))
 
     def declare(self, section: str, name: str) -> None:
         """A parameter, state, signal or intermediate value; each name once, and none that is given."""
         span = self._key(section, name)
-        if name in self.known:
+        if name in self.known.declared:
             self.findings.error("duplicate-name", span, self.taken(name), "choose another name")
-        self.known[name] = span
+        self.known.declared[name] = span
 
     def taken(self, name: str) -> str:
         """What a name that is known already means."""
         first = self.known[name]
-        if first is not None:
+        if isinstance(first, Span):
             return f"'{name}' already means something here (it is declared in line {first.line})"
         return f"'{name}' already means something here: {meaning(name)}"
 
     def _key(self, section: str, name: str) -> Span:
-        node = self.source.get(section)
+        node = self.model.source.get(section)
         if isinstance(node, SourceMapping):
             entry = node.entry(name)
             if entry is not None:
                 return entry.key.span
-        return self.source.span if node is None else node.span
+        return self.model.source.span if node is None else node.span
 
     def optional(self, formula: Formula | None) -> Tree | None:
         """The tree of a formula that may be left out."""
         return None if formula is None else self.tree(formula)
 
-    def tree(self, formula: Formula, functions: Mapping[str, int] | None = None) -> Tree | None:
-        """The tree of a formula over what is declared so far."""
-        what = "known in this definition"
-        tree = parse_formula(
-            formula, self.known, self.findings, functions=functions, what=what, incomplete=self.incomplete
-        )
-        if tree is not None and not functions and is_constant(tree):
+    def tree(
+        self,
+        formula: Formula,
+        functions: Mapping[str, int] | None = None,
+        known: Collection[str] | None = None,
+        what: str = "known in this definition",
+    ) -> Tree:
+        """The tree of a formula over what is declared so far, or what is ``known``; 0 in the place of one that is
+        invalid, as nothing is computed with it any more."""
+        known = self.known if known is None else known
+        tree = parse_formula(formula, known, self.findings, functions=functions, what=what)
+        if tree is not UNKNOWN and not functions and is_constant(tree):
             check_finite(evaluate_array(tree, self.constants), formula, self.findings)
-        return tree
+        return Number(0.0) if tree is UNKNOWN else tree
 
     def parameters(self, parameters: Mapping[str, ParameterModel]) -> Defaults:
         """Declare the parameters; a default sees those before it."""
         result: list[Default] = []
-        values: dict[str, Value] = dict(self.constants)
-        for name, parameter in parameters.items():
-            tree = self._default(parameter.value, values)
-            low, high = self._default(parameter.minimum, values), self._default(parameter.maximum, values)
+        values = Names[Value](self.constants)
+        for name, parameter in names_of(self.model, "parameters", parameters).items():
             self.declare("parameters", name)
-            default = Default(name, Number(0.0)) if parameter.failed else Default(name, tree or Number(0.0), low, high)
+            default = Default(name, UNKNOWN) if parameter is UNKNOWN else self._default(name, parameter, values)
             result.append(default)
-            values[name] = evaluate_array(default.value, values)
-            if tree is not None and not parameter.failed:
-                check_bounds(values[name], default, values, parameter.value.span, self.findings)
-        for name in lost_names(self.source, "parameters", dict(parameters)):
-            self.known.setdefault(name, None)
-            result.append(Default(name, Number(0.0)))
+            value = values.declared[name] = value_of(default.value, values)
+            if parameter is not UNKNOWN and value is not UNKNOWN:
+                check_bounds(value, default, values, parameter.value.span, self.findings)
         return tuple(result)
 
-    def _default(self, formula: Formula | None, values: Mapping[str, Value]) -> Tree | None:
-        if formula is None:
-            return None
-        tree = parse_formula(formula, tuple(values), self.findings, what="known in this default")
-        if tree is not None and not check_finite(evaluate_array(tree, values), formula, self.findings):
-            return None
-        return tree
+    def _default(self, name: str, parameter: ParameterModel, values: Names[Value]) -> Default:
+        value = self._finite(parameter.value, values)
+        low, high = (
+            UNKNOWN if formula is None else self._finite(formula, values)
+            for formula in (parameter.minimum, parameter.maximum)
+        )
+        return Default(
+            name,
+            UNKNOWN if parameter.failed else value,
+            None if low is UNKNOWN else low,
+            None if high is UNKNOWN else high,
+        )
+
+    def _finite(self, formula: Formula, values: Names[Value]) -> Tree | Unknown:
+        tree = parse_formula(formula, values, self.findings, what="known in this default")
+        value = value_of(tree, values)
+        return UNKNOWN if value is not UNKNOWN and not check_finite(value, formula, self.findings) else tree
 
     def let(self, let: Mapping[str, Formula]) -> tuple[tuple[str, Tree], ...]:
         """Declare the intermediate values, in order."""
         result: list[tuple[str, Tree]] = []
-        for name, formula in let.items():
-            tree = self.tree(formula)
+        for name, formula in names_of(self.model, "let", let).items():
+            if formula is not UNKNOWN:
+                result.append((name, self.tree(formula)))
             self.declare("let", name)
-            result.append((name, tree or Number(0.0)))
-        for name in lost_names(self.source, "let", dict(let)):
-            self.known.setdefault(name, None)
         return tuple(result)
 
     def states(self, state: Mapping[str, StateModel], defaults: Defaults) -> tuple[Quantity, ...]:
         """The states; their right-hand sides see everything, their initial values the parameters alone."""
-        result = []
         constant = (*ALWAYS, *(default.name for default in defaults))
-        for name, model in state.items():
-            initial = None
-            if model.initial is not None:
-                initial = parse_formula(model.initial, constant, self.findings, what="known here")
-                if initial is not None and is_constant(initial):
-                    check_finite(evaluate_array(initial, self.constants), model.initial, self.findings)
-            result.append(
-                Quantity(
-                    name,
-                    initial or Number(0.0),
-                    self.optional(model.each_step),
-                    self.optional(model.each_episode),
-                )
+        return tuple(
+            Quantity(
+                name,
+                Number(0.0) if model.initial is None else self.tree(model.initial, None, constant, "known here"),
+                self.optional(model.each_step),
+                self.optional(model.each_episode),
             )
-        return tuple(result)
+            for name, model in state.items()
+        )
 
 
-def check_bounds(value: Value, default: Default, values: Mapping[str, Value], span: Span, findings: Findings) -> bool:
-    """Whether a parameter lies within its bounds everywhere; a finding where it does not."""
-    low = -np.inf if default.low is None else evaluate_array(default.low, values)
-    high = np.inf if default.high is None else evaluate_array(default.high, values)
+def check_bounds(
+    value: Value, default: Default, values: Mapping[str, Value | Unknown], span: Span, findings: Findings
+) -> bool:
+    """Whether a parameter lies within its bounds, those that are known, everywhere; a finding where it does not."""
+    low = UNKNOWN if default.low is None else value_of(default.low, values)
+    high = UNKNOWN if default.high is None else value_of(default.high, values)
+    low, high = -np.inf if low is UNKNOWN else low, np.inf if high is UNKNOWN else high
     outside = np.broadcast_to((value < low) | (value > high), np.broadcast_shapes(*map(np.shape, (value, low, high))))
     if not outside.any():
         return True
@@ -192,19 +202,21 @@ def _bound(default: Default, how: str, bound: Tree | None) -> str | None:
     return f"'{default.name}' is {how} '{bound.name}'" if isinstance(bound, Name) else None
 
 
-def _activation(name: str, model: ActivationModel, findings: Findings, dt: float) -> tuple[Activation, Defaults] | None:
-    """The activation; None where an intermediate value is invalid."""
-    checker = _Checker(_ACTIVATION.sees, model.source, findings, dt, not model.lost_keys.isdisjoint(_DECLARING))
+def _activation(
+    name: str, model: ActivationModel, findings: Findings, dt: float
+) -> tuple[Activation, Defaults] | Unknown:
+    """The activation; UNKNOWN where an intermediate value is invalid."""
+    checker = _Checker(_ACTIVATION.sees, model, findings, dt)
     defaults = checker.parameters(model.parameters)
     replaced: dict[str, Tree] = {}
     let = checker.let(model.let)
     before = findings.errors
     for key, tree in let:
         if findings.errors > before:  # what explodes once explodes again in all that uses it
-            return None
-        replaced[key] = _expanded(tree, replaced, checker.known[key] or model.source.span, findings)
-    value = checker.tree(model.value)
-    tree = _expanded(value or Number(0.0), replaced, model.value.span, findings)
+            return UNKNOWN
+        place = checker.known[key]
+        replaced[key] = _expanded(tree, replaced, place if isinstance(place, Span) else model.source.span, findings)
+    tree = _expanded(checker.tree(model.value), replaced, model.value.span, findings)
     return Activation(name, tuple(default.name for default in defaults), tree), defaults
 
 
@@ -218,34 +230,34 @@ def _expanded(tree: Tree, let: Mapping[str, Tree], span: Span, findings: Finding
 
 
 def _model(name: str, model: ModelModel, findings: Findings, dt: float) -> tuple[Model, Defaults]:
-    checker = _Checker(_MODEL.sees, model.source, findings, dt, not model.lost_keys.isdisjoint(_DECLARING))
+    checker = _Checker(_MODEL.sees, model, findings, dt)
     defaults = checker.parameters(model.parameters)
-    for key in (*model.state, *lost_names(model.source, "state", dict(model.state))):
+    for key in names_of(model, "state", model.state):
         checker.declare("state", key)
     let = checker.let(model.let)
     state = checker.states(model.state, defaults)
     activity = checker.tree(model.activity, dict.fromkeys(_MODEL.functions, 1))
     names = tuple(default.name for default in defaults)
     spikes = model.spikes is not None and model.spikes.value
-    return Model(name, names, let, state, activity or Number(0.0), spikes), defaults
+    return Model(name, names, let, state, activity, spikes), defaults
 
 
-def _rule(name: str, model: RuleModel, findings: Findings, dt: float) -> tuple[Rule, Defaults] | None:
-    """The rule; None where it is not known which signals it has."""
-    checker = _Checker(_RULE.sees, model.source, findings, dt, not model.lost_keys.isdisjoint(_DECLARING))
+def _rule(name: str, model: RuleModel, findings: Findings, dt: float) -> tuple[Rule, Defaults] | Unknown:
+    """The rule; UNKNOWN where it is not known which signals it has."""
+    checker = _Checker(_RULE.sees, model, findings, dt)
     defaults = checker.parameters(model.parameters)
     before = findings.errors
     for signal in model.signals:
         if not IDENTIFIER.fullmatch(signal.value):
             findings.error("bad-name", signal.span, bad_name(signal.value), NAME_RULE)
-        elif signal.value in checker.known:
+        elif signal.value in checker.known.declared:
             findings.error("duplicate-name", signal.span, checker.taken(signal.value), "choose another name")
-        checker.known[signal.value] = signal.span
+        checker.known.declared[signal.value] = signal.span
         if findings.errors - before >= PATIENCE:
             break
     if findings.errors > before:
-        return None
-    for key in (*model.state, *lost_names(model.source, "state", dict(model.state))):
+        return UNKNOWN
+    for key in names_of(model, "state", model.state):
         checker.declare("state", key)
     let = checker.let(model.let)
     state = checker.states(model.state, defaults)
@@ -255,36 +267,33 @@ def _rule(name: str, model: RuleModel, findings: Findings, dt: float) -> tuple[R
     return Rule(name, tuple(default.name for default in defaults), signals, let, state, step, episode), defaults
 
 
-def define(library: Library, findings: Findings, builtin: Definitions | None = None, dt: float = 1.0) -> Definitions:
-    """The definitions of a file, on top of the built-in ones. Who replaces a built-in is warned."""
-    base = builtin or Definitions()
-    for section, known in (("activations", base.activations), ("models", base.models), ("rules", base.rules)):
+def define(library: Library, findings: Findings, builtin: Definitions, dt: float = 1.0) -> Definitions:
+    """The definitions of a file. Who replaces a built-in one is warned."""
+    sections: tuple[tuple[str, Collection[str]], ...] = (
+        ("activations", builtin.activations), ("models", builtin.models), ("rules", builtin.rules)
+    )  # fmt: skip
+    for section, known in sections:
         node = library.source.get(section)
         for entry in node.entries if isinstance(node, SourceMapping) else ():
             if entry.name in known:
                 message = f"'{entry.name}' replaces the built-in of that name"
                 findings.warning("replaces-builtin", entry.key.span, message)
-    gaps = gaps_of(library)
-    activations, gaps = _defined("activations", library.activations, _activation, gaps, findings, dt)
-    models, gaps = _defined("models", library.models, _model, gaps, findings, dt)
-    rules, gaps = _defined("rules", library.rules, _rule, gaps, findings, dt)
-    return Definitions({**base.activations, **activations}, {**base.models, **models}, {**base.rules, **rules}, gaps)
+    return Definitions(
+        _defined("activations", library, library.activations, _activation, findings, dt),
+        _defined("models", library, library.models, _model, findings, dt),
+        _defined("rules", library, library.rules, _rule, findings, dt),
+    )
 
 
 def _defined(
     section: str,
+    library: Library,
     models: Mapping[str, M],
-    make: Callable[[str, M, Findings, float], tuple[D, Defaults] | None],
-    gaps: Gaps,
+    make: Callable[[str, M, Findings, float], tuple[D, Defaults] | Unknown],
     findings: Findings,
     dt: float,
-) -> tuple[dict[str, tuple[D, Defaults]], Gaps]:
-    """The definitions of a section. One whose declarations could not be read is a gap: which parameters and signals it
-    has is not known."""
+) -> Names[tuple[D, Defaults]]:
+    """The definitions of a section. One of which it is not known which parameters and signals it has is UNKNOWN."""
     made = {name: make(name, model, findings, dt) for name, model in models.items()}
-    found = {
-        name: definition
-        for name, definition in made.items()
-        if definition is not None and models[name].lost_keys.isdisjoint(_SET)
-    }
-    return found, gaps.with_names(section, gaps.names[section] | (made.keys() - found.keys()))
+    sure = {name: made[name] if model.unknown.isdisjoint(_SET) else UNKNOWN for name, model in models.items()}
+    return names_of(library, section, sure)

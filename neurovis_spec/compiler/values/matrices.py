@@ -17,6 +17,7 @@ from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.draws import Stream
 from neurovis_spec.diagnostics import Findings, Span
+from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.language.values import FileReference, Matrix, MatrixRows
 from neurovis_spec.language.yaml.source import NULL
 
@@ -76,8 +77,10 @@ def _written(
     i, j = (columns, rows) if by_target else (rows, columns)
     shape = (len(widths), int(widths.max(initial=0)))
     own = shape[::-1] if by_target else shape
-    known = {"n_from": float(own[0] if n is None else n), "n_to": float(own[1] if m is None else m)}
-    pairs = Pairs(i, j, known, stream, vague=cells.failed)
+    sizes = {"n_from": float(own[0] if n is None else n), "n_to": float(own[1] if m is None else m)}
+    pairs = Pairs(i, j, sizes, stream)
+    if cells.failed:
+        pairs = Pairs(UNKNOWN, UNKNOWN, dict.fromkeys(sizes, UNKNOWN), stream)
     values = values_of(cells, np.arange(len(rows)), constants, pairs)
     if values is None or len(uneven) or cells.failed:
         return None

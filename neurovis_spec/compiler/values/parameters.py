@@ -13,6 +13,8 @@ from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.expressions.given import RESERVED, meaning
 from neurovis_spec.language.expressions.tree import names
+from neurovis_spec.language.located import Formula
+from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.language.values import ParameterModel
 
 
@@ -42,30 +44,36 @@ def _parameter(
         message = f"a parameter may not be called '{name}': the language gives this name a meaning of its own"
         hint = f"'{name}' is {meaning(name)}; take another name, such as '{name}_0'"
         findings.error("reserved-name", span, message, hint)
-    at_fault = name in constants.broken or parameter.failed  # or what is set is invalid
+    invalid = constants.names.declared.get(name) is UNKNOWN or parameter.failed  # or what is set is invalid
     tree = constants.tree(parameter.value, what="parameters before this one, and constants", later=later)
-    constants.uses[name] = frozenset() if tree is None or name in given else names(tree)
-    value = None if tree is None else constants.scalar(parameter.value)
+    constants.uses[name] = frozenset() if tree is UNKNOWN or name in given else names(tree)
+    value = UNKNOWN if tree is UNKNOWN else constants.scalar(parameter.value)
     with constants.following() as lower:
-        low = None if parameter.minimum is None else constants.scalar(parameter.minimum)
+        low = _bound(parameter.minimum, -math.inf, constants)
     with constants.following() as upper:
-        high = None if parameter.maximum is None else constants.scalar(parameter.maximum)
+        high = _bound(parameter.maximum, math.inf, constants)
     if name in given:
         value = float(given[name])
         if not math.isfinite(value):
             findings.error("not-finite", place, f"the parameter '{name}' is set to {value}")
-            value = None
-    if value is None or at_fault:
-        constants.broken.add(name)
+            value = UNKNOWN
+    if value is UNKNOWN or invalid:
+        constants.names.declared[name] = UNKNOWN
         return
-    constants.parameters[name] = value
+    constants.names.declared[name] = value
     least, most = lower[0].formula if lower else low, upper[0].formula if upper else high
     constants.declare(name, tree, value, least, most, name in given)
-    if low is not None and high is not None and low > high and parameter.minimum is not None:
+    if low > high and parameter.minimum is not None:
         message = f"the least value of '{name}', {low:g}, is above the greatest, {high:g}"
         findings.error("out-of-range", parameter.minimum.span, message, "swap min and max")
         return
-    if (low is not None and value < low) or (high is not None and value > high):
-        bounds = f"{'-∞' if low is None else f'{low:g}'} to {'∞' if high is None else f'{high:g}'}"
+    if not low <= value <= high:
+        bounds = f"{low:g} to {high:g}".replace("inf", "∞")
         where = place if name in given else parameter.value.span
         findings.error("out-of-range", where, f"'{name}' is {value:g}; its bounds are {bounds}")
+
+
+def _bound(formula: Formula | None, otherwise: float, constants: Constants) -> float:
+    """A bound of a parameter; ``otherwise`` where there is none, or an invalid one."""
+    value = UNKNOWN if formula is None else constants.scalar(formula)
+    return otherwise if value is UNKNOWN else value
