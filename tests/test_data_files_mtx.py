@@ -102,7 +102,6 @@ SYMMETRIC, SKEW = first("coordinate real symmetric"), first("coordinate real ske
         (REAL + "2 2 1\n1 1 0x1f\n", "file-format", "line 3: '0x1f' is no number"),
         (REAL + "2 2 1\n1 1 ١\n", "file-format", "line 3: '١' is no number"),
         (REAL + "2 2 1\n1 1 \x00\n", "file-format", "line 3: '?' is no number"),
-        (REAL + "2 2 1\n1 1 1\x0b\n", "file-format", "line 3"),
         (REAL + "2 2 1\n1 1 1\r2 2 2\r", "file-format", "line 3: 3 numbers are wanted, not 6"),
         (REAL + "2 2 1\n1 1 NaN\n", "not-finite", "line 3: 'NaN' is not finite"),
         (REAL + "2 2 1\n1 1 -inf\n", "not-finite", "line 3: '-inf' is not finite"),

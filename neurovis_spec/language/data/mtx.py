@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import io
 import re
-import warnings
-from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Final
 
@@ -34,15 +32,12 @@ from neurovis_spec.language.data.table import (
 
 _BANNER: Final = "%%matrixmarket"
 _LONGEST_LINE: Final = 1024
-_LONGEST_PREFACE: Final = 1 << 20
 _LONGEST_SIZE: Final = 15
-_NUMBER: Final = rb"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
+_NUMBER: Final = re.compile(rb"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _NOT_FINITE: Final = re.compile(rb"[-+]?(?:nan|inf|infinity)", re.IGNORECASE)
 _PLAIN: Final = b"0123456789+-.eE \t\r\n"
-#: lines that say nothing; without steps back, so that a file of nothing else takes no memory
-_NOTHING: Final = re.compile(rb"(?:[ \t\r]*+(?:%[^\n]*+)?\n)*+")
-_SHORT_LINES: Final = re.compile(rb"(?:[^\n]{0,%d}+(?:\n|\Z))*+" % _LONGEST_LINE)
-_COMMENT: Final = re.compile(rb"^[ \t]*+%[^\n]*+", re.MULTILINE)
+#: bytes of lines that are read together
+_STRETCH: Final = 1 << 18
 _WORDS: Final = (
     ("matrix",),
     ("coordinate", "array"),
@@ -73,52 +68,22 @@ class _Head:
         return (2 if self.sparse else 0) + (self.field != "pattern")
 
 
-@dataclass(frozen=True, slots=True)
-class _Body:
-    """The lines after those, comments blanked out; ``line`` is the number of the first one."""
-
-    data: bytes
-    line: int
-
-    def check(self) -> None:
-        """Refuse lines that are longer than any that holds three numbers. Raises CellError."""
-        match = _SHORT_LINES.match(self.data)
-        assert match is not None
-        if match.end() < len(self.data):
-            number = self.line + self.data.count(b"\n", 0, match.end())
-            raise CellError("file-format", f"line {number} is longer than {_LONGEST_LINE} bytes")
-
-    def lines_of(self, entries: Collection[int]) -> dict[int, int]:
-        """The lines of entries, which are counted from 0."""
-        found: dict[int, int] = {}
-        wanted, entry = set(entries), 0
-        for number, text in enumerate(io.BytesIO(self.data), self.line):
-            if len(found) == len(wanted):
-                break
-            if text.strip():
-                if entry in wanted:
-                    found[entry] = number
-                entry += 1
-        return found
-
-
 def parse_mtx(data: bytes, room: Room | None = None) -> Table:
     """The matrix; in a pattern every entry is 1. Raises CellError."""
-    if data.startswith(b"\xef\xbb\xbf"):
-        data = data[3:]
-    words = _banner(data)
-    preface = _NOTHING.match(data, data.find(b"\n") + 1 or len(data), _LONGEST_PREFACE)
-    start = len(data) if preface is None else preface.end()
-    line = data.count(b"\n", 0, start) + 1
-    sizes, _, rest = data[start:].partition(b"\n")
+    file = io.BytesIO(data.removeprefix(b"\xef\xbb\xbf"))
+    words = _banner(file.readline())
+    line, sizes = 2, file.readline()
+    while sizes and (not sizes.strip() or sizes.lstrip().startswith(b"%")):
+        line, sizes = line + 1, file.readline()
     head = _sizes(words, sizes[:_LONGEST_LINE], line)
     if room is not None:
         room(head.rows * head.columns)
-    body = _Body(_COMMENT.sub(b"", rest) if b"%" in rest else rest, line + 1)
-    body.check()
     faults = Faults()
-    body, table = _numbers(head, body, line, faults)
-    i, j, values = _entries(head, body, table, faults)
+    lines, table = _numbers(file.read(), line + 1, head, faults)
+    if len(table) != head.entries and not faults:
+        there = "there are more" if len(table) > head.entries else f"there are {len(table)}"
+        faults.note(line, CellError("file-format", f"line {line} promises {head.entries} entries, {there}"))
+    i, j, values = _entries(head, lines, table, faults)
     faults.check()
     if head.symmetry != "general":
         other = i != j
@@ -128,9 +93,9 @@ def parse_mtx(data: bytes, room: Room | None = None) -> Table:
     return scattered((head.rows, head.columns), i, j, values)
 
 
-def _banner(data: bytes) -> tuple[str, ...]:
-    """The four words of the first line, in lower case."""
-    words = data[:_LONGEST_LINE].partition(b"\n")[0].decode("latin-1").lower().split()
+def _banner(line: bytes) -> tuple[str, ...]:
+    """What the first line says: form, field and symmetry."""
+    words = line[:_LONGEST_LINE].decode("latin-1").lower().split()
     if not words or words[0] != _BANNER:
         hint = "its first line is such as '%%MatrixMarket matrix coordinate real general'"
         raise CellError("file-format", "this is no Matrix Market file", hint)
@@ -174,73 +139,68 @@ def _sizes(words: tuple[str, ...], text: bytes, line: int) -> _Head:
     return _Head(sparse, field, symmetry, rows, columns, entries)
 
 
-def _numbers(head: _Head, body: _Body, line: int, faults: Faults) -> tuple[_Body, NDArray[np.float64]]:
-    """The numbers of all lines, (entries, width), and the lines, those invalid blanked out, which is reported."""
-    table = _loaded(head, body)
-    if table is None:
-        body = _without_bad_lines(head, body, faults)
-        table = _loaded(head, body)
-    if table is None:  # loadtxt and we do not agree on what is a number
-        raise CellError("file-format", f"the lines from {body.line} on hold something else than numbers")
-    if len(table) != head.entries and not faults:
-        there = "there are more" if len(table) > head.entries else f"there are {len(table)}"
-        faults.note(line, CellError("file-format", f"line {line} promises {head.entries} entries, {there}"))
-    return body, table
+def _numbers(data: bytes, number: int, head: _Head, faults: Faults) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """For each entry its line, the first of which has this number, and its numbers; no more than a few entries more
+    than are promised. What is wrong with lines is reported."""
+    numbers, tables = [np.zeros(0, dtype=np.int32)], [np.zeros((0, head.width))]
+    start, entries = 0, 0
+    while start <= len(data) and entries <= head.entries and not faults.many:
+        end = data.find(b"\n", start + _STRETCH) % (len(data) + 1)
+        lines = data[start:end].split(b"\n")
+        table = None if data[start:end].translate(None, _PLAIN) else _loaded(lines, head.width)
+        if table is not None:
+            places = np.arange(number, number + len(lines), dtype=np.int32)
+        else:
+            places, table = _one_by_one(lines, number, head.width, faults)
+        numbers.append(places)
+        tables.append(table)
+        start, number, entries = end + 1, number + len(lines), entries + len(table)
+    return np.concatenate(numbers), np.concatenate(tables)
 
 
-def _loaded(head: _Head, body: _Body) -> NDArray[np.float64] | None:
-    """The numbers of all lines, one line more than is promised at most; None where lines are invalid."""
-    if not body.data.strip():
-        return np.zeros((0, head.width))
-    if body.data.translate(None, _PLAIN):
+def _loaded(lines: list[bytes], width: int) -> NDArray[np.float64] | None:
+    """The numbers of lines; None where lines are invalid, or empty."""
+    if not all(map(bytes.strip, lines)) or max(map(len, lines)) > _LONGEST_LINE:
         return None
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # which would say that empty lines are not counted
-            most = head.entries + 1
-            table = np.loadtxt(io.BytesIO(body.data), ndmin=2, comments=None, dtype=np.float64, max_rows=most)
+        table = np.loadtxt(lines, ndmin=2, comments=None, dtype=np.float64)
     except (ValueError, OverflowError):
         return None
-    return table if table.shape[1] == head.width else None
+    return table if table.shape[1] == width else None
 
 
-def _without_bad_lines(head: _Head, body: _Body, faults: Faults) -> _Body:
-    """The lines without those that do not hold as many numbers as they should, which are reported, and without what is
-    behind the last one that is."""
-    line = rb"[ \t\r]*(?:%b(?:[ \t]+%b){%d}[ \t\r]*)?(?:\n|\Z)" % (_NUMBER, _NUMBER, head.width - 1)
-    good = re.compile(rb"(?:%b){0,%d}" % (line, _TOGETHER))
-    parts: list[bytes] = []
-    start, number = 0, body.line
-    while start < len(body.data) and not faults.many:
-        match = good.match(body.data, start)
-        assert match is not None
-        if match.end() > start:
-            parts.append(match[0])
-            number += match[0].count(b"\n")
-            start = match.end()
-            continue
-        end = body.data.find(b"\n", start) % (len(body.data) + 1)
-        faults.note(number, _bad_line(head, body.data[start : min(end, start + _LONGEST_LINE)], number))
-        parts.append(b"\n")
-        start, number = end + 1, number + 1
-    return _Body(b"".join(parts), body.line)
+def _one_by_one(
+    lines: list[bytes], number: int, width: int, faults: Faults
+) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """The same of lines of which some are empty, or comments, or invalid, which is reported."""
+    found: dict[int, list[float]] = {}
+    for at, line in enumerate(lines, number):
+        words = line.split()
+        if len(line) > _LONGEST_LINE:
+            faults.note(at, CellError("file-format", f"line {at} is longer than {_LONGEST_LINE} bytes"))
+        elif len(words) == width and all(map(_NUMBER.fullmatch, words)):
+            found[at] = [*map(float, words)]
+        elif words and not words[0].startswith(b"%"):
+            faults.note(at, _bad_line(words, at, width))
+        if faults.many:
+            break
+    return np.array([*found], dtype=np.int32), np.array([*found.values()], dtype=np.float64).reshape(-1, width)
 
 
-def _bad_line(head: _Head, text: bytes, number: int) -> CellError:
+def _bad_line(words: list[bytes], number: int, width: int) -> CellError:
     """What is wrong with a line that does not hold as many numbers as it should."""
-    words = text.split()
     for word in words:
-        if not re.fullmatch(_NUMBER, word):
+        if not _NUMBER.fullmatch(word):
             shown = quoted(word.decode("utf-8", "replace"))
             if _NOT_FINITE.fullmatch(word):
                 return CellError("not-finite", f"line {number}: {shown} is not finite")
             return CellError("file-format", f"line {number}: {shown} is no number")
-    wanted = "1 number is" if head.width == 1 else f"{head.width} numbers are"
+    wanted = "1 number is" if width == 1 else f"{width} numbers are"
     return CellError("file-format", f"line {number}: {wanted} wanted, not {len(words)}")
 
 
 def _entries(
-    head: _Head, body: _Body, table: NDArray[np.float64], faults: Faults
+    head: _Head, lines: NDArray[np.int32], table: NDArray[np.float64], faults: Faults
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
     """Rows and columns (from 0) and values, as the file states them; what is wrong with them is reported."""
     values = np.ones(len(table)) if head.field == "pattern" else table[:, -1]
@@ -256,7 +216,6 @@ def _entries(
             given = table[:, column]
             outside = ~((given >= 1) & (given <= size) & (given == np.rint(given)))
             wrong += [(entry, f"there is no {what} {given[entry]:g}, only 1 to {size}") for entry in _few(outside)]
-    lines = body.lines_of({entry for entry, _ in wrong})
     for entry, message in wrong:
         code = "not-finite" if message is _BEYOND else "file-format"
         faults.note(lines[entry], CellError(code, f"line {lines[entry]}: {message}"))
@@ -266,13 +225,10 @@ def _entries(
     if wrong:
         faults.check()
     i, j = table[:, 0].astype(np.int64) - 1, table[:, 1].astype(np.int64) - 1
-    _check_once(head, body, (i, j), faults)
+    _check_once(head, lines, (i, j), faults)
     return i, j, values
 
 
-#: Lines that are checked together; no more, since a match remembers each. (Not possessively: alternatives at the end
-#: of such a group are invalid in Python before 3.11.5.)
-_TOGETHER: Final = 500
 _BEYOND: Final = "the value is beyond double precision"
 
 
@@ -282,7 +238,7 @@ def _few(wrong: NDArray[np.bool_]) -> list[int]:
 
 
 def _dense_places(head: _Head) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Table and columns of an array's cells, column by column; of a symmetric one from the diagonal down."""
+    """Rows and columns of an array's cells, column by column; of a symmetric one from the diagonal down."""
     if head.symmetry == "general":
         j, i = np.divmod(np.arange(head.entries), head.rows)
     else:
@@ -290,19 +246,20 @@ def _dense_places(head: _Head) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return i, j
 
 
-def _check_once(head: _Head, body: _Body, cells: tuple[NDArray[np.int64], NDArray[np.int64]], faults: Faults) -> None:
+def _check_once(
+    head: _Head, lines: NDArray[np.int32], cells: tuple[NDArray[np.int64], NDArray[np.int64]], faults: Faults
+) -> None:
     """No cell is given twice, not even by way of the symmetry; else that is reported."""
     i, j = cells
     if head.symmetry == "skew-symmetric":
-        for line in body.lines_of(set(_few(i == j))).values():
-            message = f"line {line}: the diagonal of a skew-symmetric matrix is not given"
-            faults.note(line, CellError("file-format", message))
+        for entry in _few(i == j):
+            message = f"line {lines[entry]}: the diagonal of a skew-symmetric matrix is not given"
+            faults.note(lines[entry], CellError("file-format", message))
     low, high = (np.minimum(i, j), np.maximum(i, j)) if head.symmetry != "general" else (i, j)
     twice = repeated(low, high, head.columns)
     if twice is not None:
-        lines = body.lines_of(set(twice))
-        first, second = (lines[entry] for entry in twice)
-        cell = f"row {i[twice[1]] + 1}, column {j[twice[1]] + 1}"
-        by = "" if (i[twice[0]], j[twice[0]]) == (i[twice[1]], j[twice[1]]) else " by way of the symmetry"
-        message = f"line {second}: {cell} is given on line {first} already{by}"
-        faults.note(second, CellError("file-format", message))
+        first, second = twice
+        cell = f"row {i[second] + 1}, column {j[second] + 1}"
+        by = "" if (i[first], j[first]) == (i[second], j[second]) else " by way of the symmetry"
+        message = f"line {lines[second]}: {cell} is given on line {lines[first]} already{by}"
+        faults.note(lines[second], CellError("file-format", message))
