@@ -27,6 +27,7 @@ from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.data.header import AS_TEXTS, NUMBERED
 from neurovis_spec.language.sections import ConnectionModel
+from neurovis_spec.language.unknown import UNKNOWN
 from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence
 
 
@@ -99,8 +100,8 @@ _READ: Final = "give it to a group, as in {{input: {0}}}, or to a rule as a sign
 def _files(section: Section, files: Files, findings: Findings) -> None:
     """Files of inputs that begin with the numbers of their columns. The file has been read: nothing is read again."""
     for model in section.inputs.values():
-        table = None if model.file is None else files.table_at(model.file)
-        if model.file is not None and table is not None and table.numbered:
+        table = UNKNOWN if model.file is None else files.table_at(model.file)
+        if model.file is not None and table is not UNKNOWN and table.numbered:
             findings.warning("numbered-columns", model.file.span, NUMBERED, AS_TEXTS)
 
 

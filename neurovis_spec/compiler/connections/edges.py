@@ -15,7 +15,7 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.compiler.limits import LONGEST_DELAY, PATIENCE
 from neurovis_spec.compiler.names.references import Directory, few
-from neurovis_spec.compiler.values.cells import Cells, Pairs, cells_of, values_of
+from neurovis_spec.compiler.values.cells import Cells, cells_of, seen_by_pairs, values_of
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.draws import Stream
@@ -128,10 +128,10 @@ class EdgeReader:
 
     def _given(self, cells: Cells, which: IntArray, ends: tuple[IntArray, IntArray] | None) -> FloatArray | None:
         """The weights in these cells, 1 for a null; they are checked even if their ends are invalid."""
-        sizes = {"n_from": self.sources.size, "n_to": self.targets.size}
-        pairs = Pairs(UNKNOWN, UNKNOWN, sizes, self.stream) if ends is None else Pairs(*ends, sizes, self.stream)
-        values = values_of(cells, which, self.constants, pairs)
-        return None if values is None else np.where(cells.kinds[which] == NULL, 1.0, values)
+        i, j = ends or (UNKNOWN, UNKNOWN)
+        seen = seen_by_pairs(i, j, (self.sources.size, self.targets.size), self.stream)
+        values = values_of(cells, which, self.constants, *seen)
+        return None if values is UNKNOWN else np.where(cells.kinds[which] == NULL, 1.0, values)
 
     def _delays(self, cells: Cells, which: IntArray) -> IntArray | None:
         """The delays in these cells: few distinct ones, each looked at once."""
@@ -160,7 +160,7 @@ class EdgeReader:
 
     def _from_file(self, reference: FileReference) -> EdgeList | None:
         table = self.files.edges(reference, self.most)
-        if table is None:
+        if table is UNKNOWN:
             return None
         span = reference.path.span
         if not table.sources and table.fault is None:

@@ -17,13 +17,12 @@ from neurovis_spec.compiler.network import Input
 from neurovis_spec.compiler.values.cells import cells_of, values_of
 from neurovis_spec.compiler.values.constants import ALWAYS, Constants, is_constant
 from neurovis_spec.compiler.values.data_files import Files
-from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.expressions.tree import Tree
-from neurovis_spec.language.located import Formula, Located, formula_of
+from neurovis_spec.language.located import Formula, Located
 from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.sections import InputModel
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
-from neurovis_spec.language.yaml.source import NULL, Packed, Sequence
+from neurovis_spec.language.yaml.source import Packed, Sequence
 
 _SOURCES = ("expression", "file", "values", "size")
 
@@ -32,12 +31,11 @@ def make_input(
     name: str, model: InputModel, start: int, section: Section, constants: Constants, files: Files
 ) -> Input | Unknown:
     """One input of a section, from ``start`` on in the vector of all inputs."""
-    findings = constants.findings
     sources = {"expression": model.expression, "file": model.file, "values": model.values, "size": model.size}
     given = [key for key in _SOURCES if sources[key] is not None]
     made = [
         None if model.expression is None else _by_expression(name, model.expression, start, constants),
-        None if model.file is None else _by_file(name, model.file, start, files, findings),
+        None if model.file is None else _by_file(name, model.file, start, files),
         None if model.values is None else _by_values(name, model.values, start, constants),
         None if given and model.size is None else _by_size(name, model, start, section, constants),
     ]
@@ -55,16 +53,9 @@ def _by_expression(name: str, formula: Formula, start: int, constants: Constants
     )
 
 
-def _by_file(name: str, path: Located[str], start: int, files: Files, findings: Findings) -> Input | Unknown:
+def _by_file(name: str, path: Located[str], start: int, files: Files) -> Input | Unknown:
     table = files.table_at(path)
-    if table is None:
-        return UNKNOWN
-    gap = next(table.gaps(), None)
-    if gap is not None:
-        message = f"row {gap[0]}, column {gap[1]} of the file is empty; an input needs a number everywhere"
-        findings.error("file-format", path.span, message)
-        return UNKNOWN
-    return _tabled(name, start, np.array(table.values, dtype=np.float64))
+    return UNKNOWN if table is UNKNOWN else _tabled(name, start, np.array(table.values, dtype=np.float64))
 
 
 def _by_values(name: str, node: Sequence | Packed, start: int, constants: Constants) -> Input | Unknown:
@@ -101,22 +92,19 @@ def _tabled(name: str, start: int, table: FloatArray) -> Input:
 def _inline(node: Sequence | Packed, constants: Constants) -> FloatArray | Unknown:
     """Rows of numbers; a bare number is a row of one."""
     findings = constants.findings
-    cells = cells_of(node, findings, "")
+    cells = cells_of(node, findings, "", gaps=False)
     if cells is None:
         return UNKNOWN
     widths = cells.widths
     if not len(widths):
         findings.error("wrong-size", node.span, "an input needs at least one row")
         return UNKNOWN
-    missing = np.flatnonzero(cells.kinds == NULL)
-    for cell in missing[:PATIENCE].tolist():
-        formula_of(cells.node(cell), findings)  # once more where it is no cell: a finding counts once
     uneven = np.flatnonzero((widths != widths[0]) if widths[0] else widths == 0)
-    for row in () if len(missing) or cells.failed else uneven[:PATIENCE].tolist():
+    for row in () if cells.failed else uneven[:PATIENCE].tolist():
         wanted = f"{amount(int(widths[0]))}, as in the first row" if widths[0] else "at least one"
         message = f"a row of {plural(int(widths[row]), 'number')}; expected {wanted}"
         findings.error("wrong-size", cells.row_span(row), message)
     values = values_of(cells, np.arange(len(cells.kinds)), constants)
-    if len(uneven) or len(missing) or cells.failed:
+    if values is UNKNOWN or len(uneven) or cells.failed:
         return UNKNOWN
-    return UNKNOWN if values is None else values.reshape(len(widths), int(widths[0]))
+    return values.reshape(len(widths), int(widths[0]))

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -52,20 +51,24 @@ class Cells:
         return np.arange(len(self.kinds)) - np.repeat(self.starts[:-1], self.widths)
 
 
-def cells_of(node: Sequence | Packed, findings: Findings, row: str, *, named: bool = False) -> Cells | None:
+def cells_of(
+    node: Sequence | Packed, findings: Findings, row: str, *, named: bool = False, gaps: bool = True
+) -> Cells | None:
     """The cells of a list of rows; findings where one is no number, text or null, or a row is no list. None where there
     are many such.
 
     ``row`` is what a row is, for a finding; with "" a bare cell is a row of one. ``named``: some cells are names, so
-    that the caller has to say what an empty text is.
+    that the caller has to say what an empty text is. ``gaps``: a cell may be null.
     """
     cells = _packed(node, row) if isinstance(node, Packed) else None
     cells = cells or _written(node, findings, row, named)
     if cells is None:
         return None
-    wild = np.flatnonzero((cells.kinds == NUMBER) & ~np.isfinite(cells.numbers))
+    wild = np.flatnonzero(
+        ((cells.kinds == NUMBER) & ~np.isfinite(cells.numbers)) | ((cells.kinds == NULL) & (not gaps))
+    )
     for cell in wild[:PATIENCE].tolist():
-        formula_of(cells.node(cell), findings)
+        formula_of(cells.node(cell), findings)  # perhaps once more: a finding counts once
     return replace(cells, failed=True) if len(wild) else cells
 
 
@@ -122,19 +125,26 @@ def _written(node: Sequence | Packed, findings: Findings, row: str, named: bool)
     )
 
 
-class Pairs(NamedTuple):
-    """What the formulas of cells see: source ``i`` and target ``j``, which also count the numbers drawn, and how many
-    there are (``sizes``)."""
+def seen_by_pairs(
+    i: IntArray | Unknown, j: IntArray | Unknown, sizes: tuple[float | Unknown, float | Unknown], stream: Stream
+) -> tuple[dict[str, Value | Unknown], Randomness | Unknown]:
+    """What the formula of a connection sees, and what it draws from: its source ``i``, its target ``j``, the sizes of
+    both ends."""
+    seen: dict[str, Value | Unknown] = {"n_from": sizes[0], "n_to": sizes[1]}
+    if i is UNKNOWN or j is UNKNOWN:
+        return {**seen, "i": UNKNOWN, "j": UNKNOWN}, UNKNOWN
+    return {**seen, "i": i.astype(np.float64), "j": j.astype(np.float64)}, Randomness(stream, i, j)
 
-    i: IntArray | Unknown
-    j: IntArray | Unknown
-    sizes: Mapping[str, float | Unknown]
-    stream: Stream
 
-
-def values_of(cells: Cells, which: IntArray, constants: Constants, pairs: Pairs | None = None) -> FloatArray | None:
-    """The values of the cells ``which``; NaN where null. ``pairs`` are as long as ``which``; without them a formula
-    sees parameters alone."""
+def values_of(
+    cells: Cells,
+    which: IntArray,
+    constants: Constants,
+    seen: Mapping[str, Value | Unknown] | None = None,
+    randomness: Randomness | Unknown | None = None,
+) -> FloatArray | Unknown:
+    """The values of the cells ``which``; NaN where null. ``seen`` is what their formulas see beside the parameters, and
+    ``randomness`` what they draw from, each the same for all or as long as ``which``."""
     result = cells.numbers[which]
     kinds = cells.kinds[which]
     result[kinds == NULL] = np.nan
@@ -147,38 +157,41 @@ def values_of(cells: Cells, which: IntArray, constants: Constants, pairs: Pairs 
     before = constants.findings.errors
     failed = False
     for places in sorted(groups, key=lambda places: int(places[0])):
-        values = _evaluated(cells, which, places, constants, pairs)
-        failed = failed or values is None
-        if values is not None:
+        around = {name: _at(value, places) for name, value in (seen or {}).items()}
+        drawn = randomness
+        if isinstance(drawn, Randomness):
+            drawn = drawn._replace(i=np.asarray(drawn.i)[places], j=np.asarray(drawn.j)[places])
+        values = _evaluated(cells, which[places], constants, around, drawn, places)
+        failed = failed or values is UNKNOWN
+        if values is not UNKNOWN:
             result[places] = values
         elif constants.findings.errors - before >= PATIENCE:
-            return None
-    return None if failed else result
+            return UNKNOWN
+    return UNKNOWN if failed else result
+
+
+def _at(value: Value | Unknown, places: IntArray) -> Value | Unknown:
+    return value[places] if isinstance(value, np.ndarray) else value
 
 
 def _evaluated(
-    cells: Cells, which: IntArray, places: IntArray, constants: Constants, pairs: Pairs | None
-) -> Value | None:
-    """The values of one formula at all its places; a finding stands at the first place invalid."""
-    formula = formula_of(cells.node(int(which[places[0]])), constants.findings)
+    cells: Cells,
+    which: IntArray,
+    constants: Constants,
+    seen: Mapping[str, Value | Unknown],
+    randomness: Randomness | Unknown | None,
+    places: IntArray,
+) -> Value | Unknown:
+    """The values of one formula in all its cells; a finding stands at the first cell whose value is not finite."""
+    formula = formula_of(cells.node(int(which[0])), constants.findings)
     if formula is None:
-        return None
-    extra: dict[str, Value | Unknown] = {}
-    randomness: Randomness | Unknown | None = None
-    if pairs is not None:
-        extra, randomness = {"i": UNKNOWN, "j": UNKNOWN, **pairs.sizes}, UNKNOWN
-        if pairs.i is not UNKNOWN and pairs.j is not UNKNOWN:
-            i, j = pairs.i[places], pairs.j[places]
-            extra |= {"i": i.astype(np.float64), "j": j.astype(np.float64)}
-            randomness = Randomness(pairs.stream, i, j)
-    values = constants.unchecked(formula, extra, randomness, places=places)
-    if values is UNKNOWN:
-        return None
-    if np.isfinite(values).all():
+        return UNKNOWN
+    values = constants.unchecked(formula, seen, randomness, places=places)
+    if values is UNKNOWN or np.isfinite(values).all():
         return values
-    everywhere = np.broadcast_to(values, places.shape)
+    everywhere = np.broadcast_to(values, which.shape)
     wild = int(np.flatnonzero(~np.isfinite(everywhere))[0])
-    node = cells.node(int(which[places[wild]]))
+    node = cells.node(int(which[wild]))
     assert isinstance(node, Scalar)
     check_finite(float(everywhere[wild]), Located(formula.value, node), constants.findings)
-    return None
+    return UNKNOWN

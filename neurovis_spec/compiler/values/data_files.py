@@ -15,6 +15,7 @@ from neurovis_spec.compiler.limits import amount
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.data.files import CellError, Room, Table, read_edges, read_table
 from neurovis_spec.language.located import Located
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.values import FileReference
 
 if TYPE_CHECKING:
@@ -64,19 +65,39 @@ class Files:
     _edges: _Shelf[EdgeTable] = field(default_factory=_Shelf)
 
     def table(
-        self, reference: FileReference, shape: tuple[int, int] | None = None, *, gaps: bool = True
-    ) -> Table | None:
-        """The numbers of a file, and where it has none, which the caller refuses if there may be no ``gaps``; None
-        where it is invalid. A table of many more cells than the ``shape`` that its place needs is refused; whether a
-        smaller one fits, the caller has to say."""
-        return self._table(reference.path, reference.key, shape, keyed=True, gaps=gaps)
+        self, reference: FileReference, shape: tuple[int, int] | None = None, *, full: str = "", keyed: bool = True
+    ) -> Table | Unknown:
+        """The numbers of a file, and where it has none. A table of many more cells than the ``shape`` that its place
+        needs is refused; whether a smaller one fits, the caller has to say. ``full``, if given, says what needs a
+        number everywhere in a table of that shape. ``keyed``: the author can give a key at this place."""
+        path, key = reference.path, reference.key
 
-    def table_at(self, path: Located[str]) -> Table | None:
-        """The same of a path alone, beside which no ``key`` can stand, without gaps and of any size."""
-        return self._table(path, None, None, keyed=False, gaps=False)
+        def room(cells: int) -> None:
+            if shape is not None and cells > max(_FEW, 2 * shape[0] * shape[1]):  # a header counts as well
+                raise CellError("wrong-size", f"it has {amount(cells)} cells; {shape[0]} × {shape[1]} are wanted")
 
-    def edges(self, reference: FileReference, most: int | None = None) -> EdgeTable | None:
-        """The edges of a ``.csv`` file, at most so many; None where it is invalid."""
+        def read(room: Room) -> Table | None:
+            where = (path.value, self.root, self.base, path.span)
+            return read_table(*where, self.findings, key, keyed=keyed, gaps=not full, room=room)
+
+        file = (path.value, None if key is None else key.value, keyed, full)
+        table = self._tables.get(file, shape, room, read)
+        if table is None:
+            return UNKNOWN
+        gap = next(table.gaps(), None) if full and shape in (None, table.values.shape) else None
+        if gap is not None:
+            message = f"row {gap[0]}, column {gap[1]} of the file is empty; {full}"
+            self.findings.error("file-format", path.span, message)
+            return UNKNOWN
+        return table
+
+    def table_at(self, path: Located[str]) -> Table | Unknown:
+        """The table of an input: of any size, beside whose path no key can stand."""
+        reference = FileReference(path, None, path.span)
+        return self.table(reference, full="an input needs a number everywhere", keyed=False)
+
+    def edges(self, reference: FileReference, most: int | None = None) -> EdgeTable | Unknown:
+        """The edges of a ``.csv`` file, at most so many."""
         path, key = reference.path, reference.key
 
         def room(edges: int) -> None:
@@ -87,17 +108,5 @@ class Files:
         def read(room: Room) -> EdgeTable | None:
             return read_edges(path.value, self.root, self.base, path.span, self.findings, key, room=room)
 
-        return self._edges.get((path.value, None if key is None else key.value), most, room, read)
-
-    def _table(
-        self, path: Located[str], key: Located[str] | None, shape: tuple[int, int] | None, *, keyed: bool, gaps: bool
-    ) -> Table | None:
-        def room(cells: int) -> None:
-            if shape is not None and cells > max(_FEW, 2 * shape[0] * shape[1]):  # a header counts as well
-                raise CellError("wrong-size", f"it has {amount(cells)} cells; {shape[0]} × {shape[1]} are wanted")
-
-        def read(room: Room) -> Table | None:
-            where = (path.value, self.root, self.base, path.span)
-            return read_table(*where, self.findings, key, keyed=keyed, gaps=gaps, room=room)
-
-        return self._tables.get((path.value, None if key is None else key.value, keyed, gaps), shape, room, read)
+        table = self._edges.get((path.value, None if key is None else key.value), most, room, read)
+        return UNKNOWN if table is None else table

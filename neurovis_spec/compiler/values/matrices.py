@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.limits import PATIENCE, plural
-from neurovis_spec.compiler.values.cells import Pairs, cells_of, values_of
+from neurovis_spec.compiler.values.cells import cells_of, seen_by_pairs, values_of
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.compiler.values.data_files import Files
 from neurovis_spec.compiler.values.draws import Stream
@@ -49,8 +49,9 @@ def grid_of(
     """
     if isinstance(matrix, FileReference):
         table = files.table(matrix, None if n is None or m is None else (n, m))
-        grid = None if table is None else Grid(table.values, table.present, matrix.path.span)
-        return None if grid is None else fit(grid, n, m, by_target, constants.findings)
+        if table is UNKNOWN:
+            return None
+        return fit(Grid(table.values, table.present, matrix.path.span), n, m, by_target, constants.findings)
     return _written(matrix, n, m, by_target, constants, stream)
 
 
@@ -74,15 +75,14 @@ def _written(
         message = f"this row has {plural(int(widths[row]), 'cell')}, the first has {widths[0]}"
         findings.error("ragged-matrix", cells.row_span(row), message)
     rows, columns = cells.rows(), cells.columns()
-    i, j = (columns, rows) if by_target else (rows, columns)
+    i, j = (UNKNOWN, UNKNOWN) if cells.failed else (columns, rows) if by_target else (rows, columns)
     shape = (len(widths), int(widths.max(initial=0)))
     own = shape[::-1] if by_target else shape
-    sizes = {"n_from": float(own[0] if n is None else n), "n_to": float(own[1] if m is None else m)}
-    pairs = Pairs(i, j, sizes, stream)
-    if cells.failed:
-        pairs = Pairs(UNKNOWN, UNKNOWN, dict.fromkeys(sizes, UNKNOWN), stream)
-    values = values_of(cells, np.arange(len(rows)), constants, pairs)
-    if values is None or len(uneven) or cells.failed:
+    sizes = (
+        (UNKNOWN, UNKNOWN) if cells.failed else (float(own[0] if n is None else n), float(own[1] if m is None else m))
+    )
+    values = values_of(cells, np.arange(len(rows)), constants, *seen_by_pairs(i, j, sizes, stream))
+    if values is UNKNOWN or len(uneven) or cells.failed:
         return None
     grid = Grid(values.reshape(shape), (cells.kinds != NULL).reshape(shape), matrix.span)
     return fit(grid, n, m, by_target, findings)
