@@ -15,6 +15,9 @@ from typing import SupportsFloat, SupportsIndex, TypeVar
 
 import numpy as np
 
+#: The most steps of a run: beyond it a step is no number that a double can hold.
+MOST_STEPS = 1 << 53
+
 Kind = TypeVar("Kind")
 Item = TypeVar("Item")
 
