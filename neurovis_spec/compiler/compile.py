@@ -24,7 +24,7 @@ from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.drawing.sections import layout_settings, render_settings
 from neurovis_spec.compiler.events.bound import make_settable, own_weights
 from neurovis_spec.compiler.limits import MOST_SIGNALS, Limits, amount
-from neurovis_spec.compiler.lower import make_blocks, make_plasticity, make_program
+from neurovis_spec.compiler.lower import Cycle, levels, make_blocks, make_plasticity, make_program
 from neurovis_spec.compiler.names.expand import Expander, constants_of
 from neurovis_spec.compiler.names.finder import Finder, finder_of
 from neurovis_spec.compiler.names.modules import library_of
@@ -35,7 +35,6 @@ from neurovis_spec.compiler.names.state_references import singles
 from neurovis_spec.compiler.network import Input, Instance, Network, Output
 from neurovis_spec.compiler.neurons.noise import make_noises
 from neurovis_spec.compiler.neurons.populate import Population, populate, without_neurons
-from neurovis_spec.compiler.order import Cycle, levels
 from neurovis_spec.compiler.ros_settings import RosSettings
 from neurovis_spec.compiler.values.constants import Constants, parse_formula
 from neurovis_spec.compiler.values.data_files import Files

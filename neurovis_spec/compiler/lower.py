@@ -1,7 +1,8 @@
 """Lowering: from neurons and connections to blocks and the update program.
 
-In: the Population, the connections, the levels. Out: Blocks (neurons that are updated together), Plasticities
-(connections that learn by one rule) and the program, an ordered list of operations.
+In: the Population, the connections. Out: levels of neurons along delay-0 connections (one more than the highest of
+those that reach it within the step) or a Cycle; Blocks (neurons that are updated together), Plasticities (connections
+that learn by one rule) and the program, an ordered list of operations.
 """
 
 from __future__ import annotations
@@ -32,6 +33,58 @@ from neurovis_spec.compiler.program import (
 _Key: TypeAlias = tuple[int, str, str, Combine]
 #: The row of a group of one; there may be many of these.
 _ONE: Final[IntArray] = np.zeros(1, dtype=np.int64)
+
+
+class Cycle(NamedTuple):
+    """Neurons that wait for each other: the first is named again at the end; ``connection`` closes the cycle."""
+
+    neurons: tuple[int, ...]
+    connection: int
+
+
+def levels(n: int, sources: IntArray, targets: IntArray, delays: IntArray) -> IntArray | Cycle:
+    """Levels by Kahn's algorithm; a cycle of delay-0 connections of single neurons where there is one."""
+    prompt = np.flatnonzero(delays == 0)
+    result = np.zeros(n, dtype=np.int64)
+    if not len(prompt):
+        return result
+    order = prompt[np.argsort(sources[prompt], kind="stable")]
+    outgoing = targets[order].tolist()
+    starts = np.searchsorted(sources[order], np.arange(n + 1)).tolist()
+    waiting = np.bincount(targets[prompt], minlength=n).tolist()
+    ready = [neuron for neuron in range(n) if waiting[neuron] == 0]
+    level = result.tolist()
+    done = 0
+    while done < len(ready):
+        neuron = ready[done]
+        done += 1
+        for target in outgoing[starts[neuron] : starts[neuron + 1]]:
+            level[target] = max(level[target], level[neuron] + 1)
+            waiting[target] -= 1
+            if waiting[target] == 0:
+                ready.append(target)
+    if len(ready) == n:
+        return np.array(level, dtype=np.int64)
+    return _cycle(prompt.tolist(), sources, targets, waiting)
+
+
+def _cycle(prompt: list[int], sources: IntArray, targets: IntArray, waiting: list[int]) -> Cycle:
+    """Go backwards among the neurons that still wait until one comes up again."""
+    into: dict[int, int] = {}
+    for connection in prompt:
+        source, target = int(sources[connection]), int(targets[connection])
+        if waiting[source] and waiting[target]:
+            into.setdefault(target, connection)
+    neuron = min(into)
+    path: list[int] = []
+    place: dict[int, int] = {}
+    while neuron not in place:
+        place[neuron] = len(path)
+        path.append(neuron)
+        neuron = int(sources[into[neuron]])
+    ring = path[place[neuron] :]
+    forward = (ring[0], *reversed(ring))
+    return Cycle(forward, into[ring[0]])
 
 
 def make_blocks(population: Population, sources: IntArray, targets: IntArray, levels: IntArray) -> tuple[Block, ...]:

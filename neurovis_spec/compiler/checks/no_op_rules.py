@@ -1,8 +1,10 @@
-"""Inert rules: those whose weight is the old one, whatever is put in.
+"""Rules that change no weight: whatever is put in, or because a signal is the connection's own end.
 
-In: a rule and its parameters. Out: whether it changes no weight, found by trying: its formulas are evaluated at a few
-points that nobody chose, and a formula that gives back the weight at all of them does so everywhere. Whether signals
-keep it from changing any is tried over some steps, as that may lie in its states.
+In: what a spec without errors became, a rule and its parameters. Out: whether it changes no weight, found by trying:
+its formulas are evaluated at a few points that nobody chose, and a formula that gives back the weight at all of them
+does so everywhere; over some steps where it may lie in its states. A warning at each signal that is the very neuron
+whose activity is ``post`` (``A -> O`` that learns by ``delta`` from the target O), where the rule then changes no
+weight, though it does with any other signal.
 """
 
 from __future__ import annotations
@@ -12,9 +14,14 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray
+from neurovis_spec.compiler.checks.compiled import Compiled
+from neurovis_spec.compiler.connections.entries import Bundle
+from neurovis_spec.compiler.connections.plasticity import Learning
 from neurovis_spec.compiler.program import Rule
+from neurovis_spec.diagnostics import Findings, shorten
 from neurovis_spec.language.expressions.arrays import Value, evaluate_array
 from neurovis_spec.language.expressions.functions import CONSTANTS
+from neurovis_spec.language.sections import ConnectionModel
 
 _POINTS = 16
 _STEPS = 6
@@ -60,3 +67,31 @@ def ever_changes(rule: Rule, parameters: Mapping[str, FloatArray], own: Collecti
                     new[state.name] = evaluate_array(change, values)
             values |= new
     return False
+
+
+def check_own_ends(compiled: Compiled, findings: Findings) -> None:
+    """Warn of every signal that keeps a rule from changing weights, as it is the connection's own end."""
+    for _, body, bundles in compiled.entries():
+        learning = next((bundle.learning for bundle in bundles), None)
+        for signal in () if learning is None else learning.rule.signals:
+            if all(_is_own(bundle, signal) for bundle in bundles):
+                _check_signal(body, learning, signal, findings)
+
+
+def _is_own(bundle: Bundle, signal: str) -> bool:
+    """Whether a signal is, for every connection, the activity of its own target."""
+    return bundle.learning is not None and np.array_equal(bundle.learning.signals[signal], bundle.targets)
+
+
+def _check_signal(body: ConnectionModel, learning: Learning | None, signal: str, findings: Findings) -> None:
+    assert body.plasticity is not None
+    assert learning is not None
+    rule = learning.rule
+    if ever_changes(rule, learning.parameters, (signal,)) or not ever_changes(rule, learning.parameters):
+        return
+    span = next(entry.value.span for entry in body.plasticity.settings if entry.name == signal)
+    message = (
+        f"'{shorten(learning.texts[signal])}' is this connection's own end: '{signal}' is then always 'post', and "
+        f"'{rule.name}' changes no weight"
+    )
+    findings.warning("no-effect", span, message, "name a neuron or an input that says what 'post' should be")

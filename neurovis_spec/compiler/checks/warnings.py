@@ -9,18 +9,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from neurovis_spec.compiler.checks.beyond import check_beyond
 from neurovis_spec.compiler.checks.compiled import Compiled
 from neurovis_spec.compiler.checks.doubled import check_doubled
 from neurovis_spec.compiler.checks.hidden_definitions import check_hidden
 from neurovis_spec.compiler.checks.ignored_settings import check_ignored
 from neurovis_spec.compiler.checks.lone_indices import check_lone_indices
-from neurovis_spec.compiler.checks.no_op_rules import changes_nothing
-from neurovis_spec.compiler.checks.own_ends import check_own_ends
+from neurovis_spec.compiler.checks.no_op_rules import changes_nothing, check_own_ends
 from neurovis_spec.compiler.checks.replaced_weights import check_replaced_weights
 from neurovis_spec.compiler.checks.silent_neurons import idle_neurons
 from neurovis_spec.compiler.checks.undefined_operations import check_undefined
 from neurovis_spec.compiler.checks.unused_parts import check_unused_parts
+from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.names.references import Section, key_span
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.values.data_files import Files
@@ -45,7 +44,7 @@ def warn(compiled: Compiled, findings: Findings) -> None:
     check_undefined(compiled, findings)
     check_hidden(compiled, findings)
     check_replaced_weights(compiled, findings)
-    check_beyond(compiled, findings)
+    _beyond(compiled, findings)
     _events(compiled, findings)
     _theme(compiled, findings)
     _definitions(compiled, findings)
@@ -55,6 +54,26 @@ def warn(compiled: Compiled, findings: Findings) -> None:
     _rates(compiled, findings)
     _episodes(compiled, findings)
     _vain(compiled, findings)
+
+
+def _beyond(compiled: Compiled, findings: Findings) -> None:
+    """Warn of delays and episodes that are too long for a run of the spec's own length."""
+    time, steps = compiled.spec.time, compiled.network.steps
+    if time is None or time.steps is None:
+        return
+    hint = "shorten it, or lengthen the run: time: {{steps: {}}}"
+    episode = compiled.network.episode
+    if time.episode is not None and episode is not None and episode > steps:
+        message = f"an episode of {plural(episode, 'step')} does not end in a run of {steps} ('steps')"
+        findings.warning("beyond-steps", time.episode.span, message, hint.format(episode))
+    for key, body, bundles in compiled.entries():
+        late = [bundle for bundle in bundles if (bundle.delays >= steps).any()]
+        if not late:
+            continue
+        longest = max(int(bundle.delays.max()) for bundle in late)
+        span = key.span if body.delay is None or body.edges is not None else body.delay.span
+        message = f"after a delay of {plural(longest, 'step')} nothing arrives in a run of {steps} ('steps')"
+        findings.warning("beyond-steps", span, message, hint.format(longest + 1))
 
 
 def _theme(compiled: Compiled, findings: Findings) -> None:
