@@ -67,7 +67,7 @@ def build(spec: Spec, request: Request, findings: Findings) -> Network | None:
         return compile_spec(spec, request, findings)
 
 
-class Compiled(NamedTuple):
+class Outcome(NamedTuple):
     """What a text became, as far as it could be read; what is None is invalid, and the findings say why. ``memory`` is
     the earlier layout that the spec names."""
 
@@ -77,7 +77,7 @@ class Compiled(NamedTuple):
     memory: Layout | None = None
 
 
-def compile(document: SourceDocument | None, request: Request, findings: Findings) -> Compiled:
+def compile(document: SourceDocument | None, request: Request, findings: Findings) -> Outcome:
     """All stages up to the network, in their order."""
     spec = None if document is None else shape(document, findings)
     network = memory = None
@@ -88,7 +88,7 @@ def compile(document: SourceDocument | None, request: Request, findings: Finding
             memory = remember(spec, request, network, findings)
             foresee(spec, network, findings)
     allow(findings)
-    return Compiled(spec, request, network, memory)
+    return Outcome(spec, request, network, memory)
 
 
 def allow(findings: Findings) -> None:

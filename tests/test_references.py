@@ -8,8 +8,8 @@ import neurovis_spec as nv
 from neurovis_spec.language.references import (
     Arrow,
     DottedName,
-    Fault,
     NeuronRange,
+    NoReference,
     RuleState,
     Sum,
     parse,
@@ -54,7 +54,7 @@ def test_an_arrow_has_two_ends() -> None:
 )
 def test_what_is_no_reference_says_why_and_where(text: str, code: str, start: int) -> None:
     found = parse(text)
-    faults = [part for part in (found.parts if isinstance(found, Sum) else (found,)) if isinstance(part, Fault)]
+    faults = [part for part in (found.parts if isinstance(found, Sum) else (found,)) if isinstance(part, NoReference)]
     assert [(fault.code, fault.start) for fault in faults] == [(code, start)]
     assert all(fault.message and fault.hint for fault in faults)
 

@@ -1,8 +1,8 @@
 """References as they are written: ``left.K3..K5 + O``, ``A -> B``, ``K.v``, ``(K -> O).eligibility``.
 
 In: a text. Out: a tree of its parts, each with its characters and where these begin in the text; what is no reference
-is a Fault, with the words for it. What the names mean is for those to say who have tables of names: the compiler, a
-recording, a layout, the language server.
+is a NoReference, with the words for it. What the names mean is for those to say who have tables of names: the
+compiler, a recording, a layout, the language server.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _NUMBERED = re.compile(r"(?P<stem>.*?\D)(?P<number>0|[1-9][0-9]{0,63})", re.ASCI
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class Characters:
     """Some characters of a reference, without the blanks around them, and where they begin."""
 
     text: str
@@ -39,22 +39,22 @@ class Piece:
 
 
 @dataclass(frozen=True, slots=True)
-class DottedName(Piece):
+class DottedName(Characters):
     """``K``, ``K3``, ``left1.K3``: a group, a neuron, an instance; or ``K.v``, a state: who has tables of names can
     tell."""
 
     @property
-    def steps(self) -> tuple[Piece, ...]:
+    def steps(self) -> tuple[Characters, ...]:
         """What stands between the dots, in order."""
         result, start = [], self.start
         for step in self.text.split("."):
-            result.append(Piece(step, start))
+            result.append(Characters(step, start))
             start += len(step) + 1
         return tuple(result)
 
 
 @dataclass(frozen=True, slots=True)
-class NeuronRange(Piece):
+class NeuronRange(Characters):
     """``left1.K3..left1.K5``, or shorter ``left1.K3..K5``."""
 
     low: DottedName
@@ -81,7 +81,7 @@ class NeuronRange(Piece):
 
 
 @dataclass(frozen=True, slots=True)
-class RuleState(Piece):
+class RuleState(Characters):
     """``(K -> O).eligibility``: a state of the rule of connections."""
 
     ends: Arrow
@@ -89,7 +89,7 @@ class RuleState(Piece):
 
 
 @dataclass(frozen=True, slots=True)
-class Fault(Piece):
+class NoReference(Characters):
     """Characters that are no reference, and why."""
 
     code: str
@@ -97,11 +97,11 @@ class Fault(Piece):
     hint: str
 
 
-Part: TypeAlias = DottedName | NeuronRange | RuleState | Fault
+Part: TypeAlias = DottedName | NeuronRange | RuleState | NoReference
 
 
 @dataclass(frozen=True, slots=True)
-class Sum(Piece):
+class Sum(Characters):
     """References that are joined with ``+``; often it is one."""
 
     parts: tuple[Part, ...]
@@ -113,7 +113,7 @@ class Sum(Piece):
 
 
 @dataclass(frozen=True, slots=True)
-class Arrow(Piece):
+class Arrow(Characters):
     """``FROM -> TO``: the connections from any of some neurons to any of others."""
 
     sources: Sum
@@ -137,7 +137,7 @@ class StateName(NamedTuple):
         return isinstance(self.owner, Arrow)
 
 
-def parse(text: str) -> Sum | Arrow | Fault:
+def parse(text: str) -> Sum | Arrow | NoReference:
     """The tree of a reference.
 
     >>> parse("K1 + K3..K5 -> O").normal, [part.start for part in parse("K1 + (K -> O).e").parts]
@@ -161,7 +161,7 @@ def state_of(part: Part) -> StateName | None:
     """
     if isinstance(part, RuleState):
         return StateName(part.ends, part.state)
-    if isinstance(part, Fault):
+    if isinstance(part, NoReference):
         return None
     written = part.last if isinstance(part, NeuronRange) else part
     match = _STATE.fullmatch(written.text)
@@ -175,7 +175,7 @@ def state_of(part: Part) -> StateName | None:
     return StateName(DottedName(owner, part.start), match["state"])
 
 
-def _parse(text: str, start: int, end: int) -> Sum | Arrow | Fault:
+def _parse(text: str, start: int, end: int) -> Sum | Arrow | NoReference:
     arrows: list[int] = []
     pluses: list[int] = []
     depth = 0
@@ -189,13 +189,16 @@ def _parse(text: str, start: int, end: int) -> Sum | Arrow | Fault:
     first, last = _stripped(text, start, end)
     whole = text[first:last]
     if len(arrows) > 1:
-        return Fault(whole, first, "bad-connection", f"'{shorten(whole)}' is no connection", "write FROM -> TO")
+        return NoReference(whole, first, "bad-connection", f"'{shorten(whole)}' is no connection", "write FROM -> TO")
     (arrow,) = arrows
     sources = _sum(text, start, arrow, [plus for plus in pluses if plus < arrow])
     return Arrow(whole, first, sources, _sum(text, arrow + 2, end, [plus for plus in pluses if plus > arrow]))
 
 
 def _sum(text: str, start: int, end: int, pluses: list[int]) -> Sum:
+    if not pluses:
+        part = _part(text, start, end)
+        return Sum(part.text, part.start, (part,))
     begins, ends = [start, *(plus + 1 for plus in pluses)], [*pluses, end]
     parts = tuple(_part(text, begin, stop) for begin, stop in zip(begins, ends, strict=True))
     first, last = _stripped(text, start, end)
@@ -206,8 +209,10 @@ def _part(text: str, start: int, end: int) -> Part:
     start, end = _stripped(text, start, end)
     piece = text[start:end]
     if not piece:
-        return Fault("", start, "empty-reference", "a reference is missing here", "name a group, a neuron or a range")
-    rule = _STATE_OF_RULE.fullmatch(piece)
+        return NoReference(
+            "", start, "empty-reference", "a reference is missing here", "name a group, a neuron or a range"
+        )
+    rule = _STATE_OF_RULE.fullmatch(piece) if piece[0] == "(" else None
     if rule is not None:
         ends = _parse(text, start + 1, start + rule.end("ends"))
         if isinstance(ends, Arrow):

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from neurovis_spec.arrays import IntArray, frozen
-from neurovis_spec.compiler.connections.entries import Bundle, EntryBuilder, Surroundings
+from neurovis_spec.compiler.connections.entries import Bundle, EntryBuilder, EntryContext
 from neurovis_spec.compiler.connections.plasticity import title_of
 from neurovis_spec.compiler.limits import Limits
 from neurovis_spec.compiler.names.references import Directory, arrow_of, resolve_sum
@@ -64,7 +64,7 @@ def connect(scopes: tuple[Scope, ...], population: Population, limits: Limits, s
                 name = f"{name} ({number[name]})"
             if body.contradictory:  # which key is meant is not known: nothing is held against the sizes of the ends
                 sources = targets = None
-            around = Surroundings(scope, directory, population, limits, seed, limits.connections - total)
+            around = EntryContext(scope, directory, population, limits, seed, limits.connections - total)
             bundle = EntryBuilder(around, key, body, name, sources, targets).build()
             if bundle is None or findings.errors > before:
                 failed.add(scope.module)

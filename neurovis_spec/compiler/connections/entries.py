@@ -72,7 +72,7 @@ class _Shape(NamedTuple):
     parts: tuple[Part, ...] = ()
 
 
-class Surroundings(NamedTuple):
+class EntryContext(NamedTuple):
     """Where an entry stands: its scope, what is called how there, how many connections it may make."""
 
     scope: Scope
@@ -90,7 +90,7 @@ class EntryBuilder:
     ``name`` is what it is called in its scope.
     """
 
-    around: Surroundings
+    around: EntryContext
     key: Located[str]
     body: ConnectionModel
     name: str

@@ -17,7 +17,7 @@ from neurovis_spec.compiler.network import Group
 from neurovis_spec.diagnostics import Findings, Span, did_you_mean, listed, meant, nearest, shorten, suggest
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.modules import ModuleModel
-from neurovis_spec.language.references import Arrow, Fault, NeuronRange, Part, Sum, parse, parse_sum
+from neurovis_spec.language.references import Arrow, NeuronRange, NoReference, Part, Sum, parse, parse_sum
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.yaml.source import Mapping as SourceMapping
@@ -207,7 +207,7 @@ def check_keys(
 def resolve_part(part: Part, text: Located[str], directory: Directory, findings: Findings) -> tuple[int, ...] | None:
     """One reference within a text: a group, a neuron or a range."""
     span = text.node.at(part.start, part.end)
-    if isinstance(part, Fault):
+    if isinstance(part, NoReference):
         findings.error(part.code, span, part.message, part.hint)
         return None
     if isinstance(part, NeuronRange):
