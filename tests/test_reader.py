@@ -278,7 +278,7 @@ def test_a_duplicate_cites_both_places_and_the_first_stays() -> None:
 def test_reading_goes_on_behind_refusals() -> None:
     document, _ = read("a: !x 1\nb: &y 2\nc: *y\n<<: 3\ntrue: 4\nd: 5\n")
     assert document is not None
-    assert plain(document.root) == {"a": 1, "b": 2, "c": 2, "true": 4, "d": 5}
+    assert plain(document.root) == {"a": 1, "b": 2, "c": True, "true": 4, "d": 5}  # what an alias stands for is unknown
 
 
 def nested(depth: int) -> str:

@@ -75,7 +75,7 @@ class Packer:
         arrays = self._arrays
         integer = 0
         if type(value) is str:
-            if "(" in value and is_open(value):  # perhaps a text that a comma has cut
+            if "(" in value and balance(value) > 0:  # perhaps a text that a comma has cut
                 return False
             texts = self._texts
             kind, number = TEXT, float(texts.setdefault(value, len(texts)))
@@ -126,6 +126,6 @@ class Packer:
         )
 
 
-def is_open(text: str) -> bool:
-    """Whether a parenthesis of the text is not closed in it."""
-    return text.count("(") > text.count(")")
+def balance(text: str) -> int:
+    """How many parentheses of a text are not closed in it."""
+    return text.count("(") - text.count(")")

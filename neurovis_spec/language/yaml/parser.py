@@ -18,9 +18,8 @@ from typing import Final, NamedTuple
 from neurovis_spec.diagnostics import Findings, Span
 from neurovis_spec.language.yaml import faults, texts
 from neurovis_spec.language.yaml.characters import Lines
-from neurovis_spec.language.yaml.cut_texts import FlowCommas, Plain, Run
-from neurovis_spec.language.yaml.faults import Fault
-from neurovis_spec.language.yaml.packed import Packer, is_open
+from neurovis_spec.language.yaml.faults import Words
+from neurovis_spec.language.yaml.packed import Packer, balance
 from neurovis_spec.language.yaml.refusals import DEEPEST, ComposingStoppedError, Refusals
 from neurovis_spec.language.yaml.scalars import NumberRangeError, resolve
 from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Scalar, ScalarValue, Sequence
@@ -38,6 +37,10 @@ _PLAIN: Final = re.compile(_FIRST + r"[-?:](?=\S))" + _TEXT + "*+", re.ASCII)
 _MORE: Final = re.compile(_TEXT + "++", re.ASCII)
 _FLOW_TEXT: Final = r"(?:[^\s:,\[\]{}]+|:(?![\s,\[\]{}]|\Z)|[ \t]+(?![\s#,\[\]{}]|:[\s,\[\]{}]|:\Z|\Z))"
 _FLOW_PLAIN: Final = re.compile(_FIRST + r"-(?![\s,\[\]{}]|\Z))" + _FLOW_TEXT + "*+", re.ASCII)
+#: What is behind a comma within brackets, and no key.
+_CUT_OFF: Final = re.compile(
+    rf"\s*,\s*{_FIRST}-(?![\s,\[\]{{}}]|\Z)){_FLOW_TEXT}*+(?![ \t]*:(?:[\s,\[\]{{}}]|\Z))", re.ASCII
+)
 _FLOW_MORE: Final = re.compile(_FLOW_TEXT + "++", re.ASCII)
 _QUOTED: Final = {"'": re.compile(r"'(?:[^']|'')*+'"), '"': re.compile(r'"(?:[^"\\]|\\.)*+"', re.DOTALL)}
 _HEADER: Final = re.compile(r"[|>](?:([-+])?([1-9])?|([1-9])([-+]))(?:[ \t]+(#[^\r\n]*)?)?(?=[\r\n]|\Z)")
@@ -49,9 +52,12 @@ _BREAK: Final = re.compile(r"\r\n|\n|\r")
 _BLANKS: Final = re.compile(" *")
 _BLANK_LINE: Final = re.compile(r"[ \t]*(#[^\r\n]*)?(?:\r\n|\n|\r)")
 _NEXT_TEXT: Final = re.compile(r"[ \t]*(?:\r\n|\n|\r)(?:[ \t]*(?:\r\n|\n|\r))*")
+_DIRECTIVE: Final = re.compile(r"%YAML[ \t]+1\.2[ \t]*(#.*)?")
 _TAB: Final = re.compile(r"(?<![^\r\n]) *\t")
 _VISIBLE: Final = re.compile(r"[^\s]")
 _MARKER: Final = re.compile(r"(?<![^\r\n])(?:---|\.\.\.)" + _END)
+_TIGHT: Final = re.compile(r":[,\[\]{}]")
+_TIGHT_COLON: Final = re.compile(r"[A-Za-z_][\w.]*:(?=\S)")
 #: A line that has a key and a colon.
 _KEYED: Final = re.compile(r":(?:\s|\Z)")
 #: Where a value has begun within what looks like its key: without a blank before it, or without a colon.
@@ -94,9 +100,18 @@ class _Key(NamedTuple):
 class _UnsoundError(Exception):
     """A syntax error in a value that is read for the first time."""
 
-    def __init__(self, fault: Fault) -> None:
-        super().__init__(fault.message)
-        self.fault = fault
+    def __init__(self, words: Words, at: int) -> None:
+        super().__init__(words.message)
+        self.words = words
+        self.at = at
+
+
+class _Plain(NamedTuple):
+    """A scalar without quotes, and where it begins and ends in the text."""
+
+    begin: int
+    end: int
+    scalar: Scalar
 
 
 class _Cursor(NamedTuple):
@@ -118,8 +133,7 @@ class Parser:
         self._file = file
         self._lines = Lines(text)
         self._partial = partial
-        self._refuse = Refusals(file)
-        self._anchored: dict[str, Scalar] = {}
+        self._refuse = Refusals()
         self._at = 0
         self._line = 1
         self._start = 0
@@ -131,7 +145,7 @@ class Parser:
         #: how much had been found by then: what else is found in the same value may follow from it
         self._told = 0
         #: the scalar that was read last, where it is without quotes
-        self._plain: Plain | None = None
+        self._plain: _Plain | None = None
         #: where values stand that are lost to a syntax error
         self._lost: list[Span] = []
         #: whether it is known what every syntax error has cost
@@ -156,14 +170,18 @@ class Parser:
 
     def _document(self) -> Node | None:
         self._next_line()
-        directive = self._text.startswith("%", self._at) and self._at == self._start
+        directive = False
         while self._text.startswith("%", self._at) and self._at == self._start:
-            self._at = self._line_end()
+            directive = True
+            end = self._line_end()
+            if not _DIRECTIVE.fullmatch(self._text, self._at, end):
+                self._refuse.directive(self._span(end))
+            self._at = end
             self._next_line()
         marker = _MARKER.match(self._text, self._at)
         bare = marker is None or marker[0] != "---"
         if directive and bare:
-            self._misplaced(faults.no_start(*self._here()))
+            self._misplaced(faults.NO_START)
         if marker is not None and not bare:
             self._at = marker.end()
         stop = _MARKER.search(self._text, self._at)
@@ -174,7 +192,7 @@ class Parser:
         if self._broken:
             self._whole = False
         if self._at < self._end:
-            self._misplaced(faults.belongs_nowhere(*self._here()))
+            self._misplaced(faults.NOWHERE)
         if stop is not None:
             self._behind(stop)
         return root
@@ -192,7 +210,7 @@ class Parser:
         if self._text.startswith("---", self._at) and self._at == self._start:
             self._refuse.second_document(self._span(self._at + 3))
         elif self._at < self._end:
-            self._misplaced(faults.belongs_nowhere(*self._here()))
+            self._misplaced(faults.NOWHERE)
 
     # Where we are
 
@@ -244,7 +262,7 @@ class Parser:
         before = self._at
         self._gap()
         if self._text.find("\t", before, self._at) >= 0 and (tab := _TAB.search(self._text, before, self._at)):
-            self._misplaced(faults.tab(*self._lines.place(tab.end() - 1)))
+            self._misplaced(faults.TAB, tab.end() - 1)
 
     def _finish(self) -> None:
         """Behind a value of a block: only a comment may follow on the line."""
@@ -257,32 +275,36 @@ class Parser:
             self._at = self._line_end()
         self._next_line()
 
-    def _behind_value(self) -> Fault:
+    def _behind_value(self) -> Words:
         character = self._text[self._at]
         if character == ":":
-            blank = _COLON.match(self._text, self._at, self._end)
-            return faults.second_colon(*self._here()) if blank else faults.no_blank(*self._here())
-        return faults.behind_value(character, *self._here())
+            return faults.SECOND_COLON if _COLON.match(self._text, self._at, self._end) else faults.NO_BLANK
+        return faults.start(character) if character in "]}" else faults.BEHIND_VALUE
 
     # What is wrong
 
-    def _report(self, fault: Fault) -> None:
-        """Report a syntax error in the value that is being read; its first one."""
+    def _report(self, words: Words, at: int | None = None) -> None:
+        """Report a syntax error in the value that is being read; its first one. It is at the next character unless
+        told otherwise."""
+        at = self._at if at is None else at
         if self._trial:
-            raise _UnsoundError(fault)
+            raise _UnsoundError(words, at)
         if not self._broken:
-            if self._whole:
-                self._refuse.syntax(fault, self._lines)
+            self._note(words, at)
             self._told = len(self._refuse.found)
         self._broken = True
 
-    def _misplaced(self, fault: Fault) -> None:
+    def _misplaced(self, words: Words, at: int | None = None) -> None:
         """Report a syntax error between values: nobody can tell what is missing then."""
-        if self._broken:
-            return
+        if not self._broken:
+            self._note(words, self._at if at is None else at)
+            self._whole = False
+
+    def _note(self, words: Words, at: int) -> None:
         if self._whole:
-            self._refuse.syntax(fault, self._lines)
-        self._whole = False
+            line, column = self._lines.place(at)
+            width = column <= len(self._lines.line(line))
+            self._refuse.syntax(words, Span(self._file, line, column, line, column + width))
 
     def _mark(self) -> _Cursor:
         noted = len(self.comments), len(self._refuse.found), len(self._lost)
@@ -313,7 +335,7 @@ class Parser:
             end, self._end = self._end, self._limit(column)
             self._trial = False
             node = self._value(column, depth, fresh=fresh, dashes=dashes)
-            self._report(error.fault)  # where another was found there is one already
+            self._report(error.words, error.at)  # where another was found there is one already
             told = self._refuse.found[cursor.findings : self._told]
             self._refuse.found[cursor.findings :] = [item for item in told if item.code == faults.CODE]
             self._move(max(self._at, self._end))
@@ -339,29 +361,26 @@ class Parser:
         """A value of a block that stands in column ``indent`` (from 0), to the begin of the next line. ``fresh``: a
         block may begin on this line; ``dashes``: a list may stand in the block's own column."""
         behind = self._here()
-        anchors: list[str] = []
         column = -1
         while True:
             line, before = self._line, self._at
             if self._gap_on_line():
                 tab = self._text.find("\t", before, self._at) if fresh else -1
                 if tab >= 0:
-                    self._report(faults.start("\t", line, tab - self._start + 1))
+                    self._report(faults.TAB_BEFORE, tab)
             else:
                 self._next_line()
                 fresh, column = True, -1
                 here = self._at - self._start
-                if self._at >= self._end or (here <= indent and not (dashes and here == indent and self._dash())):
-                    return self._anchor(anchors, self._nothing(*behind))
+                if self._at >= self._end or (
+                    here <= indent and not (dashes and here == indent and self._indicator("-"))
+                ):
+                    return self._nothing(*behind)
             if column < 0 or self._line != line:
                 column = self._at - self._start
-            if self._text[self._at] not in "!&":
-                break
-            if (anchor := self._property()) is None:
-                break
-            anchors.append(anchor)
+            if not self._property():
+                return self._block_node(indent, depth, column, fresh=fresh)
             behind = self._here()
-        return self._anchor(anchors, self._block_node(indent, depth, column, fresh=fresh))
 
     def _gap_on_line(self) -> bool:
         """Pass blanks and a comment. Returns whether something else follows on the line."""
@@ -372,24 +391,14 @@ class Parser:
         self._at = rest.end()
         return self._at < self._end and self._text[self._at] not in "\r\n"
 
-    def _anchor(self, names: list[str], node: Node) -> Node:
-        if isinstance(node, Scalar):
-            self._anchored.update(dict.fromkeys(filter(None, names), node))
-        return node
-
-    def _property(self) -> str | None:
-        """Refuse a tag or an anchor. Returns the anchor's name, nothing for a tag, None where it is neither."""
-        match = _PROPERTY.match(self._text, self._at, self._end)
+    def _property(self) -> bool:
+        """Refuse a tag or an anchor, if there is one."""
+        match = _PROPERTY.match(self._text, self._at, self._end) if self._text[self._at] in "!&" else None
         if match is None:
-            self._report(faults.start(self._text[self._at], *self._here()))
-            return None
-        written = match[0]
-        self._refuse.property(written, self._span(match.end()))
+            return False
+        self._refuse.property(match[0], self._span(match.end()))
         self._at = match.end()
-        return written[1:] if written[0] == "&" else ""
-
-    def _dash(self) -> bool:
-        return self._indicator("-")
+        return True
 
     def _indicator(self, sign: str) -> bool:
         """Whether a sign comes next that has a blank behind it."""
@@ -400,7 +409,7 @@ class Parser:
         if self._indicator("-"):
             if fresh:
                 return self._sequence(column, depth, indent)
-            self._report(Fault("a list item cannot stand here", *self._here(), "begin the list on a line of its own"))
+            self._report(faults.LATE_ITEM)
         if fresh and (self._indicator("?") or self._indicator(":")):
             return self._mapping(column, depth)
         if self._text[self._at] in "|>":
@@ -419,21 +428,18 @@ class Parser:
 
     def _key_in_text(self, node: Scalar, cursor: _Cursor, column: int, depth: int, *, fresh: bool) -> Node:
         """A text that goes on for several lines until there is a colon: its last line was meant to be a key."""
-        line = self._text[self._start : self._at]
-        here = len(line) - len(line.lstrip()) + 1
-        number = self._line - 1
-        while number > node.span.line and not self._lines.line(number).strip():
-            number -= 1
-        above = self._lines.line(number)
+        blanks = _BLANKS.match(self._text, self._start)
+        assert blanks is not None
+        here = blanks.end() - self._start
+        number, above = self._above(node.span.line)
         indent = len(above) - len(above.lstrip())
         if self._plain is None:
-            fault = Fault("a key of several lines needs '? ' before it", node.span.line, node.span.column)
-        elif indent + 1 >= here and not _KEYED.search(above):
-            fault = faults.no_colon(above[indent:], number, indent + 1)
+            self._misplaced(faults.KEY_OF_LINES, cursor.at)
+        elif indent >= here and not _KEYED.search(above):
+            self._no_colon(self._lines.starts[number - 1] + indent)
         else:
-            fault = faults.late_key(self._line, here)
-        self._misplaced(fault)
-        if not fresh or here - 1 != column or self._plain is None:
+            self._misplaced(faults.LATE_KEY, blanks.end())
+        if not fresh or here != column or self._plain is None:
             self._at = self._line_end()
             self._next_line()
             return node
@@ -444,11 +450,28 @@ class Parser:
         self._at = match.end()
         return self._mapping(column, depth, _Key(key.span, key, colon=False))
 
+    def _above(self, first: int) -> tuple[int, str]:
+        """The last line above this one that is not blank, and its number, which is no less than ``first``."""
+        number = self._line - 1
+        while number > first and not self._lines.line(number).strip():
+            number -= 1
+        return number, self._lines.line(number)
+
+    def _no_colon(self, at: int) -> None:
+        """Report that what begins at an index and fills its line is no key."""
+        line = self._lines.line(self._lines.place(at)[0])
+        written = line[self._lines.place(at)[1] - 1 :].rstrip()
+        tight = _TIGHT_COLON.match(written)
+        if tight:
+            self._misplaced(faults.NO_BLANK, at + tight.end() - 1)
+        else:
+            self._misplaced(faults.no_colon(written), at)
+
     def _deep(self, depth: int) -> None:
         """Refuse a collection below the deepest level; nothing more is read then."""
         if depth > DEEPEST:
             if self._trial:
-                raise _UnsoundError(Fault("", 1, 1))
+                raise _UnsoundError(faults.NOWHERE, self._at)
             self._refuse.too_deep(self._span(self._at + 1))
             raise ComposingStoppedError
 
@@ -526,29 +549,24 @@ class Parser:
 
     def _early(self, key: Scalar, soon: re.Match[str], found: int) -> Scalar:
         """The key of a value that is lost, where it seems to reach into this value: ``A:{bias`` is the key ``A``."""
-        span = key.at(0, max(1, soon.start()))
+        name = str(key.value)[: soon.start()]
+        at = self._lines.starts[key.span.line - 1] + key.span.column - 1
         del self._refuse.found[found:]
-        line, column = span.line, span.column + soon.start()
-        written = str(key.value)
-        tight = written.startswith(":", soon.start())
-        fault = faults.no_blank(line, column) if tight else faults.no_colon(written[: soon.start()], line, span.column)
-        self._refuse.syntax(fault, self._lines)
-        return Scalar(written[: soon.start()], span)
+        tight = soon[0].startswith(":")
+        self._note(faults.NO_BLANK if tight else faults.no_colon(name), at + soon.start() if tight else at)
+        return Scalar(name, key.at(0, soon.start()))
 
     def _further_in(self, column: int) -> None:
         """Lines between two entries that are indented further than these."""
         character = self._text[self._at]
         if character in "]}":
-            fault = faults.behind_value(character, *self._here())
+            self._misplaced(faults.start(character))
         elif self._indicator("-"):
-            fault = faults.item_in_mapping(*self._here())
+            self._misplaced(faults.ITEM_IN_MAPPING)
         else:
-            above = self._line - 1
-            while above > 1 and not self._lines.line(above).strip():
-                above -= 1
-            indent = len(self._lines.line(above)) - len(self._lines.line(above).lstrip())
-            fault = faults.indentation(*self._here(), {column + 1, indent + 1})
-        self._misplaced(fault)
+            _, above = self._above(1)
+            columns = {column + 1, len(above) - len(above.lstrip()) + 1} - {self._at - self._start + 1}
+            self._misplaced(faults.indentation(columns))
         self._move(self._limit(column))
         self._next_line()
 
@@ -557,40 +575,34 @@ class Parser:
         cursor = self._mark()
         if self._indicator("?"):
             self._at += 1
-            node = self._entry(column, depth + 1, fresh=True)
+            announced = self._entry(column, depth + 1, fresh=True)
             colon = self._at - self._start == column and self._indicator(":")
             self._at += colon
-            return _Key(node.span, self._as_key(node), colon, announced=True)
+            return _Key(announced.span, self._as_key(announced), colon, announced=True)
         if self._indicator(":") or self._indicator("-"):
             place = self._here()
-            self._misplaced(faults.start(":", *place) if self._indicator(":") else faults.item_in_mapping(*place))
+            self._misplaced(faults.NO_KEY if self._indicator(":") else faults.ITEM_IN_MAPPING)
             self._at += 1
             self._entry(column, depth + 1, fresh=True)
             return _Key(self._nothing(*place).span, None, colon=False, announced=True)
-        anchors = []
-        while self._text[self._at] in "!&" and (anchor := self._property()) is not None:
-            anchors.append(anchor)
-            if not self._gap_on_line():
-                break
+        while self._property() and self._gap_on_line():
+            pass
         cursor = self._mark()
+        node: Node = self._nothing(*self._here())
         if not _COLON.match(self._text, self._at, self._end) and self._gap_on_line():
-            node = self._anchor(anchors, self._inline(depth + 1, None))
-        else:
-            node = self._anchor(anchors, self._nothing(*self._here()))
-        if self._line == cursor.line and _COLON.match(self._text, self._at, self._end):
-            return self._behind_key(node, cursor)
-        self._move(max(self._at, cursor.at))
+            node = self._inline(depth + 1, None)
         if self._line == cursor.line:
-            written = self._text[cursor.at : self._line_end()]
-            self._misplaced(faults.no_colon(written, node.span.line, node.span.column))
+            if _COLON.match(self._text, self._at, self._end):
+                return self._behind_key(node, cursor)
+            self._no_colon(cursor.at)
         else:
-            self._misplaced(faults.long_text_as_key(node.span.line, node.span.column))
+            self._misplaced(faults.KEY_OF_LINES, cursor.at)
         return _Key(node.span, node if isinstance(node, Scalar) and isinstance(node.value, str) else None, colon=False)
 
     def _behind_key(self, node: Node, cursor: _Cursor) -> _Key:
         """Pass the colon behind a key that begins at the cursor."""
         if self._at - cursor.at > _LONGEST_KEY:
-            self._misplaced(faults.long_key(cursor.line, cursor.at - cursor.start + 1))
+            self._misplaced(faults.LONG_KEY, cursor.at)
         colon = _COLON.match(self._text, self._at, self._end)
         assert colon is not None
         self._at = colon.end()
@@ -634,7 +646,7 @@ class Parser:
             if not self._goes_on(column) or not self._indicator("-"):
                 break
         if self._at < self._end and self._at - self._start == column > indent:
-            self._misplaced(faults.key_in_list(*self._here()))
+            self._misplaced(faults.KEY_IN_LIST)
             self._move(self._limit(column))
             self._next_line()
         if packer is not None:
@@ -662,7 +674,7 @@ class Parser:
         try:
             for piece in inner.split(","):
                 text = piece.strip(" \t")
-                if not text or (text[0] == "-" and text[1:2] in ("", " ", "\t")) or is_open(text):
+                if not text or (text[0] == "-" and text[1:2] in ("", " ", "\t")) or balance(text) > 0:
                     return None
                 first = column + piece.index(text)
                 cells.append((resolve(text), first, first + len(text)))
@@ -690,17 +702,15 @@ class Parser:
         match = _PROPERTY.match(self._text, self._at, self._end)
         if match is None:
             return self._no_text()
-        span = self._span(match.end())
-        # Only a scalar's value is taken over: copies of collections are how a small file becomes a huge one.
-        known = self._anchored.get(match[0][1:])
-        self._refuse.alias(match[0], span)
+        self._refuse.alias(match[0], self._span(match.end()))
+        cursor = self._mark()
         self._at = match.end()
-        return Scalar(None if known is None else known.value, span, None)
+        return self._loss(cursor)
 
     def _no_text(self) -> Scalar:
         """Report a character with which no text begins, and pass it."""
         span = self._span(self._at + 1)
-        self._report(faults.start(self._text[self._at], *self._here()))
+        self._report(faults.start(self._text[self._at]))
         self._at += 1
         return Scalar(None, span)
 
@@ -724,7 +734,7 @@ class Parser:
         except NumberRangeError as error:
             self._refuse.number(error, span)
             scalar = scalar._replace(value=error.nearest)
-        self._plain = Plain(first, self._at, scalar)
+        self._plain = _Plain(first, self._at, scalar)
         return scalar
 
     def _go_on(self, more: re.Pattern[str], indent: int) -> None:
@@ -747,7 +757,7 @@ class Parser:
         line, column = self._here()
         match = _QUOTED[quote].match(text, first, self._end)
         if match is None:
-            self._report(faults.quote(quote, line, column))
+            self._report(faults.quote(quote))
             self._at = self._line_end()
             return Scalar(text[first + 1 : self._at], self._from(line, column), 1)
         written = match[0]
@@ -761,8 +771,8 @@ class Parser:
             value = texts.double(written[1:-1])
         except texts.EscapeError as error:
             at = first + 1 + error.at
-            self._report(faults.escape(text[at : at + 2], *self._lines.place(at)))
-            value = written[1:-1]
+            self._report(faults.escape(text[at : at + 2]), at)
+            return Scalar(written[1:-1], span, None)
         return Scalar(self._refuse.escaped_controls(value, span), span, None, Written(text, first, match.end()))
 
     def _block_text(self, indent: int) -> Scalar:
@@ -771,7 +781,7 @@ class Parser:
         line, column = self._here()
         header = _HEADER.match(text, first, end)
         if header is None:
-            self._report(faults.block_header(text[first], line, column))
+            self._report(faults.block_header(text[first]))
             self._at = self._line_end()
             return Scalar(None, self._from(line, column), None)
         if header[5]:
@@ -784,7 +794,7 @@ class Parser:
             blanks, behind = match.end(1) - match.start(1), text[match.end(1) : match.end(1) + 1]
             if blanks < width and behind not in ("", "\r", "\n"):
                 if behind == "\t":
-                    self._report(faults.tab(*self._lines.place(match.end(1))))
+                    self._report(faults.TAB, match.end(1))
                 break
             if match.end() == match.start(1) and match.end() >= end:
                 break  # behind the last line break
@@ -807,7 +817,7 @@ class Parser:
             width = max(width, match.end(1) - match.start(1))
             at = match.end()
             if self._text.startswith("\t", match.end(1)):
-                self._report(faults.tab(*self._lines.place(match.end(1))))
+                self._report(faults.TAB, match.end(1))
             if match.end(1) < at or at >= self._end:
                 break
         return width
@@ -818,75 +828,54 @@ class Parser:
         self._deep(depth)
         return self._list(depth) if self._text[self._at] == "[" else self._braces(depth)
 
-    def _closed(self, opening: str, place: tuple[int, int]) -> bool:
-        """Whether a collection in brackets ends here; a bracket that closes it is passed."""
-        character = self._gap()
-        if character == _CLOSING[opening]:
-            self._at += 1
-            return True
+    def _closed(self, opening: str, begin: int) -> bool:
+        """Whether a collection that a bracket has opened ends here; one that closes it is passed."""
+        character, closing = self._gap(), _CLOSING[opening]
         if not character:
             more = _VISIBLE.search(self._text, self._end)
-            self._report(faults.unclosed(opening, *place, self._lines.place(self._end)[0] if more else None))
-            return True
-        if character in "]}":
-            self._report(faults.wrong_bracket(character, opening, *self._here()))
-            self._at += 1
-            return True
-        return False
+            self._report(faults.unclosed(opening, closing, self._lines.place(self._end)[0] if more else None), begin)
+        elif character not in "]}":
+            return False
+        elif character != closing:
+            self._report(faults.wrong_bracket(character, opening, closing))
+        self._at += bool(character)
+        return True
 
     def _comma(self, opening: str) -> None:
         """Pass the comma between two items; none is wanted before a closing bracket."""
         character = self._gap()
-        if character == ",":
-            self._at += 1
-        elif character and character not in "]}":
-            self._report(self._no_comma(opening))
-            if character == ":":
-                self._at += 1
-
-    def _no_comma(self, opening: str) -> Fault:
-        if self._plain is not None and self._plain.end == self._at and self._text[self._at] == ":":
-            following = self._text[self._at + 1 : self._at + 2]
-            if following and following in ",[]{}":
-                return faults.no_blank(*self._here())
-        return faults.no_comma(opening, *self._here())
+        if character and character not in ",]}":
+            tight = self._text[self._at - 1 : self._at].strip() and _TIGHT.match(self._text, self._at)
+            self._report(faults.NO_BLANK if tight else faults.no_comma(_CLOSING[opening]))
+        self._at += character in (",", ":")
 
     def _list(self, depth: int) -> Node:
-        place = self._here()
-        items: list[Node] = []
-        packer: Packer | None = None
-        run: Run | None = None
-        match = _SIMPLE_ROW.match(self._text, self._at, self._end)
+        place, begin = self._here(), self._at
+        match = _SIMPLE_ROW.match(self._text, begin, self._end)
         cells = self._cells(match.start(1), match[1]) if match else None
-        if match is not None and cells is not None and len(cells) <= _PACK_FROM:
-            line = self._line
-            items += (Scalar(value, Span(self._file, line, one, line, other)) for value, one, other in cells)
-            self._at = match.end()
-            return Sequence(tuple(items), self._from(*place))
-        self._at += 1
         if match is not None and cells is not None:
-            packer = Packer(self._file, in_rows=False)
-            if packer.add_cells(cells, self._line):
-                self._at = match.end()
-                return packer.finish(self._from(*place))
-            packer = None
-        while not self._closed("[", place):
-            item = self._item(depth + 1)
-            plain = self._plain
-            if run is not None and run.take(plain):
-                pass
-            else:
-                if run is not None and run.joined:
-                    items[-1] = run.refused(self._refuse)
-                run = None if self._partial else Run.begin(self._text, plain)
-                items.append(item)
+            self._at = match.end()
+            return self._simple_row(cells, self._from(*place))
+        self._at += 1
+        items: list[Node] = []
+        while not self._closed("[", begin):
+            items.append(self._item(depth + 1))
             self._comma("[")
-        if run is not None and run.joined:
-            items[-1] = run.refused(self._refuse)
         self._plain = None
         span = self._from(*place)
         packer = Packer.of(items, self._file) if len(items) > _PACK_FROM else None
         return Sequence(tuple(items), span) if packer is None else packer.finish(span)
+
+    def _simple_row(self, cells: list[tuple[ScalarValue, int, int]], span: Span) -> Node:
+        """A list of texts and numbers on one line."""
+        if len(cells) > _PACK_FROM:
+            packer = Packer(self._file, in_rows=False)
+            if packer.add_cells(cells, span.line):
+                return packer.finish(span)
+        line = span.line
+        return Sequence(
+            tuple(Scalar(value, Span(self._file, line, one, line, other)) for value, one, other in cells), span
+        )
 
     def _item(self, depth: int) -> Node:
         """An item of a list: a value, or a single pair ``a: 1``."""
@@ -914,7 +903,7 @@ class Parser:
         if self._plain is not None and self._text[match.end() : match.end() + 1] in _FLOW_SIGNS:
             return False
         if match.end() - at > _LONGEST_KEY and not announced:
-            self._report(faults.long_key(line, at - self._start + 1))
+            self._report(faults.LONG_KEY, at)
         self._at = match.end()
         return True
 
@@ -932,32 +921,46 @@ class Parser:
     def _flow_node(self, depth: int) -> Node:
         """A value within brackets, to its last character."""
         self._plain = None
-        anchors = []
         behind = self._here()
-        character = self._gap()
-        while character and character in "!&" and (anchor := self._property()) is not None:
-            anchors.append(anchor)
-            behind = self._here()
-            character = self._gap()
-        if not character or (anchors and character in ",]}:"):
-            return self._anchor(anchors, self._nothing(*behind))
+        refused = False
+        while (character := self._gap()) and self._property():
+            refused, behind = True, self._here()
+        if not character or (refused and character in ",]}:"):
+            return self._nothing(*behind)
         if character in "[{":
             return self._flow(depth)
         if character in "'\"":
-            return self._anchor(anchors, self._quoted(character))
+            return self._quoted(character)
         if character == "*":
             return self._alias()
-        return self._anchor(anchors, self._plain_text(_FLOW_PLAIN, _FLOW_MORE, -1))
+        scalar = self._plain_text(_FLOW_PLAIN, _FLOW_MORE, -1)
+        return scalar if self._partial or self._plain is None else self._past_commas(self._plain)
+
+    def _past_commas(self, first: _Plain) -> Scalar:
+        """A text as it was meant that commas have cut: ``{weight: normal(0, 1)}`` reads as ``normal(0`` and ``1)``. It
+        goes on while one of its parentheses is open."""
+        text, span = self._text, first.scalar.span
+        unclosed = balance(text[first.begin : first.end])
+        while unclosed > 0 and (match := _CUT_OFF.match(text, self._at, self._end)):
+            unclosed += balance(match[0])
+            self._move(match.end())
+        if self._at == first.end:
+            return first.scalar
+        written = text[first.begin : self._at]
+        whole = Scalar(written, self._from(span.line, span.column))
+        if span.line != self._line:
+            whole = Scalar(" ".join(written.split()), whole.span, None, Written(text, first.begin, self._at))
+        self._refuse.cut_text(whole, text[first.begin : first.end])
+        self._plain = None
+        return whole
 
     def _braces(self, depth: int) -> Mapping:
-        place = self._here()
+        place, begin = self._here(), self._at
         self._at += 1
         entries: dict[str, Entry] = {}
-        commas = None if self._partial else FlowCommas(self._text, self._refuse, entries)
-        empty = True
-        while not self._closed("{", place):
-            empty = False
-            announced = self._indicator("?")
+        empty, before = True, None
+        while not self._closed("{", begin):
+            empty, announced = False, self._indicator("?")
             if announced:
                 self._at += 1
                 self._gap()
@@ -965,17 +968,31 @@ class Parser:
             node = self._flow_node(depth + 1)
             plain = self._plain
             colon = self._flow_colon(line, at, announced=announced)
-            if not colon and commas is not None and commas.cut(plain):
-                self._comma("{")
-                continue
-            key = self._as_key(node)
-            value = self._flow_value(depth + 1, colon)
-            if key is not None and not self._put(entries, key, value):
-                key = None
-            if commas is not None:
-                commas.begin(None if key is None else str(key.value), self._plain if colon else None)
+            if colon or not self._is_cut_off(before, plain):
+                key = self._as_key(node)
+                value = self._flow_value(depth + 1, colon)
+                before = self._plain if colon else None
+                if key is not None:
+                    self._put(entries, key, value)
             self._comma("{")
-        if commas is not None:
-            commas.close()
         self._plain = None
         return self._made(entries, self._from(*place), empty=empty)
+
+    def _is_cut_off(self, before: _Plain | None, key: _Plain | None) -> bool:
+        """Whether a key without a colon is a piece of the value before it, which a comma has cut."""
+        if before is None or key is None or self._partial:
+            return False
+        one, other = before.scalar, key.scalar
+        if _is_number(one) and _is_number(other):
+            if self._text[before.end : key.begin] != ",":
+                return False
+            self._refuse.decimal_comma(one, other, self._text[before.begin : key.end])
+            return True
+        if isinstance(one.value, str) and isinstance(other.value, str) and "->" not in other.value:
+            self._refuse.stray_text(one, other)
+            return True
+        return False
+
+
+def _is_number(scalar: Scalar) -> bool:
+    return isinstance(scalar.value, int | float) and not isinstance(scalar.value, bool)

@@ -7,7 +7,6 @@ where it could not be read to its end. Findings are collected, never raised; the
 
 from __future__ import annotations
 
-import re
 from itertools import islice
 from pathlib import Path
 from typing import Final
@@ -22,10 +21,6 @@ from neurovis_spec.language.yaml.source import Mapping, Node, Scalar, SourceDocu
 LARGEST: Final = 64 << 20  # bytes
 _MOST_CHARACTERS: Final = 20
 _BOM: Final = "\ufeff"
-_MOST_DIRECTIVES: Final = 20
-_DIRECTIVE: Final = re.compile(r"^%", re.MULTILINE)
-_ALLOWED_DIRECTIVE: Final = re.compile(r"%YAML[ \t]+1\.2[ \t]*(#.*)?")
-_PROLOGUE_LINE: Final = re.compile(r"(?:[ \t]*(?:#[^\r\n]*)?|%[^\r\n]*)(?:\r\n|\n|\r|\Z)")
 
 
 def read_file(path: Path, name: str, findings: Findings) -> SourceDocument | None:
@@ -60,7 +55,6 @@ def read_text(text: str, file: str, findings: Findings) -> SourceDocument | None
         return None
     lines = Lines(text)
     clean = _without_forbidden(text, file, lines, findings)
-    clean = _without_directives(clean, file, findings)
     errors = findings.errors
     with uncollected():
         root = Parser(clean, file).document(findings)
@@ -104,25 +98,6 @@ def _without_forbidden(text: str, file: str, lines: Lines, findings: Findings) -
         message = f"the character {character_name(match.group())} is not allowed"
         findings.error("control-character", Span(file, line, column, line, column + 1), message)
     return FORBIDDEN.sub(REPLACEMENT, text)
-
-
-def _without_directives(text: str, file: str, findings: Findings) -> str:
-    """Refuse directives other than %YAML 1.2; the text with a comment for each."""
-    if _DIRECTIVE.search(text) is None:
-        return text
-    index, number, refused = 0, 1, 0
-    pieces: list[str] = []
-    while index < len(text) and refused < _MOST_DIRECTIVES and (match := _PROLOGUE_LINE.match(text, index)):
-        line = match.group()
-        directive = line.rstrip()
-        if directive.startswith("%") and not _ALLOWED_DIRECTIVE.fullmatch(directive):
-            span = Span(file, number, 1, number, len(directive) + 1)
-            findings.error("directive", span, "the only directive that is allowed is '%YAML 1.2'", "remove this line")
-            line = "#" + line[1:]
-            refused += 1
-        pieces.append(line)
-        index, number = match.end(), number + 1
-    return "".join(pieces) + text[index:]
 
 
 def _refuse_bytes(data: bytes, at: int, name: str, findings: Findings) -> None:

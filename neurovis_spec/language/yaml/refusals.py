@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import Final
 
 from neurovis_spec.diagnostics import Diagnostic, Findings, Span
-from neurovis_spec.language.yaml.characters import FORBIDDEN, REPLACEMENT, Lines, character_name
-from neurovis_spec.language.yaml.faults import Fault
+from neurovis_spec.language.yaml.characters import FORBIDDEN, REPLACEMENT, character_name
+from neurovis_spec.language.yaml.faults import CODE, Words
 from neurovis_spec.language.yaml.scalars import NumberRangeError
 from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Scalar, Sequence
 
@@ -27,8 +27,7 @@ class ComposingStoppedError(Exception):
 class Refusals:
     """What was found in one text; the last of it may be forgotten again, where it is read once more."""
 
-    def __init__(self, file: str) -> None:
-        self._file = file
+    def __init__(self) -> None:
         self.found: list[Diagnostic] = []
 
     def report(self, findings: Findings) -> None:
@@ -41,9 +40,13 @@ class Refusals:
         if len(self.found) >= _MOST_FINDINGS:
             raise ComposingStoppedError
 
-    def syntax(self, fault: Fault, lines: Lines) -> None:
+    def syntax(self, words: Words, span: Span) -> None:
         """Report a syntax error."""
-        self._error(fault.code, fault.span(self._file, lines), fault.message, fault.hint)
+        self._error(CODE, span, *words)
+
+    def directive(self, span: Span) -> None:
+        """Refuse a directive."""
+        self._error("directive", span, "the only directive that is allowed is '%YAML 1.2'", "remove this line")
 
     def property(self, written: str, span: Span) -> None:
         """Refuse a tag or an anchor."""
@@ -122,7 +125,7 @@ class Refusals:
     def stray_text(self, value: Scalar, key: Scalar) -> None:
         """Refuse a key without a value behind a text: perhaps a comma that was part of the text."""
         begin, end = value.span, key.span
-        span = Span(self._file, begin.line, begin.column, end.end_line, end.end_column)
+        span = Span(begin.file, begin.line, begin.column, end.end_line, end.end_column)
         message = f"inside {{ }} a comma ends a text: '{_short(str(key.value))}' is read as a key without a value"
         hint = f'if the comma is part of the text, put it in quotes: "{_short(f"{value.value}, {key.value}")}"'
         self._error("flow-comma", span, message, hint)
@@ -130,7 +133,7 @@ class Refusals:
     def decimal_comma(self, value: Scalar, key: Scalar, written: str) -> None:
         """Refuse a number with a decimal comma."""
         begin, end = value.span, key.span
-        span = Span(self._file, begin.line, begin.column, end.end_line, end.end_column)
+        span = Span(begin.file, begin.line, begin.column, end.end_line, end.end_column)
         message = f"a comma separates entries: '{_short(written)}' is not one number"
         self._error("flow-comma", span, message, f"numbers have a decimal point: {_short(written.replace(',', '.'))}")
 

@@ -17,8 +17,10 @@ _ESCAPES: Final = (
     r"\\(?:(?:\r\n|\n|\r)[ \t]*((?:(?:\r\n|\n|\r)[ \t]*)*)|x([0-9A-Fa-f]{2})|u([0-9A-Fa-f]{4})|U([0-9A-Fa-f]{8})|(.))"
 )
 _DOUBLE: Final = re.compile(f"{_ESCAPES}|{_FOLD}", re.DOTALL)
+#: What is written otherwise between quotes, by the quote.
+OTHERWISE: Final = {"'": _SINGLE, '"': _DOUBLE}
 _BREAK: Final = re.compile(r"\r\n|\n|\r")
-ESCAPED: Final = {
+_ESCAPED: Final = {
     **{"0": "\0", "a": "\a", "b": "\b", "t": "\t", "\t": "\t", "n": "\n", "v": "\v", "f": "\f", "r": "\r", "e": "\x1b"},
     **{" ": " ", '"': '"', "/": "/", "\\": "\\", "N": "\x85", "_": "\xa0", "L": "\u2028", "P": "\u2029"},
 }
@@ -43,12 +45,12 @@ def plain(written: str) -> str:
 
 def single(inner: str) -> str:
     """What stands between single quotes."""
-    return _SINGLE.sub(lambda match: "'" if match[0] == "''" else _folded(match), inner)
+    return _SINGLE.sub(meaning, inner)
 
 
 def double(inner: str) -> str:
     """What stands between double quotes. Raises EscapeError."""
-    return _DOUBLE.sub(_unescaped, inner)
+    return _DOUBLE.sub(meaning, inner)
 
 
 def _folded(match: re.Match[str]) -> str:
@@ -57,16 +59,19 @@ def _folded(match: re.Match[str]) -> str:
     return "\n" * len(_BREAK.findall(later)) if later else " "
 
 
-def _unescaped(match: re.Match[str]) -> str:
+def meaning(match: re.Match[str]) -> str:
+    """What something stands for that is written otherwise between quotes. Raises EscapeError."""
+    if match[0] == "''":
+        return "'"
     if match[0][0] != "\\":
         return _folded(match)
     if match[1] is not None:
         return "\n" * len(_BREAK.findall(match[1]))
     number = match[2] or match[3] or match[4]
     if number is None:
-        if match[5] not in ESCAPED:
+        if match[5] not in _ESCAPED:
             raise EscapeError(match.start())
-        return ESCAPED[match[5]]
+        return _ESCAPED[match[5]]
     code = int(number, 16)
     if code > 0x10FFFF or 0xD800 <= code < 0xE000:
         raise EscapeError(match.start())

@@ -13,12 +13,9 @@ from collections.abc import Iterator
 from functools import lru_cache
 from typing import Final, NamedTuple
 
-from neurovis_spec.language.yaml.texts import ESCAPED
+from neurovis_spec.language.yaml.texts import OTHERWISE, meaning
 
 _BREAK: Final = re.compile("\r\n|\n|\r")
-#: An escape of a text in double quotes: one behind which the line goes on, one with a number, any other.
-_ESCAPE: Final = re.compile(r"\\(?:\r\n|[\r\n]|x([0-9A-Fa-f]{2})|u([0-9A-Fa-f]{4})|U([0-9A-Fa-f]{8})|(.))", re.DOTALL)
-_DOUBLED: Final = re.compile("''")
 
 
 class Written(NamedTuple):
@@ -50,28 +47,18 @@ class Written(NamedTuple):
     def pieces(self) -> Iterator[tuple[str, int, int]]:
         """The characters that are no blanks, each with where it begins and ends."""
         raw = self.text[self.begin : self.end]
-        quote = raw[:1]
-        if quote in ("|", ">"):
+        at, end = 0, len(raw)
+        if raw[:1] in ("|", ">"):
             header = _BREAK.search(raw)
-            yield from _visible(raw, len(raw) if header is None else header.end(), len(raw))
-        elif quote == '"':
-            at = 1
-            for match in _ESCAPE.finditer(raw, 1, len(raw) - 1):
+            at = end if header is None else header.end()
+        elif (pattern := OTHERWISE.get(raw[:1])) is not None:
+            at, end = 1, end - 1
+            for match in pattern.finditer(raw, at, end):
                 yield from _visible(raw, at, match.start())
                 at = match.end()
-                character = _unescaped(match)
-                if not character.isspace() and character:
+                if character := meaning(match).strip():
                     yield character, match.start(), at
-            yield from _visible(raw, at, len(raw) - 1)
-        elif quote == "'":
-            at = 1
-            for match in _DOUBLED.finditer(raw, 1, len(raw) - 1):
-                yield from _visible(raw, at, match.start())
-                at = match.end()
-                yield "'", match.start(), at
-            yield from _visible(raw, at, len(raw) - 1)
-        else:
-            yield from _visible(raw, 0, len(raw))
+        yield from _visible(raw, at, end)
 
 
 @lru_cache(maxsize=4)
@@ -101,13 +88,3 @@ def _visible(raw: str, begin: int, end: int) -> Iterator[tuple[str, int, int]]:
     for at in range(begin, end):
         if not raw[at].isspace():
             yield raw[at], at, at + 1
-
-
-def _unescaped(match: re.Match[str]) -> str:
-    """What an escape stands for; a blank for those that stand for blanks, nothing for the end of a line."""
-    number = match[1] or match[2] or match[3]
-    if number:
-        return chr(int(number, 16)) if int(number, 16) <= 0x10FFFF else "?"
-    if match[4] is None:
-        return ""
-    return ESCAPED.get(match[4], " ")
