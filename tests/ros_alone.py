@@ -49,7 +49,8 @@ class Alone:
         without: Sequence[str] = ("diagnostic_msgs/DiagnosticArray",),
     ) -> None:
         self.name, self.ros, self.encoding = name, ros, ENCODINGS[ros]
-        self.before, self.without, self.sent = before, without, dict[str, Sent]()
+        self.before, self.without = before, without
+        self.sent, self.arrived = dict[str, Sent](), dict[str, Arrived]()
 
     def now(self) -> int:
         return 1_700_000_000_000_000_007
@@ -58,6 +59,7 @@ class Alone:
         return self.sent.setdefault(topic, Sent(topic, type_, self.before))
 
     def subscription(self, topic: str, type_: str, quality: Quality, arrived: Arrived) -> Listener:
+        self.arrived[topic] = arrived
         return Listener(topic)
 
     def definition(self, type_: str) -> str:

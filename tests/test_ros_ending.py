@@ -12,6 +12,7 @@ from ros_alone import Alone
 
 import neurovis_spec as nv
 from neurovis_spec.interrupts import end_like_ctrl_c, heeded
+from neurovis_spec.ros.middleware import Arrival
 from neurovis_spec.ros.run import Course, NodeRun
 
 SPEC = """
@@ -89,3 +90,16 @@ def test_each_output_is_safe_at_the_end() -> None:
     assert is_safe(node)
     assert len(node.sent["/left"].messages) == 4
     assert told == []
+
+
+def test_what_comes_after_the_end_is_not_counted() -> None:
+    """It is not recorded any more: what is received is what is recorded or rejected."""
+    node = Alone("/neurovis/pair")
+    text = SPEC.replace("neurons: {A: {bias: 1}", "inputs: {aim: {}}\nneurons: {A: {input: aim}")
+    text = text.replace("ros: {", "ros: {subscribe: {aim: {topic: /aim}}, ")
+    made = NodeRun(nv.compile_text(text), node, Course(1000, steps=3, backend="reference"), print)
+    message = Arrival(struct.pack("<d", 1.5), 0, None, "std_msgs/Float64")
+    node.arrived["/aim"](message)
+    made.run(lambda: False)
+    node.arrived["/aim"](message)
+    assert made.summary().topics["/aim"].received == 1

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from threading import Lock
 
 import numpy as np
 
@@ -58,9 +59,21 @@ class InputTopic:
     counts: Counts = field(default_factory=Counts)
     #: called with each message that is not rejected
     heard: Arrived = _ignore
+    _lock: Lock = field(default_factory=Lock)
+    _over: bool = False
+
+    def end(self) -> None:
+        """Take no more messages."""
+        with self._lock:
+            self._over = True
 
     def take(self, arrival: Arrival) -> None:
         """A message."""
+        with self._lock:
+            if not self._over:
+                self._take(arrival)
+
+    def _take(self, arrival: Arrival) -> None:
         self.counts.received += 1
         if arrival.type not in (self.type, "*", ""):
             self._reject("type")

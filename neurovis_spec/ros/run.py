@@ -227,6 +227,8 @@ class NodeRun:
         finally:
             with deferred():  # who presses Ctrl-C twice must not lose what is safe
                 self._make_safe()
+                for topic in self._inputs.topics:
+                    topic.end()
                 self._over = time.monotonic()
                 self._end.set()
                 watch.join(2.0)
