@@ -320,9 +320,9 @@ def test_an_input_of_a_node_in_cpp_falls_silent(one: World, node: Path) -> None:
 
 
 def test_a_node_in_cpp_says_once_a_second_how_it_goes(one: World, node: Path) -> None:
-    run = start(one, node, "--rate", "50")
+    run = start(one, node, "--rate", "50", "/target:=/aim")
     wish = {"topic": "/diagnostics", "type": "diagnostic_msgs/DiagnosticArray", "raw": True}
-    target = {"topic": "/target", "type": "std_msgs/Float64", "values": {"data": 1.5}, "count": 5, "rate": 50}
+    target = {"topic": "/aim", "type": "std_msgs/Float64", "values": {"data": 1.5}, "count": 5, "rate": 50}
     peer = one.peer(listen=[wish], send=[target], until={"/diagnostics": 3})
     assert peer.end() == 0
     assert run.stop() == 0
@@ -335,7 +335,7 @@ def test_a_node_in_cpp_says_once_a_second_how_it_goes(one: World, node: Path) ->
     steps = [int(one["steps"]) for one in values]
     assert steps == sorted(set(steps))
     assert values[-1]["rate"] == "50"
-    assert values[-1]["/target: received"] == "5"
+    assert values[-1]["/aim: received"] == "5"
     last = came[-1]
     assert (last.status[0].name, last.status[0].hardware_id) == ("neurovis/arm: network", "arm")
     assert last.status[0].level == 1

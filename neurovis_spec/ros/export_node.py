@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.compiler.ros_settings import absolute
 from neurovis_spec.language.expressions.emit_c import INEXACT
 from neurovis_spec.ros.definitions import Definition, definition
 from neurovis_spec.ros.templates import render
@@ -82,21 +81,20 @@ def _open(network: Network) -> Network:
 
 def _values(made: Exported) -> dict[str, object]:
     network = made.network
-    base = f"{network.ros.namespace.rstrip('/')}/{network.name}"
     inputs = {one.name: (one, own) for one, own in zip(made.inputs, made.input_names, strict=True)}
     outputs = {one.name: (one, own) for one, own in zip(network.outputs, made.output_names, strict=True)}
     sources, sinks = list[_Source](), list[_Sink]()
     for heard in network.ros.subscribe:
         entry, own = inputs[heard.input]
         timeout = -1.0 if heard.timeout is None else heard.timeout
-        topic, private = _topic(heard.topic, base)
+        topic, private = _topic(heard.topic)
         sources.append(
             _Source(own, heard.input, entry.size, topic, private, heard.type, heard.field, heard.names, timeout,
                     heard.on_timeout)
         )  # fmt: skip
     for said in network.ros.publish:
         output, own = outputs[said.output]
-        topic, private = _topic(said.topic, base)
+        topic, private = _topic(said.topic)
         truth = _is_truth(said.type, said.field)
         sinks.append(_Sink(own, said.output, output.size, topic, private, said.type, said.field, truth, said.safe))
     slots = network.settable.index
@@ -112,11 +110,9 @@ def _values(made: Exported) -> dict[str, object]:
     }
 
 
-def _topic(topic: str, base: str) -> tuple[str, bool]:
-    """A topic's whole name; or that behind the node's, which may be another one when it runs."""
-    if topic.startswith("~"):
-        return topic[1:].lstrip("/"), True
-    return absolute(topic, base), False
+def _topic(topic: str) -> tuple[str, bool]:
+    """A topic's name, whole or seen from the node's namespace; or that behind the node's name."""
+    return (topic[1:].lstrip("/"), True) if topic.startswith("~") else (topic, False)
 
 
 def _is_truth(type_: str, path: str) -> bool:
