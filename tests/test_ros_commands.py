@@ -18,9 +18,11 @@ from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.live.live import listen
 from neurovis_spec.ros import middleware
 from neurovis_spec.ros.accept import ARRAY
-from neurovis_spec.ros.announced import Others
+from neurovis_spec.ros.announced import Others, find
 from neurovis_spec.ros.definitions import definition
-from neurovis_spec.ros.middleware import Node
+from neurovis_spec.ros.listening import Listening, Wanted
+from neurovis_spec.ros.middleware import Arrival, Node
+from neurovis_spec.runtime.wire import text_message
 
 OPENING = 0.5
 
@@ -135,3 +137,21 @@ def test_a_spec_that_cannot_be_written_at_the_end_is_refused_at_the_beginning(qu
     assert found.exit_code == 1
     assert "there is no folder" in found.stderr
     assert "ready" not in found.stderr
+
+
+def test_a_network_is_listened_to_where_it_announces_itself() -> None:
+    """Its topics may have been given other names."""
+    text = text_message("neurovis: 1\nname: a\nneurons: {A: {}}\n", "cdr")
+    there = {"/robot/left/spec": ("std_msgs/String",), "/robot/left/activity": (ARRAY,)}
+
+    def subscription(topic: str, type_: str, quality: object, arrived: Callable[[Arrival], None]) -> SimpleNamespace:
+        assert topic == "/robot/left/spec"
+        arrived(Arrival(text, 0, None, type_))
+        return SimpleNamespace(close=lambda: None)
+
+    node = SimpleNamespace(topics=lambda: there, subscription=subscription, encoding="cdr")
+    found = find(cast(Node, node), "left", lambda: False)
+    assert found is not None
+    assert (found.compiled.name, found.base) == ("a", "/robot/left")
+    listening = Listening(found.compiled, 2, Wanted(), print, base=found.base)
+    assert list(listening.streams) == ["/robot/left/activity"]

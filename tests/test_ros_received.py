@@ -363,6 +363,10 @@ def test_a_bag_of_other_messages_is_read_without_them_or_refused(compiled: nv.Co
     listening = Listening(compiled, 1, Wanted(path), print)
     heard(listening, rows_of(made, range(10)))
     bag = read_bag(path)
+    files = Files(tmp_path / "u.bag", 1, {})
+    files.write([one._replace(topic=one.topic._replace(name=f"/robot{one.topic.name}")) for one in bag.messages()])
+    files.close()
+    assert np.array_equal(nv.load(tmp_path / "u.bag").activity, made.activity), "whatever the topics are called"
     (spec, *_), topic = bag.messages(), bag.topics[1]
     foreign = ArrayForm.of(label_of(other.hash), 3, "ros1").message(5, 5.0, np.zeros(3))
     files = Files(tmp_path / "y.bag", 1, {})

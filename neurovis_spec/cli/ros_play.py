@@ -61,11 +61,11 @@ def command(file: str, speed: float, loop: bool, network: str | None, desk: Desk
         tell(f"warning: {warning.message}")
     if not bag.topics:
         raise fault(f"{file}: it holds no topics")
-    compiled = _network(bag, file, network) if desk else None
+    compiled, base = _network(bag, file, network) if desk else (None, None)
     course = Course(speed, loop, meeting.wait, meeting.seconds, meeting.sim_time)
     sys.setswitchinterval(0.0005)
     with meeting.node("neurovis_play", anonymous=True) as node, ExitStack() as stack, heeded() as asked:
-        listening = None if compiled is None else stack.enter_context(desk.open(compiled, node))
+        listening = None if compiled is None else stack.enter_context(desk.open(compiled, node, base))
         player = Player(bag, node, course, tell, None if listening is None else listening.put)
         tell(f"ready: {file}, ROS {node.ros}, {len(bag.topics)} topics")
         player.wait(lambda: bool(asked))
@@ -86,11 +86,13 @@ def command(file: str, speed: float, loop: bool, network: str | None, desk: Desk
     meeting.show(summary)
 
 
-def _network(bag: Bag, file: str, name: str | None) -> CompiledNetwork:
+def _network(bag: Bag, file: str, name: str | None) -> tuple[CompiledNetwork, str]:
+    """The network of a recording, and what the names of its topics begin with."""
     from neurovis_spec.ros.announced import compiled_from
     from neurovis_spec.ros.play import spec_of
 
-    text = spec_of(bag, name)
-    if text is None:
+    found = spec_of(bag, name)
+    if found is None:
         raise fault(f"{file}: it holds no spec of a network, so it can neither be shown nor recorded anew")
-    return compiled_from(text, file)
+    text, base = found
+    return compiled_from(text, file), base

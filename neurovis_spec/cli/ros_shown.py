@@ -92,15 +92,16 @@ class Desk:
         return bound("127.0.0.1", port)
 
     @contextmanager
-    def open(self, compiled: CompiledNetwork, node: Node) -> Iterator[Listening]:
-        """A network's topics, heard for a block, and shown in the page where that is wanted."""
+    def open(self, compiled: CompiledNetwork, node: Node, base: str | None = None) -> Iterator[Listening]:
+        """A network's topics, by default those that its spec says, heard for a block, and shown in the page where that
+        is wanted."""
         from neurovis_spec.ros.listening import Listening, Wanted
 
         path = None if self.record is None else self._path(self.record, node.ros)
         film = self._film(compiled)
         wanted = Wanted(path, self.rotation, self.force, self.live is not None or film is not None)
         with _told_of_files():
-            listening = Listening(compiled, node.ros, wanted, tell, node.definition)
+            listening = Listening(compiled, node.ros, wanted, tell, node.definition, base)
         with self._page(listening), self._filmed(listening, film):
             listening.start()
             try:

@@ -47,6 +47,7 @@ def command(spec: str | None, network: str | None, settings: dict[str, float], d
 
     desk.check()
     begun = time.monotonic()
+    base = None
     compiled = None if spec is None else network_of(spec, settings)
     sys.setswitchinterval(0.0005)
     with meeting.node("neurovis_view", anonymous=True) as node, heeded() as asked:
@@ -57,11 +58,12 @@ def command(spec: str | None, network: str | None, settings: dict[str, float], d
 
         if compiled is None:
             tell("waiting for a network that announces itself")
-            compiled = find(node, network, stopped)
-            if compiled is None:
+            found = find(node, network, stopped)
+            if found is None:
                 raise fault("no network has announced itself", "name its spec: neurovis ros view SPEC")
+            compiled, base = found
             show_findings(compiled)
-        with desk.open(compiled, node) as listening:
+        with desk.open(compiled, node, base) as listening:
             quality = DISPLAY if desk.record is None else RECORDER
             reconnects = node.reconnects
             subscriptions = [
@@ -71,7 +73,7 @@ def command(spec: str | None, network: str | None, settings: dict[str, float], d
             tell(f"ready: {compiled.name}, ROS {node.ros}, {subscriptions[0].topic.removesuffix(ACTIVITY)}")
             begun = time.monotonic()
             steering = ViewSteering(compiled.network, node, base_of(compiled))
-            others = Others(node, f"{base_of(compiled)}/{SPEC}", tell)
+            others = Others(node, f"{listening.base}/{SPEC}", tell)
             due = begun
             while not stopped():
                 if node.reconnects != reconnects:

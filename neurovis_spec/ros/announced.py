@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from queue import Empty, SimpleQueue
 from tempfile import TemporaryDirectory
+from typing import NamedTuple
 
 from neurovis_spec import api
 from neurovis_spec.compiled import CompiledNetwork
@@ -53,7 +54,14 @@ class Others:
                 self._tell(f"another network announces itself, on {topic}: --network {name} shows it")
 
 
-def find(node: Node, network: str | None, stopped: Callable[[], bool]) -> CompiledNetwork | None:
+class Announced(NamedTuple):
+    """A network that has announced itself, and what the names of its topics begin with."""
+
+    compiled: CompiledNetwork
+    base: str
+
+
+def find(node: Node, network: str | None, stopped: Callable[[], bool]) -> Announced | None:
     """The network that announces itself, of this name where there are several; None where it was stopped before.
     Raises MiddlewareError, SpecError."""
     topic = _topic(node, network, stopped)
@@ -68,7 +76,8 @@ def find(node: Node, network: str | None, stopped: Callable[[], bool]) -> Compil
             except Empty:
                 continue
             try:
-                return compiled_from(text_of(arrival.data, node.encoding), topic)
+                compiled = compiled_from(text_of(arrival.data, node.encoding), topic)
+                return Announced(compiled, topic.removesuffix("/spec"))
             except WireError as error:
                 raise MiddlewareError(f"the message on {topic} cannot be read: {error}") from None
     finally:

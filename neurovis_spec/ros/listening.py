@@ -56,8 +56,8 @@ def frame(compiled: CompiledNetwork) -> Recording:
 
 
 class Listening:
-    """The topics of a network. ``definitions`` gives the text of a type that is not in the table of the usual ones.
-    Raises OSError where there can be no recording."""
+    """The topics of a network, whose names begin with ``base``. ``definitions`` gives the text of a type that is not in
+    the table of the usual ones. Raises OSError where there can be no recording."""
 
     def __init__(
         self,
@@ -66,10 +66,11 @@ class Listening:
         wanted: Wanted,
         tell: Callable[[str], None],
         definitions: Callable[[str], str] = lambda type_: "",
+        base: str | None = None,
     ) -> None:
         network = compiled.network
         self.compiled, self.ros, self._definitions_of = compiled, ros, definitions
-        self._base = base_of(compiled)
+        self.base = base_of(compiled) if base is None else base
         self.streams: dict[str, Stream] = {}
         self._definitions: dict[str, str] = {}
         self.source = ReceivedSource(network) if wanted.shown else None
@@ -78,16 +79,16 @@ class Listening:
         self.video: Video | None = None
         self.recorder = Recorder(self._files, self._definitions, tell, self._heard)
         self.activity = self._add(
-            ACTIVITY, f"{self._base}/{ACTIVITY}", ARRAY, arrays(network.hash, len(network.neurons))
+            ACTIVITY, f"{self.base}/{ACTIVITY}", ARRAY, arrays(network.hash, len(network.neurons))
         )
         changing = len(network.changing)
         if changing:
-            self._add(WEIGHTS, f"{self._base}/{WEIGHTS}", ARRAY, arrays(network.hash, changing))
+            self._add(WEIGHTS, f"{self.base}/{WEIGHTS}", ARRAY, arrays(network.hash, changing))
 
     def _recording(self, path: Path, wanted: Wanted) -> Files:
         network = self.compiled.network
         about = {"network": network.name, "hash": network.hash, "dt": repr(network.dt), "version": __version__}
-        topic = topic_of(f"{self._base}/{SPEC}", STRING, self._definition(STRING), self.ros)
+        topic = topic_of(f"{self.base}/{SPEC}", STRING, self._definition(STRING), self.ros)
         first = [(topic, text_message(self.compiled.text(), ENCODINGS[self.ros]))]
         return Files(path, self.ros, about, first, wanted.rotation, wanted.force, frame_bytes(frame(self.compiled)))
 

@@ -41,8 +41,9 @@ def is_spec(topic: Topic, bag: Bag) -> bool:
     return name == "spec" and topic.type == STRING and any(one.name == f"{base}/activity" for one in bag.topics)
 
 
-def spec_of(bag: Bag, network: str | None = None) -> str | None:
-    """The spec that a recording holds, of the network of this name where it holds several; None where there is none."""
+def spec_of(bag: Bag, network: str | None = None) -> tuple[str, str] | None:
+    """The spec that a recording holds, of the network of this name where it holds several, and what the names of the
+    network's topics begin with; None where there is none."""
     topics = [topic for topic in bag.topics if is_spec(topic, bag)]
     if network is not None:
         topics = [topic for topic in topics if topic.name.split("/")[-2] == network]
@@ -51,7 +52,7 @@ def spec_of(bag: Bag, network: str | None = None) -> str | None:
     for message in bag.messages():
         if message.topic == topics[0]:
             try:
-                return text_of(message.data, message.topic.encoding)
+                return text_of(message.data, message.topic.encoding), topics[0].name.removesuffix("/spec")
             except WireError:
                 return None
     return None

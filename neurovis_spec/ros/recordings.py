@@ -29,7 +29,7 @@ class BagFormat:
 
         from neurovis_spec.ros.announced import compiled_from
         from neurovis_spec.ros.bags import read_bag
-        from neurovis_spec.ros.listening import base_of, frame
+        from neurovis_spec.ros.listening import frame
         from neurovis_spec.ros.play import spec_of
         from neurovis_spec.runtime.arrived import KINDS, Arrived
         from neurovis_spec.runtime.npz_file import suspicion
@@ -37,11 +37,12 @@ class BagFormat:
         from neurovis_spec.runtime.wire import WireError
 
         bag = read_bag(path)
-        text = spec_of(bag)
-        if text is None:
+        found = spec_of(bag)
+        if found is None:
             raise RecordingError(f"{path}: it does not say of which network it is: no topic 'spec' is in it")
+        text, base = found
         compiled = compiled_from(text, str(path))
-        kinds = {f"{base_of(compiled)}/{kind}": place for place, kind in enumerate(KINDS)}
+        kinds = {f"{base}/{kind}": place for place, kind in enumerate(KINDS)}
         arrived, left_out = Arrived(frame(compiled)), 0
         for message in bag.messages():
             kind = kinds.get(message.topic.name)

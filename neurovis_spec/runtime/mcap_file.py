@@ -37,6 +37,10 @@ from neurovis_spec.version import __version__
 
 #: the attachment that holds what does not grow with the steps
 FRAME = "neurovis/frame.npz"
+_FOREIGN = (
+    "not a recording of NeuroVis: it does not say of which network it is; where it holds the topic 'spec', "
+    "'neurovis ros play FILE --record NEW.mcap' makes one of it"
+)
 _ABOUT, _AFTER = "neurovis", "neurovis/after"
 _LAST_TIME = (1 << 64) - 1
 #: bytes that the frame may take
@@ -238,7 +242,7 @@ class _Reading:
     def recording(self, path: Path, run: int | None) -> Recording:
         """What was read. Raises RecordingError."""
         if self._rows is None:
-            raise RecordingError("not a recording: it does not say of which network it is")
+            raise RecordingError(_FOREIGN)
         recording = replace(self._rows.recording(path, run), spec=self._spec)
         return ended(recording, self._ended(recording))
 
@@ -294,7 +298,7 @@ class _Reading:
             return
         kind, encoding = self._channels[message.channel]
         if self._rows is None:
-            raise RecordingError("not a recording: messages come before the network that they are of")
+            raise RecordingError(_FOREIGN)
         self._rows.take(kind, message.log_time, message.data, encoding)
 
     def _ended(self, recording: Recording) -> After:
