@@ -1,12 +1,12 @@
 """What layouts are worth, ours beside dot, sfdp and networkx on the same graphs in one run.
 
 In: nothing; ``--graphs FOLDER`` (see ``networks.py``), ``--sample SEED`` for thirty other Rome and North graphs (or
-``1,2,3`` for several times thirty: constants were set on sample 11), ``--all`` for the large ones, ``--only WORD`` for
-rows whose name holds it, ``--peers "dot;sfdp"``, ``--engines layered,large``, ``--limit SECONDS`` for a peer. Out: a table, in
-Markdown, on standard output: crossings of the routes as drawn, discs that overlap, routes over foreign discs, the share
-of connections along the direction (of those in no loop), area, CPU seconds, and our crossings by the best peer's: of
-``layered`` by the best of dot's, which draws ranks as well, of the others by the best of all. Sets of graphs are summed
-up, flow is averaged. Only ratios of one run can be compared.
+``1,2,3`` for several times thirty; constants were set on sample 11), ``--all`` for the large ones, ``--only WORD`` for
+rows whose name holds it, ``--peers "dot;sfdp"``, ``--engines layered,large``, ``--limit SECONDS`` for a peer. Out: a
+table, in Markdown, on standard output: crossings of the routes as drawn, discs that overlap, routes over foreign discs,
+the share of connections along the direction (of those in no loop), area, CPU seconds, and our crossings by the best
+peer's: of ``layered`` by the best of dot's, which draws ranks as well, of the others by the best of all. Sets of graphs
+are summed up, flow is averaged. Only ratios of one run can be compared.
 """
 
 from __future__ import annotations

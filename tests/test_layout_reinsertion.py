@@ -88,3 +88,16 @@ def test_levels_in_new_ranks_are_whole(graph: tuple[int, Pairs]) -> None:
     for i, (upper, lower) in ends.items():
         between = [moved.nodes[node].rank for node in moved.passages.get(i, [])]
         assert between == list(range(moved.nodes[upper].rank + 1, moved.nodes[lower].rank))
+
+
+@given(downward(9))
+@settings(deadline=None, max_examples=12)
+def test_a_group_that_only_names_changes_nothing(graph: tuple[int, Pairs]) -> None:
+    alone, grouped = problem(*graph), problem(*graph, tuple(range(graph[0])))
+    assert lay_out_problem(alone, "layered") == lay_out_problem(grouped, "layered")
+
+
+def test_a_loop_in_a_group_that_names_more_is_drawn_as_if_it_were_in_none() -> None:
+    pairs = [(0, 1), (1, 2), (2, 0), (2, 3), (3, 4), (4, 5), (5, 6), (0, 6), (6, 7)]
+    alone, grouped = problem(8, pairs), problem(8, pairs, tuple(range(8)))
+    assert lay_out_problem(alone, "layered") == lay_out_problem(grouped, "layered")

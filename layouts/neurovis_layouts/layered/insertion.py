@@ -154,9 +154,11 @@ class Insertion:
         return crossed // 2 * CROSSING + length
 
     def keep(self) -> Kept:
+        """The order as it is now."""
         return Kept(tuple(self.order), tuple(self._before), tuple(self._costs), tuple(self.rank), tuple(self.cells))
 
     def restore(self, kept: Kept) -> None:
+        """Return to an order in which nothing was taken out."""
         self.order, self._before, self._costs = list(kept.order), list(kept.before), list(kept.costs)
         self.rank, self.cells = list(kept.rank), list(kept.cells)
         self._out.clear()
@@ -273,10 +275,8 @@ class Insertion:
     def _through(self, lines: Counts, costs: Counts) -> Counts:
         """The lines led on by one rank."""
         self.work += 2 + lines.shape[0] * costs.size // _NUMBERS
-        if len(lines) == 1:
-            found: Counts = (lines[0][:, None] + costs).min(axis=0)[None]
-            return found
-        return (lines[:, :, None] + costs).min(axis=1)
+        found: Counts = (lines[:, :, None] + costs).min(axis=1)
+        return found
 
     def _cost_of(self, r: int) -> Counts:
         """(p, q): how many segments a line from slot p of a rank to slot q of the next crosses."""
@@ -320,10 +320,9 @@ class Insertion:
         first, last = self.rank[link.upper], self.rank[link.lower]
         a, b = self.order[first].index(link.top), self.order[last].index(link.bottom)
         if last == first + 1:
-            crossed, slots = _between(self._before[first], a, b), []
+            crossed, at = _between(self._before[first], a, b), [a, b]
         else:
-            crossed, slots = self._way(link, a, b)
-        at = [a, *slots, b]
+            crossed, at = self._way(link, a, b)
         for k in range(last - first):
             old = self._before[first + k]
             i, j, di, dj = at[k] + 1, at[k + 1] + 1, k > 0, first + k + 1 < last
@@ -335,13 +334,13 @@ class Insertion:
             self._set(first + k, new)
             self.work += 1 + old.size // _NUMBERS
         cells = tuple(self._cell(c, r) for r in range(first + 1, last))
-        for r, slot, cell in zip(range(first + 1, last), slots, cells, strict=True):
+        for r, slot, cell in zip(range(first + 1, last), at[1:-1], cells, strict=True):
             self.order[r] = [*self.order[r][:slot], cell, *self.order[r][slot:]]
         self.cells[c] = cells
         return crossed * CROSSING + last - first
 
     def _way(self, link: Link, a: int, b: int) -> tuple[int, list[int]]:
-        """The least crossings on the way from the a-th to the b-th entry of two ranks, and the slots between."""
+        """The least crossings on the way from the a-th to the b-th entry of two ranks; these and the slots between."""
         first, last = self.rank[link.upper] + 1, self.rank[link.lower] - 1
         before = self._before[first - 1]
         line = before[a, -1] - before[a] + before[-1] - before[a + 1]
@@ -360,7 +359,7 @@ class Insertion:
         crossed = int(line[slots[0]])
         for back in reversed(come):
             slots.append(int(back[slots[-1]]))
-        return crossed, slots[::-1]
+        return crossed, [a, *slots[::-1], b]
 
     def _shut(self, r: int, box: int) -> Counts:
         """For each slot of a rank what it costs that it lies within a block, or within a box that is not this one; or,

@@ -6,6 +6,7 @@ segments between neighbouring ranks.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
@@ -107,10 +108,10 @@ def levels_of(
 
 def _nodes(unit: Unit, rank: int, boxes: dict[int, int], groups: dict[int, int]) -> list[Node]:
     if unit.places is None:
-        return [
-            Node(rank, ((m, 0.0, 0.0),), (0.0, 0.0), groups.get(m, -1), boxes.get(m, -1), unit.lift)
-            for m in unit.members
-        ]
+        # a group keeps its order where it shares a rank; of others only the names have something in common
+        size = Counter(groups.get(m, -1) for m in unit.members)
+        kin = {m: groups[m] if size[groups.get(m, -1)] > 1 and m in groups else -1 for m in unit.members}
+        return [Node(rank, ((m, 0.0, 0.0),), (0.0, 0.0), kin[m], boxes.get(m, -1), unit.lift) for m in unit.members]
     members = tuple((m, dx, dy) for m, (dx, dy) in zip(unit.members, unit.places, strict=True))
     reach = unit.reach or (max(abs(dx) for _, dx, _ in members), max(abs(dy) for _, _, dy in members))
     shared = {boxes.get(m, -1) for m in unit.members}

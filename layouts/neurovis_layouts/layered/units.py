@@ -2,7 +2,7 @@
 
 In: a LayoutProblem. Out: units in canonical order, each neuron in exactly one. A group shares a rank, unless
 connections within it run forward (a chain), or only some of its neurons are on a line with others: then each of its
-neurons finds its own. Neurons that drive each other in
+neurons finds its own, as if it were in no group. Neurons that drive each other in
 a loop (a half-centre oscillator, a ring, a reservoir) are one block: a row where they are a line, else a ring.
 """
 
@@ -53,10 +53,11 @@ def units_of(
     for group in problem.groups:
         members = [member for member in group.members if member not in taken]
         taken.update(members)
-        if len(members) == 1:
+        unit = _of_group(problem, members)
+        if unit is None:
             lone += members
-        elif members:
-            found += _of_group(problem, members)
+        else:
+            found.append(unit)
     lone += [i for i in range(len(problem.neurons)) if i not in taken]
     found += _of_lone(problem, sorted(lone))
     lines = _lines(problem)
@@ -89,18 +90,16 @@ def _graph(problem: LayoutProblem, members: Iterable[int]) -> nx.DiGraph[int]:
     return graph
 
 
-def _of_group(problem: LayoutProblem, members: Sequence[int]) -> list[Unit]:
+def _of_group(problem: LayoutProblem, members: Sequence[int]) -> Unit | None:
+    """Neurons that nothing connects with each other share a rank, those of a loop are a block; the others of a group
+    are where they would be without it: it only names them."""
+    if len(members) < 2:
+        return None
     graph = _graph(problem, members)
     if not graph.size():
-        return [Unit(tuple(members))]
-    loops = [sorted(loop) for loop in nx.strongly_connected_components(graph) if len(loop) > 1]
-    if not loops:
-        return [Unit((member,)) for member in members]
-    if len(members) <= _MOST_IN_A_RING and 2 * sum(len(loop) for loop in loops) >= len(members):
-        return [_block(problem, members)]
-    small = sorted(loop for loop in loops if len(loop) <= _MOST_IN_A_RING)
-    inside = {member for loop in small for member in loop}
-    return [_block(problem, loop) for loop in small] + [Unit((m,)) for m in members if m not in inside]
+        return Unit(tuple(members))
+    inside = sum(len(loop) for loop in nx.strongly_connected_components(graph) if len(loop) > 1)
+    return _block(problem, members) if len(members) <= _MOST_IN_A_RING and 2 * inside >= len(members) else None
 
 
 def _of_lone(problem: LayoutProblem, lone: Sequence[int]) -> list[Unit]:
