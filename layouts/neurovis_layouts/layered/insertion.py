@@ -9,7 +9,7 @@ to which the shortest paths of all of its connections are shortest together (aft
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from itertools import pairwise
@@ -89,12 +89,10 @@ class Insertion:
         self._before: list[Counts] = [
             np.zeros((len(a) + 1, len(b) + 1), dtype=np.int32) for a, b in pairwise(self.order)
         ]
+        for r, i, j in self._segments():
+            self._before[r][i + 1, j + 1] += 1
+        self._before = [counts.cumsum(axis=0, dtype=np.int32).cumsum(axis=1, dtype=np.int32) for counts in self._before]
         self._costs: list[Counts | None] = [None] * len(self._before)
-        place = [{entry: i for i, entry in enumerate(rank)} for rank in self.order]
-        for link, cells in zip(self.links, self.cells, strict=True):
-            line = [link.top, *(cells or ()), link.bottom]
-            for r, (a, b) in enumerate(pairwise(line), self.rank[link.upper]):
-                self._before[r][place[r][a] + 1 :, place[r + 1][b] + 1 :] += 1
         self._tight = [
             any(self._points[n] and (self._box[n] >= 0 or self._kin[n] >= 0 or len(self._points[n]) > 1) for n in rank)
             for rank in order
@@ -144,14 +142,17 @@ class Insertion:
 
     def cost(self) -> int:
         """That of the whole: its crossings and lengths."""
-        crossed = length = 0
+        segments = list(self._segments())
+        crossed = sum(_between(self._before[r], i, j) for r, i, j in segments) // 2
+        return crossed * CROSSING + len(segments)
+
+    def _segments(self) -> Iterator[tuple[int, int, int]]:
+        """Every piece of a connection: its upper rank, which entry it leaves there, at which of the next it arrives."""
         place = [{entry: i for i, entry in enumerate(rank)} for rank in self.order]
         for link, cells in zip(self.links, self.cells, strict=True):
             line = [link.top, *(cells or ()), link.bottom]
-            length += len(line) - 1
             for r, (a, b) in enumerate(pairwise(line), self.rank[link.upper]):
-                crossed += _between(self._before[r], place[r][a], place[r + 1][b])
-        return crossed // 2 * CROSSING + length
+                yield r, place[r][a], place[r + 1][b]
 
     def keep(self) -> Kept:
         """The order as it is now."""
