@@ -105,3 +105,12 @@ def test_every_type_of_the_table_can_be_read() -> None:
     without = {name for name in all_types() if not numbers_of(name)}
     assert without == {f"std_msgs/{name}" for name in ("Duration", "Empty", "Header", "String", "Time")}
     assert fields_of("my_msgs/Own") is None
+
+
+@pytest.mark.parametrize(
+    ("written", "rate", "kept"),
+    [("", 1000, 2000), ("", 100, 200), ("", 1, 10), ("", 1e9, 1_000_000), ("qos: {depth: 3}", 1000, 3)],
+)
+def test_what_a_recorder_may_miss_its_turn_for_is_kept_for_it(written: str, rate: float, kept: int) -> None:
+    spec = f"neurovis: 1\nname: x\nneurons: {{A: {{}}}}\nros: {{rate: {rate}, {written}}}\n"
+    assert nv.compile_text(spec).network.ros.depth_at(rate) == kept

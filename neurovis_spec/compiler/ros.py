@@ -15,7 +15,14 @@ from neurovis_spec.compiler.limits import plural
 from neurovis_spec.compiler.names.references import key_of, known_inputs
 from neurovis_spec.compiler.names.scope import Scope
 from neurovis_spec.compiler.network import Input, Output
-from neurovis_spec.compiler.ros_settings import NAMESPACE, Publication, RosSettings, Subscription, absolute
+from neurovis_spec.compiler.ros_settings import (
+    MOST_WAITING,
+    NAMESPACE,
+    Publication,
+    RosSettings,
+    Subscription,
+    absolute,
+)
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, shorten, suggest
 from neurovis_spec.language.located import Located
@@ -31,7 +38,6 @@ _DATA: Final = "data"
 _ARRAY: Final = "std_msgs/Float64MultiArray"
 _SPEC: Final = "std_msgs/String"
 #: A queue of more messages is a mistake.
-_DEEPEST: Final = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -86,13 +92,14 @@ def _check_topics(model: RosModel, settings: RosSettings, name: str, findings: F
 
 def _quality(
     model: QosModel | None, constants: Constants
-) -> tuple[Literal["reliable", "best_effort"], Literal["volatile", "transient_local"], int]:
-    reliability, durability, depth = "reliable", "volatile", 10
+) -> tuple[Literal["reliable", "best_effort"], Literal["volatile", "transient_local"], int | None]:
+    reliability, durability = "reliable", "volatile"
+    depth: int | None = None
     if model is not None:
         reliability = reliability if model.reliability is None else model.reliability.value
         durability = durability if model.durability is None else model.durability.value
         if model.depth is not None:
-            depth = known(constants.integer(model.depth, "'depth'", 1, _DEEPEST, structural=False), depth)
+            depth = known(constants.integer(model.depth, "'depth'", 1, MOST_WAITING, structural=False), depth)
     return (
         cast(Literal["reliable", "best_effort"], reliability),
         cast(Literal["volatile", "transient_local"], durability),

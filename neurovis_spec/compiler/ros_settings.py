@@ -5,10 +5,14 @@ In: nothing; these are values of a Network, which ``compiler.ros`` makes. Nothin
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final, Literal
 
 NAMESPACE: Final = "/neurovis"
+
+#: The most messages that may wait to be sent.
+MOST_WAITING = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,15 +45,21 @@ class Publication:
 
 @dataclass(frozen=True, slots=True)
 class RosSettings:
-    """The ``ros`` section, references resolved. ``namespace`` is absolute; ``rate`` is steps a second."""
+    """The ``ros`` section, references resolved. ``namespace`` is absolute; ``rate`` is steps a second; ``depth`` is how
+    many messages wait to be sent, None: as the rate asks for."""
 
     rate: float = 1.0
     namespace: str = NAMESPACE
     reliability: Literal["reliable", "best_effort"] = "reliable"
     durability: Literal["volatile", "transient_local"] = "volatile"
-    depth: int = 10
+    depth: int | None = None
     subscribe: tuple[Subscription, ...] = ()
     publish: tuple[Publication, ...] = ()
+
+    def depth_at(self, rate: float) -> int:
+        """How many messages wait to be sent at so many steps a second: what the spec says, else those of two seconds,
+        so that a recorder that does not get its turn for so long misses nothing; 10 at least, ROS's own default."""
+        return max(10, math.ceil(min(2 * rate, MOST_WAITING))) if self.depth is None else self.depth
 
 
 def absolute(topic: str, node: str) -> str:

@@ -101,7 +101,10 @@ class QosModel(Model):
     durability: Annotated[Located[str], words("volatile", "transient_local")] | None = Field(
         None, description="Whether who comes late gets the last messages (default volatile)."
     )
-    depth: FormulaField | None = Field(None, description="How many messages wait to be sent (default 10).")
+    depth: FormulaField | None = Field(
+        None, description="How many messages wait to be sent (default those of two seconds, 10 at least).
+    )
+    )
 
 
 class TopicModel(Model):

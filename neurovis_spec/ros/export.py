@@ -113,6 +113,7 @@ def _values(compiled: CompiledNetwork) -> dict[str, object]:
         if name not in network.structural and name in network.settable.index:
             written = spec.parameters.get(name)
             settings.append(Setting(name, value, "" if written is None else written.about))
+    depth = network.ros.depth_at(network.ros.rate)
     return {
         "package": f"neurovis_{c}",
         "c": c,
@@ -124,9 +125,9 @@ def _values(compiled: CompiledNetwork) -> dict[str, object]:
         "neurons": len(network.neurons),
         "weights": len(np.atleast_1d(network.changing)),
         "reliable": network.ros.reliability == "reliable",
-        "depth": network.ros.depth,
+        "depth": depth,
         "rate": network.ros.rate,
-        "queue": network.ros.depth if network.ros.reliability == "best_effort" else max(2000, network.ros.depth),
+        "queue": depth if network.ros.reliability == "best_effort" else max(2000, depth),
         "latched": network.ros.durability == "transient_local",
         "messages": packages_of(network.ros),
         "parameters": settings,

@@ -156,7 +156,7 @@ class NodeRun:
     def _publish(self) -> None:
         node, network = self.node, self.network
         settings = network.ros
-        quality = Quality(settings.reliability, settings.durability, settings.depth)
+        quality = Quality(settings.reliability, settings.durability, settings.depth_at(self._course.rate))
         base = base_of(self._compiled)
         self._activity = self._array(f"{base}/{ACTIVITY}", len(network.neurons), quality)
         changing = len(network.changing)
