@@ -174,13 +174,14 @@ def test_a_node_takes_the_arguments_of_ros(name: str, tmp_path: Path) -> None:
     spec = tmp_path / "arm.yaml"
     spec.write_text(compiled(published=False).text())
     with world(name) as ros:
-        given = ["_gain:=9.0", "_turn:=0.1", "/neurovis/arm/activity:=/seen", "__name:=other"]
+        given = ["_gain:=9.0", "_turn:=0.1", "/neurovis/arm/activity:=/seen", "__name:=other", "__ns:=/left"]
         if ros.ros == 2:
             given = ["--ros-args", "-p", "turn:=0.1", "-r", "/neurovis/arm/activity:=/seen", "-r", "__node:=other"]
+            given += ["-r", "__ns:=/left"]
         peer = ros.peer(listen=[{**ACTIVITY, "topic": "/seen"}], until={"/seen": 20})
         words = ["--steps", "20", "--wait", "3", "--backend", "reference"]
         run = ros.neurovis("ros", "run", spec, *words, *given)
-        assert "/neurovis/other" in run.wait_for("ready")
+        assert "/left/other" in run.wait_for("ready")
         assert run.end() == 0
         assert peer.end() == 0
         rows = [one[0][2:] for one in peer.json()["/seen"]]

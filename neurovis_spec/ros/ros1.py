@@ -169,8 +169,10 @@ class Ros1Node:
         if wish.arguments[:1] == ("--ros-args",):
             raise MiddlewareError("ROS 1 does not take '--ros-args'", "write /from:=/to, _NAME:=VALUE")
         uri = os.environ.setdefault("ROS_MASTER_URI", "http://localhost:11311")
-        os.environ["ROS_NAMESPACE"] = wish.namespace
-        rospy.names._set_caller_id(rosgraph.names.make_global_ns(wish.namespace) + wish.name)
+        asked = [word.removeprefix("__ns:=") for word in wish.arguments if word.startswith("__ns:=")]
+        namespace = asked[-1] if asked else wish.environment.get("ROS_NAMESPACE") or wish.namespace
+        os.environ["ROS_NAMESPACE"] = namespace
+        rospy.names._set_caller_id(rosgraph.names.make_global_ns(namespace) + wish.name)
         if urlsplit(uri).scheme not in ("http", "https") or not urlsplit(uri).hostname:
             raise MiddlewareError(f"ROS_MASTER_URI is no address: '{uri}'", "such as http://localhost:11311")
         self._uri = uri
@@ -180,7 +182,7 @@ class Ros1Node:
         # rospy prints who has asked the node to end where the summary is printed
         rospy.impl.masterslave.print = partial(print, file=sys.stderr)
         try:
-            remaps = ["neurovis", f"__ns:={wish.namespace}", *wish.arguments]
+            remaps = ["neurovis", f"__ns:={namespace}", *wish.arguments]
             rospy.init_node(wish.name, remaps, anonymous=wish.anonymous, disable_signals=True, disable_rostime=True)
         except Exception as error:
             raise MiddlewareError(f"a node of ROS 1 cannot be made: {error}") from None
