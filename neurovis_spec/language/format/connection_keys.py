@@ -10,8 +10,9 @@ import re
 from collections.abc import Sequence
 from typing import Final
 
-_END: Final = r"[A-Za-z0-9_.]+(?:[ \t]*\+[ \t]*[A-Za-z0-9_.]+)*"
-_CONNECTION: Final = re.compile(rf"[ \t]*{_END}[ \t]*->[ \t]*{_END}[ \t]*")
+from neurovis_spec.language.references import Arrow, parse
+
+_NAMES: Final = re.compile(r"[A-Za-z0-9_.]+")
 
 
 def is_connections(path: Sequence[str]) -> bool:
@@ -35,11 +36,9 @@ def normal(key: str) -> str:
     """
     quote = key[:1] if key[:1] in ("'", '"') else ""
     bare = key[1:-1] if quote else key
-    if not _CONNECTION.fullmatch(bare):
-        return key
-    source, _, target = bare.partition("->")
-    ends = (" + ".join(part.strip() for part in end.split("+")) for end in (source, target))
-    return quote + " -> ".join(ends) + quote
+    found = parse(bare)
+    ends = (*found.sources.parts, *found.targets.parts) if isinstance(found, Arrow) else ()
+    return quote + found.normal + quote if ends and all(_NAMES.fullmatch(part.text) for part in ends) else key
 
 
 def normal_all(keys: Sequence[str]) -> list[str]:
