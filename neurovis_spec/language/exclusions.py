@@ -5,55 +5,54 @@ In: these rules and a mapping as written. Out: findings, and the same as JSON Sc
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import TypeAlias
 
 from pydantic.json_schema import JsonSchemaValue
 
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.grammar import AsTable, Needs, NotWith, OneOf, Written
-from neurovis_spec.language.yaml.source import Mapping, Scalar
+from neurovis_spec.language.yaml.source import Entry, Scalar
 
 #: What the fields of a model say, by their keys.
-Rules: TypeAlias = tuple[tuple[str, NotWith | Needs], ...]
+Rules: TypeAlias = Mapping[str, tuple[NotWith | Needs, ...]]
+#: The entries of a mapping by their keys.
+Entries: TypeAlias = Mapping[str, Entry]
 
 
 def _key(other: Written) -> str:
     return other.key if isinstance(other, AsTable) else other
 
 
-def _is_there(other: Written, data: Mapping) -> bool:
-    entry = data.entry(_key(other))
+def _is_there(other: Written, entries: Entries) -> bool:
+    entry = entries.get(_key(other))
     return entry is not None and not (isinstance(other, AsTable) and isinstance(entry.value, Scalar))
 
 
-def _excluded(rule: NotWith, data: Mapping) -> str | None:
+def _excluded(rule: NotWith | Needs, entries: Entries) -> str | None:
     """The first key that is there and excludes that of a field."""
-    return next((_key(other) for other in rule.others if _is_there(other, data)), None)
+    others = rule.others if isinstance(rule, NotWith) else ()
+    return next((_key(other) for other in others if _is_there(other, entries)), None)
 
 
-def contradictory(rules: Rules, data: Mapping) -> bool:
+def contradictory(rules: Rules, entries: Entries) -> bool:
     """Whether two keys of a mapping exclude each other."""
-    return any(
-        isinstance(rule, NotWith) and data.entry(own) is not None and _excluded(rule, data) is not None
-        for own, rule in rules
-    )
+    return any(_excluded(rule, entries) is not None for own in entries for rule in rules.get(own, ()))
 
 
-def check_rules(rules: Rules, data: Mapping, unknown: Collection[str], findings: Findings) -> None:
-    """Report keys that exclude each other, each once, and those that miss another one, unless that is ``unknown``, as
-    an unknown key may be meant for it."""
-    for own, rule in rules:
-        entry = data.entry(own)
-        if entry is None:
-            continue
-        if isinstance(rule, NotWith):
-            other = _excluded(rule, data)
+def check_rules(rules: Rules, entries: Entries, unknown: Collection[str], findings: Findings) -> None:
+    """Report keys that exclude each other, each once, and those that miss another one, unless that is ``unknown``,
+    as an unknown key may be meant for it."""
+    for own, entry in entries.items():
+        for rule in rules.get(own, ()):
+            other = _excluded(rule, entries)
             if other is not None:
                 hint = None if rule.hint is None else rule.hint.format(own=own, other=other)
                 findings.error(rule.code, entry.key.span, rule.why.format(own=own, other=other), hint)
-        elif not any(_key(other) in unknown or _is_there(other, data) for other in rule.others):
-            findings.error(rule.code, entry.key.span, rule.why, rule.hint)
+            elif isinstance(rule, Needs) and not any(
+                _key(needed) in unknown or _is_there(needed, entries) for needed in rule.others
+            ):
+                findings.error(rule.code, entry.key.span, rule.why, rule.hint)
 
 
 def _has(other: Written) -> JsonSchemaValue:
@@ -65,7 +64,7 @@ def _has(other: Written) -> JsonSchemaValue:
 def schema_of(rules: Rules, one_of: OneOf | None) -> JsonSchemaValue:
     """The rules as keywords of a JSON Schema."""
     found: list[JsonSchemaValue] = []
-    for own, rule in rules:
+    for own, rule in ((own, rule) for own, several in rules.items() for rule in several):
         if isinstance(rule, NotWith):
             found += ({"not": {"allOf": [_has(own), _has(other)]}} for other in rule.others)
         else:

@@ -108,22 +108,26 @@ class Model(BaseModel):
     @cache
     def _rules(cls) -> Rules:
         """Which keys exclude each other, and which need others."""
-        fields = cls._fields().items()
-        return tuple(
-            (name, item) for name, field in fields for item in field.metadata if isinstance(item, (NotWith, Needs))
-        )
+        said = {
+            name: tuple(item for item in field.metadata if isinstance(item, (NotWith, Needs)))
+            for name, field in cls._fields().items()
+        }
+        return {name: rules for name, rules in said.items() if rules}
 
     @classmethod
     def _check_rules(cls, data: Mapping, unknown: Collection[str], findings: Findings) -> None:
-        check_rules(cls._rules(), data, unknown, findings)
-        one_of, there = cls.ONE_OF, {entry.name for entry in data.entries}
-        if one_of is not None and there.isdisjoint(one_of.keys) and there <= cls._fields().keys():
+        rules, one_of = cls._rules(), cls.ONE_OF
+        if not rules and one_of is None:
+            return
+        entries = {entry.name: entry for entry in data.entries}
+        check_rules(rules, entries, unknown, findings)
+        if one_of is not None and entries.keys().isdisjoint(one_of.keys) and entries.keys() <= cls._fields().keys():
             findings.error(one_of.code, opening(data), one_of.why, one_of.hint)
 
     @cached_property
     def contradictory(self) -> bool:
         """Whether keys exclude each other, which is reported: which of them is meant is not known."""
-        return contradictory(self._rules(), self.source)
+        return contradictory(self._rules(), {entry.name: entry for entry in self.source.entries})
 
     @classmethod
     @cache
