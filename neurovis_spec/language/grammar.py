@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, Literal, TypeAlias
 
 from pydantic.json_schema import JsonSchemaValue
@@ -102,16 +102,29 @@ class Shape(ABC):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plain(Shape):
-    """A scalar. ``role``: what it is for, whatever its field says; ``formula``: it is a number or an expression."""
+    """A scalar. ``role``: what it is for, whatever its field says; ``formula``: it is a number or an expression;
+    ``abouts``: what the words mean of which it is one, where that is not plain."""
 
     written: Mapping[str, object]
     role: Role | None = None
     formula: bool = False
+    abouts: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def schema(self) -> JsonSchemaValue:
         """As written."""
         return dict(self.written)
+
+    @property
+    def words(self) -> Iterator[str]:
+        """The words of which it is one."""
+        words = self.written.get("enum")
+        if isinstance(words, list):
+            yield from map(str, words)
+        elif self.written.get("type") == "boolean":
+            yield from ("true", "false")
+        elif "const" in self.written:
+            yield str(self.written["const"])
 
     def role_in(self, field: Role | None) -> Role | None:
         """Its role in a field: formulas have those of formulas, other texts the others."""
@@ -240,9 +253,9 @@ TEXTS: Final = Either((TEXT, ListOf(TEXT)))
 REFERENCE: Final = Plain({"type": "string", "pattern": "[A-Za-z_]"})
 
 
-def words(*known: str) -> Plain:
-    """One of these words."""
-    return Plain({"enum": [*known]})
+def words(*known: str, abouts: Mapping[str, str] | None = None) -> Plain:
+    """One of these words, with what they mean."""
+    return Plain({"enum": [*known]}, abouts=abouts or {})
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Annotated, Generic, NamedTuple, NoReturn, TypeAlias, TypeVar
@@ -224,9 +224,9 @@ def one_of(*words: str) -> Callable[[Node, ValidationInfo], Located[str]]:
     return check
 
 
-def words(*allowed: str) -> Leaf[Node]:
-    """The annotation of a field that takes one of these words."""
-    return Leaf(one_of(*allowed), grammar.words(*allowed))
+def words(*allowed: str, abouts: Mapping[str, str] | None = None) -> Leaf[Node]:
+    """The annotation of a field that takes one of these words; ``abouts`` says what they mean."""
+    return Leaf(one_of(*allowed), grammar.words(*allowed, abouts=abouts))
 
 
 TextField = Annotated[Located[str], Leaf(as_text, TEXT)]

@@ -59,9 +59,10 @@ def key_at(path: Path) -> KeyHere | None:
     return next((key for key in keys_at(path[:-1]) if key.name == path[-1]), None)
 
 
-def words_at(path: Path) -> tuple[str, ...]:
-    """The words of which the value at a path is one."""
-    return tuple(dict.fromkeys(word for place in _places(path) for word in _words(place.kind)))
+def words_at(path: Path) -> dict[str, str]:
+    """The words of which the value at a path is one, with what they mean."""
+    shapes = [place.kind for place in _places(path) if isinstance(place.kind, Plain)]
+    return {word: shape.abouts.get(word, "") for shape in shapes for word in shape.words}
 
 
 def role_of(path: Path, is_key: bool) -> Role | None:
@@ -180,15 +181,3 @@ def _keys(kind: object) -> Iterator[KeyHere]:
     elif isinstance(kind, Map):
         for name, key in kind.known.items():
             yield KeyHere(name, key.about, key.required)
-
-
-def _words(kind: object) -> Iterator[str]:
-    if not isinstance(kind, Plain):
-        return
-    words = kind.written.get("enum")
-    if isinstance(words, list):
-        yield from (str(word) for word in words)
-    elif kind.written.get("type") == "boolean":
-        yield from ("true", "false")
-    elif "const" in kind.written:
-        yield str(kind.written["const"])

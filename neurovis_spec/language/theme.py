@@ -6,7 +6,8 @@ In: nodes. Out: a frozen model whose leaves know their places.
 from __future__ import annotations
 
 import re
-from typing import Annotated, ClassVar
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Final
 
 from pydantic import Field, ValidationInfo
 
@@ -17,7 +18,12 @@ from neurovis_spec.language.model import Model, Short
 from neurovis_spec.language.yaml.source import Node
 
 _COLOUR = re.compile(r"#[0-9A-Fa-f]{6}")
-THEME_NAMES = ("default", "dark", "print", "paper")
+THEMES: Final[Mapping[str, str]] = {
+    "default": "vermilion over grey to blue, on light",
+    "dark": "the same on dark",
+    "print": "for paper, readable without colour",
+    "paper": "red, grey and green, as in the NeuroVis paper",
+}
 
 
 def _colour(node: Node, info: ValidationInfo) -> Located[str]:
@@ -39,7 +45,7 @@ class ThemeModel(Model):
     PLACE: ClassVar[str] = "'render: theme'"
     UNSAID: ClassVar[str] = "leave the key out, or write a colour in quotes, '#d55e00': # begins a comment"
 
-    base: Annotated[Located[str], words(*THEME_NAMES)] | None = Field(
+    base: Annotated[Located[str], words(*THEMES, abouts=THEMES)] | None = Field(
         None, description="The theme whose colours hold where no other is given: default, dark, print or paper."
     )
     negative: ColourField | None = Field(None, description="The colour of −1, in quotes: '#d55e00'.")

@@ -28,7 +28,7 @@ from neurovis_spec.lsp.names import Name
 from neurovis_spec.lsp.outline import Path
 from neurovis_spec.lsp.scopes import Scope, scope_of
 from neurovis_spec.lsp.text import Place
-from neurovis_spec.lsp.words import THEMES, functions
+from neurovis_spec.manual.words import functions_of
 
 _WORD = re.compile(r"(?:(?<![\w.])[A-Za-z_]\w*\.(?!\.))*(?:(?<!\w)[A-Za-z_]\w*)?$", re.ASCII)
 _REST = re.compile(r"\w*", re.ASCII)
@@ -108,8 +108,8 @@ def _offers(
     for offer in _of_role(role, scope, path, front, index, place):
         label = offer.label
         yield Completion(label, offer.sort, label + colon, span, offer.detail, offer.documentation)
-    for label in () if is_key else words_at(path):
-        yield Completion(label, "word", label, span, THEMES.get(label, "") if path[-1] == "theme" else "")
+    for label, about in () if is_key else words_at(path).items():
+        yield Completion(label, "word", label, span, about)
 
 
 def _span(file: str, place: Place, typed: str, rest: str) -> Span:
@@ -196,8 +196,8 @@ def _formula(role: Role, scope: Scope, path: Path, index: Index, place: Place) -
             yield _Offer(name.text, "local", str(name.item.path[2]))
     for given in (*role.sees, *ALWAYS):
         yield _Offer(given, "constant", GIVEN[given])
-    for function, (usage, meaning) in functions(role.draws, role.functions).items():
-        yield _Offer(function, "function", usage, meaning)
+    for word in functions_of(role).values():
+        yield _Offer(word.name, "function", word.usage, word.about)
 
 
 def _inner_inputs(module: str | None, index: Index) -> Iterator[_Offer]:

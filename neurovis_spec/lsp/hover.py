@@ -24,7 +24,7 @@ from neurovis_spec.lsp.names import Name
 from neurovis_spec.lsp.outline import Item
 from neurovis_spec.lsp.scopes import DEFINITIONS
 from neurovis_spec.lsp.text import Place, holds
-from neurovis_spec.lsp.words import functions
+from neurovis_spec.manual.words import functions_of
 
 _WORD = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 
@@ -64,14 +64,14 @@ def _given(item: Item, role: Role, place: Place) -> Hover | None:
     """A function or a constant in an expression."""
     if item.scalar.inner is None:
         return None
-    called = functions(role.draws, role.functions)
+    called = functions_of(role)
     for match in _WORD.finditer(item.text):
         span = item.scalar.at(match.start(), match.end())
         if not holds(span, place) or not _in_expression(item.text, role, match.start()):
             continue
         if match[0] in called and item.text[match.end() :].lstrip().startswith("("):
-            usage, meaning = called[match[0]]
-            return Hover(f"`{usage}`" + (f": {meaning}" if meaning else ""), span)
+            word = called[match[0]]
+            return Hover(f"`{word.usage}`: {word.about}", span)
         if match[0] in GIVEN:
             return Hover(f"`{match[0]}`: {GIVEN[match[0]]}", span)
     return None

@@ -11,6 +11,8 @@ from types import MappingProxyType
 
 from neurovis_spec.language.expressions.functions import FUNCTIONS
 from neurovis_spec.language.expressions.given import GIVEN
+from neurovis_spec.language.expressions.parser import DRAWS
+from neurovis_spec.language.grammar import Role
 
 FUNCTION_TEXTS: Mapping[str, str] = MappingProxyType(
     {
@@ -62,6 +64,13 @@ class Word:
 def functions() -> tuple[Word, ...]:
     """The functions of expressions, in the order of the language reference."""
     return tuple(Word(name, function.usage, FUNCTION_TEXTS[name]) for name, function in FUNCTIONS.items())
+
+
+def functions_of(role: Role) -> dict[str, Word]:
+    """The functions that a formula of this role may call, by name."""
+    found = {word.name: word for word in functions()}
+    found |= {word.name: word for word in names() if role.draws and word.name in DRAWS}
+    return found | {name: Word(name, f"{name}(x)", GIVEN[name]) for name in role.functions}
 
 
 def names() -> tuple[Word, ...]:
