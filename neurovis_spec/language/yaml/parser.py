@@ -68,6 +68,9 @@ _SIMPLE_ROW: Final = re.compile(r"\[([^\[\]{}'\"#&*!|>%@`?:\r\n]*)\]")
 _ROW_LINE: Final = re.compile(r"- +\[([^\[\]{}'\"#&*!|>%@`?:\r\n]*)\][ \t]*(?:\r\n|\n|\r)")
 #: A line end, the blanks that begin the next line, and the rest of it.
 _LINE: Final = re.compile(r"(?:\r\n|\n|\r)( *)[^\r\n]*")
+#: A name, and a number or a short text.
+_SIMPLE: Final = r"([A-Za-z_][\w.]*(?: (?:->|\+) [\w.]+)*) *: +((?:[A-Za-z0-9_.]|[-+](?![ \t\r\n,\[\]{}]))[\w.+*/^-]*)"
+_SIMPLE_PAIR: Final = re.compile(_SIMPLE + r" *(?:, *|(?=\}))")
 _FLOW_SIGNS: Final = frozenset(",[]{}")
 _CLOSING: Final = {"[": "]", "{": "}"}
 
@@ -81,10 +84,9 @@ def _stretch(column: int) -> re.Pattern[str]:
 
 
 @cache
-def _simple_entry(column: int) -> re.Pattern[str]:
+def _simple_lines(column: int) -> re.Pattern[str]:
     """A line of a block in a column that holds a name and a number or a short text, behind which neither goes on."""
-    name, text = r"[A-Za-z_][\w.]*(?: (?:->|\+) [\w.]+)*", r"(?:[A-Za-z0-9_.]|[-+](?![ \t\r\n]))[\w.+*/()^-]*"
-    return re.compile(rf"({name}) *: +({text}) *(?:\r\n|\n|\r)( {{0,{column}}})(?=[^ \t\r\n#]|\Z)")
+    return re.compile(rf"{_SIMPLE} *(?:\r\n|\n|\r)( {{0,{column}}})(?=[^ \t\r\n#]|\Z)")
 
 
 class _Key(NamedTuple):
@@ -245,6 +247,8 @@ class Parser:
     def _gap(self) -> str:
         """Pass blanks, comments and line ends. Returns the character that is next, nothing at the end."""
         text, end = self._text, self._end
+        if self._at < end and text[self._at] not in " \t\r\n#":
+            return text[self._at]
         while match := _BLANK_LINE.match(text, self._at, end):
             if match.lastindex:
                 self.comments.append(match.start(1))
@@ -503,21 +507,29 @@ class Parser:
 
     def _simple_entries(self, column: int, entries: dict[str, Entry]) -> tuple[int, int] | None:
         """Take up lines that hold no more than a name and a value. Returns where the last of these values ends."""
-        pattern, text, file, passed = _simple_entry(column), self._text, self._file, None
-        while self._at - self._start == column and (match := pattern.match(text, self._at, self._end)):
-            name, written = match[1], match[2]
-            try:
-                value = resolve(written)
-            except NumberRangeError:
+        pattern, last = _simple_lines(column), None
+        while self._at - self._start == column and (match := pattern.match(self._text, self._at, self._end)):
+            value = self._simple_entry(match, entries)
+            if value is None:
                 break
-            if name in entries or resolve(name) != name or len(name) > _LONGEST_KEY:
-                break
-            line, start = self._line, self._start - 1
-            key = Scalar(name, Span(file, line, match.start() - start, line, match.end(1) - start))
-            passed = line, match.end(2) - start
-            entries[name] = Entry(key, Scalar(value, Span(file, line, match.start(2) - start, *passed)))
-            self._at, self._start, self._line = match.end(), match.start(3), line + 1
-        return passed
+            last = value.span[3:]
+            self._at, self._start, self._line = match.end(), match.start(3), self._line + 1
+        return last
+
+    def _simple_entry(self, match: re.Match[str], entries: dict[str, Entry]) -> Scalar | None:
+        """Take up a name and a value; None, and nothing taken, where they need a second look."""
+        name = match[1]
+        try:
+            value = resolve(match[2])
+        except NumberRangeError:
+            return None
+        if name in entries or resolve(name) != name or len(name) > _LONGEST_KEY:
+            return None
+        file, line, start = self._file, self._line, self._start - 1
+        key = Scalar(name, Span(file, line, match.start() - start, line, match.end(1) - start))
+        scalar = Scalar(value, Span(file, line, match.start(2) - start, line, match.end(2) - start))
+        entries[name] = Entry(key, scalar)
+        return scalar
 
     def _mapping_entry(self, key: _Key, column: int, depth: int, entries: dict[str, Entry]) -> tuple[int, int]:
         """Read the value of a key. Returns where the entry ends."""
@@ -536,16 +548,15 @@ class Parser:
             self._put(entries, name, value)
         return max((span.end_line, span.end_column), (value.span.end_line, value.span.end_column))
 
-    def _put(self, entries: dict[str, Entry], key: Scalar, value: Node) -> bool:
+    def _put(self, entries: dict[str, Entry], key: Scalar, value: Node) -> None:
         """Take an entry up, unless its key is there already; parts of a text may have a key twice."""
         name = str(key.value)
         if name in entries and not self._partial:
             self._refuse.duplicate(key, entries[name])
-            return False
+            return
         if name in entries:
             name = f"{name}\0{len(entries)}"
         entries[name] = Entry(key, value)
-        return True
 
     def _early(self, key: Scalar, soon: re.Match[str], found: int) -> Scalar:
         """The key of a value that is lost, where it seems to reach into this value: ``A:{bias`` is the key ``A``."""
@@ -572,7 +583,6 @@ class Parser:
 
     def _key(self, column: int, depth: int) -> _Key:
         """A key of a block, to its colon; what is none has a place and no name."""
-        cursor = self._mark()
         if self._indicator("?"):
             self._at += 1
             announced = self._entry(column, depth + 1, fresh=True)
@@ -723,17 +733,16 @@ class Parser:
         self._at = match.end()
         if indent is not None:
             self._go_on(more, indent)
-        written = text[first : self._at]
         span = self._from(line, column)
+        content, written = text[first : self._at], None
         if span.line != span.end_line:
-            scalar = Scalar(texts.plain(written), span, None, Written(text, first, self._at))
-        else:
-            scalar = Scalar(written, span)
+            content, written = texts.plain(content), Written(text, first, self._at)
         try:
-            scalar = scalar._replace(value=resolve(str(scalar.value)))
+            value = resolve(content)
         except NumberRangeError as error:
             self._refuse.number(error, span)
-            scalar = scalar._replace(value=error.nearest)
+            value = error.nearest
+        scalar = Scalar(value, span, 0 if written is None else None, written)
         self._plain = _Plain(first, self._at, scalar)
         return scalar
 
@@ -960,7 +969,13 @@ class Parser:
         entries: dict[str, Entry] = {}
         empty, before = True, None
         while not self._closed("{", begin):
-            empty, announced = False, self._indicator("?")
+            empty = False
+            match = _SIMPLE_PAIR.match(self._text, self._at, self._end)
+            if match is not None and (simple := self._simple_entry(match, entries)) is not None:
+                before = _Plain(match.start(2), match.end(2), simple)
+                self._at = match.end()
+                continue
+            announced = self._indicator("?")
             if announced:
                 self._at += 1
                 self._gap()
