@@ -194,7 +194,9 @@ class Expander:
         module = self._module(model)
         count = None if model.count is None else scope.constants.integer(model.count, "'count'", 1)
         if module is UNKNOWN or count is UNKNOWN or "count" in model.unknown:
-            self._check(model, scope)
+            for formula in model.set.values():
+                scope.constants.value(formula, dict.fromkeys(COUNTED, UNKNOWN))
+            bindings_of(model, scope, self.findings)
             return {name: UNKNOWN}
         if len(way) > DEEPEST:
             span = key_span(scope.section, "instances", name)
@@ -234,12 +236,6 @@ class Expander:
                 lambda: suggest(name, known, "modules") or "there are no modules; add it under 'modules'",
             )
         return UNKNOWN if found is None else found
-
-    def _check(self, model: InstanceModel, scope: Scope) -> None:
-        """What can be said of an instance whose module or count is not known."""
-        for formula in model.set.values():
-            scope.constants.value(formula, dict.fromkeys(COUNTED, UNKNOWN))
-        bindings_of(model, scope, self.findings)
 
     def _check_keys(self, model: InstanceModel, module: Module) -> None:
         """What ``set`` and ``inputs`` name must be the module's."""

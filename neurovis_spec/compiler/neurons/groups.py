@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple, TypeAlias, cast
+from typing import Literal, NamedTuple, TypeAlias, TypeVar, cast
 
 import numpy as np
 
@@ -36,6 +36,7 @@ from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 from neurovis_spec.language.values import Choice, FormulaList, Initial
 from neurovis_spec.language.yaml.source import Packed, Scalar, Sequence
 
+T = TypeVar("T")
 _SETTING = formula_at(GroupModel, "model", "NAME", "SETTING")
 
 
@@ -243,18 +244,6 @@ class Builder:
             return UNKNOWN
         return tuple(seen)
 
-    def _choices(
-        self, model: GroupModel
-    ) -> tuple[tuple[Activation, Defaults] | Unknown, tuple[Model, Defaults] | Unknown]:
-        """The definitions that a group names."""
-        known, findings = self.definitions, self.constants.findings
-        activation = model.activation or _default("identity", model)
-        neuron = model.model or _default("static", model)
-        return (
-            choose(activation, known.activations, "activation", findings),
-            choose(neuron, known.models, "model", findings),
-        )
-
     def _kind(self, name: str, model: GroupModel, n: int | Unknown) -> Kind:
         """What the neurons are; identity and static in the place of what is invalid."""
         if n is UNKNOWN or not (_fixed(model.activation) and _fixed(model.model)):
@@ -265,30 +254,25 @@ class Builder:
         return self.kinds[key]
 
     def _made(self, model: GroupModel, n: int | Unknown) -> Kind:
-        activation, neuron = self._choices(model)
-        activity: dict[str, FloatArray] | Unknown = UNKNOWN
-        settings: dict[str, FloatArray] | Unknown = UNKNOWN
-        parts: list[Part] = []
-        if activation is not UNKNOWN:
-            with self.constants.following() as found:
-                activity = parameters(model.activation or _default("identity", model), activation[1], n, self.constants)
-            parts += (part._replace(field="activation") for part in found)
-        elif model.activation is not None:
-            check_settings(model.activation, self.constants, _SETTING.sees)
-        if neuron is UNKNOWN and model.model is not None:
-            check_settings(model.model, self.constants, _SETTING.sees)
-        if neuron is not UNKNOWN:
-            choice = model.model or _default("static", model)
-            with self.constants.following() as found:
-                settings = parameters(choice, neuron[1], n, self.constants)
-            parts += (part._replace(field="model") for part in found)
-            if settings is not UNKNOWN:
-                check_initials(neuron[0].state, settings, choice, self.constants)
-        if activation is UNKNOWN or activity is UNKNOWN:
-            activation, activity = self.definitions.activations.known()["identity"], {}
-        if neuron is UNKNOWN or settings is UNKNOWN:
-            neuron, settings = self.definitions.models.known()["static"], {}
-        return Kind(activation[0], activity, neuron[0], settings, tuple(parts))
+        choices = model.activation or _default("identity", model), model.model or _default("static", model)
+        activation, activity, first = self._chosen(choices[0], "activation", self.definitions.activations, n)
+        neuron, settings, second = self._chosen(choices[1], "model", self.definitions.models, n)
+        check_initials(neuron.state, settings, choices[1], self.constants)
+        return Kind(activation, activity, neuron, settings, (*first, *second))
+
+    def _chosen(
+        self, choice: Choice, what: Literal["activation", "model"], known: Names[tuple[T, Defaults]], n: int | Unknown
+    ) -> tuple[T, dict[str, FloatArray], list[Part]]:
+        """The definition that a group names, the values of its parameters, and what of these follows parameters."""
+        found = choose(choice, known, what, self.constants.findings)
+        if found is UNKNOWN:
+            check_settings(choice, self.constants, _SETTING.sees)
+        else:
+            with self.constants.following() as parts:
+                values = parameters(choice, found[1], n, self.constants)
+            if values is not UNKNOWN:
+                return found[0], values, [part._replace(field=what) for part in parts]
+        return known.known()["identity" if what == "activation" else "static"][0], {}, []
 
     def _drawn(
         self, formulas: Formula | FormulaList, n: int | Unknown, purpose: str, name: str, state: str | None = None
