@@ -102,8 +102,7 @@ class QosModel(Model):
         None, description="Whether who comes late gets the last messages (default volatile)."
     )
     depth: FormulaField | None = Field(
-        None, description="How many messages wait to be sent (default those of two seconds, 10 at least).
-    )
+        None, description="How many messages wait to be sent (default those of two seconds, 10 at least)."
     )
 
 
