@@ -69,6 +69,7 @@ class Request:
 def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | None:
     """The network of a spec; None where it is invalid (the findings say why)."""
     before = findings.errors
+    name = known(spec.name.value, "")
     seed = request.seed if request.seed is not None else 0 if spec.seed is None else spec.seed.value
     constants = Constants(names_of(spec, "parameters", {}), 1.0, findings)
     _step_length(spec, constants)
@@ -113,7 +114,7 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
     ordered = canonical(population.neurons, inputs, outputs, blocks, plasticity)
     content = digest(
         "neurovis 1",
-        spec.name.value,
+        name,
         constants.dt,
         episode,
         seed,
@@ -127,8 +128,8 @@ def compile_spec(spec: Spec, request: Request, findings: Findings) -> Network | 
     )
     slots = tuple(constants.slots)
     network = Network(
-        name=spec.name.value,
-        title=", ".join(text.value for text in spec.title or ()) or spec.name.value,
+        name=name,
+        title=", ".join(text.value for text in spec.title or ()) or name,
         description="\n".join(text.value for text in spec.description or ()),
         dt=constants.dt,
         dt_given=spec.time is not None and spec.time.dt is not None,

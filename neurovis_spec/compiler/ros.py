@@ -25,7 +25,7 @@ from neurovis_spec.compiler.ros_settings import (
 )
 from neurovis_spec.compiler.values.constants import Constants
 from neurovis_spec.diagnostics import Findings, shorten, suggest
-from neurovis_spec.language.located import Located
+from neurovis_spec.language.located import Formula
 from neurovis_spec.language.model import names_of
 from neurovis_spec.language.ros import PublishModel, QosModel, RosModel, SubscribeModel
 from neurovis_spec.language.ros_types import Field, all_types, fields_of, misspelt, numbers_of, plain
@@ -64,7 +64,7 @@ def ros_settings(model: RosModel, around: Surroundings, constants: Constants) ->
         subscribe=tuple(_subscriptions(model, around, constants)),
         publish=tuple(_publications(model, around, constants)),
     )
-    _check_topics(model, settings, around.spec.name.value, constants.findings)
+    _check_topics(model, settings, known(around.spec.name.value, ""), constants.findings)
     return settings
 
 
@@ -107,7 +107,7 @@ def _quality(
     )
 
 
-def _above_zero(formula: Located[int | float | str], what: str, constants: Constants) -> float | None:
+def _above_zero(formula: Formula, what: str, constants: Constants) -> float | None:
     value = known(constants.scalar(formula), None)
     if value is not None and not value > 0:
         constants.findings.error("out-of-range", formula.span, f"{what} and above 0, this is {value:g}")

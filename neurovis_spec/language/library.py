@@ -31,7 +31,8 @@ from neurovis_spec.language.located import (
     give_up,
     refuse,
 )
-from neurovis_spec.language.model import Model, Named, StandIns
+from neurovis_spec.language.model import Model, Named
+from neurovis_spec.language.unknown import Unknown
 from neurovis_spec.language.values import ParameterField
 from neurovis_spec.language.yaml.source import Mapping, Node, Scalar
 
@@ -64,8 +65,6 @@ class StateModel(Model):
 class ActivationModel(Model):
     """An activation function of one's own."""
 
-    STAND_INS: ClassVar[StandIns] = {"value": 0}
-
     parameters: Annotated[Named[ParameterField], LOCAL] = Field(default_factory=dict, description="Names and defaults.")
     let: Annotated[Named[Annotated[FormulaField, IN_ACTIVATION]], LOCAL] = Field(
         default_factory=dict, description="Intermediate values, in order."
@@ -78,8 +77,6 @@ class ActivationModel(Model):
 
 class ModelModel(Model):
     """A neuron model of one's own: how the activity follows from the drive."""
-
-    STAND_INS: ClassVar[StandIns] = {"activity": 0}
 
     parameters: Annotated[Named[ParameterField], LOCAL] = Field(default_factory=dict, description="Names and defaults.")
     let: Annotated[Named[Annotated[FormulaField, IN_MODEL]], LOCAL] = Field(
@@ -114,8 +111,6 @@ class WeightModel(Model):
 class RuleModel(Model):
     """A plasticity rule of one's own."""
 
-    STAND_INS: ClassVar[StandIns] = {"weight": {"each_step": 0}}
-
     parameters: Annotated[Named[ParameterField], LOCAL] = Field(default_factory=dict, description="Names and defaults.")
     signals: Annotated[TextsField, LOCAL] = Field(
         default=(), description="Names of signals that the connection must supply."
@@ -137,9 +132,7 @@ class RuleModel(Model):
 class Library(Model):
     """A file of definitions, as the built-in ones ship."""
 
-    STAND_INS: ClassVar[StandIns] = {"neurovis": LANGUAGE_VERSION}
-
-    neurovis: Annotated[Located[int], Leaf(version_field, VERSION)] = Field(
+    neurovis: Annotated[Located[int | Unknown], Leaf(version_field, VERSION, True)] = Field(
         description="The version of the language: 1."
     )
     title: TextsField | None = Field(None, description="A title.")

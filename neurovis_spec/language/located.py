@@ -22,6 +22,7 @@ from neurovis_spec.diagnostics import Findings, Span, meant, nearest, shorten, s
 from neurovis_spec.language import grammar
 from neurovis_spec.language.expressions.lexer import decimal_hint
 from neurovis_spec.language.grammar import FORMULA, REFERENCE, TEXT, TEXTS, Either, ListOf, Plain, Shape
+from neurovis_spec.language.unknown import UNKNOWN, Unknown
 from neurovis_spec.language.yaml.scalars import INTEGER_HIGH, INTEGER_LOW
 from neurovis_spec.language.yaml.source import Node, Packed, Scalar, Sequence, describe
 
@@ -44,10 +45,15 @@ class Leaf(Generic[N]):
 
     check: Callable[[N, ValidationInfo], object]
     shape: Shape
+    #: whether the value may be UNKNOWN, where it has to be there
+    may_be_unknown: bool = False
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
         """The check alone: pydantic need not know the classes of our values."""
-        return core_schema.with_info_plain_validator_function(self.check)
+        return core_schema.with_info_plain_validator_function(self._checked)
+
+    def _checked(self, node: N | Located[Unknown], info: ValidationInfo) -> object:
+        return node if isinstance(node, Located) else self.check(node, info)
 
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
@@ -68,8 +74,13 @@ class Located(NamedTuple, Generic[T]):
         return self.node.span
 
 
+def unknown_at(span: Span) -> Located[Unknown]:
+    """What stands in the place of a value that is missing or invalid, which is reported."""
+    return Located(UNKNOWN, Scalar(None, span))
+
+
 #: A number or an expression, as written.
-Formula: TypeAlias = Located[int | float | str]
+Formula: TypeAlias = Located[int | float | str | Unknown]
 
 
 def findings_of(info: ValidationInfo) -> Findings:
@@ -167,6 +178,7 @@ def as_number(node: Node, info: ValidationInfo) -> Located[float]:
         text = node.value if isinstance(node, Scalar) else None
         refuse(info, node, "a number", decimal_hint(text) if isinstance(text, str) else None)
     formula = as_formula(node, info)
+    assert formula.value is not UNKNOWN
     return Located(float(formula.value), formula.node)
 
 
@@ -239,4 +251,4 @@ BoolField = Annotated[Located[bool], Leaf(as_bool, Plain({"type": "boolean"}))]
 IntegerField = Annotated[
     Located[int], Leaf(as_integer, Plain({"type": "integer", "minimum": INTEGER_LOW, "maximum": INTEGER_HIGH}))
 ]
-FormulaField = Annotated[Formula, Leaf(as_formula, FORMULA)]
+FormulaField = Annotated[Formula, Leaf(as_formula, FORMULA, True)]

@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Iterator
 from collections.abc import Mapping as AnyMapping
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Annotated, ClassVar, TypeAlias, TypeVar
+from typing import Annotated, ClassVar, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -35,19 +35,25 @@ from neurovis_spec.language.exclusions import Rules, check_rules, contradictory,
 from neurovis_spec.language.expressions.given import RESERVED
 from neurovis_spec.language.grammar import Needs, NotWith, OneOf
 from neurovis_spec.language.keys import Keys, Words, read_keys
-from neurovis_spec.language.located import IDENTIFIER, NAME_RULE, Leaf, bad_name, findings_of, give_up, refuse
+from neurovis_spec.language.located import (
+    IDENTIFIER,
+    NAME_RULE,
+    Leaf,
+    Located,
+    bad_name,
+    findings_of,
+    give_up,
+    refuse,
+    unknown_at,
+)
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
-from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Scalar, ScalarValue, Sequence
+from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Scalar, Sequence
 
 V = TypeVar("V")
 
 
 def _as_it_is(value: Node, info: ValidationInfo) -> Node:
     return value
-
-
-#: What required keys are taken for where they are missing or invalid, to go on looking: scalars, or mappings of these.
-StandIns: TypeAlias = dict[str, ScalarValue | dict[str, ScalarValue]]
 
 
 class Model(BaseModel):
@@ -57,7 +63,6 @@ class Model(BaseModel):
 
     #: what a mapping of this kind is called in a finding, for keys that are written elsewhere
     PLACE: ClassVar[str] = ""
-    STAND_INS: ClassVar[StandIns] = {}
     #: keys of which there has to be one
     ONE_OF: ClassVar[OneOf | None] = None
     #: what is said of a key without a value
@@ -70,6 +75,10 @@ class Model(BaseModel):
     @model_validator(mode="wrap")
     @classmethod
     def _read(cls, data: object, handler: Callable[[object], Model], info: ValidationInfo) -> Model:
+        if isinstance(data, Located):  # all of it is unknown
+            result = handler({"$": Mapping((), data.span), **dict.fromkeys(cls._fields(), data)})
+            result._meant = frozenset(cls._fields())
+            return result
         if not isinstance(data, Mapping):
             assert not isinstance(data, (str, int, float, dict))
             hint = "write {} where there is nothing to say" if isinstance(data, Scalar) and data.value is None else None
@@ -90,9 +99,7 @@ class Model(BaseModel):
                 for key in map(str, faulty):
                     values.pop(key, None)
                     if cls._fields()[key].is_required():
-                        if key not in cls.STAND_INS:
-                            give_up()
-                        values[key] = _standing_in(cls.STAND_INS[key], data.span)
+                        values[key] = cls._unknown(key, data.span)
         give_up()
 
     @classmethod
@@ -155,20 +162,25 @@ class Model(BaseModel):
                     findings.error("no-value", entry.key.span, message, cls.UNSAID)
             else:
                 result[entry.name] = entry.value
-        hopeless = False
         told = findings.is_invalid(opening(data))
         for name, field in fields.items():
             if field.is_required() and name not in result:
                 if keys.lack(name) and not told:
                     message = f"the key '{name}' is missing"
                     findings.error("missing-key", opening(data), message, cls._without(name, data), key=name)
-                if name in cls.STAND_INS:
-                    result[name] = _standing_in(cls.STAND_INS[name], opening(data))
-                else:
-                    hopeless = True
-        if hopeless:
-            give_up()
+                result[name] = cls._unknown(name, opening(data))
         return result
+
+    @classmethod
+    def _unknown(cls, name: str, span: Span) -> Located[Unknown]:
+        """A required value that is missing or invalid. Where it may not be UNKNOWN, nothing is known of the whole."""
+        field = cls._fields()[name]
+        inner = field.annotation
+        if any(isinstance(item, Leaf) and item.may_be_unknown for item in field.metadata):
+            return unknown_at(span)
+        if isinstance(inner, type) and issubclass(inner, Model):
+            return unknown_at(span)
+        give_up()
 
     @classmethod
     def _without(cls, name: str, data: Mapping) -> str | None:
@@ -196,12 +208,6 @@ class Model(BaseModel):
         """The keys of which it is not known what they say: invalid ones, and those that an unknown key may be meant
         for."""
         return self._meant | self._left_out.intersection(self._fields())
-
-
-def _standing_in(value: ScalarValue | dict[str, ScalarValue], span: Span) -> Node:
-    if not isinstance(value, dict):
-        return Scalar(value, span)
-    return Mapping(tuple(Entry(Scalar(key, span), Scalar(inner, span)) for key, inner in value.items()), span)
 
 
 def _home(name: str) -> str | None:

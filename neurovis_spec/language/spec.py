@@ -13,11 +13,12 @@ from pydantic import Field
 from neurovis_spec.language.drawing import LayoutModel, RenderModel
 from neurovis_spec.language.grammar import declaring
 from neurovis_spec.language.library import LANGUAGE_VERSION, VERSION, Library, version_field
-from neurovis_spec.language.located import IdentifierField, IntegerField, Leaf, Located, TextsField
-from neurovis_spec.language.model import Named, NamedParameters, StandIns
+from neurovis_spec.language.located import NAME, IntegerField, Leaf, Located, TextsField, as_identifier
+from neurovis_spec.language.model import Named, NamedParameters
 from neurovis_spec.language.modules import INCLUDED, InstanceModel, ModuleModel
 from neurovis_spec.language.ros import RosModel
 from neurovis_spec.language.sections import ConnectionsField, EventsField, GroupModel, InputModel, Time
+from neurovis_spec.language.unknown import Unknown
 from neurovis_spec.language.values import ParameterField, ReferenceField
 from neurovis_spec.language.yaml.source import Mapping
 
@@ -26,9 +27,10 @@ class Spec(Library):
     """A whole spec."""
 
     PLACE: ClassVar[str] = "the top level"
-    STAND_INS: ClassVar[StandIns] = {"neurovis": LANGUAGE_VERSION, "name": "unnamed"}
 
-    name: IdentifierField = Field(description="The name of the network, an identifier.")
+    name: Annotated[Located[str | Unknown], Leaf(as_identifier, NAME, True)] = Field(
+        description="The name of the network, an identifier."
+    )
     authors: TextsField | None = Field(None, description="Who wrote it.")
     license: TextsField | None = Field(None, description="Under which licence.")
     references: TextsField | None = Field(None, description="What it goes back to.")
@@ -78,7 +80,6 @@ class IncludedModel(Library):
     """A file that a spec includes: modules, definitions and metadata, nothing else."""
 
     PLACE: ClassVar[str] = "an included file"
-    STAND_INS: ClassVar[StandIns] = {}
 
     neurovis: Annotated[Located[int], Leaf(version_field, VERSION)] | None = Field(  # type: ignore[assignment]
         None, description="The version of the language: 1."

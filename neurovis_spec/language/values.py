@@ -47,7 +47,7 @@ from neurovis_spec.language.located import (
     give_up,
     refuse,
 )
-from neurovis_spec.language.model import Model, Short, StandIns, opening
+from neurovis_spec.language.model import Model, Short, opening
 from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Packed, Scalar, Sequence
 
 T = TypeVar("T")
@@ -242,7 +242,6 @@ class ParameterModel(Model):
     """A named constant: its value, and the bounds within which it may be set."""
 
     PLACE: ClassVar[str] = "a parameter"
-    STAND_INS: ClassVar[StandIns] = {"value": 0}
 
     value: FormulaField = Field(description="The value.")
     minimum: FormulaField | None = Field(None, alias="min", description="The least value that it may be given.")
@@ -253,11 +252,6 @@ class ParameterModel(Model):
     def about(self) -> str:
         """What it is, as the author says."""
         return "" if self.description is None else self.description.value
-
-    @property
-    def failed(self) -> bool:
-        """Whether something of it is invalid, which is reported; of a value that is, 0 stands in."""
-        return not self.sound
 
 
 ParameterField = Annotated[ParameterModel, Short("value", "a number or an expression")]

@@ -96,7 +96,7 @@ def _indices(found: Sequence[IntArray]) -> IntArray:
 
 def _formula(formula: Formula, constants: Constants) -> ParameterFormula:
     """A formula of an event over the parameters, whatever these are by then."""
-    tree = constants.tree(formula) if isinstance(formula.value, str) else Number(float(formula.value))
+    tree = constants.tree(formula)
     return constants.bound(Number(0.0) if tree is UNKNOWN else tree)
 
 

@@ -127,7 +127,7 @@ def _listed(
     result: list[float] = []
     before = constants.findings.errors
     for position, item in enumerate(formulas.items):
-        if not isinstance(item.value, str):
+        if isinstance(item.value, (int, float)):
             result.append(float(item.value))
             continue
         randomness = None if stream is None else Randomness(stream, position)

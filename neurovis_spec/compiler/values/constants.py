@@ -74,6 +74,8 @@ def parse_formula(
 
     ``later`` are names that are declared behind the formula.
     """
+    if formula.value is UNKNOWN:
+        return UNKNOWN
     if not isinstance(formula.value, str):
         return Number(float(formula.value))
     try:
@@ -251,7 +253,7 @@ class Constants:
         """The value of a formula, finite or not: a float, or an array where ``extra`` or the draws hold arrays.
         ``places`` is where it is to stand, for who collects what follows parameters."""
         if not isinstance(formula.value, str):
-            return float(formula.value)
+            return UNKNOWN if formula.value is UNKNOWN else float(formula.value)
         tree = self.tree(formula, extra or (), randomness is not None)
         if tree is UNKNOWN:
             return UNKNOWN

@@ -146,7 +146,7 @@ class _Checker:
         )
         return Default(
             name,
-            UNKNOWN if parameter.failed else value,
+            value,
             None if low is UNKNOWN else low,
             None if high is UNKNOWN else high,
         )

@@ -44,7 +44,7 @@ def _parameter(
         message = f"a parameter may not be called '{name}': the language gives this name a meaning of its own"
         hint = f"'{name}' is {meaning(name)}; take another name, such as '{name}_0'"
         findings.error("reserved-name", span, message, hint)
-    invalid = constants.names.declared.get(name) is UNKNOWN or parameter.failed  # or what is set is invalid
+    invalid = constants.names.declared.get(name) is UNKNOWN  # what is set
     tree = constants.tree(parameter.value, what="parameters before this one, and constants", later=later)
     constants.uses[name] = frozenset() if tree is UNKNOWN or name in given else names(tree)
     value = UNKNOWN if tree is UNKNOWN else constants.scalar(parameter.value)
