@@ -17,7 +17,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from neurovis_spec.language.data.table import EMPTY_CELL, CellError, quoted
+from neurovis_spec.language.data.table import EMPTY_CELL, CellError, in_cell, in_row, quoted
 
 #: what is said of a file that begins with a comment
 NO_COMMENT: Final = "row 1 is no comment: all rows of a .csv are read"
@@ -61,7 +61,7 @@ def plain_text(data: bytes) -> bytes:
             text.decode("utf-8")
         except UnicodeDecodeError as error:
             row = text.count(b"\n", 0, error.start) + 1
-            raise CellError("invalid-utf8", f"row {row} is not UTF-8", "save the file as UTF-8", (row, 0)) from None
+            raise in_row(row, "is not UTF-8", "save the file as UTF-8", "invalid-utf8") from None
     return text
 
 
@@ -77,9 +77,8 @@ def _check_lengths(text: bytes) -> None:
         end = _SEPARATOR.search(text, start + half, high)
         if (min(len(text), high) if end is None else end.start()) - begin > LONGEST_CELL:
             row, line = text.count(b"\n", 0, begin) + 1, text.rfind(b"\n", 0, begin) + 1
-            at = row, text.count(b",", line, begin) + 1
-            message = f"row {at[0]}, column {at[1]}: no number or name has more than {LONGEST_CELL:,} bytes"
-            raise CellError("file-format", message, at=at)
+            column = text.count(b",", line, begin) + 1
+            raise in_cell(row, column, f"no number or name has more than {LONGEST_CELL:,} bytes")
 
 
 def rows_of(text: bytes, number: int = 1) -> Iterator[Row]:
@@ -90,8 +89,7 @@ def rows_of(text: bytes, number: int = 1) -> Iterator[Row]:
         for cells in reader:
             yield Row(number - 1 + reader.line_num, cells or [""])
     except csv.Error as error:
-        row = number - 1 + reader.line_num
-        raise CellError("file-format", f"row {row} is no CSV: {error}", at=(row, 0)) from error
+        raise in_row(number - 1 + reader.line_num, f"is no CSV: {error}") from error
 
 
 def below(text: bytes, number: int) -> Iterator[tuple[int, bytes]]:
@@ -139,15 +137,14 @@ def number_of(cell: str, row: int, column: int) -> float:
     """A cell's number, NaN for an empty cell. Raises CellError."""
     if not cell:
         return math.nan
-    place, at = f"row {row}, column {column}", (row, column)
     if _NUMBER.fullmatch(cell):
         value = float(cell)
         if math.isfinite(value):
             return value
-        raise CellError("not-finite", f"{place}: {quoted(cell)} is beyond double precision", at=at)
+        raise in_cell(row, column, f"{quoted(cell)} is beyond double precision", code="not-finite")
     if _NOT_FINITE.fullmatch(cell):
-        raise CellError("not-finite", f"{place}: '{cell}' is not finite", EMPTY_CELL, at)
-    raise CellError("file-format", f"{place}: {quoted(cell)} is no number", separated(cell), at)
+        raise in_cell(row, column, f"'{cell}' is not finite", EMPTY_CELL, "not-finite")
+    raise in_cell(row, column, f"{quoted(cell)} is no number", separated(cell))
 
 
 def separated(cell: str) -> str | None:

@@ -54,7 +54,7 @@ def parse_numbers(data: bytes, room: Room | None = None) -> Table:
             if faults.many:
                 break
     except CellError as error:
-        faults.note(len(data), error)  # there is nothing behind it
+        faults.note(error)
     faults.check()
     if not filled:
         hint = next(filter(None, map(separated, header or ())), None)
@@ -89,7 +89,7 @@ def _numbers(
             if len(row.cells) != width and _comment(header):  # the width of all rows is taken from it
                 raise _ragged(row, width, NO_COMMENT)
             if len(row.cells) != width and not faults.many:
-                faults.note(row.number, _ragged(row, width, "rows of a table are equally long"))
+                faults.note(_ragged(row, width, "rows of a table are equally long"))
         cells = list(chain.from_iterable(row.cells for row in even))
         for start in range(0, len(cells), _FEW):
             yield _few_numbers(cells[start : start + _FEW], start, width, even, faults)
@@ -125,7 +125,7 @@ def _few_numbers(cells: list[str], start: int, width: int, rows: list[Row], faul
         try:
             values[place] = number_of(cell.strip(), rows[row].number, column + 1)
         except CellError as error:
-            faults.note(rows[row].number, error)
+            faults.note(error)
             if faults.many:
                 break
     return values

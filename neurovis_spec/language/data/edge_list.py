@@ -27,7 +27,7 @@ from neurovis_spec.language.data.cells import (
     rows_of,
     separated,
 )
-from neurovis_spec.language.data.table import CellError, Faults, Room, quoted
+from neurovis_spec.language.data.table import CellError, Faults, Room, in_cell, in_row, quoted
 
 _COLUMNS: Final = ("from", "to", "weight", "delay")
 _LARGEST_DELAY: Final = 2**31 - 1
@@ -59,7 +59,7 @@ def parse_edges(data: bytes, room: Room | None = None) -> EdgeTable:
     text = plain_text(data)
     cells = 1 + text.count(b",", 0, text.find(b"\n") % (len(text) + 1))
     if cells > _MOST_CELLS:
-        raise CellError("file-format", f"row 1 has {cells:,} cells", _HINT)
+        raise in_row(1, f"has {cells:,} cells", _HINT)
     first = next(rows_of(text))
     reader = _Reader(_columns(first.stripped().cells))
     try:
@@ -67,8 +67,8 @@ def parse_edges(data: bytes, room: Room | None = None) -> EdgeTable:
             reader.take(lines, number)
             if reader.faults.many:
                 break
-    except CellError as error:  # there is nothing behind it
-        reader.faults.note(len(data), error)
+    except CellError as error:
+        reader.faults.note(error)
     return reader.table()
 
 
@@ -83,9 +83,9 @@ def _columns(header: list[str]) -> dict[str, int]:
                 hint = NO_COMMENT
             elif separated(name):
                 hint = f"{separated(name)}; {_HINT}"
-            raise CellError("file-format", f"row 1, column {column}: no column is called {quoted(name)}", hint)
+            raise in_cell(1, column, f"no column is called {quoted(name)}", hint)
         if names.index(name) != column - 1:
-            raise CellError("file-format", f"row 1, column {column}: '{name}' is there twice")
+            raise in_cell(1, column, f"'{name}' is there twice")
     missing = [name for name in _COLUMNS[:2] if name not in names]
     if missing:
         raise CellError("file-format", f"there is no column '{missing[0]}'", _HINT)
@@ -149,14 +149,12 @@ class _Reader:
         """Take one row, or what of it is in order."""
         number, cells = row
         if len(cells) != len(self._places):
-            message = f"row {number} has {counted(len(cells))}, the header {len(self._places)}"
-            self.faults.note(number, CellError("file-format", message))
+            self.faults.note(in_row(number, f"has {counted(len(cells))}, the header {len(self._places)}"))
             return
         ends = [cells[self._places[end]] for end in ("from", "to")]
         for column in sorted(self._places[end] for end in ("from", "to")):
             if not cells[column]:
-                message = f"row {number}, column {column + 1}: the name of a neuron is wanted"
-                self.faults.note(number, CellError("file-format", message))
+                self.faults.note(in_cell(number, column + 1, "the name of a neuron is wanted"))
         weight, delay = (self._number(number, cells, name) for name in ("weight", "delay"))
         if all(ends):
             self._sources.append(self._known.setdefault(ends[0], ends[0]))
@@ -173,9 +171,8 @@ class _Reader:
         try:
             value = number_of(cells[column], row, column + 1)
             if name == "delay" and not math.isnan(value) and not (value.is_integer() and 0 <= value <= _LARGEST_DELAY):
-                message = f"row {row}, column {column + 1}: {quoted(cells[column])} is no delay (0, 1, 2, … steps)"
-                raise CellError("file-format", message)
+                raise in_cell(row, column + 1, f"{quoted(cells[column])} is no delay (0, 1, 2, … steps)")
         except CellError as error:
-            self.faults.note(row, error)
+            self.faults.note(error)
             return math.nan
         return value

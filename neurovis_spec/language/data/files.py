@@ -13,7 +13,7 @@ from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Final
 
 from neurovis_spec.diagnostics import Findings, Span, suggest
-from neurovis_spec.language.data.table import EMPTY_CELL, MOST_FAULTS, CellError, Faults, Room, Table, full
+from neurovis_spec.language.data.table import EMPTY_CELL, MOST_FAULTS, CellError, Faults, Room, Table, full, in_cell
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.yaml.opening import FileFault, read_bytes
 
@@ -119,11 +119,9 @@ def read_table(
     except CellError as error:
         if error.code == "missing-key" and not keyed:
             error = CellError("file-format", str(error), "keep the one that is meant in a file of its own")
-        if inside and suffix == ".csv":
-            _refuse_inside(error, data, span, findings)
-            return None
         place = key.span if key is not None and error.code == "unknown-array" else span
-        _refuse(error, path_text, place, findings, gaps)
+        shown = data if inside and suffix == ".csv" else None
+        _refuse(error, path_text, place, findings, gaps=gaps and not inside, shown=shown)
         return None
 
 
@@ -131,7 +129,7 @@ def _check_full(table: Table) -> None:
     """Refuse empty cells. Raises CellError."""
     faults = Faults()
     for row, column in islice(table.gaps(), MOST_FAULTS):
-        faults.note(row, CellError("cell-empty", f"row {row}, column {column}: a cell is empty", NO_GAP, (row, column)))
+        faults.note(in_cell(row, column, "a cell is empty", NO_GAP, "cell-empty"))
     faults.check()
 
 
@@ -195,25 +193,21 @@ def _refuse_key(key: Located[str], findings: Findings) -> None:
     findings.error("useless-key", key.span, "'key' names an array of an .npz file, and this file is none")
 
 
-def _refuse(error: CellError, path_text: str, span: Span, findings: Findings, gaps: bool = True) -> None:
-    for number, one in enumerate((error, *error.others)):
-        message = f"the file '{_short(path_text)}': {one}"
-        findings.error(one.code, span, message, _hint(one, gaps), key=number)
-
-
-def _hint(error: CellError, gaps: bool) -> str | None:
-    return NO_GAP if error.hint == EMPTY_CELL and not gaps else error.hint
-
-
-def _refuse_inside(error: CellError, data: bytes, span: Span, findings: Findings) -> None:
-    """The same at the cells of a file of text, whose lines are then shown."""
+def _refuse(
+    error: CellError, path_text: str, span: Span, findings: Findings, *, gaps: bool = True, shown: bytes | None = None
+) -> None:
+    """All that is wrong with a file; at the cells of a file of text, where this is ``shown``."""
     from neurovis_spec.language.data.csv_table import cell_at
 
-    for one in (error, *error.others):
-        place = span if one.at is None else cell_at(data, span.file, one.at)
-        findings.error(one.code, place, str(one), _hint(one, False))
-    if len(data) <= _SHOWN:
-        findings.sources[span.file] = data.decode("utf-8-sig", "replace")
+    for number, one in enumerate((error, *error.others)):
+        hint = NO_GAP if one.hint == EMPTY_CELL and not gaps else one.hint
+        if shown is None:
+            findings.error(one.code, span, f"the file '{_short(path_text)}': {one}", hint, key=number)
+        else:
+            place = cell_at(shown, span.file, one.at) if any(one.at) else span
+            findings.error(one.code, place, str(one), hint)
+    if shown is not None and len(shown) <= _SHOWN:
+        findings.sources[span.file] = shown.decode("utf-8-sig", "replace")
 
 
 def _neighbours(path: Path) -> str | None:

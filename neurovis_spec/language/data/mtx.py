@@ -68,6 +68,11 @@ class _Head:
         return (2 if self.sparse else 0) + (self.field != "pattern")
 
 
+def _in_line(line: int, message: str, code: str = "file-format", hint: str | None = None) -> CellError:
+    """What is wrong with a line."""
+    return CellError(code, f"line {line}: {message}", hint, (line, 0))
+
+
 def parse_mtx(data: bytes, room: Room | None = None) -> Table:
     """The matrix; in a pattern every entry is 1. Raises CellError."""
     file = io.BytesIO(data.removeprefix(b"\xef\xbb\xbf"))
@@ -82,7 +87,7 @@ def parse_mtx(data: bytes, room: Room | None = None) -> Table:
     lines, table = _numbers(file.read(), line + 1, head, faults)
     if len(table) != head.entries and not faults:
         there = "there are more" if len(table) > head.entries else f"there are {len(table)}"
-        faults.note(line, CellError("file-format", f"line {line} promises {head.entries} entries, {there}"))
+        faults.note(CellError("file-format", f"line {line} promises {head.entries} entries, {there}", at=(line, 0)))
     i, j, values = _entries(head, lines, table, faults)
     faults.check()
     if head.symmetry != "general":
@@ -104,15 +109,15 @@ def _banner(line: bytes) -> tuple[str, ...]:
         raise CellError("file-format", message, "such as '%%MatrixMarket matrix coordinate real general'")
     for word, known in zip(words[1:], _WORDS, strict=True):
         if word in _REFUSED:
-            raise CellError("file-format", f"line 1: '{word}': {_REFUSED[word]}", "known: " + ", ".join(known))
+            raise _in_line(1, f"'{word}': {_REFUSED[word]}", hint="known: " + ", ".join(known))
         if word not in known:
             close = nearest(word, known, 1)
             hint = f"did you mean '{close[0]}'?" if close else "known: " + ", ".join(known)
-            raise CellError("file-format", f"line 1: {quoted(word)} is not known here", hint)
+            raise _in_line(1, f"{quoted(word)} is not known here", hint=hint)
     _, form, field, symmetry = words[1:]
     needy = form if form == "array" else symmetry
     if field == "pattern" and needy in ("array", "skew-symmetric"):
-        raise CellError("file-format", f"line 1: a pattern has no values, and '{needy}' needs them")
+        raise _in_line(1, f"a pattern has no values, and '{needy}' needs them")
     return tuple(words[2:])
 
 
@@ -122,14 +127,14 @@ def _sizes(words: tuple[str, ...], text: bytes, line: int) -> _Head:
     sizes = text.split()
     if len(sizes) != 2 + sparse or not all(size.isdigit() for size in sizes):
         wanted = "rows, columns and entries" if sparse else "rows and columns"
-        raise CellError("file-format", f"line {line}: the numbers of {wanted} are wanted")
+        raise _in_line(line, f"the numbers of {wanted} are wanted")
     if max(len(size) for size in sizes) > _LONGEST_SIZE:
-        raise CellError("too-large", f"line {line}: {quoted(max(sizes, key=len).decode())} is more than any matrix has")
+        raise _in_line(line, f"{quoted(max(sizes, key=len).decode())} is more than any matrix has", "too-large")
     rows, columns = int(sizes[0]), int(sizes[1])
     if not rows or not columns:
-        raise CellError("file-format", f"line {line}: a matrix has one row and one column at least")
+        raise _in_line(line, "a matrix has one row and one column at least")
     if symmetry != "general" and rows != columns:
-        raise CellError("file-format", f"line {line}: {rows} × {columns} cannot be {symmetry}")
+        raise _in_line(line, f"{rows} × {columns} cannot be {symmetry}")
     check_cells(rows * columns, hint=SPARSER)
     lower = {"general": rows * columns, "symmetric": rows * (rows + 1) // 2, "skew-symmetric": rows * (rows - 1) // 2}
     entries = int(sizes[2]) if sparse else lower[symmetry]
@@ -177,11 +182,11 @@ def _one_by_one(
     for at, line in enumerate(lines, number):
         words = line.split()
         if len(line) > _LONGEST_LINE:
-            faults.note(at, CellError("file-format", f"line {at} is longer than {_LONGEST_LINE} bytes"))
+            faults.note(CellError("file-format", f"line {at} is longer than {_LONGEST_LINE} bytes", at=(at, 0)))
         elif len(words) == width and all(map(_NUMBER.fullmatch, words)):
             found[at] = [*map(float, words)]
         elif words and not words[0].startswith(b"%"):
-            faults.note(at, _bad_line(words, at, width))
+            faults.note(_bad_line(words, at, width))
         if faults.many:
             break
     return np.array([*found], dtype=np.int32), np.array([*found.values()], dtype=np.float64).reshape(-1, width)
@@ -193,10 +198,10 @@ def _bad_line(words: list[bytes], number: int, width: int) -> CellError:
         if not _NUMBER.fullmatch(word):
             shown = quoted(word.decode("utf-8", "replace"))
             if _NOT_FINITE.fullmatch(word):
-                return CellError("not-finite", f"line {number}: {shown} is not finite")
-            return CellError("file-format", f"line {number}: {shown} is no number")
+                return _in_line(number, f"{shown} is not finite", "not-finite")
+            return _in_line(number, f"{shown} is no number")
     wanted = "1 number is" if width == 1 else f"{width} numbers are"
-    return CellError("file-format", f"line {number}: {wanted} wanted, not {len(words)}")
+    return _in_line(number, f"{wanted} wanted, not {len(words)}")
 
 
 def _entries(
@@ -217,8 +222,7 @@ def _entries(
             outside = ~((given >= 1) & (given <= size) & (given == np.rint(given)))
             wrong += [(entry, f"there is no {what} {given[entry]:g}, only 1 to {size}") for entry in _few(outside)]
     for entry, message in wrong:
-        code = "not-finite" if message is _BEYOND else "file-format"
-        faults.note(lines[entry], CellError(code, f"line {lines[entry]}: {message}"))
+        faults.note(_in_line(int(lines[entry]), message, "not-finite" if message is _BEYOND else "file-format"))
     if not head.sparse:
         faults.check()  # what is missing moves all that is behind it
         return (*_dense_places(head), values)
@@ -253,13 +257,11 @@ def _check_once(
     i, j = cells
     if head.symmetry == "skew-symmetric":
         for entry in _few(i == j):
-            message = f"line {lines[entry]}: the diagonal of a skew-symmetric matrix is not given"
-            faults.note(lines[entry], CellError("file-format", message))
+            faults.note(_in_line(int(lines[entry]), "the diagonal of a skew-symmetric matrix is not given"))
     low, high = (np.minimum(i, j), np.maximum(i, j)) if head.symmetry != "general" else (i, j)
     twice = repeated(low, high, head.columns)
     if twice is not None:
         first, second = twice
         cell = f"row {i[second] + 1}, column {j[second] + 1}"
         by = "" if (i[first], j[first]) == (i[second], j[second]) else " by way of the symmetry"
-        message = f"line {lines[second]}: {cell} is given on line {lines[first]} already{by}"
-        faults.note(lines[second], CellError("file-format", message))
+        faults.note(_in_line(int(lines[second]), f"{cell} is given on line {lines[first]} already{by}"))

@@ -30,9 +30,9 @@ EMPTY_CELL: Final = "an empty cell means that there is none"
 
 class CellError(ValueError):
     """What is wrong with a file: a finding's code, a sentence that names the place, and perhaps a hint; of a file of
-    text also ``at``, the row and the column of the cell, from 1 (a column of 0: the whole row)."""
+    text also ``at``, the row or line and the column of the cell, from 1 (a column of 0: the whole row)."""
 
-    def __init__(self, code: str, message: str, hint: str | None = None, at: tuple[int, int] | None = None) -> None:
+    def __init__(self, code: str, message: str, hint: str | None = None, at: tuple[int, int] = (0, 0)) -> None:
         super().__init__(message)
         self.code = code
         self.hint = hint
@@ -41,11 +41,21 @@ class CellError(ValueError):
         self.others: tuple[CellError, ...] = ()
 
 
+def in_cell(row: int, column: int, message: str, hint: str | None = None, code: str = "file-format") -> CellError:
+    """What is wrong with a cell."""
+    return CellError(code, f"row {row}, column {column}: {message}", hint, (row, column))
+
+
+def in_row(row: int, message: str, hint: str | None = None, code: str = "file-format") -> CellError:
+    """What is wrong with a row as a whole; the message goes on behind its number."""
+    return CellError(code, f"row {row} {message}", hint, (row, 0))
+
+
 class Faults:
     """What is wrong with a file, as long as reading can go on; with MOST_FAULTS it does not."""
 
     def __init__(self) -> None:
-        self._found: list[tuple[int, CellError]] = []
+        self._found: list[CellError] = []
 
     def __bool__(self) -> bool:
         return bool(self._found)
@@ -55,13 +65,13 @@ class Faults:
         """Whether these are enough for one file."""
         return len(self._found) >= MOST_FAULTS
 
-    def note(self, row: int, error: CellError) -> None:
+    def note(self, error: CellError) -> None:
         """Report what is wrong in a row or a line."""
-        self._found.append((row, error))
+        self._found.append(error)
 
     def first(self) -> CellError | None:
         """The first in the file, which holds the others; None where nothing is wrong."""
-        found = [error for _, error in sorted(self._found, key=lambda one: one[0])][:MOST_FAULTS]
+        found = sorted(self._found, key=lambda error: error.at[0])[:MOST_FAULTS]
         if not found:
             return None
         found[0].others = (*found[1:],)
