@@ -12,10 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from data_attempts import HERE, attempt, fault, npy, table
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from neurovis_spec.diagnostics import Diagnostic, Findings
+from neurovis_spec.language.data.cells import number_of, numbers_of
 from neurovis_spec.language.data.csv_table import parse_numbers
 from neurovis_spec.language.data.edge_list import EdgeTable, parse_edges
 from neurovis_spec.language.data.files import read_edges, read_table
@@ -90,6 +91,20 @@ def test_csv_numbers_read_back_exactly(rows: list[list[float]]) -> None:
     text = "\n".join(",".join(map(repr, row)) for row in rows)
     np.testing.assert_array_equal(parse_numbers(text.encode()).values, rows)
     np.testing.assert_array_equal(parse_numbers(b'a,b,"c"\n' + text.encode()).values, rows)
+
+
+@given(st.lists(st.text("12+-.eE \t", max_size=4), min_size=1, max_size=4))
+@example(["1", "2e"])
+@example([" ", "1"])
+@example(["1", "-"])
+def test_numbers_of_many_cells_are_those_of_each(cells: list[str]) -> None:
+    many = numbers_of(",".join(cells).encode())
+    try:
+        each = [number_of(cell.strip(), 1, 1) for cell in cells]
+    except CellError:
+        assert many is None
+    else:
+        np.testing.assert_array_equal(many, each)
 
 
 @pytest.mark.parametrize(
