@@ -77,112 +77,36 @@ class StreamingFormat(Format, Protocol):
 
 
 class NpzFormat:
-    """NumPy's archive of arrays (§12)."""
+    """NumPy's archive of the arrays of a recording, and ``about``. No pickles are read, and no more memory is taken
+    than the file's size warrants."""
 
     name = "npz"
     suffixes = frozenset({".npz"})
-
-    def save(self, recording: Recording, path: Path) -> None:
-        """Write the arrays of §12, and ``about``."""
-        write_npz(recording, path)
-
-    def stream(self, path: Path, frame: Recording, steps: Steps) -> AbstractContextManager[RowWriter]:
-        """Write the same while the network runs."""
-        return stream_npz(path, frame, steps)
-
-    def size(self, frame: Recording, steps: Steps) -> int:
-        """Bytes of the disk."""
-        return npz_size(frame, steps)
-
-    def held(self, file: FileIO) -> int | None:
-        """The last step that a part holds."""
-        return held_npz(file)
-
-    def recover(self, part: Path) -> Recording:
-        """Read a part."""
-        return recover_npz(part)
-
-    def finish(self, file: FileIO, part: Path, path: Path) -> None:
-        """Make a recording of a part."""
-        finish_npz(file, part, path)
-
-    def load(self, path: Path) -> Recording:
-        """Read the arrays; no pickles, and no more memory than the file's size warrants."""
-        return read_npz(path)
+    save, load = staticmethod(write_npz), staticmethod(read_npz)
+    stream, size = staticmethod(stream_npz), staticmethod(npz_size)
+    held, recover, finish = staticmethod(held_npz), staticmethod(recover_npz), staticmethod(finish_npz)
 
 
 class CsvFormat:
-    """A row a step: ``step``, ``t``, the neurons, then the changing weights by name."""
+    """A row a step: ``step``, ``t``, the neurons, then the changing weights by name. What stays is not in it: a
+    recording that is read knows the changing connections alone."""
 
     name = "csv"
     suffixes = frozenset({".csv"})
-
-    def save(self, recording: Recording, path: Path) -> None:
-        """Write the table row by row."""
-        write_csv(recording, path)
-
-    def stream(self, path: Path, frame: Recording, steps: Steps) -> AbstractContextManager[RowWriter]:
-        """Write the same while the network runs."""
-        return stream_csv(path, frame, steps)
-
-    def size(self, frame: Recording, steps: Steps) -> int:
-        """About the bytes of the disk."""
-        return csv_size(frame, steps)
-
-    def held(self, file: FileIO) -> int | None:
-        """The last step that a part holds."""
-        return held_csv(file)
-
-    def recover(self, part: Path) -> Recording:
-        """Read a part."""
-        return recover_csv(part)
-
-    def finish(self, file: FileIO, part: Path, path: Path) -> None:
-        """Make a recording of a part."""
-        finish_csv(file, part, path)
-
-    def load(self, path: Path) -> Recording:
-        """Read the table: what stays is not in it, so the recording knows the changing connections alone."""
-        return read_csv(path)
+    save, load = staticmethod(write_csv), staticmethod(read_csv)
+    stream, size = staticmethod(stream_csv), staticmethod(csv_size)
+    held, recover, finish = staticmethod(held_csv), staticmethod(recover_csv), staticmethod(finish_csv)
 
 
 class McapFormat:
-    """Messages as a node of ROS 2 would send them, for the tools of robots."""
+    """Messages as a node of ROS 2 would send them, for the tools of robots, with index and footer. A file that breaks
+    off is read as far as it is whole; one that holds several runs, run by run."""
 
     name = "mcap"
     suffixes = frozenset({".mcap"})
-
-    def save(self, recording: Recording, path: Path) -> None:
-        """Write messages, index and footer."""
-        write_mcap(recording, path)
-
-    def stream(self, path: Path, frame: Recording, steps: Steps) -> AbstractContextManager[RowWriter]:
-        """Write the same while the network runs."""
-        return stream_mcap(path, frame, steps)
-
-    def size(self, frame: Recording, steps: Steps) -> int:
-        """About the bytes of the disk."""
-        return mcap_size(frame, steps)
-
-    def held(self, file: FileIO) -> int | None:
-        """The last step that a part holds."""
-        return held_mcap(file)
-
-    def recover(self, part: Path) -> Recording:
-        """Read a part."""
-        return recover_mcap(part)
-
-    def finish(self, file: FileIO, part: Path, path: Path) -> None:
-        """Make a recording of a part."""
-        finish_mcap(file, part, path)
-
-    def load(self, path: Path) -> Recording:
-        """Read the messages, of a file that breaks off as far as it is whole."""
-        return read_mcap(path)
-
-    def load_run(self, path: Path, run: int | None) -> Recording:
-        """Read those of one run."""
-        return read_mcap(path, run)
+    save, load, load_run = staticmethod(write_mcap), staticmethod(read_mcap), staticmethod(read_mcap)
+    stream, size = staticmethod(stream_mcap), staticmethod(mcap_size)
+    held, recover, finish = staticmethod(held_mcap), staticmethod(recover_mcap), staticmethod(finish_mcap)
 
 
 def load(path: str | os.PathLike[str], run: int | None = None) -> Recording:
