@@ -19,7 +19,7 @@ from neurovis_spec.language import places, schema, shape
 from neurovis_spec.language.grammar import ENDS, NOISE, Needs, NotWith, declaring
 from neurovis_spec.language.located import Formula, FormulaField, Located
 from neurovis_spec.language.model import Named
-from neurovis_spec.language.places import formula_at, role_of
+from neurovis_spec.language.places import formula_at, formulas_of, role_of
 from neurovis_spec.language.sections import GroupModel
 from neurovis_spec.language.spec import Spec
 from neurovis_spec.language.unknown import Names
@@ -110,6 +110,23 @@ def test_its_formulas_see_what_it_says() -> None:
         formula: Formula = Located(text, Scalar(text, read_text(HEAD, "x", findings).root.span))  # type: ignore[union-attr]
         Constants(Names(), 1.0, findings).tree(formula, role.sees, role.draws)
     assert [(item.code, item.message) for item in findings.sorted()] == [("unknown-name", "unknown name 'j'")]
+
+
+def test_its_formulas_are_found_by_what_they_see() -> None:
+    written = "count: 2, mood: i*k, bias: [i, 1], label: 'K{i}', activation: {gaussian: {mean: n}}"
+    text = f"{HEAD}neurons:\n  K: {{{written}}}\n"
+    findings = Findings()
+    document = read_text(text, "x", findings)
+    assert document is not None
+    spec = shape.read_spec(document, findings)
+    assert spec is not None
+    group = spec.neurons["K"]
+    assert [(one.path, one.text) for one in formulas_of(group, ("i",))] == [
+        (("mood",), "i*k"),
+        (("bias",), "i"),
+        (("activation", "gaussian", "mean"), "n"),
+    ]
+    assert [one.text for one in formulas_of(group, ("k",))] == ["i*k"]
 
 
 def test_the_language_server_offers_and_explains_it() -> None:

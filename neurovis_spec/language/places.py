@@ -6,7 +6,7 @@ In: a path of keys and indices. Out: Keys, Roles and words, read from the fields
 from __future__ import annotations
 
 import types
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from functools import lru_cache
 from typing import Annotated, Final, NamedTuple, TypeAlias, Union, get_args, get_origin
 
@@ -17,6 +17,7 @@ from neurovis_spec.language.located import Leaf
 from neurovis_spec.language.model import Model, Short
 from neurovis_spec.language.modules import INCLUDED
 from neurovis_spec.language.spec import IncludedModel, Spec
+from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence
 
 #: Keys and indices from the root.
 Path: TypeAlias = tuple[str | int, ...]
@@ -95,6 +96,35 @@ def formula_at(model: type[Model], *path: str | int) -> Role:
     role = role_at(model, *path)
     assert role is not None
     return role
+
+
+class Written(NamedTuple):
+    """A formula as it is written: its text, and the keys that lead to it from a model; indices are left out."""
+
+    text: str
+    node: Scalar
+    path: tuple[str, ...]
+
+
+def formulas_of(model: Model, seen: Collection[str]) -> Iterator[Written]:
+    """The formulas of a model that are texts and see any of some names."""
+    yield from _formulas(model.source, (_Place(type(model)),), frozenset(seen), ())
+
+
+def _formulas(node: Node, places: tuple[_Place, ...], seen: frozenset[str], path: tuple[str, ...]) -> Iterator[Written]:
+    match node:
+        case Scalar(value=str() as text):
+            role = _role(places)
+            if role is not None and role.use in ("formula", "setting value") and not seen.isdisjoint(role.sees):
+                yield Written(text, node, path)
+        case Mapping(entries=entries):
+            for entry in entries:
+                yield from _formulas(entry.value, _below(places, entry.name), seen, (*path, entry.name))
+        case Packed(texts=texts) if all(text.isidentifier() and text not in seen for text in texts):
+            return  # of many numbers and names none is asked
+        case Sequence() | Packed():
+            for index, item in enumerate(node.items):
+                yield from _formulas(item, _below(places, index), seen, path)
 
 
 def _role(places: tuple[_Place, ...]) -> Role | None:

@@ -15,14 +15,11 @@ from neurovis_spec.diagnostics import Findings, shorten
 from neurovis_spec.language.expressions.parser import parse, unknown_names
 from neurovis_spec.language.expressions.tree import Name, names
 from neurovis_spec.language.located import Located
+from neurovis_spec.language.places import Written, formulas_of
 from neurovis_spec.language.references import Arrow
 from neurovis_spec.language.references import parse as parse_reference
 from neurovis_spec.language.sections import ConnectionModel, GroupModel
-from neurovis_spec.language.values import EdgeRows
-from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence
-
-#: the keys of a group whose expressions know ``i`` and ``n``
-_OF_A_GROUP = ("bias", "initial", "noise", "position")
+from neurovis_spec.language.yaml.source import Scalar
 
 
 def check_lone_indices(compiled: Compiled, findings: Findings) -> None:
@@ -43,46 +40,26 @@ def check_lone_indices(compiled: Compiled, findings: Findings) -> None:
 def _instances(section: Section, findings: Findings) -> None:
     for name, model in section.instances.items():
         if model.count is None:
-            for formula in model.set.values():
-                for place, index in _found(formula.node, COUNTED):
-                    hint = "'i' and 'n' count the instances of an entry; give it a 'count'"
-                    _warn(place, index, f"'{name}' is one instance", hint, findings)
+            for place, index in _found(formulas_of(model, COUNTED), COUNTED):
+                hint = "'i' and 'n' count the instances of an entry; give it a 'count'"
+                _warn(place, index, f"'{name}' is one instance", hint, findings)
 
 
 def _group(name: str, group: GroupModel, findings: Findings) -> None:
-    nodes = [group.source.get(key) for key in _OF_A_GROUP]
-    states = group.source.get("initial")
-    nodes += [entry.value for entry in states.entries] if isinstance(states, Mapping) else []
-    for choice in (group.activation, group.model):
-        nodes += [] if choice is None else [entry.value for entry in choice.settings]
-    for place, index in _found_in(nodes, COUNTED):
+    for place, index in _found(formulas_of(group, COUNTED), COUNTED):
         hint = "'i' and 'n' count the neurons of a group; give it a 'count'"
         _warn(place, index, f"'{name}' is one neuron", hint, findings)
 
 
 def _connection(body: ConnectionModel, alone: dict[str, str], signals: Collection[str], findings: Findings) -> None:
-    """``i`` and ``j`` in an entry; ``alone`` has those that stand for one neuron, with what that is called."""
-    for place, index in _found_in(_nodes(body, signals), alone):
+    """``i`` and ``j`` in an entry; ``alone`` has those that stand for one neuron, with what that is called. A rule's
+    signals are names."""
+    formulas = (one for one in formulas_of(body, alone) if one.path[0] != "plasticity" or one.path[-1] not in signals)
+    for place, index in _found(formulas, alone):
         hint = "'i' counts the sources and 'j' the targets, both from 0"
         if len(alone) == 1:
             hint += f"; did you mean '{'j' if index.name == 'i' else 'i'}'?"
         _warn(place, index, f"'{shorten(alone[index.name])}' is one neuron", hint, findings)
-
-
-def _nodes(body: ConnectionModel, signals: Collection[str]) -> Iterator[Node | None]:
-    """What of the body of a connection knows ``i`` and ``j``; a rule's signals are names."""
-    for key in ("weight", "matrix", "centre"):
-        yield body.source.get(key)
-    if body.plasticity is not None:
-        yield from (entry.value for entry in body.plasticity.settings if entry.name not in signals)
-    if isinstance(body.edges, EdgeRows) and _mentions(body.edges.node):
-        for row in body.edges.node.items:  # the first two cells are names
-            yield from row.items[2:] if isinstance(row, (Sequence, Packed)) else ()
-
-
-def _mentions(node: Sequence | Packed) -> bool:
-    """Whether there may be an index among the cells: of many, only the different texts are checked."""
-    return not isinstance(node, Packed) or any(not text.isidentifier() or text in ("i", "j") for text in node.texts)
 
 
 def _alone(key: Located[str], compiled: Compiled, place: int) -> dict[str, str]:
@@ -105,22 +82,12 @@ def _is_one(name: str, compiled: Compiled, place: int) -> bool:
     return len(inside) == 1 and not counted and _is_one(rest, compiled, inside[0])
 
 
-def _found_in(nodes: Iterable[Node | None], wanted: Collection[str]) -> Iterator[tuple[Scalar, Name]]:
-    for node in nodes:
-        yield from _found(node, wanted)
-
-
-def _found(node: Node | None, wanted: Collection[str]) -> Iterator[tuple[Scalar, Name]]:
-    """The places of some names in the expressions of a node; a mapping is a file, which holds none."""
-    match node:
-        case Scalar(value=str() as text):
-            tree = parse(text, random=True)
-            for name in unknown_names(tree, names(tree).difference(wanted)):
-                yield node, name
-        case Packed(texts=()):
-            return
-        case Sequence() | Packed():
-            yield from _found_in(node.items, wanted)
+def _found(formulas: Iterable[Written], wanted: Collection[str]) -> Iterator[tuple[Scalar, Name]]:
+    """The places of some names in formulas."""
+    for formula in formulas:
+        tree = parse(formula.text, random=True)
+        for name in unknown_names(tree, names(tree).difference(wanted)):
+            yield formula.node, name
 
 
 def _warn(place: Scalar, index: Name, one: str, hint: str, findings: Findings) -> None:
