@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import math
 import os
+import re
 import unicodedata
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from hypothesis import strategies as st
 from neurovis_spec.diagnostics import Diagnostic, Findings
 from neurovis_spec.findings import show_text
 from neurovis_spec.language.yaml.characters import Lines
-from neurovis_spec.language.yaml.reader import read_file, read_text
+from neurovis_spec.language.yaml.reader import read_any, read_file, read_text
 from neurovis_spec.language.yaml.scalars import NumberRangeError, resolve
 from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, ScalarValue, Sequence, SourceDocument
 
@@ -600,6 +601,7 @@ TEXTS = [
     for folder in ("specs", "tests/errors", "neurovis_spec")
     for path in sorted((ROOT / folder).rglob("*.yaml"))
 ]
+SOUND = [path.read_text(encoding="utf-8") for path in sorted((ROOT / "specs").glob("*.yaml"))]
 MIXED = [
     SPEC,
     *(text for text, *_ in SYNTAX),
@@ -619,6 +621,27 @@ def test_all_our_specs_say_the_same_to_another_parser() -> None:
             assert ours(document.root, text) == theirs(nodes[0])
             compared += 1
     assert compared > 300
+
+
+def scalars(node: Node) -> list[Scalar]:
+    """The keys and values of a tree, in the order of the text."""
+    match node:
+        case Scalar():
+            return [node]
+        case Mapping(entries=entries):
+            return [scalar for entry in entries for part in entry for scalar in scalars(part)]
+    return [scalar for item in node.items for scalar in scalars(item)]
+
+
+@pytest.mark.parametrize("text", [SPEC, *SOUND])
+def test_nothing_but_blanks_comments_and_punctuation_lies_between_values(text: str) -> None:
+    tree = read_any(text, "x")
+    lines = Lines(text)
+    between, at = "", 0
+    for scalar in () if tree is None else scalars(tree):
+        between += text[at : lines.starts[scalar.span.line - 1] + scalar.span.column - 1]
+        at = lines.starts[scalar.span.end_line - 1] + scalar.span.end_column - 1
+    assert re.fullmatch(r"([\s:,\[\]{}?]|-(?=\s)|---|#.*)*", between), between
 
 
 @fuzz

@@ -9,10 +9,13 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Sequence as Many
+from typing import Final
 
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.yaml.source import NULL, NUMBER, TEXT, Node, Packed, Scalar, ScalarValue, Sequence
 
+#: Longer lists are packed.
+PACK_FROM: Final = 64
 _EXACT = 2**53  # beyond it a float skips integers
 _NAN = float("nan")
 
