@@ -12,7 +12,7 @@ from typing import Final
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language.yaml import faults
 from neurovis_spec.language.yaml.packed import PACK_FROM, Packer, balance
-from neurovis_spec.language.yaml.refusals import DEEPEST, ComposingStoppedError
+from neurovis_spec.language.yaml.refusals import DEEPEST, ReadingStoppedError
 from neurovis_spec.language.yaml.scalars import NumberRangeError, resolve
 from neurovis_spec.language.yaml.scanner import (
     FIRST,
@@ -295,7 +295,7 @@ class Brackets(Scanner):
             if self._trial:
                 raise UnsoundError(faults.NOWHERE, self._at)
             self._refuse.too_deep(self._span(self._at + 1))
-            raise ComposingStoppedError
+            raise ReadingStoppedError
 
 
 def _is_number(scalar: Scalar) -> bool:

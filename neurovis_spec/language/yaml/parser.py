@@ -20,7 +20,7 @@ from neurovis_spec.language.yaml import faults
 from neurovis_spec.language.yaml.brackets import Brackets
 from neurovis_spec.language.yaml.faults import Words
 from neurovis_spec.language.yaml.packed import PACK_FROM, Packer
-from neurovis_spec.language.yaml.refusals import ComposingStoppedError
+from neurovis_spec.language.yaml.refusals import ReadingStoppedError
 from neurovis_spec.language.yaml.scanner import BLANKS, FIRST, LONGEST_KEY, REST, SIMPLE, UnsoundError
 from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Scalar, Sequence
 
@@ -85,7 +85,7 @@ class Parser(Brackets):
         root: Node | None = None
         try:
             root = self._document()
-        except ComposingStoppedError:
+        except ReadingStoppedError:
             self._whole = False
         self._refuse.report(findings)
         for span in self._lost:

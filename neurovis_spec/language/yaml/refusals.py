@@ -20,7 +20,7 @@ _MOST_FINDINGS: Final = 1000
 _USE_NAMES = "a constant used in several places belongs in `parameters`, a part used in several places in `modules`"
 
 
-class ComposingStoppedError(Exception):
+class ReadingStoppedError(Exception):
     """A refusal after which it makes no sense to go on; the finding is reported already."""
 
 
@@ -38,7 +38,7 @@ class Refusals:
     def _error(self, code: str, span: Span, message: str, hint: str | None = None) -> None:
         self.found.append(Diagnostic(code, message, span, "error", hint))
         if len(self.found) >= _MOST_FINDINGS:
-            raise ComposingStoppedError
+            raise ReadingStoppedError
 
     def syntax(self, words: Words, span: Span) -> None:
         """Report a syntax error."""
