@@ -80,7 +80,7 @@ class _Editor:
         for name, value in tree.items():
             entry = node.entry(name)
             if entry is not None:
-                yield from self._replaced(entry.key, entry.value, value, column)
+                yield from self._replaced(entry.value, value, column)
         new = {name: value for name, value in tree.items() if node.entry(name) is None}
         if new:
             apart = "\n" if column == 0 and self._has_blank_lines(node) else ""
@@ -97,7 +97,7 @@ class _Editor:
         end = self._text.index("\n", at) + 1
         return _Edit(end, end, lines)
 
-    def _replaced(self, key: Scalar, node: Node, value: _Tree | Value, column: int) -> Iterator[_Edit]:
+    def _replaced(self, node: Node, value: _Tree | Value, column: int) -> Iterator[_Edit]:
         """A value in place of that of a key which stands in a column of a block."""
         begin, end = self._source.begin(node), self._source.end(node)
         if not isinstance(value, dict):
