@@ -146,9 +146,9 @@ def foresee(spec: Spec, network: Network, findings: Findings) -> None:
     """What the layout will surely not be as it is meant."""
     if spec.layout is None or spec.layout.engine is None or not network.instances:
         return
-    from neurovis_spec.layout.framing import check_engine
+    from neurovis_spec.layout.foreseen import foresee_frames
 
-    check_engine(spec.layout.engine, network, findings)
+    foresee_frames(spec.layout.engine, network, findings)
 
 
 def refusal(

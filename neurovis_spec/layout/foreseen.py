@@ -1,7 +1,7 @@
-"""Foreseen: what laying out a network would refuse, found without an engine at work.
+"""Foreseen: what laying out a network would refuse, or not draw as it is meant, found without an engine at work.
 
-In: a network, what makes its LayoutProblem. Out: the LayoutRefusalError that ``arrange`` would raise before
-the engine begins. What an engine finds out while it draws is not foreseen.
+In: a network, what makes its LayoutProblem. Out: the LayoutRefusalError that ``arrange`` would raise before the engine
+begins; a warning where instances will not be drawn alike. What an engine finds out while it draws is not foreseen.
 """
 
 from __future__ import annotations
@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.layout.engines import engine_of
+from neurovis_spec.diagnostics import Findings
+from neurovis_spec.language.located import Located
+from neurovis_spec.layout.engines import engine_of, engines_that, they_can
 from neurovis_spec.layout.model import LayoutProblem, LayoutRefusalError
 from neurovis_spec.layout.refusals import asked_of, refuse
 from neurovis_spec.plugins import PluginError
@@ -31,3 +33,19 @@ def foreseen(network: Network, problem: Callable[[], LayoutProblem], *, memory: 
     except PluginError:  # told of when it is called
         return None
     return None
+
+
+def foresee_frames(engine: Located[str], network: Network, findings: Findings) -> None:
+    """Report a warning (``engine-without-frames``) where instances will not be drawn alike. An engine that draws what
+    is pinned alone has no choice, and one that cannot be loaded is told of when it is called."""
+    name = engine.value
+    if not network.instances or name == "auto":
+        return
+    try:
+        can = engine_of(name).capabilities
+    except (LayoutRefusalError, PluginError):
+        return
+    if can.free and not can.modules:
+        message = f"the engine '{name}' draws no frames: instances of a module are not drawn alike"
+        hint = they_can(engines_that(lambda other: other.modules))
+        findings.warning("engine-without-frames", engine.span, message, hint)
