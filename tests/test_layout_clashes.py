@@ -21,7 +21,8 @@ layout: LAYOUT
 """
 EACH_OTHER = "the frames of 'left' and 'right' lie on each other"
 IN_LEFT = "'D' stands in the frame of 'left', which is not drawn therefore"
-IN_BOX = "'C1' stands in the frame of 'q', which is not drawn therefore"
+#: C1 stands in the box, and the frame of the right leg may reach into it, too: one of the two is told.
+IN_BOX = "'q'"
 CASES = [
     ("{positions: {left: [0, 0], right: [2, 0]}}", "", ""),
     ("{positions: {left: [0, 0], right: [1, 0]}}", EACH_OTHER, "[0, 0]"),
