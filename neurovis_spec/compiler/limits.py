@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-#: Findings in one list of values, after which the rest of the list is not looked at.
+#: Findings in one list of values, after which the rest of the list is not checked.
 PATIENCE = 20
 #: The most instances of modules, and how deep they may be nested.
 MOST_INSTANCES, DEEPEST = 100_000, 64

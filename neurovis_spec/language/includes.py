@@ -66,7 +66,7 @@ class _Reader:
     def follow(self, paths: tuple[Located[str], ...], file: str, folder: Path, way: tuple[Path, ...]) -> None:
         """Read these paths, named in ``file``; ``way`` are the files that led here."""
         for path in paths:
-            # what is wrong within a file that could be read is that file's gaps; nothing more is unknown because of it
+            # what is wrong within a file that could be read is UNKNOWN in that file; nothing more is, because of it
             done = self._one(path, file, folder, way)  # which follows paths of its own
             self.complete &= done
 

@@ -2,7 +2,7 @@
 
 In: nodes of a SourceDocument. Out: Located values (text, number, truth value, formula), or a finding at the node. The
 checks are pydantic validators: they report into the Findings that the caller passes as ``context``, and then give up
-on that value with the error ``reported``, so that all other values are still looked at.
+on that value with the error ``reported``, so that all other values are still checked.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ N = TypeVar("N", bound=Node)
 #: The error by which a validator says that the finding is already noted.
 REPORTED = "reported"
 
-#: Findings of one list, after which the rest of it is not looked at.
+#: Findings of one list, after which the rest of it is not checked.
 _PATIENCE = 20
 
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,63}")

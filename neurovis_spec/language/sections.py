@@ -304,7 +304,7 @@ class EventModel(Model):
     )
 
 
-#: Findings of one list, after which the rest of it is not looked at.
+#: Findings of one list, after which the rest of it is not checked.
 _PATIENCE = 20
 
 

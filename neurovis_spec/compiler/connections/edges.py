@@ -134,7 +134,7 @@ class EdgeReader:
         return None if values is UNKNOWN else np.where(cells.kinds[which] == NULL, 1.0, values)
 
     def _delays(self, cells: Cells, which: IntArray) -> IntArray | None:
-        """The delays in these cells: few distinct ones, each looked at once."""
+        """The delays in these cells: few distinct ones, each evaluated once."""
         found: dict[tuple[int, float], int | None] = {}
         result = np.zeros(len(which), dtype=np.int64)
         for place, cell in enumerate(which.tolist()):

@@ -1,7 +1,7 @@
 """Entries: one entry of ``connections``, from its ends and its body to arrays.
 
 In: the neurons of both ends, where these are known, and the body. Out: a Bundle, or None: of an entry that is invalid
-every part is still looked at, whatever is wrong with the others.
+every part is still checked, whatever is wrong with the others.
 """
 
 from __future__ import annotations

@@ -166,7 +166,7 @@ def parameters(
     """The value of every parameter of a definition for n neurons, or for ``each`` of n connections; UNKNOWN where one
     is.
 
-    ``settled`` are its settings, where the caller has looked at them for more than the parameters.
+    ``settled`` are its settings, where the caller has read them for more than the parameters.
     """
     findings = constants.findings
     if settled is None:
