@@ -108,7 +108,7 @@ def test_its_formulas_see_what_it_says() -> None:
     findings = Findings()
     for text in ("normal(0, i*k)", "j"):
         formula: Formula = Located(text, Scalar(text, read_text(HEAD, "x", findings).root.span))  # type: ignore[union-attr]
-        Constants(Names(), 1.0, findings).tree(formula, role.sees, role.draws)
+        Constants(Names(), 1.0, findings).tree(formula, role)
     assert [(item.code, item.message) for item in findings.sorted()] == [("unknown-name", "unknown name 'j'")]
 
 

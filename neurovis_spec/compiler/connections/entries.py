@@ -284,7 +284,7 @@ class EntryBuilder:
             "n_from": float(len(self.sources)),
             "n_to": float(len(self.targets)),
         }
-        tree = self.constants.tree(formula, _WEIGHT.sees, _WEIGHT.draws)
+        tree = self.constants.tree(formula, _WEIGHT)
         if tree is UNKNOWN:
             return None
         if "distance" in names(tree):

@@ -33,7 +33,8 @@ from neurovis_spec.language.places import formula_at
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 
 #: What ``set`` knows beside the parameters: the number of the instance, from 0, and how many its entry makes.
-COUNTED = formula_at(InstanceModel, "set", "PARAMETER").sees
+_SETTING = formula_at(InstanceModel, "set", "PARAMETER")
+COUNTED = _SETTING.sees
 
 
 @dataclass(frozen=True)
@@ -269,7 +270,7 @@ class Expander:
                 constants.names.declared[name] = UNKNOWN
                 continue
             given[name] = float(value)
-            tree = scope.constants.tree(formula, COUNTED) if isinstance(formula.value, str) else UNKNOWN
+            tree = scope.constants.tree(formula, _SETTING) if isinstance(formula.value, str) else UNKNOWN
             settings[name] = frozenset() if tree is UNKNOWN else names(tree)
             if tree is not UNKNOWN and not names(tree).isdisjoint(outer.settable):
                 following[name] = outer.bound(tree, extra)

@@ -78,7 +78,7 @@ def _by_size(name: str, model: InputModel, start: int, section: Section, constan
 
 
 def _expression(formula: Formula, constants: Constants) -> Tree | Unknown:
-    tree = constants.tree(formula, formula_at(InputModel, "expression").sees)
+    tree = constants.tree(formula, formula_at(InputModel, "expression"))
     if tree is not UNKNOWN and is_constant(tree, (*ALWAYS, *constants.parameters)):
         constants.value(formula)
     return tree

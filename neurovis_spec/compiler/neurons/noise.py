@@ -48,7 +48,7 @@ def make_noises(population: Population, inputs: int) -> tuple[Noise, ...]:
 
 def noise_of(formula: Formula, constants: Constants) -> Tree | Unknown:
     """The expression of a noise, which draws something."""
-    tree = constants.tree(formula, _NOISE.sees, _NOISE.draws)
+    tree = constants.tree(formula, _NOISE)
     if tree is UNKNOWN or draws(tree):
         return tree
     message = "this noise draws nothing: it is the same at each run"

@@ -90,5 +90,5 @@ def depend_on_positions(node: FileReference | Sequence | Packed | None, constant
     for cell in () if cells is None else np.flatnonzero(cells.kinds == TEXT).tolist():
         assert cells is not None
         formula = formula_of(cells.node(cell), quiet.findings)
-        tree = UNKNOWN if formula is None else quiet.tree(formula, _POSITION.sees)
+        tree = UNKNOWN if formula is None else quiet.tree(formula, _POSITION)
         constants.depend(() if tree is UNKNOWN else names(tree))

@@ -25,6 +25,7 @@ from neurovis_spec.language.expressions.functions import CONSTANTS, FUNCTIONS
 from neurovis_spec.language.expressions.given import GIVEN, meaning
 from neurovis_spec.language.expressions.parser import DRAWS, ExpressionError, parse, unknown_names
 from neurovis_spec.language.expressions.tree import Draw, Number, Tree, draws, names
+from neurovis_spec.language.grammar import PLAIN, Role
 from neurovis_spec.language.located import Formula
 from neurovis_spec.language.unknown import UNKNOWN, Names, Unknown
 
@@ -224,23 +225,17 @@ class Constants:
         return ParameterFormula(tree, places, known, draw)
 
     def tree(
-        self,
-        formula: Formula,
-        extra: Iterable[str] = (),
-        random: bool = False,
-        what: str = "known here",
-        later: Collection[str] = (),
+        self, formula: Formula, role: Role = PLAIN, what: str = "known here", later: Collection[str] = ()
     ) -> Tree | Unknown:
-        """The tree of a formula over the parameters and ``extra``, for a caller that evaluates it; else findings.
+        """The tree of a formula over the parameters and what it sees, for a caller that evaluates it; else findings.
         ``later`` are parameters that it does not see."""
-        extra = tuple(extra)
-        known = Scope((extra, self.names, ALWAYS))
-        tree = parse_formula(formula, known, self.findings, random=random, what=what, later=later)
+        known = Scope((role.sees, self.names, ALWAYS))
+        tree = parse_formula(formula, known, self.findings, random=role.draws, what=what, later=later)
         if tree is UNKNOWN:
             return UNKNOWN
         used = names(tree)
         self.read |= used
-        return UNKNOWN if any(self.names[name] is UNKNOWN for name in used.difference(extra, ALWAYS)) else tree
+        return UNKNOWN if any(self.names[name] is UNKNOWN for name in used.difference(role.sees, ALWAYS)) else tree
 
     def unchecked(
         self,
@@ -254,7 +249,7 @@ class Constants:
         ``places`` is where it is to stand, for who collects what follows parameters."""
         if not isinstance(formula.value, str):
             return UNKNOWN if formula.value is UNKNOWN else float(formula.value)
-        tree = self.tree(formula, extra or (), randomness is not None)
+        tree = self.tree(formula, Role("formula", sees=tuple(extra or ()), draws=randomness is not None))
         if tree is UNKNOWN:
             return UNKNOWN
         if structural:
