@@ -325,7 +325,7 @@ class RenderModel(Model):
     size: Annotated[
         tuple[FormulaField, FormulaField] | None,
         BeforeValidator(lambda node, info: _size(node, info)),
-        WithJsonSchema(TWO.schema),
+        WithJsonSchema(grammar.schema_of(TWO)),
     ] = Field(None, description="[width, height] in pixels: 64 to 16384 each, and 33554432 in all.")
     labels: BoolField | None = Field(None, description="Whether neurons show their labels (default true).")
     legend: BoolField | None = Field(None, description="Whether there is a legend (default true).")

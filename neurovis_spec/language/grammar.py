@@ -8,8 +8,7 @@ compiler ask the field.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final, Literal, TypeAlias
 
@@ -87,21 +86,8 @@ def naming(kind: Kind) -> Role:
     return Role("names", kind)
 
 
-class Shape(ABC):
-    """What may be written at a place."""
-
-    @property
-    @abstractmethod
-    def schema(self) -> JsonSchemaValue:
-        """The same as a JSON Schema."""
-
-    def below(self, part: str | int) -> Iterator[Shape]:
-        """What may be written under a key, or at an index."""
-        return iter(())
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class Plain(Shape):
+class Plain:
     """A scalar. ``role``: what it is for, whatever its field says; ``formula``: it is a number or an expression;
     ``abouts``: what the words mean of which it is one, where that is not plain."""
 
@@ -111,20 +97,12 @@ class Plain(Shape):
     abouts: Mapping[str, str] = field(default_factory=dict)
 
     @property
-    def schema(self) -> JsonSchemaValue:
-        """As written."""
-        return dict(self.written)
-
-    @property
-    def words(self) -> Iterator[str]:
+    def words(self) -> tuple[str, ...]:
         """The words of which it is one."""
-        words = self.written.get("enum")
-        if isinstance(words, list):
-            yield from map(str, words)
-        elif self.written.get("type") == "boolean":
-            yield from ("true", "false")
-        elif "const" in self.written:
-            yield str(self.written["const"])
+        if self.written.get("type") == "boolean":
+            return ("true", "false")
+        words = self.written.get("enum", [self.written["const"]] if "const" in self.written else [])
+        return tuple(map(str, words)) if isinstance(words, list) else ()
 
     def role_in(self, field: Role | None) -> Role | None:
         """Its role in a field: formulas have those of formulas, other texts the others."""
@@ -134,59 +112,27 @@ class Plain(Shape):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Either(Shape):
+class Either:
     """One of several."""
 
     choices: tuple[Shape, ...]
 
-    @property
-    def schema(self) -> JsonSchemaValue:
-        """``anyOf``, of one level."""
-        schemas = [choice.schema for choice in self.choices]
-        return {
-            "anyOf": [
-                one for schema in schemas for one in (schema["anyOf"] if schema.keys() == {"anyOf"} else [schema])
-            ]
-        }
-
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ListOf(Shape):
+class ListOf:
     """A list of things of one shape."""
 
     item: Shape
     least: int = 0
     most: int | None = None
 
-    @property
-    def schema(self) -> JsonSchemaValue:
-        """An array."""
-        bounds = {"minItems": self.least or None, "maxItems": self.most}
-        return {"type": "array", "items": self.item.schema, **{key: n for key, n in bounds.items() if n is not None}}
-
-    def below(self, part: str | int) -> Iterator[Shape]:
-        """The item."""
-        if isinstance(part, int):
-            yield self.item
-
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Row(Shape):
+class Row:
     """A list whose items differ; those from ``least`` on may be left out."""
 
     items: tuple[Shape, ...]
     least: int
-
-    @property
-    def schema(self) -> JsonSchemaValue:
-        """An array with ``prefixItems``."""
-        items = [item.schema for item in self.items]
-        return {"type": "array", "prefixItems": items, "minItems": self.least, "maxItems": len(items)}
-
-    def below(self, part: str | int) -> Iterator[Shape]:
-        """The item at the index."""
-        if isinstance(part, int) and part < len(self.items):
-            yield self.items[part]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -199,7 +145,7 @@ class Key:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Map(Shape):
+class Map:
     """A mapping: of ``known`` keys, and of others, which have a role, to an ``other`` shape. ``one``: it has one key;
     ``nothing``: it may be left empty."""
 
@@ -210,29 +156,46 @@ class Map(Shape):
     least: int = 0
     nothing: bool = False
 
-    @property
-    def schema(self) -> JsonSchemaValue:
-        """An object."""
-        result: JsonSchemaValue = {"type": ["object", "null"] if self.nothing else "object"}
-        if self.known:
-            result["properties"] = {name: key.shape.schema for name, key in self.known.items()}
-        required = [name for name, key in self.known.items() if key.required]
-        if required:
-            result["required"] = required
-        result["additionalProperties"] = False if self.other is None else self.other.schema
-        if self.least or self.one:
-            result["minProperties"] = self.least or 1
-        if self.one:
-            result["maxProperties"] = 1
-        return result
 
-    def below(self, part: str | int) -> Iterator[Shape]:
-        """What stands under the key."""
-        if isinstance(part, str):
-            known = self.known.get(part)
-            below = self.other if known is None else known.shape
-            if below is not None:
-                yield below
+#: What may be written at a place.
+Shape: TypeAlias = Plain | Either | ListOf | Row | Map
+
+
+def schema_of(shape: Shape) -> JsonSchemaValue:
+    """A shape as a JSON Schema."""
+    match shape:
+        case Plain():
+            return dict(shape.written)
+        case Either():
+            schemas = map(schema_of, shape.choices)  # a choice of choices is one choice
+            return {"anyOf": [one for each in schemas for one in (each["anyOf"] if [*each] == ["anyOf"] else [each])]}
+        case ListOf():
+            found = {"type": "array", "items": schema_of(shape.item)}
+            least = {"minItems": shape.least} if shape.least else {}
+            return {**found, **least, **({"maxItems": shape.most} if shape.most else {})}
+        case Row():
+            items = [*map(schema_of, shape.items)]
+            return {"type": "array", "prefixItems": items, "minItems": shape.least, "maxItems": len(items)}
+        case Map():
+            result: JsonSchemaValue = {"type": ["object", "null"] if shape.nothing else "object"}
+            if shape.known:
+                result["properties"] = {name: schema_of(key.shape) for name, key in shape.known.items()}
+                result["required"] = [name for name, key in shape.known.items() if key.required]
+            result["additionalProperties"] = False if shape.other is None else schema_of(shape.other)
+            result["minProperties"] = max(shape.least, int(shape.one))
+            return {**result, "maxProperties": 1} if shape.one else result
+
+
+def below(shape: Shape, part: str | int) -> Shape | None:
+    """What may be written under a key of a mapping, or at an index of a list; None where nothing may."""
+    match shape:
+        case ListOf() if isinstance(part, int):
+            return shape.item
+        case Row() if isinstance(part, int):
+            return shape.items[part] if part < len(shape.items) else None
+        case Map() if isinstance(part, str):
+            return shape.known[part].shape if part in shape.known else shape.other
+    return None
 
 
 #: A number, or the text of an expression.

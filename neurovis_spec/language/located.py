@@ -59,7 +59,7 @@ class Leaf(Generic[N]):
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
         """The JSON Schema of the value as written."""
-        return self.shape.schema
+        return grammar.schema_of(self.shape)
 
 
 class Located(NamedTuple, Generic[T]):

@@ -13,9 +13,9 @@ from pydantic import Field
 from neurovis_spec.language.drawing import ModuleLayoutModel
 from neurovis_spec.language.grammar import GROUP, declaring, naming
 from neurovis_spec.language.located import FormulaField, IdentifierField, TextField
-from neurovis_spec.language.model import Model, Named, NamedParameters
-from neurovis_spec.language.sections import ConnectionsField, GroupModel, InputModel
-from neurovis_spec.language.values import ParameterField
+from neurovis_spec.language.model import Model, Named
+from neurovis_spec.language.sections import ConnectionsField, GroupsField, InputsField
+from neurovis_spec.language.values import ParametersField
 
 #: the sections of an included file
 INCLUDED = ("modules", "activations", "models", "rules")
@@ -40,6 +40,9 @@ class InstanceModel(Model):
     description: TextField | None = Field(None, description="What it is.")
 
 
+InstancesField = Annotated[Named[InstanceModel], declaring("instance")]
+
+
 class ModuleModel(Model):
     """A network that is used several times, with parameters and inputs of its own."""
 
@@ -47,18 +50,17 @@ class ModuleModel(Model):
 
     title: TextField | None = Field(None, description="A title.")
     description: TextField | None = Field(None, description="What this is.")
-    parameters: Annotated[NamedParameters[ParameterField], declaring("parameter")] = Field(
+    parameters: ParametersField = Field(
         default_factory=dict, description="Constants of its own, in order; an instance may set them."
     )
-    inputs: Annotated[Named[InputModel], declaring("input")] = Field(
+    inputs: InputsField = Field(
         default_factory=dict,
         description="Signals from outside the module; those that an instance does not name are inputs of the network.",
     )
-    neurons: Annotated[Named[GroupModel], declaring("neuron")] = Field(
-        default_factory=dict, description="Groups of neurons."
-    )
-    instances: Annotated[Named[InstanceModel], declaring("instance")] = Field(
-        default_factory=dict, description="Uses of other modules."
-    )
+    neurons: GroupsField = Field(default_factory=dict, description="Groups of neurons.")
+    instances: InstancesField = Field(default_factory=dict, description="Uses of other modules.")
     connections: ConnectionsField = Field(default=(), description="FROM -> TO: a weight or a body.")
     layout: ModuleLayoutModel | None = Field(None, description="How every instance is laid out.")
+
+
+ModulesField = Annotated[Named[ModuleModel], declaring("module")]

@@ -12,7 +12,7 @@ from typing import Annotated, Final, NamedTuple, TypeAlias, Union, get_args, get
 
 from pydantic.fields import FieldInfo
 
-from neurovis_spec.language.grammar import Either, Map, Plain, Role, Shape
+from neurovis_spec.language.grammar import Either, Map, Plain, Role, Shape, below
 from neurovis_spec.language.located import Leaf
 from neurovis_spec.language.model import Model, Short
 from neurovis_spec.language.modules import INCLUDED
@@ -149,7 +149,7 @@ def _places(path: Path) -> tuple[_Place, ...]:
 
 
 def _below(places: tuple[_Place, ...], part: str | int) -> tuple[_Place, ...]:
-    return tuple(below for place in places for below in _step(place, part))
+    return tuple(one for place in places for one in _step(place, part))
 
 
 def _open(annotation: object, metadata: tuple[object, ...] = (), role: Role | None = None) -> Iterator[_Place]:
@@ -184,8 +184,8 @@ def _step(place: _Place, part: str | int) -> Iterator[_Place]:
     kind, role = place
     arguments = get_args(kind)
     if isinstance(kind, Shape):
-        for below in kind.below(part):
-            yield from _choices(below, role)
+        under = below(kind, part)
+        yield from () if under is None else _choices(under, role)
     elif isinstance(kind, type) and issubclass(kind, Model):
         field = dict(_fields(kind)).get(str(part))
         if field is not None:

@@ -14,6 +14,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import PydanticCustomError, core_schema
 
 from neurovis_spec.diagnostics import shorten
+from neurovis_spec.language import grammar
 from neurovis_spec.language.grammar import (
     ENDS,
     FORMULAS,
@@ -48,7 +49,7 @@ from neurovis_spec.language.located import (
     refuse,
     words,
 )
-from neurovis_spec.language.model import Filled, Keyed, KeysAreNames, Model, Short
+from neurovis_spec.language.model import Filled, Keyed, KeysAreNames, Model, Named, Short
 from neurovis_spec.language.patterns import PatternField
 from neurovis_spec.language.values import (
     FILE,
@@ -106,6 +107,9 @@ class InputModel(Model):
     description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
 
 
+InputsField = Annotated[Named[InputModel], declaring("input")]
+
+
 def _position(node: Node, info: ValidationInfo) -> FileReference | Sequence | Packed:
     if isinstance(node, Mapping):
         return as_file(node, info)
@@ -161,6 +165,9 @@ class GroupModel(Model):
         None, description="What the picture and the layout take it for: input, hidden or output."
     )
     description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
+
+
+GroupsField = Annotated[Named[GroupModel], declaring("neuron")]
 
 
 def _one_scale(*others: str) -> NotWith:
@@ -234,7 +241,7 @@ class ConnectionModel(Model):
     bounds: Annotated[
         tuple[FormulaField, FormulaField] | None,
         BeforeValidator(lambda node, info: _pair(node, info)),
-        WithJsonSchema(TWO.schema),
+        WithJsonSchema(grammar.schema_of(TWO)),
         Needs(("plasticity",), "'bounds' hold plastic weights; there is no 'plasticity'"),
     ] = Field(None, description="[low, high] for plastic weights.")
     label: TextField | None = Field(None, description="What it is called in pictures and tooltips.")

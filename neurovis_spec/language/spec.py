@@ -14,12 +14,12 @@ from neurovis_spec.language.drawing import LayoutModel, RenderModel
 from neurovis_spec.language.grammar import declaring
 from neurovis_spec.language.library import LANGUAGE_VERSION, VERSION, Library, version_field
 from neurovis_spec.language.located import NAME, IntegerField, Leaf, Located, TextsField, as_identifier
-from neurovis_spec.language.model import Named, NamedParameters
-from neurovis_spec.language.modules import INCLUDED, InstanceModel, ModuleModel
+from neurovis_spec.language.model import Named
+from neurovis_spec.language.modules import INCLUDED, InstancesField, ModulesField
 from neurovis_spec.language.ros import RosModel
-from neurovis_spec.language.sections import ConnectionsField, EventsField, GroupModel, InputModel, Time
+from neurovis_spec.language.sections import ConnectionsField, EventsField, GroupsField, InputsField, Time
 from neurovis_spec.language.unknown import Unknown
-from neurovis_spec.language.values import ParameterField, ReferenceField
+from neurovis_spec.language.values import ParametersField, ReferenceField
 from neurovis_spec.language.yaml.source import Mapping
 
 
@@ -36,24 +36,14 @@ class Spec(Library):
     references: TextsField | None = Field(None, description="What it goes back to.")
     time: Time | None = Field(None, description="The clock: dt, steps, episode.")
     seed: IntegerField | None = Field(None, description="The only source of randomness (default 0).")
-    parameters: Annotated[NamedParameters[ParameterField], declaring("parameter")] = Field(
-        default_factory=dict, description="Named constants, in order."
-    )
+    parameters: ParametersField = Field(default_factory=dict, description="Named constants, in order.")
     include: TextsField = Field(
         default=(), description="Files whose modules, activations, models and rules are used here."
     )
-    modules: Annotated[Named[ModuleModel], declaring("module")] = Field(
-        default_factory=dict, description="Networks to be used several times."
-    )
-    inputs: Annotated[Named[InputModel], declaring("input")] = Field(
-        default_factory=dict, description="Signals from outside the network."
-    )
-    neurons: Annotated[Named[GroupModel], declaring("neuron")] = Field(
-        default_factory=dict, description="Groups of neurons."
-    )
-    instances: Annotated[Named[InstanceModel], declaring("instance")] = Field(
-        default_factory=dict, description="Uses of modules."
-    )
+    modules: ModulesField = Field(default_factory=dict, description="Networks to be used several times.")
+    inputs: InputsField = Field(default_factory=dict, description="Signals from outside the network.")
+    neurons: GroupsField = Field(default_factory=dict, description="Groups of neurons.")
+    instances: InstancesField = Field(default_factory=dict, description="Uses of modules.")
     connections: ConnectionsField = Field(
         default=(), description="FROM -> TO: a weight or a body. Rows are sources, columns are targets."
     )
@@ -88,9 +78,7 @@ class IncludedModel(Library):
     license: TextsField | None = Field(None, description="Under which licence.")
     references: TextsField | None = Field(None, description="What it goes back to.")
     include: TextsField = Field(default=(), description="Files whose modules and definitions are used here.")
-    modules: Annotated[Named[ModuleModel], declaring("module")] = Field(
-        default_factory=dict, description="Networks to be used several times."
-    )
+    modules: ModulesField = Field(default_factory=dict, description="Networks to be used several times.")
 
     @classmethod
     def _foreign(cls, name: str) -> tuple[str, str] | None:

@@ -31,6 +31,7 @@ from neurovis_spec.language.grammar import (
     Plain,
     Role,
     Row,
+    declaring,
 )
 from neurovis_spec.language.keys import read_keys
 from neurovis_spec.language.located import (
@@ -47,7 +48,7 @@ from neurovis_spec.language.located import (
     give_up,
     refuse,
 )
-from neurovis_spec.language.model import Model, Short, opening
+from neurovis_spec.language.model import Model, NamedParameters, Short, opening
 from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Packed, Scalar, Sequence
 
 T = TypeVar("T")
@@ -255,6 +256,7 @@ class ParameterModel(Model):
 
 
 ParameterField = Annotated[ParameterModel, Short("value", "a number or an expression")]
+ParametersField = Annotated[NamedParameters[ParameterField], declaring("parameter")]
 
 
 class Reference(NamedTuple):
