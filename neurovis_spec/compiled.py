@@ -227,21 +227,33 @@ class CompiledNetwork(Drawable):
         )
 
     def layout(
-        self, engine: str | None = None, *, earlier: Layout | None = None, progress: Progress | None = None
+        self,
+        engine: str | None = None,
+        *,
+        effort: str | None = None,
+        earlier: Layout | None = None,
+        progress: Progress | None = None,
     ) -> NetworkLayout:
         """Where everything is. What an ``earlier`` layout knew (default: that of ``layout.file``) stays where it was.
-        Raises LayoutRefusalError where an engine cannot do what is asked; its ``diagnostic`` says where the spec asks
-        for it."""
-        check(engine=engine, earlier=earlier, progress=progress)
-        return NetworkLayout(self, self._arranged(engine, earlier, progress))
+        ``effort`` says how long ``layered`` may look for fewer crossings: quick, normal (the default) or best. Raises
+        LayoutRefusalError where an engine cannot do what is asked; its ``diagnostic`` says where the spec asks for
+        it."""
+        check(engine=engine, effort=effort, earlier=earlier, progress=progress)
+        return NetworkLayout(self, self._arranged(engine, effort, earlier, progress))
 
     def _arranged(
-        self, engine: str | None = None, earlier: Layout | None = None, progress: Progress | None = None
+        self,
+        engine: str | None = None,
+        effort: str | None = None,
+        earlier: Layout | None = None,
+        progress: Progress | None = None,
     ) -> Layout:
-        from neurovis_spec.layout.model import LayoutRefusalError
+        from neurovis_spec.layout.model import LayoutRefusalError, effort_of
 
         try:
-            problem = self.problem if earlier is None else replace(self.problem, memory=earlier)
+            problem = replace(self.problem, effort=effort_of(effort or "normal"))
+            if earlier is not None:
+                problem = replace(problem, memory=earlier)
             return pipeline.arrange(problem, engine or self.network.layout.engine, progress)
         except LayoutRefusalError as refusal:
             span = pipeline.locate(refusal, self.spec, self.request, self.network, engine)
@@ -255,19 +267,20 @@ class CompiledNetwork(Drawable):
         return pipeline.pose(self.network, self.memory)
 
     @cached_property
-    def _layouts(self) -> dict[str | None, NetworkLayout]:
+    def _layouts(self) -> dict[tuple[str | None, str], NetworkLayout]:
         return {}
 
-    def drawn(self, engine: str | None = None) -> NetworkLayout:
+    def drawn(self, engine: str | None = None, effort: str | None = None) -> NetworkLayout:
         """The layout that pictures are drawn in, by this engine or the spec's; computed once. Raises what ``layout``
         raises."""
-        if engine not in self._layouts:
-            self._layouts[engine] = self.layout(engine)
-        return self._layouts[engine]
+        key = engine, effort or "normal"
+        if key not in self._layouts:
+            self._layouts[key] = self.layout(engine, effort=effort)
+        return self._layouts[key]
 
-    def placed(self, engine: str | None = None) -> Layout:
+    def placed(self, engine: str | None = None, effort: str | None = None) -> Layout:
         """The value of ``drawn``."""
-        return self.drawn(engine).value
+        return self.drawn(engine, effort).value
 
     def export(
         self, folder: str | Path, to: str = "c", *, start: Recording | None = None, real: str = "double"

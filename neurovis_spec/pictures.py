@@ -55,7 +55,7 @@ class Drawable:
         """A run of its own."""
         raise NotImplementedError
 
-    def placed(self, engine: str | None = None) -> Layout:
+    def placed(self, engine: str | None = None, effort: str | None = None) -> Layout:
         """The layout that pictures are drawn in."""
         raise NotImplementedError
 
@@ -73,6 +73,7 @@ class Drawable:
         inputs: Mapping[str, npt.ArrayLike] | None = None,
         theme: str | None = None,
         engine: str | None = None,
+        effort: str | None = None,
         view: View | Sequence[View] | None = None,
         window: int | None = None,
         dpi: float | None = None,
@@ -90,7 +91,8 @@ class Drawable:
         run. ``view`` says what is shown, from top to bottom: ``network``, ``matrix``, ``traces``, ``raster``,
         ``weights``, alone or with references (``traces: C1, C2`` or {"traces": ["C1", "C2"]}); by default it is the
         spec's ``figure``. Views over time show the whole recording or run, or ``window`` steps around the one that is
-        drawn. ``dpi`` are the pixels of an inch, 96 of which are a picture's usual size on the screen.
+        drawn. ``effort`` is that of ``layout``. ``dpi`` are the pixels of an inch, 96 of which are a picture's usual
+        size on the screen.
 
         ``collapse`` names groups and instances that are one glyph each in the picture of the network, ``focus``
         neurons that are shown with all they are connected to, ``paths`` (``"A -> B"``) what the shortest paths are
@@ -101,7 +103,7 @@ class Drawable:
         """
         from neurovis_spec.scene.renderers import renderer_for
 
-        check(recording=recording, inputs=inputs, theme=theme, engine=engine, progress=progress)
+        check(recording=recording, inputs=inputs, theme=theme, engine=engine, effort=effort, progress=progress)
         place, wanted = arguments.path("path", path), None if step is None else arguments.integer("step", step)
         renderer_for(suffix := place.suffix, moving=False)
         density = None if dpi is None else _density(dpi)
@@ -109,7 +111,7 @@ class Drawable:
         seen, settings = self._seen(theme, _excerpt(collapse, focus, paths, min_weight, full), panels)
         if window is not None:
             settings = replace(settings, window=arguments.integer("window", window, 1))
-        layout = self._placed(panels, engine)
+        layout = self._placed(panels, engine, effort)
         picture: Callable[[RenderSettings], Scene]
         if panels:
             if recording is not None:
@@ -273,9 +275,9 @@ class Drawable:
         """Whether a picture of these views (default: the spec's ``figure``) needs the layout."""
         return _shows(self._panels(view), "network", "matrix")
 
-    def _placed(self, panels: Sequence[Panel], engine: str | None) -> Layout | None:
+    def _placed(self, panels: Sequence[Panel], engine: str | None, effort: str | None = None) -> Layout | None:
         """The layout, where one of the views needs it."""
-        return self.placed(engine) if _shows(panels, "network", "matrix") else None
+        return self.placed(engine, effort) if _shows(panels, "network", "matrix") else None
 
     def _ran(
         self,
@@ -481,6 +483,10 @@ def check(**given: object) -> None:
             from neurovis_spec.layout import Layout
 
             arguments.instance(name, value, Layout, "a layout")
+        elif name == "effort":
+            from neurovis_spec.layout.model import effort_of
+
+            effort_of(arguments.text(name, value))
         elif name == "progress":
             arguments.function(name, value)
         elif name == "inputs":

@@ -344,6 +344,15 @@ def test_layout_goes_to_standard_output_or_into_a_file(folder: Path) -> None:
     assert "engine: circular" in good("layout", "small.yaml", "--engine", "circular")
 
 
+def test_effort_is_one_of_three(folder: Path) -> None:
+    assert good("layout", "small.yaml", "--effort", "quick") == good("layout", "small.yaml")
+    assert good("render", "small.yaml", "-o", "x.svg", "--effort", "best") == "x.svg\n"
+    result = call("layout", "small.yaml", "--effort", "most")
+    assert (result.exit_code, result.stdout) == (2, "")
+    with pytest.raises(ValueError, match="'effort' is quick, normal or best, not 'most'"):
+        nv.compile(folder / "small.yaml").layout(effort="most")
+
+
 def test_layout_metrics_are_one_object_also_beside_a_file(folder: Path) -> None:
     measured = json.loads(good("layout", "small.yaml", "--metrics", "-o", "x.yaml"))
     assert list(measured) == [

@@ -101,3 +101,12 @@ def test_a_loop_in_a_group_that_names_more_is_drawn_as_if_it_were_in_none() -> N
     pairs = [(0, 1), (1, 2), (2, 0), (2, 3), (3, 4), (4, 5), (5, 6), (0, 6), (6, 7)]
     alone, grouped = problem(8, pairs), problem(8, pairs, tuple(range(8)))
     assert lay_out_problem(alone, "layered") == lay_out_problem(grouped, "layered")
+
+
+def test_more_effort_never_leaves_more_crossings() -> None:
+    random = Random(5)
+    pairs = sorted({(min(a, b), max(a, b)) for a, b in (random.sample(range(24), 2) for _ in range(60))})
+    found = levels(24, pairs)
+    free = frozenset(range(24))
+    quick, normal = (crossings(*ordered(found, free, effort)) for effort in ("quick", "normal"))
+    assert normal < quick

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from neurovis_spec.cli.files import count, earlier_layout, network_of, show_warnings, writing
-from neurovis_spec.cli.options import engine_option, examples, output_option, set_option, spec_argument
+from neurovis_spec.cli.options import effort_option, engine_option, examples, output_option, set_option, spec_argument
 from neurovis_spec.cli.progress import progress
 from neurovis_spec.cli.targets import check_files, check_target
 
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 @spec_argument
 @output_option("Write the layout file here; without it, or for -, to standard output.")
 @engine_option
+@effort_option
 @click.option(
     "--update",
     type=click.Path(path_type=Path, dir_okay=False),
@@ -43,7 +44,13 @@ if TYPE_CHECKING:
 )
 @set_option
 def command(
-    spec: str, output: Path | None, engine: str | None, update: Path | None, metrics: bool, settings: dict[str, float]
+    spec: str,
+    output: Path | None,
+    engine: str | None,
+    effort: str | None,
+    update: Path | None,
+    metrics: bool,
+    settings: dict[str, float],
 ) -> None:
     """Compute and write the layout.
 
@@ -65,7 +72,7 @@ def command(
     earlier = None if update is None else earlier_layout(update)
     begun = perf_counter()
     with progress("laying out") as bar:
-        layout = network.layout(engine, earlier=earlier, progress=bar)
+        layout = network.layout(engine, effort=effort, earlier=earlier, progress=bar)
     seconds = perf_counter() - begun
     show_warnings(layout)
     if output is not None:

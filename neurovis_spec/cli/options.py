@@ -171,6 +171,11 @@ engine_option = click.option(
     shell_complete=one_of(_engines),
     help="Layout engine, such as layered, circular, grid or manual; else the spec's.",
 )
+effort_option = click.option(
+    "--effort",
+    type=click.Choice(("quick", "normal", "best")),
+    help="How long layered may look for fewer crossings; default: normal.",
+)
 theme_option = click.option(
     "--theme",
     metavar="T",

@@ -9,6 +9,7 @@ import click
 
 from neurovis_spec.cli.files import count, network_of, recording_of, show_warnings, tables, writing
 from neurovis_spec.cli.options import (
+    effort_option,
     engine_option,
     examples,
     excerpt_options,
@@ -61,6 +62,7 @@ def _why(network: CompiledNetwork, step: int | None, steps: int) -> str:
 )
 @excerpt_options
 @engine_option
+@effort_option
 @click.option(
     "--dpi",
     type=click.FloatRange(1, 9600),
@@ -80,6 +82,7 @@ def command(
     views: tuple[str, ...],
     window: int | None,
     engine: str | None,
+    effort: str | None,
     dpi: float | None,
     settings: dict[str, float],
     collapse: tuple[str, ...],
@@ -111,6 +114,7 @@ def command(
             inputs=arrays,
             theme=theme,
             engine=engine,
+            effort=effort,
             view=view,
             window=window,
             dpi=dpi,
@@ -122,5 +126,5 @@ def command(
             full=full,
         )
     if network.needs_layout(view):
-        show_warnings(network.drawn(engine))
+        show_warnings(network.drawn(engine, effort))
     click.echo(str(output))

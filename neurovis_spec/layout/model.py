@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal, Protocol, TypeAlias, runtime_checkable
+from typing import Literal, Protocol, TypeAlias, get_args, runtime_checkable
 
 from neurovis_spec.diagnostics import Diagnostic, Span
 from neurovis_spec.progress import Progress
@@ -20,6 +20,9 @@ Point: TypeAlias = tuple[float, float]
 Route: TypeAlias = tuple[Point, ...]
 Direction = Literal["down", "up", "right", "left"]
 Arrangement = Literal["row", "column", "grid", "ring", "arc"]
+#: How long an engine may look for fewer crossings.
+Effort = Literal["quick", "normal", "best"]
+EFFORTS: tuple[Effort, ...] = get_args(Effort)
 #: What a drawing may show best: how signals flow, what is near what in the network, clusters of very many neurons, some
 #: neurons that nearly all drive each other, pins of all neurons, where neurons are as data.
 Suits = Literal["flow", "nearness", "clusters", "tangle", "pins", "positions"]
@@ -124,6 +127,7 @@ class LayoutProblem:
     places: tuple[Point, ...] = ()
     #: an earlier layout of the same network: memory, not pins
     memory: Layout | None = None
+    effort: Effort = "normal"
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,6 +196,14 @@ class ReportingEngine(LayoutEngine, Protocol):
     def lay_out(self, problem: LayoutProblem, progress: Progress | None = None) -> Layout:
         """As LayoutEngine's; ``progress`` is called now and then."""
         ...
+
+
+def effort_of(text: str) -> Effort:
+    """Raises ValueError where there is no such effort."""
+    for effort in EFFORTS:
+        if effort == text:
+            return effort
+    raise ValueError(f"'effort' is quick, normal or best, not {text!r}")
 
 
 class LayoutRefusalError(Exception):

@@ -135,7 +135,8 @@ def _component(
     if pair:
         order, partner = mirrored(problem, levels, pair)
     else:
-        levels, order = ordered(levels, frozenset() if columns or folds.ranks else _free(levels, units, bonds))
+        free = frozenset[int]() if columns or folds.ranks else _free(levels, units, bonds)
+        levels, order = ordered(levels, free, problem.effort)
         straight = straightened(levels, order, columns) if columns else None
         if straight is None:
             columns = frozenset()
@@ -181,7 +182,7 @@ def _ranks(problem: LayoutProblem, units: Sequence[Unit], bonds: Sequence[int], 
     return [ranks[numbers[bond]] for bond in bonds]
 
 
-def _free(levels: Levels, units: Sequence[Unit], bonds: Sequence[int]) -> set[int]:
+def _free(levels: Levels, units: Sequence[Unit], bonds: Sequence[int]) -> frozenset[int]:
     """The nodes that may change their rank: single neurons that share none with others, outside of boxes."""
     count = Counter(bonds)
     alone = {
@@ -189,7 +190,9 @@ def _free(levels: Levels, units: Sequence[Unit], bonds: Sequence[int]) -> set[in
         for unit, bond in zip(units, bonds, strict=True)
         if count[bond] == 1 and len(unit.members) == 1 and unit.places is None
     }
-    return {n for n, node in enumerate(levels.nodes) if node.members and node.members[0][0] in alone and node.box < 0}
+    return frozenset(
+        n for n, node in enumerate(levels.nodes) if node.members and node.members[0][0] in alone and node.box < 0
+    )
 
 
 def _one_on_axis(

@@ -34,7 +34,7 @@ def mirrored(problem: LayoutProblem, levels: Levels, pair: Mapping[int, int]) ->
     side = {n: 0 if image[n] == n else -1 if levels.nodes[n].members[0][0] in left else 1 for n in image}
     _match_passages(problem, levels, pair, where, image, side)
     half = _folded(levels, image, side)
-    order = _unfolded(levels, ordered(half[0])[1], half[1], image, side)
+    order = _unfolded(levels, ordered(half[0], effort=problem.effort)[1], half[1], image, side)
     if sum(len(gap) for gap in levels.segments) <= _MOST_SEGMENTS:
         order = _improved(levels, order, image, side)
     for rank in order:

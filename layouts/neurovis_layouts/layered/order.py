@@ -17,6 +17,7 @@ from neurovis_layouts.layered.exchange import Exchange
 from neurovis_layouts.layered.levels import Levels
 from neurovis_layouts.layered.reinsertion import reinserted
 from neurovis_layouts.layered.sifting import HELD, sifted, sifted_in_boxes
+from neurovis_spec.layout.model import Effort
 
 Order = list[list[int]]
 
@@ -31,21 +32,21 @@ _SWEEPS, _PLAIN_SWEEPS = 4, 14
 _LONG = 100_000
 
 
-def ordered(levels: Levels, free: AbstractSet[int] = frozenset()) -> tuple[Levels, Order]:
+def ordered(levels: Levels, free: AbstractSet[int] = frozenset(), effort: Effort = "normal") -> tuple[Levels, Order]:
     """The ranks in order; ``free`` nodes may have moved to others. Deterministic: every tie falls to the order before,
     in the end to that of the names."""
     natural = [_grouped_start(levels, rank) for rank in levels.ranks]
     if not any(levels.segments):
         return levels, natural
     segments = Segments(levels)
-    held = _Search(levels, segments, True)
+    held = _Search(levels, segments, True, effort)
     starts = [natural, _by_descent(levels, natural)]
     if segments.ports > 1:  # blocks are not turned round with the order around them
         starts.append([rank[::-1] for rank in natural])
     strict = held.best(starts)
     if strict[0] == 0 or not any(held.kin):
         return held.improved(*strict, free)[1:]
-    loose = _Search(levels, segments, False)
+    loose = _Search(levels, segments, False, effort)
     if held.work > _LONG:
         unbound = loose.improved(*loose.best([natural, strict[1]]), free)
         return (unbound if unbound[0] < _CLEARLY * strict[0] else held.improved(*strict, free))[1:]
@@ -70,8 +71,8 @@ def places(count: int, order: Sequence[Ints]) -> Ints:
 class _Search:
     """One search; with ``strict`` neurons of a group keep their order in each rank."""
 
-    def __init__(self, levels: Levels, segments: Segments, strict: bool) -> None:
-        self.levels, self.segments, self.strict = levels, segments, strict
+    def __init__(self, levels: Levels, segments: Segments, strict: bool, effort: Effort) -> None:
+        self.levels, self.segments, self.strict, self.effort = levels, segments, strict, effort
         self.ids = [np.array(rank, dtype=np.int64) for rank in levels.ranks]
         boxes = np.array([node.box for node in levels.nodes], dtype=np.int64)
         self.boxes = [_shared(boxes[ids]) for ids in self.ids]
@@ -131,7 +132,7 @@ class _Search:
     def improved(self, crossings: int, order: Order, free: AbstractSet[int]) -> tuple[int, Levels, Order]:
         """What reinsertion makes of it."""
         if self.sifts and crossings:
-            return reinserted(self.levels, order, self.strict, free)
+            return reinserted(self.levels, order, self.strict, free, self.effort)
         return crossings, self.levels, order
 
 

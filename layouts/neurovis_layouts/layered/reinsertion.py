@@ -13,9 +13,12 @@ from collections.abc import Set as AbstractSet
 
 from neurovis_layouts.layered.insertion import CROSSING, Insertion
 from neurovis_layouts.layered.levels import Ends, Levels, moved
+from neurovis_spec.layout.model import Effort
 
 Order = list[list[int]]
 
+#: By effort: how many times the budget and the patience.
+_TIMES: dict[Effort, float] = {"quick": 1 / 8, "normal": 1, "best": 10}
 #: Operations on arrays in all, some 7 µs each. Half as many leave some 4 % more crossings in the Rome graphs of sample
 #: 11 (see ``benchmarks/layout.py``).
 _BUDGET = 40_000
@@ -26,12 +29,16 @@ _PATIENCE = 6
 
 
 def reinserted(
-    levels: Levels, order: Sequence[Sequence[int]], strict: bool, free: AbstractSet[int] = frozenset()
+    levels: Levels,
+    order: Sequence[Sequence[int]],
+    strict: bool,
+    free: AbstractSet[int] = frozenset(),
+    effort: Effort = "normal",
 ) -> tuple[int, Levels, Order]:
     """Crossings, levels and order; with ``strict`` neurons of a group keep their order in each rank; the ``free`` nodes
     stand in any rank in which what leads down leads down."""
     state = Insertion(levels, order, strict, free)
-    cost = _Search(state).run()
+    cost = _Search(state, _TIMES[effort]).run()
     crossings = (cost - sum(state.rank[link.lower] - state.rank[link.upper] for link in state.links)) // CROSSING
     return crossings, *_levels(levels, state)
 
@@ -39,13 +46,15 @@ def reinserted(
 class _Search:
     """One search for a state that costs less."""
 
-    def __init__(self, state: Insertion) -> None:
+    def __init__(self, state: Insertion, times: float) -> None:
         self._state = state
+        self._budget = int(_BUDGET * times)
         self._near = [
             sorted({state.links[c].upper for c in state.ups[n]} | {state.links[c].lower for c in state.downs[n]})
             for n in range(len(state.rank))
         ]
         self._nodes = [n for n, near in enumerate(self._near) if near]
+        self._patience = int(_PATIENCE * times * len(self._nodes))
         self._dice = _dice()
 
     def run(self) -> int:
@@ -54,7 +63,7 @@ class _Search:
         best = now = self._descent(state.cost())
         found = state.keep()
         in_vain, most = 0, min(_MOST, len(self._nodes) // 2)
-        while best >= CROSSING and most > 0 and state.work < _BUDGET and in_vain < _PATIENCE * len(self._nodes):
+        while best >= CROSSING and most > 0 and state.work < self._budget and in_vain < self._patience:
             kept = state.keep()
             ruin = self._ruin(1 + next(self._dice) % most)
             saved = sum(state.take(n) for n in ruin)
@@ -72,7 +81,7 @@ class _Search:
     def _descent(self, cost: int) -> int:
         """Every node put back by itself, until none gains."""
         state, before = self._state, cost + 1
-        while cost < before and cost >= CROSSING and state.work < _BUDGET:
+        while cost < before and cost >= CROSSING and state.work < self._budget:
             before = cost
             for node in self._nodes:
                 kept = state.keep()

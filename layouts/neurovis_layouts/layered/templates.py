@@ -228,6 +228,7 @@ def restricted(problem: LayoutProblem, members: Sequence[int], within: int = -1)
         neuron_spacing=problem.neuron_spacing,
         rank_spacing=problem.rank_spacing,
         modules=modules,
+        effort=problem.effort,
     )
 
 
