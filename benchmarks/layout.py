@@ -24,7 +24,7 @@ from layout_peers import PEERS
 from networks import connectome, layers, reservoir, sample, small_worlds
 
 import neurovis_spec as nv
-from neurovis_spec.layout import LayoutProblem, LayoutRefusalError
+from neurovis_spec.layout import LayoutGroup, LayoutProblem, LayoutRefusalError
 from neurovis_spec.layout.arrange import lay_out_problem
 from neurovis_spec.layout.metrics import metrics
 from neurovis_spec.layout.problem import problem_of
@@ -66,6 +66,8 @@ def cases(folder: Path | None, slow: bool, seeds: Sequence[int | None] = (None,)
         for seed in seeds:
             graphs, name = sample(folder, kind, seed)
             yield Case(name, graphs)
+            if slow:
+                yield Case(f"{name}, as one group", [_as_one_group(graph) for graph in graphs], peers=())
     for path in sorted(HEXAPOD.glob("*.yaml")) if HEXAPOD.is_dir() else ():
         problem = problem_of(nv.compile(path).network)
         peers: tuple[str, ...] = ("dot", "dot, clusters", "sfdp")
@@ -81,6 +83,10 @@ def cases(folder: Path | None, slow: bool, seeds: Sequence[int | None] = (None,)
         peers = ("sfdp",)
         yield Case("small worlds 2,000/10,000", [small_worlds(2000, 10_000)], ("large", "layered"), peers)
         yield Case("small worlds 10,000/50,000", [small_worlds(10_000, 50_000)], ("large",), peers)
+
+
+def _as_one_group(problem: LayoutProblem) -> LayoutProblem:
+    return replace(problem, groups=(LayoutGroup("N", tuple(range(len(problem.neurons)))),))
 
 
 def by_peer(case: Case, peer: str, limit: float) -> Worth | None:
