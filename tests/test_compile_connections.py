@@ -421,7 +421,9 @@ def test_parameters_of_rules_that_do_not_fit() -> None:
         rates("1/n")
     (finding,) = caught.value.diagnostics
     assert finding.code == "unknown-name"
-    assert finding.hint == "'n' is known elsewhere: the number of neurons of the group; a connection has n_from and n_to"
+    assert (
+        finding.hint == "'n' is known elsewhere: the number of neurons of the group; a connection has n_from and n_to"
+    )
 
 
 def test_parameters_of_the_rule_of_an_entry_at_fault_are_looked_at() -> None:
