@@ -1,7 +1,7 @@
-"""Around pins: frames keep off each other where a pin holds one of them.
+"""Around pins: instances and neurons that are not pinned are moved off the frames of those that are.
 
-In: a problem with instances and pins, and a layout that keeps the pins but nothing else off them. Out: the layout in
-which what is free gives way.
+In: a problem with instances and pins, and a layout in which the pins are exact, but frames may overlap. Out: a layout
+without these overlaps, found by treating the pins as an earlier layout to which everything else is added.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from neurovis_spec.layout.model import Layout, LayoutProblem, Point
 
 
 def gives_way(problem: LayoutProblem, pins: Mapping[int, Point], most: int) -> bool:
-    """Whether there are frames, and pins (those of origins included), and no earlier layout is kept, of a network of at
-    most so many neurons."""
+    """Whether ``around_pins`` is to be called: there are instances and pins (of neurons or of origins), no earlier
+    layout, and at most so many neurons."""
     return bool(problem.modules and pins and problem.memory is None and len(problem.neurons) <= most)
 
 
 def around_pins(problem: LayoutProblem, pins: Mapping[int, Point], free: Layout) -> Layout:
-    """The free layout arranged around the pins as if an earlier layout had known these and nothing else: frames keep
-    off each other, and nobody foreign comes into one."""
+    """The free layout, changed so that no two frames overlap and no frame holds a neuron of another: as if the pins
+    were an earlier layout, and everything else were new."""
     known = Layout(problem.network, free.engine, {problem.neurons[i]: point for i, point in pins.items()}, {})
     placed = tuple(replace(module, origin=None) for module in problem.modules)  # as pins now
     return kept(replace(problem, pins=pins, modules=placed, memory=known), free)

@@ -1,8 +1,9 @@
-"""Resolved: where memory contradicts what is to be drawn alike, the template and the mirror win.
+"""Conflicts: where the places of an earlier layout break a symmetry of the spec, the symmetry wins.
 
-In: a problem, a fresh layout of it, and what an earlier layout knew, which may have been edited by hand. Out: the
-places of those that have to follow others: instances the first of their make, of mirrored pairs the one that was not
-moved by hand, else the second. What the fresh layout does not draw alike either is left as it is.
+In: a problem, a fresh layout of it, and the places of an earlier layout, which may have been edited by hand. Out: new
+places for the neurons that have to move: those of an instance follow the first instance of the same make; of a mirrored
+pair the one that was not moved by hand follows the other (else the second follows the first). Where the fresh layout
+is not symmetric either, nothing moves.
 """
 
 from __future__ import annotations
@@ -21,9 +22,9 @@ _SLACK = 1e-6
 def resolved(
     problem: LayoutProblem, fresh: Sequence[Point], known: Mapping[int, Point], hand: Mapping[int, Point]
 ) -> tuple[dict[int, Point], dict[int, Point]]:
-    """Places wanted for neurons that cannot stay, and for all that is placed together with these; and the places that
-    were given by hand (``hand`` says where these neurons were before), or follow from such a place. Both are empty
-    where memory agrees with itself."""
+    """Two mappings: the wanted places of neurons that cannot stay where they were, and of all that is placed together
+    with them; and the places given by hand (``hand`` says where these neurons were before) or derived from such places.
+    Both are empty where the earlier layout breaks no symmetry."""
     where = dict(known)
     moved: set[int] = set()
     _follow_makes(problem, fresh, where, moved)

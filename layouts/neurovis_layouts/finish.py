@@ -36,8 +36,8 @@ def drawn(
     highest: float = math.inf,
 ) -> Layout:
     """The layout with the neurons at the first of ``places`` (n, 2), where no pin says otherwise. Instances without a
-    pin are kept off the ``frames`` of those that have one. Nothing is in the way of the edges ``clear``, by index, and
-    they run straight; the others bow at most ``highest`` times as high as their way is long."""
+    pin are kept off the ``frames`` of those that have one. The edges ``clear``, by index, run straight, as the caller
+    knows that nothing is in their way. The others bow at most ``highest`` times as high as they are long."""
     flat: list[Point] = [(snap(x), snap(y)) for x, y in places[: len(problem.neurons)].tolist()]
     pins = with_origins(problem, [to_picture(point, problem.direction) for point in flat])
     centres, _, _ = fit(flat, {i: from_picture(point, problem.direction) for i, point in pins.items()})
@@ -59,7 +59,7 @@ def drawn(
 
 
 def pinned_places(problem: LayoutProblem) -> tuple[IntArray, FloatArray]:
-    """Who is pinned (p,), in order, and where in the engine's frame (p, 2)."""
+    """The pinned neurons (p,), in order, and their places in the engine's frame (p, 2)."""
     fixed = np.array(sorted(problem.pins), dtype=np.int64)
     there = [from_picture(problem.pins[i], problem.direction) for i in fixed.tolist()]
     return fixed, np.array(there, dtype=np.float64).reshape(-1, 2)

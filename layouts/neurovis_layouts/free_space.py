@@ -67,8 +67,8 @@ class Copy:
 
 @dataclass(frozen=True, slots=True)
 class _Rules:
-    """What a place has to keep: from disc to disc, from a neuron to a foreign frame and between frames; without frames
-    only the discs; whether it is off the lines that are drawn."""
+    """The distances that a free place keeps: ``clear`` between discs, ``margin`` from a neuron to a foreign frame,
+    ``between`` two frames (only the first if not ``framed``); and whether it keeps off the lines that are drawn."""
 
     clear: float
     margin: float
@@ -121,8 +121,8 @@ class Room:
             self._lines.add(point)
 
     def put(self, piece: Sequence[Copy], wish: Point, stay: bool = False, in_row: bool = False) -> None:
-        """Place a piece, all of its copies, as near to the wish as may be, off the lines that are drawn, unless it
-        goes on with a row; exactly there, if they can and are to ``stay``."""
+        """Place a piece, all of its copies, as near to the wish as possible; with ``stay`` exactly there, if
+        that is free. It keeps off the lines that are drawn, unless it continues a row (``in_row``)."""
         anchor = self._found(piece, wish, stay, in_row)
         for copy in piece:
             for number, rect in self._touched(copy, anchor).items():
@@ -288,7 +288,7 @@ class _Field:
         self._cells: dict[tuple[int, int], set[int]] = {}
 
     def add(self, number: int, rect: Rect) -> None:
-        """Report a rectangle."""
+        """Add a rectangle."""
         for cell in _cells(rect):
             self._cells.setdefault(cell, set()).add(number)
 

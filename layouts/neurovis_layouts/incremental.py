@@ -25,7 +25,7 @@ _CAREFULLY = 1000
 
 
 def kept(problem: LayoutProblem, fresh: Layout) -> Layout:
-    """The fresh layout as it is without memory; with it, what the earlier one knew exactly where it was."""
+    """The fresh layout itself where there is no earlier one, else one that keeps the earlier one's places exactly."""
     memory = problem.memory
     if memory is None:
         return fresh
@@ -75,7 +75,7 @@ class _Ways:
         return not set(around.get(ends.source, ())).isdisjoint(around.get(ends.target, ()))
 
     def walls(self, routes: Mapping[int, Route]) -> list[Frame]:
-        """The frames as they are drawn with these routes; what somebody foreign stands in is not drawn."""
+        """The frames as they are drawn with these routes; one that would hold a foreign neuron is not drawn."""
         x, y = np.array(self.centres, dtype=np.float64).reshape(-1, 2).T
         rects = self.frames.rects(dict(enumerate(self.centres)), routes)
         found: list[Frame] = []
@@ -115,8 +115,8 @@ def _found(problem: LayoutProblem, ways: _Ways, rest: Sequence[int], routes: Map
 
 
 def _old_routes(problem: LayoutProblem, memory: Layout, ways: _Ways) -> dict[int, Route]:
-    """Earlier routes that still lead from centre to centre, run over nobody who was not there, and through no frame
-    that was not there."""
+    """Earlier routes, by edge, that can be kept: they still run from centre to centre, over no new neuron and through
+    no frame that is new or was drawn otherwise."""
     there = [memory.positions.get(name) == point for name, point in zip(problem.neurons, ways.centres, strict=True)]
     routes: dict[int, Route] = {}
     for i, edge in enumerate(problem.edges):
@@ -148,7 +148,8 @@ def _entering(
 
 
 def _moved_routes(problem: LayoutProblem, fresh: Layout, ways: _Ways, routes: dict[int, Route]) -> None:
-    """Fresh routes between neurons that went the same way together, such as those of a new instance."""
+    """Add the fresh routes whose two ends were moved by the same amount, such as those within a new instance; moved
+    along, and only if they are clear then."""
     found: dict[int, Route] = {}
     for i, edge in enumerate(problem.edges):
         if i in routes:

@@ -105,7 +105,7 @@ class _Wishes:
             self._ranks[axis, self._fresh[neuron][axis]] = count + 1, lines
 
     def row(self, copy: Copy, placed: Mapping[int, Point]) -> Point | None:
-        """Where a member of a group goes on with its row."""
+        """Where a new member of a group continues the row of the others; None where there is no such row."""
         row = self._rows.next(copy.offsets[0][0], placed) if len(copy.offsets) == 1 else None
         return None if row is None else (snap(row[0]), snap(row[1]))
 

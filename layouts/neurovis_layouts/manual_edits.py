@@ -1,8 +1,8 @@
-"""Edited: what somebody has moved by hand in a layout file.
+"""Manual edits: what somebody has moved by hand in a layout file.
 
-In: a problem with an earlier layout. Out: who stands elsewhere there than its routes end, neurons by themselves and
-outermost instances as wholes, and from where; the routes that still say how something is drawn; who has to give way to
-what was moved, since that stays where it was put.
+In: a problem with an earlier layout (the file). Out: the neurons whose positions differ from where the file's routes
+begin or end, with where they were before (of outermost instances only those that were moved as a whole); the routes
+that can still be used; and the neurons that have to make room for what was moved.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def by_hand(problem: LayoutProblem) -> dict[int, Point]:
 
 
 def moved_routes(problem: LayoutProblem, placed: Mapping[int, Point]) -> dict[int, Route]:
-    """The earlier routes of which both ends are, or went together, where they are placed."""
+    """The earlier routes, by edge, whose two ends are where they were or were moved by the same amount; moved along."""
     found: dict[int, Route] = {}
     routes = {} if problem.memory is None else problem.memory.routes
     for number, edge in enumerate(problem.edges):
@@ -69,7 +69,7 @@ def giving_way(
     put: AbstractSet[int],
     routes: Mapping[int, Route],
 ) -> set[int]:
-    """The neurons, with their instances, that what was ``put`` somewhere lies on: discs and drawn frames."""
+    """The neurons (with all others of their instances) that overlap a disc or a frame that was ``put`` by hand."""
     if not put:
         return set()
     rects = frames.rects(placed, routes)
@@ -97,5 +97,5 @@ def giving_way(
 
 
 def _outermost(problem: LayoutProblem) -> dict[int, frozenset[int]]:
-    """The neurons of the instances that are in none, by number."""
+    """The neurons of each outermost instance, by its number."""
     return {k: frozenset(module.members) for k, module in enumerate(problem.modules) if module.parent < 0}

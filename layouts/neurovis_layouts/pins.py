@@ -84,7 +84,7 @@ class CentreCells:
         self._cells: dict[tuple[int, int], list[Point]] = {}
 
     def add(self, point: Point) -> None:
-        """Report a centre."""
+        """Add a centre."""
         self._cells.setdefault((math.floor(point[0]), math.floor(point[1])), []).append(point)
 
     def free(self, point: Point, clear: float) -> bool:

@@ -1,7 +1,7 @@
-"""Rows: where a new member of a group stands that goes on with the row of the others.
+"""Rows of groups: where a new neuron of a group goes so that it continues the row of the others.
 
-In: a problem, a fresh layout of it, and what is placed. Out: for a neuron the place by which it continues the row, or
-column, of its group, or fills a gap in it; None where there is no such row, or the fresh layout has it elsewhere.
+In: a problem, a fresh layout of it, and the places of the neurons placed so far. Out: for a neuron the next place of
+its group's row or column, or a gap in it; None where the others form no row, or the fresh layout has it off that line.
 """
 
 from __future__ import annotations

@@ -197,7 +197,7 @@ class _Sheet:
         return best[1]
 
     def fold(self, first: int, last: int, rows: int) -> None:
-        """Report that a block has been folded."""
+        """Repeat the ranks ``first`` to ``last`` once for each row that their block is folded into."""
         here, more = slice(first, last + 1), [0.0] * ((last + 1 - first) * (rows - 1))
         self._fixed[here] = [*self._fixed[here], *more]
         self._high[here] = self._high[here] * rows

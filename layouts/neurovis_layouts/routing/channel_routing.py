@@ -79,8 +79,8 @@ def _walled(edge: LayoutEdge, gates: Sequence[Waypoint], frames: Sequence[Frame]
 
 @dataclass(frozen=True, slots=True)
 class _Way:
-    """A way that was found: along the direction or across it, its points, where it bends, its line, and what is
-    reported of that."""
+    """A way that was found: along the direction or across it, its points, where it bends, its line, and the
+    numbers of that line's runs in the ``CutLines`` of either direction."""
 
     along: bool
     path: Sequence[Point]
@@ -164,7 +164,7 @@ class _Network:
         return self._down.lines.add(line if along else other), self._side.lines.add(other if along else line)
 
     def _leave(self, i: int) -> None:
-        """Give up the room that a way takes, and what is reported of it."""
+        """Free the room that a way takes, and forget its line."""
         self._drop(i)
         gone = self._ways[i]
         (self._down if gone.along else self._side).leave(gone.path[1:-1])

@@ -75,7 +75,7 @@ class _Taken:
     lines: dict[tuple[int, float], list[Point]] = field(default_factory=dict)
 
     def add(self, path: Sequence[Point]) -> None:
-        """Report a detour."""
+        """Add a detour: later ones that use its corners or run along it cost more."""
         for point in path[1:-1]:
             self.corners[point] = self.corners.get(point, 0.0) + _TAKEN
         for a, b in pairwise(path):

@@ -146,7 +146,7 @@ class Strokes:
         self._noted: dict[int, FloatArray] = {}
 
     def note(self, edge: int, route: Route) -> None:
-        """Report that an edge has another route now."""
+        """Give an edge another route."""
         self.lines[edge] = self._noted[edge] = line_of(route)
 
     def crossed(self, edges: Sequence[int], routes: Sequence[Route], place: Point) -> list[int]:

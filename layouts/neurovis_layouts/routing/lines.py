@@ -1,6 +1,6 @@
-"""Lines: what is drawn already, and where it passes each height, for ways that are to cross little of it.
+"""Lines that are drawn already, as a table of x by height, to count quickly what a new way would cross.
 
-In: lines as points. Out: for two heights, where every line that passes both passes them.
+In: lines as points. Out: for two heights, the x of every line at both, of those lines that pass both.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class CutLines:
         self._table: FloatArray = np.full((_FEW, _FEW), np.nan)
 
     def add(self, line: Sequence[Point]) -> range:
-        """Report a line; the numbers of its runs, which go one way."""
+        """Add a line; the numbers of its runs: the line is cut wherever it turns back up or down."""
         first = len(self._runs)
         run: list[Point] = list(line[:1])
         for (_, before), point in pairwise(line):

@@ -85,7 +85,7 @@ class Loops:
         self._close: list[float] = [0.0] * len(self._choice)
 
     def add(self, route: Route) -> None:
-        """Report a loop that is there."""
+        """Add a loop that is drawn already, to be kept clear of."""
         if route not in self._there:
             self._there.add(route)
             self._new.append(route)

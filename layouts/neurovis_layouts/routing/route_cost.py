@@ -1,7 +1,7 @@
-"""Judge: how hard routes are to follow, among all that is drawn.
+"""Judge: what a route costs: how hard it is to follow by eye among all that is drawn.
 
-In: routes that are drawn, neurons, frames. Out: what a route costs: for what it runs over or into, crosses, runs along,
-for its length and its bends, and for ends that meet others at a disc.
+In: all routes, the neurons, the frames. Out: one number for a route, higher for each disc or frame that it runs over,
+for crossings, for running along other lines, for length and bends, and for ends close to others at a disc.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ class Judge:
         return (i,) if other == i else (i, other)
 
     def draw(self, i: int, route: Route) -> None:
-        """Report that an edge has another route now, and its image with it."""
+        """Give an edge another route, and its mirror image the reflection of it."""
         self.routes[i] = route
         for other in self.both(i)[1:]:
             ends = self.centres[self.edges[other].source], self.centres[self.edges[other].target]
@@ -146,8 +146,7 @@ class Pen:
         self._least: IntArray = (inside[inside > 0] == 1).astype(np.int64)
 
     def trespass(self, route: Route) -> tuple[int, float]:
-        """How many foreign frames a route enters, and by how much it is too close to a disc, looked at as closely as
-        any."""
+        """How many foreign frames a route enters, and by how much it is too close to a disc, both measured exactly."""
         lines = polylines([route])
         entered = int(meet(lines.a, lines.b, self._foreign).any(axis=0).sum())
         return entered, max(0.0, TOUCH + _SLACK - self._judge.obstacles.clearance(route, self._own))

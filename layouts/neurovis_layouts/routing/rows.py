@@ -1,6 +1,7 @@
-"""Rows: what discs and frames leave free at every height, and where ways run already.
+"""Rows: the free gaps between discs and frames at each height (y), and where ways run through them already.
 
-In: centres, frames. Out: for a way between two neurons the free spans of a row, and the walls between two rows.
+In: centres, frames. Out: for a way between two neurons, the free spans (of x) of a row, and the sides of frames that
+it must not cross between two rows. A way may always pass its own neurons, and enter the frames that hold one of them.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ _MOST = 30_000
 
 @dataclass(slots=True)
 class _Row:
-    """What stands in a row, in order, each with whose it is; who they are; and what is free, by who is not in the
-    way."""
+    """The blocked spans of a row, from left to right, each with its owner (as in ``Own``); all owners; and the free
+    spans, cached by the owners that a way need not keep off."""
 
     blocked: list[tuple[float, float, int]]
     owners: frozenset[int]
@@ -67,14 +68,14 @@ class OccupiedRows:
             self._heights = [(y, {frozenset()}) for y, _ in self._heights]
 
     def between(self, top: float, bottom: float, own: Own, off: float = _ROW) -> list[float]:
-        """The rows farther than ``off`` from both of two heights; where they are many, without those of discs in
-        foreign frames alone, which nothing bends at."""
+        """The heights of the rows between ``top`` and ``bottom``, farther than ``off`` from both. Where there are many,
+        rows with nothing but discs in frames that the way may not enter are left out: no way bends there."""
         return [
             y for y, inside in self._heights if top + off < y < bottom - off and any(around <= own for around in inside)
         ]
 
     def own(self, source: int, target: int) -> Own:
-        """What is not in the way between two neurons: they, and the frames that hold one."""
+        """What a way between two neurons need not keep off: the two, and the frames that hold one of them."""
         return frozenset((source, target, *self._around[source], *self._around[target]))
 
     def free(self, y: float, own: Own) -> list[Span]:
@@ -97,7 +98,7 @@ class OccupiedRows:
         return row.free[here]
 
     def _blocking(self, low: float, high: float, owner: int, own: Own) -> Iterable[Span]:
-        """What is in the way of a disc or frame: all of it, nothing, or the sides of one that the way may enter."""
+        """What a disc or a frame blocks: its whole width, nothing, or only the sides of a frame that may be entered."""
         if owner not in own:
             yield low, high
         elif self._lined and owner < 0:
@@ -121,12 +122,12 @@ class OccupiedRows:
         return self._used.get(y, [])
 
     def use(self, path: Iterable[Point]) -> None:
-        """Note where a way runs."""
+        """Remember where a way runs."""
         for x, y in path:
             insort(self._used.setdefault(y, []), x)
 
     def leave(self, path: Iterable[Point]) -> None:
-        """Forget a way that was reported."""
+        """Forget where a way runs (the opposite of ``use``)."""
         for x, y in path:
             self._used[y].remove(x)
 
