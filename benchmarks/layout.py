@@ -72,9 +72,9 @@ def cases(folder: Path | None, slow: bool, seeds: Sequence[int | None] = (None,)
         problem = problem_of(nv.compile(path).network)
         peers: tuple[str, ...] = ("dot", "dot, clusters", "sfdp")
         yield Case(f"specs/hexapod/{path.name}", [problem], peers=peers)
-        # the peers know no mirrors and no lines; without them ours, too, is free to let everything run along
-        plain = replace(problem, mirrors=(), align=())
-        yield Case(f"{path.name}, without mirror and align", [plain], peers=peers)
+        # the peers know no page, no mirrors and no lines; without them ours, too, is free to let everything run along
+        plain = replace(problem, plan=(), mirrors=(), align=())
+        yield Case(f"{path.name}, without plan, mirror and align", [plain], peers=peers)
     yield Case("small worlds 300/2,500", [small_worlds(300, 2500)], ("layered", "large"), _HURRIED)
     if slow:
         worm, name = connectome(folder)

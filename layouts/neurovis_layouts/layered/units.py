@@ -91,15 +91,15 @@ def _graph(problem: LayoutProblem, members: Iterable[int]) -> nx.DiGraph[int]:
 
 
 def _of_group(problem: LayoutProblem, members: Sequence[int]) -> Unit | None:
-    """Neurons that nothing connects with each other share a rank, those of a loop are a block; the others of a group
-    are where they would be without it: it only names them."""
+    """Neurons that nothing connects with each other share a rank, those all of which are in loops are a block; any
+    others are where they would be without the group: it only names them."""
     if len(members) < 2:
         return None
     graph = _graph(problem, members)
     if not graph.size():
         return Unit(tuple(members))
     inside = sum(len(loop) for loop in nx.strongly_connected_components(graph) if len(loop) > 1)
-    return _block(problem, members) if len(members) <= _MOST_IN_A_RING and 2 * inside >= len(members) else None
+    return _block(problem, members) if inside == len(members) <= _MOST_IN_A_RING else None
 
 
 def _of_lone(problem: LayoutProblem, lone: Sequence[int]) -> list[Unit]:
