@@ -39,7 +39,9 @@ def test_without_engine_it_is_auto_and_an_unknown_one_is_answered() -> None:
 )
 def test_signals_go_in_the_direction(direction: str, step: tuple[int, int]) -> None:
     """x grows right, y grows down; the default is down."""
-    (ax, ay), (bx, by) = compiled(f"{PAIR}layout: {{direction: {direction}}}").layout().positions.values()
+    (ax, ay), (bx, by) = (
+        compiled(f"{PAIR}layout: {{engine: layered, direction: {direction}}}").layout().positions.values()
+    )
     assert ((bx > ax) - (bx < ax), (by > ay) - (by < ay)) == step
     assert network_of(PAIR).layout.direction == "down"
 
