@@ -24,8 +24,8 @@ from neurovis_spec.runtime.state import State
 
 
 def carried(old: SimulatedSource, simulation: Simulation) -> SimulatedSource:
-    """The source that goes on where ``old`` stands, which nobody uses after that; from the beginning where the two
-    networks have no neuron in common."""
+    """A source of the new network at the step of ``old``, or at step 0 where the two have no neuron in common. ``old``
+    must not be used afterwards."""
     was, network, turned, step = old.network, simulation.network, old.turned, old.step
     if not set(was.neurons.names) & set(network.neurons.names):
         return SimulatedSource(simulation)

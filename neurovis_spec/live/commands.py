@@ -62,7 +62,7 @@ class Speed:
 
 @dataclass(frozen=True, slots=True)
 class Present:
-    """Show what is to be seen: somebody has come who has seen nothing."""
+    """Show the current step once more, for a client that has just connected."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Declared: what can be turned in a run, as a page gets it.
+"""Declared: what a user can change in a run (by ``turns``), as data for the page.
 
 In: a compiled network. Out: the parameters that can be set, each with its name, the value that it begins with, its
 bounds where it has some, and its description; the inputs without a source; and the rules that can be stopped.
@@ -15,7 +15,7 @@ from neurovis_spec.live.rules import rules
 
 
 def declared(compiled: CompiledNetwork) -> dict[str, list[dict[str, object]]]:
-    """All that can be turned."""
+    """All that can be changed."""
     network, written = compiled.network, compiled.spec.inputs
     inputs = [entry for entry in network.inputs if entry.expression is None and entry.table is None]
     return {

@@ -182,14 +182,14 @@ class Desk:
         answer(saving_message([str(file.path) for file in chosen.files], "", written=True))
 
     def _shown(self) -> View:
-        """The view of what is put."""
+        """The view of the layout with the neurons placed by hand."""
         wanted = self._run.appearance
         if self._view is None or self._view.appearance != wanted:
             self._view = self._draw(self._placed.compiled, wanted, self._placed.layout)
         return self._view
 
     def _show(self, answer: Answer) -> None:
-        """Have what is put shown, at the step that is shown."""
+        """Show the layout with the neurons placed by hand, at the current step."""
         self._view, self._saving = None, None
         view, shown = self._shown(), self._placed.compiled.hash
 

@@ -51,7 +51,7 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 class Edits:
-    """Has edited specs shown; what is wrong with one is told, and the old network goes on."""
+    """Shows a spec anew when one of its files was edited; if it is invalid, reports that and keeps the old network."""
 
     def __init__(
         self,

@@ -26,7 +26,7 @@ _OVERHEAD = 4096
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """All that a run goes on from: its state, what is fed to inputs, and what is still seen of the steps before."""
+    """All that a run needs to go on: its state, the inputs fed by hand, and the fading traces of earlier activities."""
 
     state: State
     fed: Mapping[str, tuple[float, ...]]

@@ -114,8 +114,8 @@ def _file(shown: Placed, now: CompiledNetwork, spec: Path) -> dict[Keys, Value]:
 
 
 def _pins(shown: Placed, now: CompiledNetwork, text: str, compile: Compile) -> dict[Keys, Value]:
-    """Pins that give the layout that is shown: those by hand, and where these are not enough, since the rest is fitted
-    to them, all that would stand elsewhere."""
+    """Pins that reproduce the layout that is shown: those made by hand and, as the rest of the network is fitted to
+    pins, those of all neurons that would otherwise stand elsewhere."""
     names = {*shown.moved, *_moved(shown, _stated(now))}
     for _ in range(_ROUNDS):
         values = _positions(shown, now, names)
@@ -134,7 +134,7 @@ def _stated(now: CompiledNetwork) -> dict[str, Point]:
 
 
 def _moved(shown: Placed, positions: Mapping[str, Point]) -> list[str]:
-    """The neurons that are shown elsewhere."""
+    """The neurons whose place in these positions is not the one that is shown."""
     return [name for name, point in positions.items() if math.dist(point, shown.layout.positions[name]) > _SAME]
 
 

@@ -1,4 +1,4 @@
-"""A recording as a source: its steps, to and fro, as they were.
+"""A recording as a source: its steps, forward and back, as they were recorded.
 
 In: a Network and a Recording of it. Out: a Source that takes no turns. What is lesioned is what the spec's events say.
 """
@@ -38,7 +38,7 @@ class RecordedSource:
 
     @property
     def step(self) -> int:
-        """The step that it stands at."""
+        """The current step."""
         return self._steps[self._row]
 
     @property
@@ -67,7 +67,7 @@ class RecordedSource:
         return {}
 
     def seen(self) -> Seen:
-        """What is seen of the step that it stands at."""
+        """What a picture of the current step is made from."""
         neurons, connections = np.zeros(len(self.network.neurons), bool), np.zeros(len(self.network.connections), bool)
         for mask, lesions in ((neurons, self._lesions.neurons), (connections, self._lesions.connections)):
             mask[[index for index, step in lesions.items() if step <= self.step]] = True

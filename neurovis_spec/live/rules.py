@@ -1,6 +1,6 @@
-"""Rules: the connections that learn, as they are told to learn or not.
+"""Rules: the connections whose learning can be switched on and off in a run.
 
-In: a network. Out: for each entry with a rule what names its connections in a run, its rule, and its members.
+In: a network. Out: for each entry with a rule the reference that names its connections, its rule, and its members.
 """
 
 from __future__ import annotations

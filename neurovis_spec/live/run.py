@@ -42,7 +42,7 @@ class Status:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shown:
-    """What is to be seen now. ``view`` is the network's, which is another after an edit."""
+    """All that is shown of the current step. ``view`` is replaced when the network is edited."""
 
     view: View
     seen: Seen
@@ -75,7 +75,7 @@ class _Drawn:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Inquiry:
-    """Something to be done with the source."""
+    """A function to be called with the source, in the thread of the run."""
 
     what: Callable[[Source], object]
 
@@ -217,7 +217,7 @@ class Run:
                 source.turn(asked)
 
     def _redraw(self, refuse: Refuse) -> None:
-        """Have the picture drawn as it is wanted, beside the run, which goes on."""
+        """Make a view in the wanted appearance, if the current one has another, in a thread beside the run."""
         view, wanted = self._view, self.appearance
         if not self._drawing and view.appearance != wanted:
             self._drawing = True

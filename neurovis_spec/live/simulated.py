@@ -61,19 +61,19 @@ class SimulatedSource:
 
     @property
     def step(self) -> int:
-        """The step that it stands at."""
+        """The current step."""
         return self._seen.snapshot.step
 
     @property
     def reach(self) -> Reach:
-        """From the first step whose changes of weights are known, for they are seen; from the beginning, where it is
-        still there."""
+        """From the beginning, if that is still kept, else from the second step that is: a picture needs the weights of
+        the step before."""
         first = self._past.first
         return Reach(min(self.step, first if first == self._started else first + 1), self._last)
 
     @property
     def turned(self) -> tuple[Turned, ...]:
-        """The turns taken on the way to the step that it stands at."""
+        """The turns that were taken up to the current step, in order."""
         taken = self._turned[: bisect_right(self._turned, self.step, key=attrgetter("step"))]
         if len(self._listed[0]) != len(taken):
             self._listed = taken, _without_ways(taken)
@@ -92,14 +92,14 @@ class SimulatedSource:
 
     @property
     def learning(self) -> Mapping[str, bool | None]:
-        """Whether the rules of the network are carried out, by their connections; None where some are."""
+        """Whether connections learn, by the reference that names them; None where only some of these do."""
         stopped = self._simulation.stopped
         if not stopped.any():
             return self._all_learn
         return carried_out(self._rules, stopped)
 
     def leave(self) -> State:
-        """The state from which the step that it stands at is made; nobody uses this source after that."""
+        """The state from which the current step is computed. The source must not be used afterwards."""
         run, step = self._simulation, self.step
         kept = self._past.before(step)
         if kept is not None:
@@ -109,7 +109,7 @@ class SimulatedSource:
         return run.state()
 
     def seen(self) -> Seen:
-        """What is seen of the step that it stands at."""
+        """What a picture of the current step is made from."""
         return self._seen
 
     def advance(self) -> bool:
@@ -155,7 +155,7 @@ class SimulatedSource:
         return recalled(self, steps)
 
     def branch(self) -> None:
-        """Forget what came after the step that it stands at."""
+        """Forget what came after the current step."""
         self._past.cut(self._simulation.k)
         self.history.cut(self.step)
         self._last = self.step

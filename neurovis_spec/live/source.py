@@ -1,7 +1,8 @@
-"""The Source: what the live view shows, one small interface.
+"""The Source: the interface behind the live view, for a run, a recording, or a network that runs elsewhere.
 
-In: nothing; these are the types. A Source stands at a step and shows it; it goes on step by step, back
-where it can, and takes turns where it can. ``simulated`` and ``recorded`` are two; ``ros.received`` is a third.
+In: nothing; these are the types. A Source has a current step. It says what a picture of that step shows, goes on
+step by step, goes back as far as it remembers, and takes the user's changes (``turns``) if it can. There are three:
+``simulated``, ``recorded`` and ``ros.received``.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ Mask: TypeAlias = npt.NDArray[np.bool_]
 
 
 class SourceError(ValueError):
-    """What a source refuses: a step out of its reach, a turn that it cannot take."""
+    """A source cannot do it: the step is out of its reach, or it does not take such a turn."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,9 +36,9 @@ class Reach:
 
 @dataclass(frozen=True, slots=True)
 class Capabilities:
-    """What a source can do besides showing and going on: ``takes``, the messages that change it which it takes (turns
-    and ``branch``); ``ends`` (there is a last step) and ``arrives`` (its steps come from elsewhere: it goes on by the
-    time of a frame, and waits at the last that there is)."""
+    """What kind of source it is. ``takes``: the names of the turns that it accepts, and ``branch`` if it accepts that;
+    ``ends``: there is a last step; ``arrives``: its steps are received from elsewhere, so it is advanced once a frame,
+    not by dt, and waits at the newest."""
 
     takes: frozenset[str] = frozenset()
     ends: bool = False
@@ -46,8 +47,8 @@ class Capabilities:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
-    """What is seen of a step: its snapshot, which neurons (n,) and connections (m,) are lesioned, and which neurons are
-    clamped (n,)."""
+    """What a picture of a step is made from: its snapshot, the lesioned neurons (n,) and connections (m,), and the
+    clamped neurons (n,)."""
 
     snapshot: Snapshot
     lesioned_neurons: Mask
@@ -57,32 +58,32 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class Turned:
-    """A turn that was taken after ``step`` was shown: it has its effect from the next one on. Of values that were given
-    to one thing at one step, or while it was dragged, the last is the turn."""
+    """A turn that was taken at ``step``: it has its effect from the next one on. Of several values that were given to
+    one thing at the same step, or in one drag, only the last is kept."""
 
     step: int
     turn: Turn
 
 
 class Source(Protocol):
-    """What a live view shows. It stands at a step from the beginning on."""
+    """What a live view shows. It has a current step as soon as it is made."""
 
     network: Network
     capabilities: Capabilities
 
     @property
     def step(self) -> int:
-        """The step that it stands at."""
+        """The current step."""
         ...
 
     @property
     def reach(self) -> Reach:
-        """Where ``go`` can go."""
+        """The steps that ``go`` accepts."""
         ...
 
     @property
     def turned(self) -> tuple[Turned, ...]:
-        """The turns taken on the way to the step that it stands at."""
+        """The turns that were taken up to the current step, in order."""
         ...
 
     @property
@@ -92,29 +93,30 @@ class Source(Protocol):
 
     @property
     def fed(self) -> Mapping[str, tuple[float, ...]]:
-        """What inputs are given by hand."""
+        """The values that inputs are fed by hand, by name."""
         ...
 
     @property
     def learning(self) -> Mapping[str, bool | None]:
-        """Whether the rules of the network are carried out, by their connections; None where some are."""
+        """Whether connections learn, by the reference that names them; None where only some of these do."""
         ...
 
     @property
     def history(self) -> History:
-        """What is known of its steps, for traces; another thread may read it."""
+        """The past activities and weights, for traces; another thread may read it."""
         ...
 
     def seen(self) -> Seen:
-        """What is seen of the step that it stands at."""
+        """What a picture of the current step is made from."""
         ...
 
     def advance(self) -> bool:
-        """Go on by one step; False at the end, or where nothing has arrived: then nothing has changed."""
+        """Go on by one step; False, and no change, at the end or where the next step has not arrived."""
         ...
 
     def beside(self, by: int) -> int:
-        """The step so many further on, or back, at most the first of its reach; there need not be one yet."""
+        """The number of the step so many further on or (negative) back, not before the first that can be reached; it
+        may be one that has not been computed yet."""
         ...
 
     def go(self, step: int) -> None:
@@ -122,25 +124,25 @@ class Source(Protocol):
         ...
 
     def restart(self) -> None:
-        """Begin anew: nothing was turned, and the past is forgotten."""
+        """Begin anew: turns and past steps are forgotten."""
         ...
 
     def recall(self, steps: int) -> list[Seen]:
-        """What was seen of the last steps up to the one that it stands at, of those within reach; it stands afterwards
-        where it stood."""
+        """``seen`` of the last so many steps up to the current one, as far as they can be reached; the current step is
+        the same afterwards."""
         ...
 
     def branch(self) -> None:
-        """From here on differently: forget what came after the step that it stands at."""
+        """Forget what came after the current step, so that the run can go on differently from here."""
         ...
 
     def turn(self, turn: Turn) -> None:
-        """Take a turn; what came after the step that it stands at is forgotten. Raises SourceError."""
+        """Apply a turn; what came after the current step is forgotten. Raises SourceError."""
         ...
 
 
 def recalled(source: Source, steps: int) -> list[Seen]:
-    """What was seen of the last steps, of a source that makes its steps one after the other."""
+    """``Source.recall`` for sources that can go back and then advance step by step."""
     here = source.step
     source.go(max(source.reach.first, here - steps + 1))
     found = [source.seen()]

@@ -1,7 +1,7 @@
-"""Turns: what somebody changes by hand while a network runs.
+"""Turns: the changes that a user makes to a network while it runs: set a parameter, feed an input, clamp, lesion, …
 
-In: names and values, as a client sends them. Out: frozen values that a Simulation is turned by. While somebody drags a
-value it is ``moving``: what is dragged from one value to another is one turn, to where it ends.
+In: names and values, as a client sends them. Out: frozen values, one for each change; ``turn`` applies one to a
+Simulation. While a slider is dragged its values are ``moving``: the whole drag counts as one turn, to its last value.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Mend:
 
 @dataclass(frozen=True, slots=True)
 class Learn:
-    """Rules of connections are carried out, or not."""
+    """Learning of these connections is switched on or off."""
 
     connections: str
     on: bool
@@ -75,7 +75,7 @@ TURNS: Final = frozenset(("set", "feed", "hold", "release", "lesion", "mend", "l
 
 
 def same_value(one: Turn, other: Turn) -> bool:
-    """Whether both give a value to the same thing."""
+    """Whether both set the same parameters, feed the same input or clamp the same neurons."""
     match one, other:
         case (Set(), Set()):
             return one.values.keys() == other.values.keys()
@@ -87,7 +87,7 @@ def same_value(one: Turn, other: Turn) -> bool:
 
 
 def turn(simulation: Simulation, what: Set | Hold | Release | Lesion | Mend | Learn) -> None:
-    """Turn a simulation. Raises ParameterError or another ValueError, or KeyError, and then nothing has changed."""
+    """Apply a turn. Raises ParameterError or another ValueError, or KeyError, and then nothing has changed."""
     match what:
         case Set():
             simulation.set(what.values)
@@ -104,7 +104,7 @@ def turn(simulation: Simulation, what: Set | Hold | Release | Lesion | Mend | Le
 
 
 def fed_by(network: Network, fed: Mapping[str, tuple[float, ...]], what: Feed) -> dict[str, tuple[float, ...]]:
-    """What inputs are given by hand after a turn. Raises ValueError."""
+    """The values that inputs are fed by hand, by name, after this turn. Raises ValueError."""
     entry = next((entry for entry in network.inputs if entry.name == what.name), None)
     if entry is None:
         raise ValueError(f"there is no input '{what.name}'")

@@ -40,13 +40,13 @@ def specs_of(node: Node) -> tuple[str, ...]:
 
 
 class Others:
-    """Tells of networks that announce themselves later than the one that is ``shown``."""
+    """Says, once each, which other networks announce themselves while this one is ``shown``."""
 
     def __init__(self, node: Node, shown: str, tell: Tell) -> None:
         self._node, self._tell, self._known = node, tell, {shown}
 
     def look(self) -> None:
-        """Tell of those that have come."""
+        """Look for new ones, and say so."""
         for topic in specs_of(self._node):
             if topic not in self._known:
                 self._known.add(topic)

@@ -49,7 +49,8 @@ def base_of(compiled: CompiledNetwork) -> str:
 
 
 def frame(compiled: CompiledNetwork) -> Recording:
-    """What makes of activities and weights a recording that can be drawn and gone on from."""
+    """A recording without rows, to which received activities and weights are added: it has the names, connections and
+    hash of the network."""
     network = compiled.network
     columns = replace(columns_of(network), probe=Probe((), ()), outputs={})
     return frame_of(network, columns, compiled.simulator("reference").state())

@@ -42,7 +42,8 @@ class Arrival(NamedTuple):
     type: str
 
 
-#: Called with each message, in a thread of the middleware: it must not wait. What it raises is told.
+#: Called with each message, in a thread of the middleware: it must not wait. What it raises is reported
+#: through ``Tell``.
 Arrived: TypeAlias = Callable[[Arrival], None]
 #: Called with a line about what goes on: a publisher with another quality of service, a master that is away.
 Tell: TypeAlias = Callable[[str], None]
@@ -168,7 +169,7 @@ class Node(Protocol):
         ...
 
     def follow(self, values: Mapping[str, float]) -> None:
-        """Have parameters show what they are by now, whoever set them."""
+        """Set the node's own parameters to these current values, which somebody may have set otherwise than by ROS."""
         ...
 
     def parameters_of(self, node: str, names: Sequence[str]) -> Mapping[str, float] | None:

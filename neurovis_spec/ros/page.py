@@ -21,7 +21,7 @@ from neurovis_spec.live.source import Source
 
 
 class Page:
-    """A page that is served; ``url`` is where. What ends it early is told. Raises LayoutRefusalError."""
+    """The live page, served at ``url``. If it ends early, ``tell`` gets the reason. Raises LayoutRefusalError."""
 
     def __init__(
         self,

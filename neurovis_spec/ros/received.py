@@ -70,8 +70,9 @@ class Steering(Protocol):
 
 @dataclass(slots=True, eq=False)
 class _Row:
-    """A step as it came: ``seq`` its publisher's number, ``time`` when it came in nanoseconds, ``weights`` those of the
-    plastic connections, ``seen`` what a picture shows in place of the activity, ``shown`` whether one has."""
+    """A received step: ``seq`` is its publisher's number, ``time`` when it was received in nanoseconds, ``weights`` are
+    those of the plastic connections, ``seen`` what a picture shows in place of the activity (traces that fade), and
+    ``shown`` whether a picture of it was made."""
 
     step: int
     seq: int | None
@@ -104,7 +105,7 @@ class ReceivedSource:
         self.shown = self.came = 0
 
     def steer(self, steering: Steering) -> None:
-        """The network takes turns, by this."""
+        """Make it accept turns, which ``steering`` applies to the network."""
         self._steering, self.capabilities = steering, Capabilities(steering.takes, arrives=True)
 
     # ---- what arrives, in the thread that receives it ----------------------------------------------------------
@@ -171,7 +172,7 @@ class ReceivedSource:
 
     @property
     def step(self) -> int:
-        """The step that it stands at."""
+        """The current step."""
         return self._at.step
 
     @property
@@ -197,17 +198,17 @@ class ReceivedSource:
 
     @property
     def learning(self) -> Mapping[str, bool | None]:
-        """Whether the rules are carried out, where the network takes turns."""
+        """Whether connections learn, by the reference that names them; empty where the network accepts no turns."""
         return {} if self._steering is None else self._steering.learning
 
     def seen(self) -> Seen:
-        """What is seen of the step that it stands at."""
+        """What a picture of the current step is made from."""
         if self._steering is not None and self._following:
             return Seen(self._show(self._at), *self._steering.touched)
         return self._untouched(self._show(self._at))
 
     def _untouched(self, snapshot: Snapshot) -> Seen:
-        """A step of which nobody knows what was lesioned and clamped."""
+        """A step without lesions and clamps, as these are not known of it."""
         neurons, connections = (np.zeros(len(of), bool) for of in (self.network.neurons, self.network.connections))
         return Seen(snapshot, neurons, connections, neurons)
 

@@ -349,7 +349,7 @@ class Ros2Node:
             self._show({one.name: float(given)})
 
     def follow(self, values: Mapping[str, float]) -> None:
-        """Have parameters show what they are by now."""
+        """Set the node's own parameters to these current values, those that differ."""
         changed = {
             name: value
             for name, value in values.items()
