@@ -1,8 +1,8 @@
 """The compiler: from a Spec to a Network, one stage after the other.
 
 In: a Spec, as far as it could be read, the folder of its data files, parameters to set. Out: a Network, or None with
-findings. All findings come at once: what is invalid is left out or stands in, and what would follow from it
-(``names.unresolved``) is held back.
+findings. All findings come at once: what is invalid is UNKNOWN to later stages (``language/unknown.py``), which report
+nothing that follows from it.
 """
 
 from __future__ import annotations
@@ -173,8 +173,8 @@ def _ros(
 
 
 def _check_unused(expander: Expander, limits: Limits, seed: int) -> None:
-    """A module that nobody uses is checked by itself, with its own parameters: mistakes are found at once. Modules
-    that others hold come last, since they are checked in these; and together they may be as large as a network."""
+    """Check each module without an instance by compiling it alone, with its own parameters. Modules that occur in
+    others come last, as they are checked with these; all together must keep the limits of one network."""
     modules = expander.library.modules.known()
     inner = {instance.module.value for module in modules.values() for instance in module.model.instances.values()}
     neurons, connections = limits.neurons, limits.connections

@@ -1,6 +1,7 @@
 """Limits: how large a network may become, checked before memory is taken.
 
-The findings of one list are limited as well: a hundred thousand wrong cells are one mistake.
+In: nothing; these are the numbers, and functions that put amounts into words. The findings of one list are limited as
+well: a hundred thousand wrong cells are one mistake.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""The ``ros`` section: what a node is told, checked against the inputs and outputs of the network.
+"""The ``ros`` section: the topics and settings of a node, checked against the inputs and outputs of the network.
 
-In: the section as written, the inputs and outputs. Out: RosSettings, a value of the Network for whoever meets ROS; or
-findings. No ROS is needed for that: of message types as much is checked as the table of the usual ones knows.
+In: the section as written, the inputs and outputs. Out: RosSettings, a value of the Network that the ROS commands read;
+or findings. No ROS has to be installed: message types are checked against a table of the usual ones.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a node of ROS is told by a spec: where inputs come from and where outputs go to.
+"""The settings of a ROS node: from which topics inputs come and to which outputs go.
 
 In: nothing; these are values of a Network, which ``compiler.ros`` makes. Nothing of them changes what the network does.
 """

@@ -1,7 +1,7 @@
-"""Keys: those of a mapping of the language, against the known ones.
+"""Keys: compares the keys of a mapping with those that the language knows there.
 
-In: a Mapping as written. Out: the same, in which a misspelt key bears the name that it can only be meant for, with the
-place where it stands; so what it holds is checked as well, and nothing that it declares is missed elsewhere.
+In: a Mapping as written. Out: the same, in which a misspelt key is reported and renamed to the one key that it can be
+meant for; so its value is checked as well, and what it declares is not reported as missing elsewhere.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from neurovis_spec.language.yaml.source import Entry, Mapping
 
 
 class Keys(NamedTuple):
-    """A mapping whose unknown keys are reported; ``unknown`` are the known ones that these may be meant for, so that
-    nobody knows what they say."""
+    """A mapping whose unknown keys were reported. ``unknown`` are known keys that one of these may be meant for: it
+    cannot be said whether they are given, and with which value."""
 
     mapping: Mapping
     unknown: frozenset[str]

@@ -205,7 +205,7 @@ def as_texts(node: Node, info: ValidationInfo) -> tuple[Located[str], ...]:
 
 
 def as_parts(node: Node, info: ValidationInfo) -> tuple[Located[str], ...]:
-    """The same, without those that are none: each of the others stands for itself."""
+    """The same, without the items that are no texts: an invalid one does not make the others invalid."""
     if not isinstance(node, (Sequence, Packed)):
         return (as_text(node, info),)
     result: list[Located[str]] = []

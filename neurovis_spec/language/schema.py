@@ -40,7 +40,7 @@ def _closed(value: dict[str, object]) -> dict[str, object]:
 
 
 def _without_null(field: dict[str, object]) -> dict[str, object]:
-    """A field that may be left out, without the null that stands for that, and without a choice of one."""
+    """The schema of an optional field without the ``null`` that pydantic adds; of a single type left, that alone."""
     choices = field.get("anyOf")
     if "default" in field and field["default"] is None:
         field = {key: item for key, item in field.items() if key != "default"}

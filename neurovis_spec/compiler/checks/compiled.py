@@ -1,6 +1,6 @@
-"""What warnings look at: a spec without errors, and what it became.
+"""The input of all warnings: a spec without errors, with the network and the tables that were compiled from it.
 
-In: nothing; this is the value that ``compile`` makes once the network stands.
+In: nothing; this is the value that ``compile`` makes when the network is complete.
 """
 
 from __future__ import annotations

@@ -58,7 +58,8 @@ def check_events(
 
 @dataclass(frozen=True)
 class _Reader:
-    """What events say, which has been found right before: ``constants`` tell nobody of anything."""
+    """Evaluates events that were found valid before; ``constants`` therefore report into findings that are thrown
+    away."""
 
     directory: Directory
     constants: Constants

@@ -1,7 +1,7 @@
 """Names that two packages define: what a spec means by one of them is not what its author may think.
 
 In: the definitions that a spec names. Out: a warning where an installed package defines one of that name, too, which is
-not used. What the spec defines itself is told elsewhere (``replaces-builtin``).
+not used. A definition of the spec's own has another warning (``replaces-builtin``).
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""Rules that change no weight: whatever is put in, or because a signal is the connection's own end.
+"""Rules that change no weight: with any signals, or because a signal is the connection's own target.
 
-In: what a spec without errors became, a rule and its parameters. Out: whether it changes no weight, found by trying:
-its formulas are evaluated at a few points that nobody chose, and a formula that gives back the weight at all of them
-does so everywhere; over some steps where it may lie in its states. A warning at each signal that is the very neuron
-whose activity is ``post`` (``A -> O`` that learns by ``delta`` from the target O), where the rule then changes no
-weight, though it does with any other signal.
+In: a compiled spec, a rule and its parameters. Out: whether the rule changes no weight, found by trial: its formulas
+are evaluated at a few arbitrary points, and one that returns the weight at all of them is taken to do so everywhere;
+a rule with states is tried over several steps. A warning at each signal that is the very neuron whose activity is
+``post`` (``A -> O`` that learns by ``delta`` from the target O), where the rule then changes no weight, though it does
+with any other signal.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def changes_nothing(rule: Rule, parameters: Mapping[str, FloatArray]) -> bool:
 
 
 def ever_changes(rule: Rule, parameters: Mapping[str, FloatArray], own: Collection[str] = ()) -> bool:
-    """Whether a weight changes in a few steps and episodes that nobody chose, from the states' initial values; the
+    """Whether a weight changes in a few steps and episodes with arbitrary values, from the states' initial values; the
     signals of ``own`` are the target's activity."""
     generator = np.random.default_rng(0)
     values: dict[str, Value] = {**CONSTANTS, "dt": 0.5, "weight": generator.uniform(-2.0, 2.0, _POINTS)}

@@ -2,9 +2,9 @@
 
 In: a Network. Out: for each group the neurons that nothing reaches but themselves or each other, that have no input,
 bias, initial value or noise, and that surely stay at 0 by their model and activation (a cosine would not), whatever
-events set: of a model that knows the time nothing is sure. Those that are only
-behind such neurons are not told of: they follow from these. A network without a single connection is a sketch: of its
-neurons only those are told of that an output or a rule asks for.
+events set (a model whose formulas read the time is never reported). Neurons that are idle only because all that drives
+them is idle are not reported: that follows from the others. A network without a single connection is a sketch: of its
+neurons only those are reported that an output or a rule names.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Operations that are undefined at each step, such as ``clip(drive/s, -1, 1)`` where s is 0: what follows may hide it.
 
 In: the models, activations and rules in use, with their settings. Out: a warning where one of them surely divides by 0,
-or takes a logarithm, a root or another function where there is none, whatever arrives. What stands in a branch is let
-be: it may never be taken.
+or takes a logarithm, a root or another function where there is none, whatever arrives. What stands in a branch of a
+conditional is not checked: the branch may never be taken.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Parts of a definition that nothing reads: parameters, signals, states and intermediate values.
 
 In: the activations, models and rules of a spec and of the files that it includes. Out: a warning at each part on which
-neither the activity nor the weight depends. What only such parts read is not told of: it follows from these.
+neither the activity nor the weight depends. A part that only such parts read is not reported: that follows from these.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Warnings: what is legal but surely not meant.
 
 In: the Spec of a network without errors, and the network. Out: warnings among the findings. Better none than a false
-one: what may be meant (a rate that is a parameter and can be set in a run, a bias of 0 that is written down) is let be.
+one: what may be meant (a rate that is a parameter and can be set in a run, a bias of 0 written down) is not reported.
 """
 
 from __future__ import annotations
@@ -134,8 +134,8 @@ def _parameters(section: Section, scopes: list[Scope], findings: Findings) -> No
 
 
 def _definitions(compiled: Compiled, findings: Findings) -> None:
-    """Activations, models and rules of the spec's own that nobody uses. A module without an instance uses whatever it
-    names."""
+    """Activations, models and rules of the spec's own that are not used. What a module names counts as used, even if it
+    has no instance."""
     network = compiled.network
     used = {
         "activations": {group.activation for group in network.neurons.groups},

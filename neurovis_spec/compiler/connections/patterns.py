@@ -98,8 +98,8 @@ def pairs_of(
 
 
 def least_pairs(name: str, n: int, m: int, values: Mapping[str, float]) -> int:
-    """How many pairs a pattern makes of n sources and m targets, but for a neuron's connection to itself: at the least,
-    or nearly so. 0 where that cannot be said, as these are no settings for such ends."""
+    """A lower bound (but for one case in a million) of the pairs that a pattern makes of n sources and m targets.
+    It may include a neuron's connections to itself. 0 where the settings do not fit such ends."""
     if name in _FIXED:
         return n * m if name == "all_to_all" else n
     if name not in PATTERNS or not PATTERNS[name].settings.keys() <= values.keys():
@@ -108,7 +108,7 @@ def least_pairs(name: str, n: int, m: int, values: Mapping[str, float]) -> int:
         probability = values["probability"]
         if not 0 < probability <= 1:
             return 0
-        # fewer there are in one case in a million; who has made them is asked again
+        # there are fewer in one case in a million; once made, the pairs are counted again
         return max(0, int(n * m * probability - 5 * (n * m * probability * (1 - probability)) ** 0.5))
     if name == "band":
         return max(0, in_band(n, m, min(int(values["width"]), max(n, m))) - min(n, m))

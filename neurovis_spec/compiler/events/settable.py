@@ -29,7 +29,7 @@ class Dependent(Protocol):
         ...
 
     def values(self, parameters: FloatArray) -> Value:
-        """What it comes to with these parameters (one a slot), finite or not."""
+        """Its value or values with these parameters (one a slot), finite or not."""
         ...
 
 
@@ -57,7 +57,7 @@ class ParameterFormula:
         return self.draw is None and all(isinstance(value, float) for value in self.known.values())
 
     def values(self, parameters: FloatArray) -> Value:
-        """What it comes to with these parameters."""
+        """Its value or values with these parameters."""
         if isinstance(self.tree, Number):
             return self.tree.value
         given: dict[str, Value] = {name: float(parameters[slot]) for name, slot in self.places.items()}

@@ -165,7 +165,8 @@ class _Trial:
         return frozenset(found)
 
     def go_on(self, change: Change, events: list[Event]) -> bytes:
-        """Carry out what changes at a step, and say what it comes to, for the hash."""
+        """Apply the changes of a step to the parameters, weights and clamps of this trial run. Gives bytes that
+        identify their effect, for the hash."""
         keys = self._keys(events)
         marks = [str(change.at).encode()]
         values: dict[int, float] = {}
@@ -224,7 +225,8 @@ class _Trial:
         return mark, patch.changed
 
     def _effect(self, patch: Patch) -> tuple[bytes, bool]:
-        """What a patch comes to, however the formulas are written, and whether it changes anything."""
+        """Bytes that identify the numbers that a patch writes, however its formulas are written (for the hash); and
+        whether it changes any of them."""
         marks = [patch.parameters[self._root].tobytes()]
         effect = False
         for array in self._written(patch.bindings):

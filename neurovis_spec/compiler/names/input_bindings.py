@@ -1,7 +1,7 @@
 """Bindings: which inputs around an instance are the inputs of its module.
 
-In: the entry of an instance, the scope around it. Out: Bindings by the names that the module knows, and the part of an
-input that one instance gets.
+In: the entry of an instance, the scope around it. Out: a Binding for each input of the module, by the name that it has
+there; and, of an input of several values, those that one instance gets.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from neurovis_spec.language.model import unread
 from neurovis_spec.language.modules import InstanceModel
 from neurovis_spec.language.unknown import UNKNOWN, Unknown
 
-#: Sizes that are told of.
+#: The most sizes that a message lists.
 _FEW = 3
 
 

@@ -83,7 +83,7 @@ class _Unsaid(NamedTuple):
 
 @lru_cache(maxsize=64)
 def _unsaid(n: int) -> _Unsaid:
-    """The same arrays, which nobody writes to, for all groups of a size: instances have many."""
+    """The default arrays, read-only and shared by all groups of a size: instances make many of these."""
     result = _Unsaid(np.zeros(n), np.full(n, np.nan), np.full(n, -1, dtype=np.int64))
     for array in result:
         frozen(array)

@@ -75,7 +75,7 @@ class Population:
         return result
 
     def go_by_position(self, neurons: IntArray) -> None:
-        """Report that connections are there, or not, by where these neurons are."""
+        """Mark the parameters that place these neurons as structural: which connections exist depends on them."""
         for number in np.unique(np.searchsorted(self._starts, neurons, side="right") - 1).tolist():
             depend_on_positions(self.models[number].position, self.constants[self.owners[number]])
 
@@ -113,7 +113,8 @@ def populate(scopes: tuple[Scope, ...], limits: Limits, seed: int) -> Population
 
 
 def without_neurons(population: Population) -> Population:
-    """A population without any neuron, in which nobody complains of a name: that there are none is said already."""
+    """A population without neurons whose tables of names are open: no name is reported as unknown, since the lack of
+    neurons was reported already."""
     first, *others = population.directories
     return replace(population, directories=(replace(first, invalid=first.invalid.opened()), *others))
 

@@ -84,7 +84,7 @@ def _one_for_all(node: Sequence | Packed, n: int) -> bool:
 
 
 def depend_on_positions(node: FileReference | Sequence | Packed | None, constants: Constants) -> None:
-    """Report that something of the structure depends on the parameters by which these positions are written."""
+    """Mark the parameters in these positions as structural: something that is fixed in a run depends on them."""
     quiet = replace(constants, findings=Findings())
     cells = None if node is None or isinstance(node, FileReference) else cells_of(node, quiet.findings, "")
     for cell in () if cells is None else np.flatnonzero(cells.kinds == TEXT).tolist():

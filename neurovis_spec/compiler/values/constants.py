@@ -41,7 +41,7 @@ _NOT_FINITE = "look for a division by zero, an overflow, or a root or logarithm 
 
 @dataclass(frozen=True, slots=True)
 class Scope(Collection[str]):
-    """Names from several places, as one collection that nobody copies: there may be many of them, and many formulas."""
+    """Names from several places as one collection, without copying them: there may be many names, and many formulas."""
 
     parts: tuple[Collection[str], ...]
 

@@ -35,7 +35,8 @@ class _Shelf(Generic[T]):
     refused: set[Hashable] = field(default_factory=set)
 
     def get(self, file: Hashable, place: Hashable, room: Room, read: Callable[[Room], T | None]) -> T | None:
-        """What ``read`` makes of a file in which there is room at a place for so much."""
+        """What ``read`` returns for a file, cached. ``room`` raises CellError where the file is too large for this
+        place; that is remembered for the place alone, and the result is None."""
         if file in self.read:
             return self.read[file]
         if (file, place) in self.refused:

@@ -74,7 +74,7 @@ def evaluate_array(
 
 
 class _Evaluation:
-    """One evaluation: what its names mean."""
+    """One evaluation, with the values of the names, the source of random numbers and the functions."""
 
     def __init__(
         self, names: Mapping[str, Given], draw: Drawing | None, functions: Mapping[str, Callable[..., Value]]

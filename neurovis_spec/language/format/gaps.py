@@ -14,8 +14,8 @@ _PROLOGUE_PIECE: Final = re.compile(r"[#%][^\n]*|\n")
 
 
 class Comment(NamedTuple):
-    """A comment with its #; where it stood: the column (from 0), the blanks between it and the code before it, and
-    whether a blank line was above it."""
+    """A comment with its #; its ``column`` (from 0), how many blanks are between the code before and it (``behind``),
+    and whether the line above is ``blank``."""
 
     text: str
     column: int
@@ -80,7 +80,7 @@ def read_gap(text: str, start: int, stop: int, *, prologue: bool = False) -> Gap
 
 
 def joined(first: Gap, *later: Gap) -> Gap:
-    """The first gap with the comments of later ones taken up behind its own."""
+    """The first gap, with the comments of later gaps after its own, each on a line of its own."""
     moved = [comment._replace(behind=0, blank=False) for gap in later for comment in gap.comments]
     if not moved:
         return first

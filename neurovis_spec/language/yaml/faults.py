@@ -1,4 +1,7 @@
-"""Syntax errors in an author's words: what is wrong, and what to change."""
+"""Syntax errors in an author's words: what is wrong, and what to change.
+
+In: nothing, or the characters that were met. Out: Words.
+"""
 
 from __future__ import annotations
 
@@ -49,7 +52,7 @@ def quote(character: str) -> Words:
 
 
 def escape(written: str) -> Words:
-    """An escape that stands for nothing."""
+    """An escape that YAML does not know."""
     hint = "a backslash is written twice in double quotes, once in single ones"
     return Words(f"'{written}' begins no escape that could be read", hint)
 

@@ -177,7 +177,7 @@ class Scanner:
             self._refuse.syntax(words, Span(self._file, line, column, line, column + width))
 
     def _loss(self, at: int) -> Scalar:
-        """What stands for a value behind an index that is lost: it fits hardly anywhere."""
+        """A placeholder for the value behind an index that a syntax error has cost; hardly any place accepts it."""
         match = VISIBLE.search(self._text, at)
         line, column = self._lines.place(at if match is None else match.start())
         span = Span(self._file, line, column, line, column + 1)

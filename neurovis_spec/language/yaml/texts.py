@@ -27,7 +27,7 @@ _ESCAPED: Final = {
 
 
 class EscapeError(ValueError):
-    """An escape that stands for nothing; ``at`` is where its backslash is."""
+    """An escape that YAML does not know; ``at`` is where its backslash is."""
 
     def __init__(self, at: int) -> None:
         super().__init__(at)
@@ -60,7 +60,7 @@ def _folded(match: re.Match[str]) -> str:
 
 
 def meaning(match: re.Match[str]) -> str:
-    """What something stands for that is written otherwise between quotes. Raises EscapeError."""
+    """The characters that an escape, a doubled quote or a line break between quotes stands for. Raises EscapeError."""
     if match[0] == "''":
         return "'"
     if match[0][0] != "\\":
