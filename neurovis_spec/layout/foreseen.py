@@ -30,7 +30,7 @@ def foreseen(network: Network, problem: Callable[[], LayoutProblem], *, memory: 
         refuse(asked_of(network, memory), name, engine_of(name).capabilities)
     except LayoutRefusalError as refusal:
         return refusal
-    except PluginError:  # told of when it is called
+    except PluginError:  # reported when it is called
         return None
     return None
 

@@ -46,7 +46,7 @@ LARGEST, _LONGEST = 16_384, 4096
 _MOST = (1 << 53) - 1
 #: The most components of an input, and parameters set at once.
 _MANY = 1024
-#: The most items that a client is told of, and the id of one.
+#: The most items whose values a client gets, and the id of one.
 _WATCHED, _ITEM = 64, re.compile(r"[nc][0-9]{1,9}", re.ASCII)
 #: The gains of Eqs. 2–5.
 _GAINS = ("activity", "signal", "thickness", "change")

@@ -65,7 +65,7 @@ def outline(node: Node, path: Path = (), edges: bool = True) -> Iterator[Item]:
 
 def nodes_at(node: Node, place: Place, path: Path = ()) -> list[tuple[Path, Node, bool]]:
     """The values around a place, from the outermost to the key or the text there, each with the keys that lead to it
-    and whether it is a key; nothing where there is none. Only the nodes around the place are checked."""
+    and whether it is a key; nothing where there is none. Only nodes around the place are visited."""
     here: tuple[Path, Node, bool] = path, node, False
     match node:
         case Mapping(entries=entries):

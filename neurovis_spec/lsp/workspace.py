@@ -88,7 +88,7 @@ class Desk:
         return self._read.get(uri, frozenset())
 
     def keep(self, uri: str, document: Document, checked: Checked) -> tuple[Path, ...]:
-        """Report what a check gave; the other files whose findings change by that."""
+        """Store the result of a check; gives the other files whose findings change by it."""
         if checked.network is not None:
             self._networks[uri] = checked.network
         found: dict[Path, tuple[Diagnostic, ...]] = {document.path: ()}

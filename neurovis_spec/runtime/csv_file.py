@@ -114,7 +114,7 @@ def held_csv(file: FileIO) -> int | None:
 
 
 def finish_csv(file: FileIO, part: Path, path: Path) -> None:
-    """Make of a part what its run did not come to make. Raises OSError."""
+    """Turn the part of a run that broke off into a recording. Raises OSError."""
     file.truncate(_whole(file, file.seek(0, io.SEEK_END)))
     move(file, part, path)
 

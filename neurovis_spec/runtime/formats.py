@@ -72,7 +72,8 @@ class StreamingFormat(Format, Protocol):
         ...
 
     def finish(self, file: FileIO, part: Path, path: Path) -> None:
-        """Make of a part the file that it was to become; ``file`` is the part, open. Raises RecordingError, OSError."""
+        """Turn the part of a run that broke off into a recording at ``path``; ``file`` is the part, open. Raises
+        RecordingError, OSError."""
         ...
 
 
@@ -150,7 +151,7 @@ def _in_place(path: Path, part: Path, format_: StreamingFormat) -> Recording:
 
 
 def _tell(path: Path, parts: Sequence[Path], format_: StreamingFormat) -> None:
-    """Say what lies beside a file that is read: a later run of which nobody might hear otherwise."""
+    """Warn if beside the file that is read lies the part of a later run, which broke off."""
     for part in parts:
         file = seize(part)
         if file is not None:

@@ -35,8 +35,8 @@ class InputReader:
     """The inputs of a network, step by step.
 
     ``supplied`` maps names to whole arrays that replace their sources: (steps, size), (steps,) for size 1, or one
-    number or (size,) for all steps; past its end the last row stays. ``made`` is told of rows when they are made: the
-    first step, and a row for each from there on. Raises InputError.
+    number or (size,) for all steps; past its end the last row stays. ``made`` is called with rows of inputs as
+    soon as they are computed: the first step, and a row for each step from there on. Raises InputError.
     """
 
     def __init__(

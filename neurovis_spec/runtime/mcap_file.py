@@ -165,7 +165,7 @@ def _steps(file: FileIO, found: Found) -> list[int]:
 
 
 def finish_mcap(file: FileIO, part: Path, path: Path) -> None:
-    """Make of a part what its run did not come to make. Raises RecordingError, OSError."""
+    """Turn the part of a run that broke off into a recording. Raises RecordingError, OSError."""
     records.finish(file)
     move(file, part, path)
 

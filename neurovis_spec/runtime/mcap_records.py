@@ -325,7 +325,7 @@ class _Summary:
     last: int = 0
 
     def take(self, file: FileIO, found: Found) -> None:
-        """Report a record."""
+        """Add a record to the index."""
         place = struct.pack("<QQ", found.start, found.end - found.start)
         if found.opcode in (SCHEMA, CHANNEL):
             self.groups[found.opcode].append(record(found.opcode, content_of(file, found).data))

@@ -222,7 +222,7 @@ class Meter:
         self.values: list[float] = [math.nan] * len(self._running)
 
     def copy(self) -> Meter:
-        """One that goes on by itself from here."""
+        """An independent copy with the values so far."""
         other = copy.copy(self)
         other._running, other.values = copy.deepcopy(self._running), list(self.values)
         return other

@@ -132,7 +132,7 @@ def held_npz(file: FileIO) -> int | None:
 
 
 def finish_npz(file: FileIO, part: Path, path: Path) -> None:
-    """Make of a part what its run did not come to make. Raises RecordingError, OSError."""
+    """Turn the part of a run that broke off into a recording. Raises RecordingError, OSError."""
     _archive(file, path)
     part.unlink()
 

@@ -60,7 +60,7 @@ def beside(target: Path, kind: Kind) -> list[Path]:
 
 
 def seize(path: Path) -> FileIO | None:
-    """A file beside, locked, if whoever wrote it is gone; None if it is being written, or nobody can tell."""
+    """Open and lock a part whose writer has ended; None if it is still being written, or if that is not known."""
     if sys.platform == "win32":
         return None
     try:
@@ -147,7 +147,7 @@ def _liken(file: FileIO, target: Path) -> None:
 
 
 def clear(target: Path, kind: Kind) -> None:
-    """Remove the files of this kind that nobody writes any more."""
+    """Remove the files of this kind whose writer has ended."""
     for path in beside(target, kind):
         file = seize(path)
         if file is not None:

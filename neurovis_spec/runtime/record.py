@@ -154,7 +154,7 @@ class InMemory:
         self._filled += count
 
     def due(self) -> bool:
-        """Only where the run is to end: nobody waits for them."""
+        """Whether the rows are to be handed on now: only when the run is to end, as nothing reads them before."""
         return self.over()
 
     def over(self) -> bool:

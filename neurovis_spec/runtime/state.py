@@ -29,8 +29,8 @@ class State:
     ``k`` is the step to compute next; ``activity`` (n,) is a[k−1], ``weights`` (m,) is w[k]; ``signals`` as in
     ``SignalLayout``; row t mod (depth) of ``history`` (depth, n) is a[t], for ``pre``; ``cells[b][i]`` is state i of
     the model of block b, ``traces[p][i]`` that of the rule of plasticity p, each as long as the members.
-    ``conditions`` are what events and callers have changed. ``continued`` says that a[−1] is given, so that nobody
-    takes ``initial`` at step 0; ``drawn`` are the steps of runs before this one, behind which random numbers go on.
+    ``conditions`` are what events and callers have changed. ``continued`` says that a[−1] is given, so that
+    ``initial`` is not used at step 0; ``drawn`` is how many steps earlier runs had, after which random numbers go on.
     """
 
     k: int

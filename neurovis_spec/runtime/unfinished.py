@@ -1,6 +1,7 @@
-"""The part of a recording that is being made: kept if its run fails, so that what was recorded is not lost.
+"""The part: the file into which a recording is written during its run; kept if the run fails, so no step is lost.
 
-In: the path of a recording. Out: a file beside it that rows are written to as they come.
+In: the path of a recording. Out: a file beside it, to which rows are written as they come, and which replaces the
+recording at the end.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ class Part:
     held: int | None = None
 
     def take_place(self) -> None:
-        """Be the recording itself from now on, where both have the same form. Raises OSError."""
+        """Move the part to the path of the recording; both have the same format. Raises OSError."""
         if self.path is None:
             copy_to_device(self.file, self.target)
             return
@@ -68,7 +69,7 @@ def part_of(path: Path) -> Iterator[Part]:
 
 
 def move(file: FileIO, part: Path, path: Path) -> None:
-    """Let a part, of the same form as the recording, be the recording. Raises OSError."""
+    """Move a part, which has the same format as the recording, to the path of the recording. Raises OSError."""
     target = written_to(path)
     if target.is_char_device():
         with target.open("wb") as device:

@@ -71,8 +71,8 @@ class Watched:
         self._until.ending = self._ending()
 
     def made(self, activity: FloatArray) -> int:
-        """Ask after many steps at once, of which these are the activities (steps, n): with how many of them the run
-        ends, all where it goes on. Only where the measure is ``together``."""
+        """Evaluate the measure after each of these steps, of which these are the activities (steps, n): how many of
+        them the run has, all unless it ends among them. Only where the measure is ``together``."""
         before, parameters = self._meter.copy(), self._state.conditions.parameters
         values = self._meter.rows(activity, parameters, np.zeros((len(activity), 0)))
         true = np.flatnonzero((values == values) & (values != 0))

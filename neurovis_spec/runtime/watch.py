@@ -35,7 +35,7 @@ class Watch:
         self.warned = False
 
     def given(self, first: int, vectors: FloatArray) -> None:
-        """The inputs of the steps from ``first`` on, a row a step: they are told of when their step is made."""
+        """Take the inputs of the steps from ``first`` on, a row a step; ``look`` warns of them at their step."""
         self._step = _NEVER
         wrong = np.flatnonzero(~np.isfinite(vectors).all(axis=1))
         if len(wrong):

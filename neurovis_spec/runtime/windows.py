@@ -22,7 +22,7 @@ _BEGIN: Final = {"rms": 0.0, "mean": 0.0, "min": math.inf, "max": -math.inf}
 
 
 class Running(Protocol):
-    """A summary that goes on."""
+    """A summary that is updated step by step."""
 
     def push(self, value: float) -> float:
         """One more value; the summary by now."""

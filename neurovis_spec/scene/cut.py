@@ -1,6 +1,7 @@
-"""Cut: names shortened so that they can still be told apart.
+"""Cut: names shortened to a width, so that they can still be told apart.
 
-In: the names that stand together in a picture. Out: as much of each as there is room for.
+In: all names that stand together in a picture. Out: for one of them and a width, the beginning of the name and an
+ellipsis; the end of the name instead, if others begin in the same way.
 """
 
 from __future__ import annotations
@@ -11,8 +12,7 @@ from neurovis_spec.scene import texts
 
 
 class Cut:
-    """Shortens names so that they can be told apart: of those that share what would be left of them, the beginning
-    goes."""
+    """Shortens names: to their beginning if that tells a name from the others, else to their end."""
 
     def __init__(self, names: Iterable[str]) -> None:
         self._begins: dict[str, int] = {}
@@ -21,7 +21,7 @@ class Cut:
                 self._begins[name[:end]] = self._begins.get(name[:end], 0) + 1
 
     def shorten(self, name: str, size: float, room: float, weight: int = 600) -> str:
-        """The name, or as much of it as fits into ``room`` with an ellipsis; '' where nothing does.
+        """The name, or what of its beginning (or end) fits into ``room`` with an ellipsis; '' where nothing does.
 
         >>> cut = Cut(["descending_1", "descending_2", "photoreceptor"])
         >>> cut.shorten("descending_2", 10, 60), cut.shorten("photoreceptor", 10, 60)

@@ -21,7 +21,7 @@ from neurovis_spec.scene.film_size import frames_a_second
 _SECONDS, _STEPS = 0.2, 2.0
 #: A trace that is fainter than this share cannot be told from nothing, nor can two pictures that differ by it.
 _FAINTEST = 1e-5
-#: Rows looked at together.
+#: Rows that are evaluated at a time.
 _CHUNK = 256
 
 
@@ -63,7 +63,7 @@ class Fading:
         return math.log(_FAINTEST) / math.log(longest) if 0 < longest < 1 else longest * math.inf
 
     def follow(self, steps: IntArray, rows: FloatArray) -> FloatArray:
-        """What is shown at the last of these steps, whose activities are ``rows`` (steps, n)."""
+        """Take the activities ``rows`` (steps, n) of the next steps; gives what a picture shows at the last of them."""
         for first in range(0, len(steps), _CHUNK):
             some, now = rows[first : first + _CHUNK], steps[first : first + _CHUNK]
             if len(self._shown):

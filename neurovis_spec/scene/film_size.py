@@ -40,17 +40,17 @@ _MOST_FPS, _FPS = 60.0, 25.0
 
 
 def frames_a_second(network: Network) -> float:
-    """How fast a film is where nobody has said so: a frame is a step."""
+    """The default rate of a film: a step a frame, in real time."""
     return min(1 / network.dt, _MOST_FPS) if network.dt_given else _FPS
 
 
-#: The most frames of a film where nobody has said how many.
+#: The most frames of a film by default.
 MOST_FRAMES = 3000
 
 
 def thinned(steps: int, every: int | None, frames: int | None) -> int:
-    """One step in so many is shown of so many: ``every`` where it is given, else such that there are at most so many
-    ``frames``.
+    """Every how many steps there is a frame in a film of so many ``steps``: ``every`` if it is given, else as few as
+    leave at most so many ``frames``.
 
     >>> thinned(2000, None, None), thinned(40_000, None, None), thinned(40_000, 2, None), thinned(1000, None, 300)
     (1, 14, 2, 4)

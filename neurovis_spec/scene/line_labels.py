@@ -19,14 +19,14 @@ from neurovis_spec.scene.obstacles import Obstacles
 _SIZE, _WEIGHT = 10.0, 400
 #: longer ones are shortened; the tooltip has all of them
 _WIDEST = 160.0
-#: where they may be on their lines, the best place first, and so many lines of an entry are checked
+#: where they may be on their lines, the best place first, and how many lines of an entry are tried
 _PLACES, _MOST = (1 / 2, 0.4, 0.6, 0.3, 0.7), 12
 #: what lies on more than this (a disc, a text) is left out
 _TOO_MUCH = 10_000
 
 
 def line_labels(network: Network, lines: Mapping[int, Line], obstacles: Obstacles, theme: Theme) -> dict[str, Text]:
-    """The texts by the names of their entries; the room that each takes is reported in ``obstacles``."""
+    """The texts by the names of their entries; the room that each takes is added to ``obstacles``."""
     connections = network.connections
     wanted: dict[int, list[int]] = {}
     if any(connections.labels):

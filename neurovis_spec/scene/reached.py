@@ -1,6 +1,6 @@
-"""Reached: how far the values of a run go, from which gains are chosen.
+"""Reached: the ranges of the activities, weights and signals of a run, from which gains are chosen.
 
-In: the activities and weights of a run. Out: Reached. What is no finite number counts for nothing.
+In: the activities and weights of a run. Out: Reached. Values that are not finite are left out.
 """
 
 from __future__ import annotations

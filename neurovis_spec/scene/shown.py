@@ -1,7 +1,7 @@
 """Shown: which neurons and connections a picture draws, and what it says of those that it leaves out.
 
-In: a network, what the author or the reader asks for, how thick lines are in what is drawn. Out: Shown. Nothing that is
-drawn looks different for it: what is left out is not drawn at all, and neurons that are out of focus are small.
+In: a network, what the author or the reader asks to see, the widths of lines. Out: Shown. What is drawn looks the same
+as in the whole picture; the rest is left out, and neurons out of focus are small.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ from neurovis_spec.scene.traces import PLOT, Trace, Traces
 
 #: The most curves of a view that names them, and of one that chooses them.
 _MOST_NAMED, _MOST_CHOSEN = 4 * MOST_COLOURS, MOST_COLOURS
-#: Columns of a recording that are checked together.
+#: Columns of a recording that are compared at a time.
 _TOGETHER = 512
 #: The share of the weights of a scale that do not go beyond its full colour in a matrix.
 _MOST = 0.9

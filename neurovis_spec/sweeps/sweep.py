@@ -1,6 +1,7 @@
-"""``nv.sweep``: a table of metrics, a row for each point of a grid.
+"""``nv.sweep``: runs a spec at every point of a grid of parameters and seeds, and measures each run.
 
-In: a spec, what it is varied over, metrics. Out: a Table, and a file that grows while the sweep runs.
+In: a spec, the values of each parameter, metrics. Out: a Table with a row for each point, and, if there is a path, a
+file to which rows are added while the sweep runs.
 """
 
 from __future__ import annotations
@@ -57,8 +58,7 @@ class Source:
 
 @dataclass(frozen=True, eq=False)
 class CheckedSweep:
-    """A sweep that has been checked, as far as the ends of its grid show what is wrong; ``network`` is that of one of
-    its points."""
+    """A sweep whose first and last point have been compiled, as a check; ``network`` is that of one of them."""
 
     job: Job
     columns: tuple[str, ...]
@@ -178,8 +178,8 @@ def carried_out(
 
 
 def _by_itself(plan: CheckedSweep) -> Job:
-    """The job with all that the spec includes and reads in its text: other machines need not have these files. Raises
-    SweepError, SpecError where one of them is gone meanwhile."""
+    """The job with all included and data files written into the text of its spec, since other machines need not have
+    these files. Raises SweepError; SpecError where a file is missing by now."""
     made = plan.network
     text = whole_text(made.spec, replace(made.request, parameters={}, seed=None), made.sources)
     if text == plan.job.text:
@@ -231,7 +231,8 @@ def _check_columns(columns: Sequence[str]) -> None:
 
 
 def _checked(job: Job, grid: Sequence[Axis], every: Sequence[Point]) -> CompiledNetwork:
-    """Refuse what is wrong with all points, as far as the ends of the grid show it; the network of one of these."""
+    """Check a sweep on the first and the last point of its grid, before anything is run: raise if both are invalid, and
+    the spec without a point, too. Gives the network of one that is valid."""
     networks: list[CompiledNetwork] = []
     errors: list[SpecError] = []
     for point in dict.fromkeys((every[0], every[-1], None)):

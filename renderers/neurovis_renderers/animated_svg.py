@@ -280,7 +280,7 @@ def _levels(values: FloatArray) -> IntArray:
 
 
 def _step(widths: FloatArray) -> float:
-    """The smallest difference of widths that is told apart: a twentieth of a unit, more where there are too many."""
+    """The step to which widths are rounded: a twentieth of a unit, more where there would be too many widths."""
     return max(0.05, float(widths.max(initial=0.0)) / _MOST_WIDTHS)
 
 

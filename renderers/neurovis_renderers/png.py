@@ -1,6 +1,6 @@
-"""PNG: coloured cells as the bytes of a file, by the standard library alone, so that SVG needs nothing else.
+"""PNG: pixels as the bytes of a file, for the images within an SVG; by zlib and NumPy, so that SVG needs no Pillow.
 
-In: red, green and blue of each cell. Out: a ``.png``, with a palette where there are few colours.
+In: red, green and blue of each pixel, row by row. Out: a ``.png``, with a palette where there are at most 256 colours.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _TRUE_COLOUR, _PALETTE = 2, 3
 
 
 def png(columns: int, rows: int, pixels: bytes) -> bytes:
-    """A picture of ``columns`` by ``rows`` cells, the same bytes for the same cells."""
+    """A picture of ``columns`` by ``rows`` pixels; the same pixels always give the same bytes."""
     cells = np.frombuffer(pixels, np.uint8).reshape(rows, columns, 3)
     wide = cells.astype(np.uint32)  # one number a cell: sorted far more quickly than three
     shades, which = np.unique(wide[:, :, 0] << 16 | wide[:, :, 1] << 8 | wide[:, :, 2], return_inverse=True)
