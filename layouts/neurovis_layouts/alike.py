@@ -1,8 +1,8 @@
-"""Alike: which neurons stand in places that follow from one another's, and how.
+"""Alike: the neurons whose places follow from each other, as copies in other instances or as mirror images.
 
-In: a problem and the places of some of its neurons. Out: for a neuron, those that are drawn like it: the same one in
-other instances of one make, and its mirror image, each with the move that takes its place to theirs. The moves are read
-off what is placed already.
+In: a problem and the places of some of its neurons. Out: for a neuron, its copies in other instances of the same make,
+and its mirror image, each with the move that takes its place to theirs. The moves are found from the neurons that have
+places already.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Move:
 
 
 class Alike:
-    """Looks up who is drawn like whom."""
+    """Looks up the counterparts of a neuron: those whose places follow from its place."""
 
     def __init__(self, problem: LayoutProblem, placed: Mapping[int, Point]) -> None:
         self._placed = placed

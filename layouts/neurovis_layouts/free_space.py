@@ -231,7 +231,7 @@ class Room:
         return grown
 
     def _apart(self, grown: Mapping[int, Rect], points: Sequence[tuple[int, Point]], rules: _Rules) -> bool:
-        """Whether frames that are new or grow hold nobody foreign and keep off the others."""
+        """Whether frames that are new or grow hold no foreign neuron, and keep off other frames."""
         for number, rect in grown.items():
             if number in self._open:
                 continue
@@ -253,7 +253,7 @@ class Room:
         return True
 
     def _strangers(self, number: int, rect: Rect) -> Iterator[int]:
-        """Who stands in a rectangle and is not of this frame."""
+        """The neurons in a rectangle that do not belong to this frame."""
         for neuron in self._discs.near(rect):
             x, y = self.placed[neuron]
             if neuron not in self._frames.members[number] and meet((x, y, x, y), rect):

@@ -92,7 +92,7 @@ class _Ends:
         return np.bincount(number, signs, len(pairs)).astype(np.int64)
 
     def _by_search(self, left: Ints, right: Ints, key: Ints) -> Ints:
-        """The same by looking up each end of the left one among those of the right one."""
+        """``gains`` for many segments: each end of the left node is searched among the sorted ends of the right one."""
         wide = int(key.max()) + 1
         owner = np.repeat(np.arange(len(self.degree), dtype=np.int64), self.degree) * wide
         every = np.sort(owner + key)

@@ -1,4 +1,4 @@
-"""Links: the connections between what stands in one frame, in no frame within it.
+"""Links: routes for the connections of one frame, but for those that are within a frame inside it.
 
 In: places, frames, the plan's waypoints. Out: a route for each; those of mirror images are reflections of each other.
 """
@@ -163,7 +163,7 @@ def _mended(
     frames: Sequence[tuple[frozenset[int], Rect]],
     drawn: Sequence[Route],
 ) -> dict[Key, Route]:
-    """Routes there and back between images of each other, clear of what is in the way and of each other."""
+    """The routes, those there and back between mirror images made clear of obstacles and of each other (``Arcs``)."""
     between: dict[tuple[int, int], list[Key]] = {}
     for source, target, number in sorted(routes):
         if pair.get(source) == target and (target, source, 0) in routes:

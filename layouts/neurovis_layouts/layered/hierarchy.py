@@ -159,7 +159,7 @@ class Composer:
     def _inside(
         self, problem: LayoutProblem, part: Part, direction: Direction, pair: Mapping[int, int]
     ) -> LayoutProblem | Drawing:
-        """An instance as it is drawn in a direction; of what is none the problem that it is by itself."""
+        """An instance's drawing in a direction; of a box, which has none yet, the problem of drawing it alone."""
         if part.kind >= 0:
             return self.kind(part.kind, direction)
         return replace(_boxed(problem, part, pair), direction=direction)
@@ -204,7 +204,7 @@ def _unit(piece: Piece, kin: int, pair: Mapping[int, int]) -> Unit:
 
 
 def _resting(plan: ComponentLayout, piece: Piece) -> tuple[Piece, FrameMove]:
-    """Where a piece has come to stand."""
+    """A piece, and the move from its own drawing to its place in the plan."""
     first = piece.part.members[0]
     flip = (piece.part.image_of >= 0) != (min(piece.part.members) in plan.turned)
     x, y = plan.places[first]

@@ -252,7 +252,7 @@ class Insertion:
         return found
 
     def _reach_up(self, starts: Sequence[tuple[int, int]], first: int, last: int) -> dict[int, Counts]:
-        """The same from below."""
+        """``_reach_down`` in the other direction: lines from entries below."""
         found: dict[int, Counts] = {}
         waiting = _by_rank(starts)
         lines: Counts | None = None
@@ -377,7 +377,7 @@ class Insertion:
         return found
 
     def _shut_to(self, r: int, node: int) -> Counts:
-        """The same for a node, which has its place among those of its group, too."""
+        """``_shut`` for a node, which also has to keep its place in the order of its group."""
         found = self._shut(r, self._box[node])
         for p, entry in enumerate(self.order[r]):
             other = self.owner(entry)[0]

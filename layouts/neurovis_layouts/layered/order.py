@@ -130,7 +130,7 @@ class _Search:
         return box, np.array([node.kin if self.strict else -1 for node in nodes], dtype=np.int64)
 
     def improved(self, crossings: int, order: Order, free: AbstractSet[int]) -> tuple[int, Levels, Order]:
-        """What reinsertion makes of it."""
+        """The order after reinsertion, with its crossings and levels; the same where there is nothing to gain."""
         if self.sifts and crossings:
             return reinserted(self.levels, order, self.strict, free, self.effort)
         return crossings, self.levels, order

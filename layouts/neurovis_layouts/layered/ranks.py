@@ -127,7 +127,7 @@ def _sifted(order: list[int], arcs: Arcs) -> list[int]:
 
 
 def _early(order: Sequence[int], rank: list[int], forward: Arcs, before: Sequence[Sequence[int]]) -> None:
-    """What is pulled forward as much as back stands as early as it may."""
+    """Move units with equal pull from both sides to the lowest rank that they may have."""
     pull = [0.0] * len(rank)
     for (a, b), weight in forward.items():
         pull[a] += weight

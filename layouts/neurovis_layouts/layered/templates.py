@@ -142,7 +142,7 @@ class Book:
         )
 
     def problem_of(self, kind: int) -> LayoutProblem:
-        """What an instance of this kind is on its own, its neurons counted from 0."""
+        """The problem of drawing one instance of this kind alone, its neurons numbered from 0."""
         copies = self._copies[kind]
         modules = self._problem.modules
         local = {number: {n: i for i, n in enumerate(modules[number].members)} for number in copies}

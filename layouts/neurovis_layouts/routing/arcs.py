@@ -130,7 +130,7 @@ class Arcs:
         lines: Sequence[FloatArray],
         drawn: _Drawn,
     ) -> list[float]:
-        """What each route costs by itself."""
+        """The cost of each route, apart from what it costs beside another arc between the same ends (``_apart``)."""
         ends = [own] * len(routes)
         clear, enters = self._obstacles.clearances(routes, ends), self._walls.entered(routes, ends)
         straight = distance(self._centres[own[0]], self._centres[own[1]])
@@ -166,7 +166,7 @@ class Arcs:
 
 
 def _apart(one: FloatArray, other: FloatArray) -> float:
-    """What it costs that two arcs between the same ends meet."""
+    """The cost of two arcs between the same ends that run on each other or cross."""
     share = together(one, [other])
     return _SAME * max(0.0, share - tolerable(one, _SHARE)) + _CROSSED * crossings(one, [other])
 

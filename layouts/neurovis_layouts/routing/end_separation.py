@@ -1,4 +1,4 @@
-"""Arrivals: no connection arrives where another leaves, since an arrowhead on the start of a line makes both one.
+"""End separation: turns the end of a route that arrives at a disc where another leaves, as both look like one line.
 
 In: routes that are drawn, those within frames, what is in the way. Out: for those that meet so, the route with an end
 turned about the disc's centre, to where there is room.
@@ -230,7 +230,7 @@ class _Disc:
         return {key: away.get(key, (stay[key[0]][0], stay[key[0]][1])) for key in lines}
 
     def _crowd(self, moved: Mapping[int, Point]) -> float:
-        """What it costs that two ends are there: close to others."""
+        """The cost of ends being ``moved`` there, by how close they are to other ends."""
         places = self._places.copy()
         for end, place in moved.items():
             places[end] = place

@@ -51,7 +51,7 @@ class Polylines:
         return len(self.starts) - 1
 
     def some(self, chosen: IntArray) -> Polylines:
-        """Those of these numbers."""
+        """The lines with these numbers."""
         counts = (self.starts[1:] - self.starts[:-1])[chosen]
         ends = np.cumsum(counts)
         place = np.arange(int(ends[-1]) if len(ends) else 0, dtype=np.int64)

@@ -152,7 +152,7 @@ class Pen:
         return entered, max(0.0, TOUCH + _SLACK - self._judge.obstacles.clearance(route, self._own))
 
     def cost(self) -> float:
-        """What the route costs that the edge has."""
+        """The cost of the edge's present route."""
         found = self.cheapest([self.route], np.inf)
         return found[1] if found is not None else np.inf
 
