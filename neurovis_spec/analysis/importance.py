@@ -35,7 +35,7 @@ def importance(
 
 
 def importance_by(trials: Trials, progress: Progress | None = None) -> NamedArray:
-    """The same for trials that are prepared."""
+    """``importance`` for trials that have been prepared."""
     network = trials.network
     names = network.neurons.names
     own = [index for index in range(len(names)) if index not in set(trials.outputs.tolist())]

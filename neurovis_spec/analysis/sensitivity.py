@@ -45,7 +45,7 @@ def sensitivity(
 
 
 def sensitivity_by(trials: Trials, progress: Progress | None = None) -> NamedArray:
-    """The same for trials that are prepared."""
+    """``sensitivity`` for trials that have been prepared."""
     network = trials.network
     total = len(network.inputs) + len(network.parameters) - len(network.structural) + len(network.connections)
     labels, found = [], []
@@ -60,7 +60,7 @@ def sensitivity_by(trials: Trials, progress: Progress | None = None) -> NamedArr
 
 
 def _moves(trials: Trials) -> Iterator[tuple[str, float, Move]]:
-    """What can be changed: its name, its size, and what changes it."""
+    """Each input, parameter and connection: its name, the size of its value, and a function that runs it changed."""
     network = trials.network
     for entry in network.inputs:
         given = trials.given[:, entry.start : entry.start + entry.size]

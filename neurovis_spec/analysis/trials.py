@@ -111,13 +111,13 @@ class Trials:
         return self._run(self._simulation.state())[:, self.outputs]
 
     def weighed(self, connection: int, more: float) -> FloatArray:
-        """The same where a connection's weight is by so much more."""
+        """The outputs (steps, outputs) with a connection's weight increased by ``more`` from the first step on."""
         state = self._state.copy()
         state.weights[connection] += more
         return self._run(state)[:, self.outputs]
 
     def told(self, entry: Input, turn: Callable[[FloatArray], FloatArray]) -> FloatArray:
-        """The same where an input is another, made of what it is at each step."""
+        """The outputs (steps, outputs) with an input replaced: ``turn`` maps its values to others at each step."""
         own = slice(entry.start, entry.start + entry.size)
 
         def seen(vector: FloatArray) -> FloatArray:

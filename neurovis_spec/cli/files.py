@@ -63,14 +63,14 @@ def _options() -> tuple[Path | None, int | None]:
 
 
 def network_of(spec: str, parameters: Mapping[str, float] | None = None) -> CompiledNetwork:
-    """The same, its warnings shown on standard error."""
+    """``compiled``, with the warnings shown on standard error."""
     network = compiled(spec, parameters)
     show_findings(network)
     return network
 
 
 def show_findings(network: CompiledNetwork) -> None:
-    """What was noticed about a spec, on standard error."""
+    """Write the warnings about a spec to standard error."""
     if network.warnings:
         from neurovis_spec.findings import show_text
 
@@ -78,7 +78,7 @@ def show_findings(network: CompiledNetwork) -> None:
 
 
 def show_warnings(layout: NetworkLayout) -> None:
-    """What was noticed about a layout, on standard error."""
+    """Write the warnings about a layout to standard error."""
     if layout.warnings:
         from neurovis_spec.findings import show_text
 

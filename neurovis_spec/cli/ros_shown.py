@@ -34,7 +34,8 @@ F = TypeVar("F", bound=Callable[..., object])
 
 @dataclass(frozen=True)
 class Desk:
-    """Where what arrives is shown (a port; None: nowhere), recorded and filmed ("": where nobody has said)."""
+    """Where the received steps are shown (``live``: a port), recorded and filmed (paths; "": at a default path). None:
+    not at all."""
 
     live: int | None
     record: str | None

@@ -278,7 +278,7 @@ def _step_length(spec: Spec, constants: Constants) -> None:
 
 
 def _check_given(spec: Spec, constants: Constants, given: Mapping[str, float]) -> None:
-    """What is set from outside must be parameters of the spec."""
+    """Report names that the caller sets and that are no parameters of the spec."""
     for name in given:
         if name not in spec.parameters:
             node = spec.source.entry("parameters")

@@ -258,7 +258,7 @@ class Network:
 
     @cached_property
     def set_by_events(self) -> tuple[Binding, ...]:
-        """What follows the parameters that events set."""
+        """The bindings of all numbers that follow parameters which events set."""
         events = sorted({slot for change in self.changes for slot, _ in change.parameters})
         slots = [*events, *self.settable.reached(events, [False] * len(self.settable.slots))]
         return tuple(self.settable.bindings[number] for number in self.settable.bound_to(slots))

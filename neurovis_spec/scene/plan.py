@@ -379,7 +379,7 @@ def _order(network: Network, widths: FloatArray, lines: npt.NDArray[np.bool_]) -
 
 
 def _gap(radius: float) -> float:
-    """What lines keep of discs."""
+    """The distance between the ends of lines and the rims of discs."""
     return min(1.5, 0.1 * radius)
 
 

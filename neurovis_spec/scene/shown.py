@@ -27,7 +27,7 @@ _MOST_LINES, _LINES_EACH, _MOST_OF_ALL = 1000, 2, 5000
 
 
 class LeftOut(UserWarning):
-    """What a picture leaves out, for who does not see it in the picture."""
+    """What a picture leaves out, as a warning for callers that do not look at its notes."""
 
     prefix = "note"
 

@@ -142,7 +142,7 @@ class _Page:
         return self._add(f"<< /Font << {letters} >> /ExtGState << {states} >> /XObject << {inner} {images} >> >>")
 
     def _form(self, body: str, resources: int) -> bytes:
-        """What is drawn as one: then it can be seen in part."""
+        """A form XObject with a transparency group: shapes that fade as one."""
         packed = zlib.compress(body.encode("ascii"), 9)
         box = _numbers(0, 0, self._scene.width, self._scene.height)
         start = (

@@ -257,7 +257,7 @@ def _vain(compiled: Compiled, findings: Findings) -> None:
 
 
 def _rate(body: ConnectionModel) -> tuple[Span, bool]:
-    """Where the rate of a rule is said, and whether it is a number for good."""
+    """The place of a rule's rate (of the rule's name, if it is the default), and whether it is a constant number."""
     assert body.plasticity is not None
     for entry in body.plasticity.settings:
         if entry.name == "rate":

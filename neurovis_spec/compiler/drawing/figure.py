@@ -45,7 +45,7 @@ class _Reader:
 
     @property
     def directory(self) -> Directory:
-        """Who is called what."""
+        """The names of groups and neurons."""
         return self.population.directory
 
     def panel(self, model: PanelModel) -> Panel | None:

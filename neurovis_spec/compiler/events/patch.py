@@ -63,7 +63,7 @@ class Patch:
 
 @dataclass(slots=True, eq=False)
 class _Plan:
-    """What is to be computed where certain slots are set."""
+    """What has to be computed when certain slots are set: the slots and bindings that follow them, in order."""
 
     following: tuple[int, ...]
     bindings: tuple[Binding, ...]

@@ -215,7 +215,7 @@ class Settable:
 
     @cached_property
     def parameters(self) -> FloatArray:
-        """What the parameters begin with, one a slot."""
+        """The initial values of the parameters, one a slot."""
         result = np.array([slot.value for slot in self.slots], dtype=np.float64)
         result.flags.writeable = False
         return result

@@ -240,7 +240,7 @@ class _Trial:
         return b"/".join(marks), effect
 
     def _written(self, bindings: tuple[Binding, ...]) -> tuple[_Written, ...]:
-        """What some bindings write to."""
+        """The arrays that these bindings write to, with the places in them."""
         if bindings not in self._arrays:
             arrays: dict[str, list[int]] = defaultdict(list)
             for number, binding in enumerate(bindings):

@@ -111,7 +111,7 @@ class Finder:
 
 
 def finder_of(population: Population, made: Connected, findings: Findings) -> Finder:
-    """Who finds what is called how in a spec."""
+    """The Finder of the neurons, connections and states of a spec."""
     rules, start = [], 0
     for bundle in made.bundles:
         members = np.arange(start, start + len(bundle.sources))

@@ -74,7 +74,7 @@ class Built(NamedTuple):
 
 
 class _Unsaid(NamedTuple):
-    """What n neurons have of which nothing is said."""
+    """The default values of n neurons, for keys that are not written."""
 
     bias: FloatArray
     initial: FloatArray
@@ -96,7 +96,7 @@ Kinds: TypeAlias = dict[tuple[str | None, str, int], Kind]
 
 @dataclass(frozen=True)
 class Builder:
-    """What makes the groups of one scope."""
+    """Makes the groups of one scope."""
 
     scope: Scope
     limits: Limits
@@ -245,7 +245,7 @@ class Builder:
         return tuple(seen)
 
     def _kind(self, name: str, model: GroupModel, n: int | Unknown) -> Kind:
-        """What the neurons are; identity and static in the place of what is invalid."""
+        """The activation and the model of the neurons; ``identity`` and ``static`` where these are invalid."""
         if n is UNKNOWN or not (_fixed(model.activation) and _fixed(model.model)):
             return self._made(model, n)
         key = self.scope.module, name, n

@@ -63,7 +63,7 @@ class Definitions:
         )
 
     def opened(self, is_open: bool) -> Definitions:
-        """The same; where it ``is_open``, there may be others that could not be read."""
+        """The same definitions; with ``is_open`` an unknown name is UNKNOWN, as some could not be read."""
         return Definitions(self.activations.opened(is_open), self.models.opened(is_open), self.rules.opened(is_open))
 
 
@@ -92,7 +92,7 @@ class _Checker:
         self.known.declared[name] = span
 
     def taken(self, name: str) -> str:
-        """What a name that is known already means."""
+        """The message for a name that is declared twice, or that is one of the given ones."""
         first = self.known[name]
         if isinstance(first, Span):
             return f"'{name}' already means something here (it is declared in line {first.line})"
@@ -198,7 +198,7 @@ def check_bounds(
 
 
 def _bound(default: Default, how: str, bound: Tree | None) -> str | None:
-    """What a parameter must not pass, where that is another one."""
+    """A hint for a parameter whose bound is another parameter; None where it is not."""
     return f"'{default.name}' is {how} '{bound.name}'" if isinstance(bound, Name) else None
 
 

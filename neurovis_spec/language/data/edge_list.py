@@ -104,7 +104,7 @@ class _Reader:
         self._weights, self._delays, self._rows = array("d"), array("q"), array("q")
 
     def table(self) -> EdgeTable:
-        """What was taken."""
+        """The table of all rows taken so far."""
         return EdgeTable(
             tuple(self._sources),
             tuple(self._targets),

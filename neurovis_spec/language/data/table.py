@@ -156,5 +156,5 @@ def printable(text: str) -> str:
 
 
 def quoted(text: str) -> str:
-    """The same, in quotes."""
+    """``printable`` text in quotes, for messages."""
     return f"'{printable(text)}'"

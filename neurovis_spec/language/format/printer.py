@@ -89,7 +89,7 @@ class Source:
         return not isinstance(node, Scalar) and self.text[self.begin(node)] not in "[{"
 
     def written(self, node: Node) -> str:
-        """What stands there."""
+        """The text of a value as the author wrote it."""
         return self.text[self.begin(node) : self.end(node)]
 
     def colon(self, key: Scalar) -> int | None:
