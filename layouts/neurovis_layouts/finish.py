@@ -1,4 +1,4 @@
-"""Finish: from places to a layout, for engines that place neurons anywhere.
+"""Finish: the last stage of engines that place neurons anywhere: from places to a complete layout.
 
 In: a problem and places in the engine's frame (x across, y along). Out: a Layout: pins exact, edges routed, turned to
 the direction, what is remembered kept.

@@ -1,4 +1,4 @@
-"""Room: where something new may stand beside what is placed.
+"""Free space: finds a place for something new among what has its place already.
 
 In: frames, what is placed, and pieces, each with the copies that follow from its place. Out: the free place nearest to
 a wish: off all discs, its frame off those of others, nobody foreign in any, mirror images on their sides.

@@ -1,4 +1,4 @@
-"""Kept: a layout that remembers an earlier one.
+"""Incremental layout: keeps what an earlier layout placed, and adds what is new.
 
 In: a problem with an earlier layout, and a fresh layout of it. Out: the layout in which what was there stays where it
 was, routes included; what is new, or runs into something new, is routed anew, alike where neurons are drawn alike.

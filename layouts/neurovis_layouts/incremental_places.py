@@ -1,4 +1,4 @@
-"""Memory: what an earlier layout placed stays there; what is new finds a place beside it.
+"""Incremental places: what an earlier layout placed stays there; what is new finds a place beside it.
 
 In: a problem with an earlier layout (``memory``), and a fresh layout of the whole as if there were none. Out: positions
 in which every neuron that the earlier layout knew stands exactly where it stood, unless it has to follow another

@@ -1,4 +1,4 @@
-"""Columns: boxes beside each other in the same ranks, each a strip that nothing foreign enters.
+"""Box columns: boxes side by side in the same ranks, each a strip across them that no other neuron or line enters.
 
 In: Levels and the boxes that are to be columns. Out: levels with a spine through every rank of a box, and passages
 within boxes marked as theirs; an order in which whatever hangs together outside a box is on one side of it; places
@@ -52,7 +52,7 @@ def with_spines(problem: LayoutProblem, levels: Levels, columns: AbstractSet[int
 
 
 def straightened(levels: Levels, order: Sequence[Sequence[int]], columns: AbstractSet[int]) -> list[list[int]] | None:
-    """The order with everything foreign on one side of each column; None where two columns cannot both have that."""
+    """The order with each connected part of the rest on one side of a column; None where that is not possible."""
     found = [list(rank) for rank in order]
     sides: dict[tuple[int, int], int] = {}
     for _ in range(len(columns) + 2):
@@ -74,10 +74,10 @@ def straightened(levels: Levels, order: Sequence[Sequence[int]], columns: Abstra
 
 
 def _part(levels: Levels, order: list[list[int]], box: int, sides: dict[tuple[int, int], int]) -> bool:
-    """Everything foreign in the ranks of a column to the side where most of what it is connected to there stands.
+    """Move each connected part of what is not in this column, within its ranks, to the side where most of it is.
 
-    ``sides`` says for two columns on which side of the first the second stands; what is settled here is added. False
-    where that is not to be had.
+    ``sides`` says for two columns on which side of the first the second stands; what is decided here is added. False
+    where these contradict each other.
     """
     spans = [r for r, rank in enumerate(order) if any(levels.nodes[n].box == box for n in rank)]
     foreign = [n for r in spans for n in order[r] if levels.nodes[n].box != box]

@@ -1,6 +1,7 @@
-"""A sheet: units of one problem in ranks, side by side where they are not connected.
+"""Component layout: the units of one frame in ranks; components that are not connected stand side by side.
 
-In: a problem, its units, who shares a rank. Out: a Plan: places of neurons and passages, which frames are reflected.
+In: a problem, its units, which of them share a rank. Out: a ComponentLayout: the places of neurons, the waypoints of
+edges, and which frames inside are reflected. It calls the stages ranks, levels, order and places one after the other.
 """
 
 from __future__ import annotations

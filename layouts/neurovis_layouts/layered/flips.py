@@ -1,6 +1,6 @@
-"""Turned: frames drawn as their mirror images where that saves crossings.
+"""Flips: frames are replaced by their mirror images where that saves crossings.
 
-In: Levels in order, and which frames may be turned. Out: Levels in which some are, and which these are.
+In: Levels in order, and which frames may be reflected. Out: Levels in which some are reflected, and which.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Exits: where connections leave the frames of folds, so that they fan out from there without bending.
+"""Fold ports: where connections leave the ranks of folded frames, so that they fan out from there without a bend.
 
-In: levels with their places, folds. Out: for connections of frames in folds waypoints on the far line of the rank,
-straight before the neuron; those that leave a frame side by side stand in the order in which they go apart. Where
-nothing crosses, these and the passages are all that a connection needs.
+In: levels with their places, folds. Out: for each connection of a folded frame a waypoint at the edge of the rank,
+straight in front of the neuron; several that leave side by side are ordered by where they go. Where they cross nothing,
+these and the passages are all the waypoints that a connection needs.
 """
 
 from __future__ import annotations

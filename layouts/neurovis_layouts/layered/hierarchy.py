@@ -1,4 +1,4 @@
-"""Compose: drawings of frames, from the inside out, put together into the drawing of the whole.
+"""Hierarchy: draws frames from the inside out, and puts their drawings together into that of the whole.
 
 In: a problem. Out: a Drawing. Every kind of instance is drawn once, by itself, with the instances in it as blocks; the
 drawing is then a block in what is around it, moved or reflected by steps of the grid, so that copies are exact. A box

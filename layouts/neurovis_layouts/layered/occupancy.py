@@ -1,4 +1,4 @@
-"""Ground: what stands where, so that nothing is put on a disc or into a frame.
+"""Occupancy: the discs and frames that have places, so that nothing else is put onto or into them.
 
 In: bodies (neurons, and frames with what is in them) and where they stand. Out: whether another may stand somewhere.
 """
@@ -51,7 +51,7 @@ class Ground:
         self._bodies: list[tuple[Body, Point]] = []
 
     def put(self, body: Body, place: Point) -> None:
-        """A body stands here from now on."""
+        """Add a body at a place."""
         points = [(place[0] + dx, place[1] + dy) for dx, dy in body.offsets]
         for point in points:
             self._cells.add(point)
@@ -71,8 +71,8 @@ class Ground:
         return not any(_holds(own, point, RADIUS) for point in self._points)
 
     def crowding(self, body: Body, place: Point) -> tuple[float, float]:
-        """How deep in frames a body that stands here lies, or they in it, and lone discs if it is a frame; and how much
-        is missing to the distance that they should keep."""
+        """How deep a body at this place would overlap frames (and, if it is a frame, lone discs), in all; and the same
+        with the distances that they should keep added."""
         points = [
             (x + other.offsets[0][0], y + other.offsets[0][1]) for other, (x, y) in self._bodies if not other.frame
         ]

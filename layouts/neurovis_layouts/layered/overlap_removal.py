@@ -1,4 +1,4 @@
-"""Yielding: what is free gives way to what is pinned, images together, what is aligned along its line.
+"""Overlap removal: moves what is not pinned off what is; mirror images move together, aligned neurons on their line.
 
 In: bodies, some of them pinned, whose mirror image each neuron is, the axis. Out: a place for every body.
 """

@@ -1,8 +1,8 @@
-"""Settle: from a free plan to places, with what is pinned where it belongs and everything else off it.
+"""Pinning: from a layout without pins to final places, with the pins exact and everything else moved off them.
 
-In: a plan, the frames in it, pins. Out: a place for every neuron, a move for every frame. A frame with pins is moved to
-them, or, where they do not fit its drawing, drawn anew around them; the image of what is pinned follows; what is free
-stays where the plan has it, moved as a whole, or gives way, images together, what is aligned along its line.
+In: a ComponentLayout, the frames in it, pins. Out: a place for every neuron, a move for every frame. A frame with pins
+is moved to them, or drawn anew around them where they do not fit its drawing; mirror images of pinned neurons follow;
+all else is moved as a whole, and then off what is pinned (``overlap_removal``).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Bonds: units that share a rank, and how far each stands behind its line.
+"""Same rank: units that have to share a rank, and how far each is shifted along the direction within it (its lift).
 
-In: units, the lists of neurons that are to be on one line, mirror images, instances declared together. Out: units with
-their lifts, and for each the number of those that it shares a rank with.
+In: units, the lists of neurons that are to be on one line, mirror images, instances declared together. Out: the units
+with their lifts, and for each a number (its bond) that is the same for all units of one rank.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The book of a problem's instances: which are drawn alike, and what each is on its own.
+"""Templates: which instances of a problem are drawn alike, and the problem of drawing each kind once.
 
 In: a LayoutProblem. Out: for every kind of instance one problem of its own, in which the connections, hints, mirrors
 and lines of all instances of that kind are joined, so that one drawing serves them all. Instances of one template are

@@ -1,7 +1,7 @@
-"""Strokes: what is drawn near a place, as points in a row, and what a route crosses of it.
+"""Line overlap: how far lines run on each other, and how often they cross near a place, measured on sample points.
 
-In: routes. Out: points on a route outside its discs; how much of a line runs on others; how often routes cross what is
-drawn near a place.
+In: routes. Out: points on a route outside its discs; the length of a line that runs on others; how often routes cross
+the lines near a place.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Nests: of bows from one disc over a neuron in a row to the next ones, each is above those it spans.
+"""Nested bows: where bows span each other, as from one disc to the second and third in a row, longer ones run higher.
 
-In: bows that are drawn. Out: for those that run on a shorter one which starts or ends at the same disc, a higher bow.
+In: all bows. Out: for those that run on a shorter one which starts or ends at the same disc, a higher bow.
 """
 
 from __future__ import annotations

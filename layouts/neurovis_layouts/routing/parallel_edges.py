@@ -1,4 +1,4 @@
-"""Sheaves: connections that share both ends, in either direction, do not run on each other.
+"""Parallel edges: connections that share both ends, in either direction, are drawn beside each other.
 
 In: routes that are drawn, what is in the way. Out: for those that run on another between the same ends, the route
 shifted to a side, where it is clear of the other, of discs and frames, and on no third.

@@ -1,4 +1,4 @@
-"""Easing: routes with needless bends are drawn anew, as seldom and as gently bent as what stands around allows.
+"""Simplified routes: routes with needless bends are drawn anew, with as few and gentle bends as obstacles allow.
 
 In: routes that are drawn, what is in the way. Out: for those that wind, a better route where there is one: with fewer
 corners or with its corners elsewhere, judged by all that makes a line hard to follow (``Judge``).

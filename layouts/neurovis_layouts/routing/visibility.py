@@ -1,4 +1,4 @@
-"""Sight: which corners of frames see each other, for searches that ask this over and over.
+"""Visibility: which corners of frames see each other, computed once for many searches.
 
 In: corners, each a place and to which sides it points, rectangles. Out: from one corner to all others how far they are,
 which lines run along both corners, and which rectangles stand between.
