@@ -36,8 +36,8 @@ def foreseen(network: Network, problem: Callable[[], LayoutProblem], *, memory: 
 
 
 def foresee_frames(engine: Located[str], network: Network, findings: Findings) -> None:
-    """Report a warning (``engine-without-frames``) where instances will not be drawn alike. An engine that draws what
-    is pinned alone has no choice, and one that cannot be loaded is told of when it is called."""
+    """Warn (``engine-without-frames``) where instances will not be drawn alike. Not of an engine that only draws what
+    is pinned, and not of one that cannot be loaded, which is an error when it is called."""
     name = engine.value
     if not network.instances or name == "auto":
         return
