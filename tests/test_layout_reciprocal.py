@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from itertools import combinations, pairwise
 
 import layout_conformance as suite
@@ -55,6 +56,48 @@ def test_a_half_centre_has_an_arc_above_and_one_below() -> None:
         assert together(there, back, 0.15) == 0.0
         for route in (there, back):
             assert [y for _, y in route] == [y for _, y in route[::-1]]
+
+
+SWINGING = """\
+neurovis: 1
+name: swinging
+modules:
+  centre:
+    neurons: {L: {bias: 1}, R: {}, E: {}}
+    connections: {L -> R: -1, R -> L: -1, L -> E: 1, R -> E: 1}
+    layout: {mirror: [[L, R]]}
+instances: {a: {module: centre, count: COUNT}}
+connections: {a1.E -> a2.E: 1MORE}
+"""
+
+
+@pytest.mark.parametrize("direction", ["down", "up", "right", "left"])
+@pytest.mark.parametrize("moved", ["L", "R"])
+def test_there_and_back_between_mirror_images_stay_two_lines_when_one_is_moved(moved: str, direction: str) -> None:
+    text = "neurovis: 1\nname: pair\nneurons: {L: {bias: 1}, R: {}}\nconnections: {L -> R: -1, R -> L: -1}\n"
+    network = nv.compile_text(text + f"layout: {{direction: {direction}, mirror: [[L, R]]}}")
+    earlier = network.layout().value
+    across = 0 if direction in ("down", "up") else 1
+    apart = -1.0 if earlier.positions[moved] == min(earlier.positions.values()) else 1.0
+    for dx, dy in ((apart, apart), (2 * apart, 0.0), (0.0, 2 * apart)):
+        x, y = earlier.positions[moved]
+        edited = replace(earlier, positions={**earlier.positions, moved: (x + dx, y + dy)})
+        layout = network.layout(earlier=edited).value
+        assert layout.positions[moved] == (x + dx, y + dy)
+        there, back = layout.routes["L -> R"], layout.routes["R -> L"]
+        assert together(there, back, 0.08) <= 0.1
+        axis = sum(layout.positions[name][across] for name in "LR")
+        for route in (there, back):
+            for one, other in zip(route, route[::-1], strict=True):
+                assert one[across] == pytest.approx(axis - other[across])
+
+
+def test_there_and_back_between_mirror_images_are_two_lines_in_new_instances() -> None:
+    before = nv.compile_text(SWINGING.replace("COUNT", "2").replace("MORE", ""))
+    after = nv.compile_text(SWINGING.replace("COUNT", "3").replace("MORE", ", a2.E -> a3.E: 1"))
+    layout = after.layout(earlier=before.layout().value)
+    for one, other in pairs(layout.routes):
+        assert together(layout.routes[one], layout.routes[other], 0.08) <= 0.1, (one, other)
 
 
 def test_pairs_crosswise_over_the_axis_do_not_lie_on_each_other() -> None:

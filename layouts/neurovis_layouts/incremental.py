@@ -175,18 +175,23 @@ class _Twins:
             self._between.setdefault((edge.source, edge.target), []).append(i)
 
     def of(self, edge: int) -> Iterator[tuple[int, Move]]:
-        """The edges drawn like this one, itself first, each with the move from its route."""
+        """The edges drawn like this one, itself first, each with the move from its route. Of two between the same
+        neurons, there and back, the one is: both would be one line."""
         source, target = self._edges[edge].source, self._edges[edge].target
         place = self._between[source, target].index(edge)
         targets = dict(self._alike.of(target))
         by_move: dict[Move, list[int]] = {}
         for mate, move in targets.items():
             by_move.setdefault(move, []).append(mate)
+        found: dict[frozenset[int], tuple[int, Move]] = {}
         for mate, move in self._alike.of(source):
             for other in by_move.get(move, ()):
                 equal = self._between.get((mate, other), [])
-                if place < len(equal):
-                    yield equal[place], move
+                ends = frozenset((mate, other))
+                # the one that is reflected less, whichever end was asked for first
+                if place < len(equal) and (ends not in found or found[ends][1].flip < move.flip):
+                    found[ends] = equal[place], move
+        yield from found.values()
 
 
 def _moved(route: Route, move: Move, start: Point, end: Point) -> Route:
