@@ -163,7 +163,7 @@ def test_values_that_are_no_numbers_are_drawn() -> None:
     case = replace(CASE, activity=np.full_like(CASE.activity, np.nan), weights=np.full_like(CASE.weights, np.inf))
     root = ET.fromstring(drawn(case))
     for circle in (next(g.iter(NS + "circle")) for g in groups(root, "data-neuron")):
-        assert circle.attrib["fill"] == "#969696"
+        assert circle.attrib["fill"] == "#1f2328", "the colour of texts, which no activity has"
     assert "nan" not in ET.tostring(root, "unicode").replace("data-", "").lower()
 
 

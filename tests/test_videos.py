@@ -25,7 +25,7 @@ from neurovis_renderers.video import VideoRenderer, ffmpeg
 from PIL import Image
 from test_raster import short_film
 
-from neurovis_spec import api, compiled, pipeline
+from neurovis_spec import api, compiled, pictures, pipeline
 from neurovis_spec.cli.commands import neurovis
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.layout.model import Layout
@@ -236,7 +236,7 @@ def test_a_film_is_made_of_parts_that_hold_few_frames(
         return moving(network, layout, seen(parts), *more)  # type: ignore[arg-type]
 
     monkeypatch.setattr(pipeline, "moving_in_parts", counted)
-    monkeypatch.setattr(compiled, "_MOST_AT_ONCE", 25)
+    monkeypatch.setattr(pictures, "_MOST_AT_ONCE", 25)
     network.animate(tmp_path / f"parts{suffix}", fps=50, steps=40)
     assert held == [25, 15]
     whole, parts = ((tmp_path / f"{name}{suffix}").read_bytes() for name in ("whole", "parts"))
