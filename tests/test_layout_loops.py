@@ -88,3 +88,30 @@ def test_a_new_loop_keeps_off_the_old_one() -> None:
     later = network.layout(engine="layered", earlier=earlier.value)
     assert later.routes["A -> A"] == earlier.routes["A -> A"]
     assert least_between_loops(later.value, problem_of(network.network)) >= 0.12
+
+
+COUPLED = """
+neurovis: 1
+name: coupled
+modules:
+  osc:
+    neurons: {A: {bias: 0.1}, B: {}}
+    connections: {A -> A: 1.5, B -> B: 1.5, A -> B: 0.4, B -> A: -0.4}
+instances: {o: {module: osc, count: 3}}
+connections: {COUPLINGS}
+layout: {engine: layered, direction: DIRECTION}
+"""
+CHAIN = "o1.A -> o2.A: 0.1, o2.A -> o1.A: 0.1, o2.A -> o3.A: 0.1, o3.A -> o2.A: 0.1"
+CROSSWISE = "o1.B -> o2.A: 0.1, o2.A -> o1.B: 0.1, o2.B -> o3.A: 0.1, o3.A -> o2.B: 0.1"
+
+
+@pytest.mark.parametrize("direction", ["down", "right"])
+@pytest.mark.parametrize("couplings", [CHAIN, CROSSWISE])
+def test_couplings_between_instances_do_not_run_through_loops(couplings: str, direction: str) -> None:
+    layout = nv.compile_text(COUPLED.replace("COUPLINGS", couplings).replace("DIRECTION", direction)).layout()
+    loops = [route for route in layout.routes.values() if route[0] == route[-1]]
+    others = [route for route in layout.routes.values() if route[0] != route[-1]]
+    assert len(loops) == 6
+    for loop in loops:
+        seen = [p for p in sampled(loop, 0.03) if distance(p, loop[0]) > 0.3]
+        assert all(min(distance(p, q) for q in sampled(route, 0.03)) > 0.03 for route in others for p in seen)

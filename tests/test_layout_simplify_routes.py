@@ -110,6 +110,24 @@ def meeting(a: list[float], b: list[float], c: list[float], d: list[float]) -> P
     return (a[0] + t / whole * ux, a[1] + t / whole * uy) if 0 <= t < whole and 0 <= s < whole else None
 
 
+def test_a_loop_is_as_long_as_it_is_drawn_and_can_be_crossed() -> None:
+    loop: Route = ((0.0, 0.0), (-1.05, -0.62), (-1.05, 0.62), (0.0, 0.0))
+    lines = polylines([loop, straight((0.0, 0.0), (0.0, 0.0))])
+    steps = [distance(a, b) for a, b in pairwise(sampled(loop, 0.05))]
+    assert lines.lengths() == pytest.approx([math.fsum(steps), 0.0], rel=0.05)
+    other = polylines([straight((-0.6, -2.0), (-0.6, 2.0))])
+    assert other.crossed(lines.a, lines.b).tolist() == [2]
+
+
+def test_a_route_through_a_loop_is_led_around_it() -> None:
+    """Though it does not wind."""
+    through, loop = straight((-3.0, 0.0), (0.0, 0.0)), ((0.0, 0.0), (-1.05, -0.62), (-1.05, 0.62), (0.0, 0.0))
+    before = Judge([edge(0, 1)], [(-3.0, 0.0), (0.0, 0.0)], {0: through}, drawn=[loop])
+    assert before.through_loops() == {0}
+    route = eased(before, {0})[0]
+    assert polylines([route]).crossed(before.a, before.b).tolist() == [0]
+
+
 @given(st.lists(routes(), min_size=1, max_size=5), st.lists(point, max_size=6), st.tuples(point, point))
 @settings(deadline=None)
 def test_what_is_in_the_way_of_lines_is_found(

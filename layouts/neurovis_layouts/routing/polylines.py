@@ -168,7 +168,9 @@ def polylines(routes: Sequence[Route]) -> Polylines:
     t, s = _T, 1 - _T
     points = s * s * s * a[:, None] + 3 * s * s * t * b[:, None] + 3 * s * t * t * c[:, None] + t * t * t * d[:, None]
     keep: BoolArray = np.zeros((len(pieces), _PARTS), dtype=np.bool_)
-    keep[off > _STRAIGHT * np.maximum(squared, 1e-9)] = True
+    # what ends where it begins has no straight way that it could be
+    looped = (squared < 1e-9) & (np.abs(np.concatenate([one, other], axis=1)).max(axis=1) > _STRAIGHT)
+    keep[looped | (off > _STRAIGHT * np.maximum(squared, 1e-9))] = True
     keep[:, -1] = True
     # each line begins with the first point of its first piece
     ends = np.cumsum(many)

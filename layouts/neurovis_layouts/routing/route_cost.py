@@ -78,6 +78,12 @@ class Judge:
             for i, bend, length in zip(sorted(self.routes), bends.tolist(), lengths, strict=False)
         }
 
+    def through_loops(self) -> set[int]:
+        """The edges whose routes run through a connection of a neuron to itself."""
+        loops = (self.segment_ends[:, 0] == self.segment_ends[:, 1]) & (self.segment_ends[:, 0] >= 0)
+        crossed = self._lines.crossed(self.a[loops], self.b[loops])
+        return {i for i, times in zip(sorted(self.routes), crossed.tolist(), strict=False) if times}
+
     def in_fans(self, most: int) -> set[int]:
         """The edges of which more than so many share both ends, in either direction."""
         fans = by_ends((i, self.edges[i]) for i in self.routes).values()
@@ -102,6 +108,9 @@ class Judge:
         edges = np.array([*chosen, *([-1] * len(self._drawn))], dtype=np.int64)
         self._lines = lines = polylines(routes)
         self.a, self.b, self.segment_edges = lines.a, lines.b, edges[lines.owner]
+        # which neurons a segment's line leads from and to; −1 where none is there
+        ends = [(self._number.get(route[0], -1), self._number.get(route[-1], -1)) for route in routes]
+        self.segment_ends: IntArray = np.array(ends, dtype=np.int64).reshape(-1, 2)[lines.owner]
         cells, owner = lines.cells()
         order = np.argsort(cells, kind="stable")
         self.cells, self.cell_edges = cells[order], edges[owner[order]]
@@ -131,8 +140,7 @@ class Pen:
         self._reflect = len(both) > 1
         others = ~np.isin(judge.segment_edges, both)
         self._a, self._b = judge.a[others], judge.b[others]
-        kin = [i for i in judge.routes if judge.edges[i].source in self._own or judge.edges[i].target in self._own]
-        self._kin = np.isin(judge.segment_edges[others], kin)
+        self._kin = np.isin(judge.segment_ends[others], self._own).any(axis=1)
         self._cells = judge.cells[~np.isin(judge.cell_edges, both)]
         self._ends = [(leaves, *judge.ends(n, both)) for n, leaves in zip(self._own, (True, False), strict=True)]
         walls = judge.walls

@@ -55,8 +55,12 @@ def eased(judge: Judge, free: AbstractSet[int]) -> dict[int, Route]:
     changed: set[int] = set()
     looked = sorted(free - judge.in_fans(_FAN))
     for _ in range(_ROUNDS):
-        winding = judge.winding()
-        chosen = [i for i in looked if winding[i][1] > _LONG or (winding[i][0] > _WINDS and len(judge.routes[i]) > 4)]
+        winding, through = judge.winding(), judge.through_loops()
+        chosen = [
+            i
+            for i in looked
+            if i in through or winding[i][1] > _LONG or (winding[i][0] > _WINDS and len(judge.routes[i]) > 4)
+        ]
         chosen.sort(key=lambda i: (-winding[i][0] - 2 * winding[i][1], i))
         looked, vain = [], 0
         for i in chosen[:most]:
