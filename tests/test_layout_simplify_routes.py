@@ -119,6 +119,10 @@ def test_a_loop_is_as_long_as_it_is_drawn_and_can_be_crossed() -> None:
     assert other.crossed(lines.a, lines.b).tolist() == [2]
 
 
+def test_where_nothing_is_drawn_nothing_is_eased() -> None:
+    assert eased(Judge([], [(0.0, 0.0)], {}), set()) == {}
+
+
 def test_a_route_through_a_loop_is_led_around_it() -> None:
     """Though it does not wind."""
     through, loop = straight((-3.0, 0.0), (0.0, 0.0)), ((0.0, 0.0), (-1.05, -0.62), (-1.05, 0.62), (0.0, 0.0))

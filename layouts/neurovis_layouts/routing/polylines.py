@@ -144,6 +144,8 @@ class Polylines:
 
     def crossed(self, c: FloatArray, d: FloatArray) -> IntArray:
         """(n,) how often they cross segments from ``c`` to ``d`` (k, 2), but for where lines meet at their ends."""
+        if not len(self.points) or not len(c):
+            return np.zeros(len(self), dtype=np.int64)
         low, high = self.points.min(axis=0), self.points.max(axis=0)
         near = ((np.maximum(c, d) >= low) & (np.minimum(c, d) <= high)).all(axis=1)
         i, share = _meetings(self.a, self.b, c[near], d[near])
