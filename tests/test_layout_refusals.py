@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 from click.testing import CliRunner
 from lsp_marks import marked
+from neurovis_layouts.layered import LayeredEngine, hierarchy
+from neurovis_layouts.layered.frame_routing import linked
 
 import neurovis_spec as nv
 from neurovis_spec.cli.commands import neurovis
@@ -74,8 +77,9 @@ def test_a_refusal_is_a_finding_with_its_place(text: str, code: str, marked: str
 
 
 #: what no engine has to begin for
-FORESEEN = {"arranged-twice", "align-conflict", "position-missing", "layout-align-unsupported",
-            "layout-mirror-unsupported", "layout-arrange-unsupported", "layout-plan-unsupported"}  # fmt: skip
+FORESEEN = {"arranged-twice", "align-conflict", "position-missing", "pin-in-frame", "mirror-pins",
+            "layout-align-unsupported", "layout-mirror-unsupported", "layout-arrange-unsupported",
+            "layout-plan-unsupported"}  # fmt: skip
 MORE = [
     (f"{GROUPS}  engine: circular\n  arrange: {{A: row}}\n", "layout-arrange-unsupported", "A"),
     (f"{GROUPS}  engine: organic\n  mirror: [[A1, A2]]\n", "layout-mirror-unsupported", "[A1, A2]"),
@@ -101,6 +105,43 @@ def test_validate_says_what_would_be_refused(text: str, code: str, marked: str, 
         assert "^" * len(marked) in validated.stderr
     else:
         assert (validated.exit_code, validated.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("said", "code"),
+    [
+        ("positions: {left1: [0, 0], left2: [0.5, 0.5]}", "pin-in-frame"),
+        ("positions: {left1.S: [0, 0], left1.K: [4, 0], right1.S: [2, 0]}", "pin-in-frame"),
+        ("mirror: [[left, right]]\n  positions: {left1: [0, 0], right2: [0.5, 0.5]}", "pin-in-frame"),
+        ("mirror: [[left, right]]\n  positions: {left1: [0, 0], right2: [6, 0.5]}", None),
+        ("positions: {left1.S: [0, 0], left1.K: [0, 4], right1.S: [6, 0], right1.K: [6, 4]}", None),
+        ("engine: grid\n  positions: {left1: [0, 0], left2: [0.5, 0.5]}", None),
+    ],
+)
+def test_validate_accepts_the_pins_that_layout_keeps_and_no_others(said: str, code: str | None) -> None:
+    network = nv.compile_text(f"{LEGS}  {said}\n")
+    refused = network.refusal()
+    assert (None if refused is None else refused.code) == code
+    if code is None:
+        assert network.layout().positions
+        return
+    with pytest.raises(LayoutRefusalError) as caught:
+        network.layout()
+    assert refused == caught.value.diagnostic
+
+
+def test_pins_are_checked_where_there_are_any_and_nothing_is_routed_between_frames_for_it() -> None:
+    with (
+        patch.object(LayeredEngine, "check", autospec=True, side_effect=LayeredEngine.check) as check,
+        patch.object(hierarchy, "linked", side_effect=linked) as routed,
+    ):
+        assert nv.compile_text(f"{LEGS}  mirror: [[left, right]]\n").refusal() is None
+        assert nv.compile_text(f"{GROUPS}  positions: {{B: [0, 5]}}\n").refusal() is None
+        assert (check.call_count, routed.call_count) == (0, 0)
+        assert nv.compile_text(f"{LEGS}  positions: {{left1: [0, 0]}}\n").refusal() is None
+        assert check.call_count == 1
+        # within the instances, which are drawn alike
+        assert [len(called.args[0].neurons) for called in routed.call_args_list] == [2]
 
 
 @pytest.mark.parametrize(

@@ -1,38 +1,57 @@
-"""Foreseen: what laying out a network would refuse, or not draw as it is meant, found without an engine at work.
+"""Foreseen: what laying out a network would refuse, or not draw as it is meant, found without a layout being made.
 
 In: a network, what makes its LayoutProblem. Out: the LayoutRefusalError that ``arrange`` would raise before the engine
-begins; a warning where instances will not be drawn alike. What an engine finds out while it draws is not foreseen.
+begins, or, of pins, after; a warning where instances will not be drawn alike. What else an engine finds out while it
+draws is not foreseen, nor are pins in a network so large that this would take long.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Final, cast
 
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import Findings
 from neurovis_spec.language.located import Located
 from neurovis_spec.layout.engines import engine_of, engines_that, they_can
-from neurovis_spec.layout.model import LayoutProblem, LayoutRefusalError
+from neurovis_spec.layout.model import CheckingEngine, LayoutProblem, LayoutRefusalError
 from neurovis_spec.layout.refusals import asked_of, refuse
 from neurovis_spec.plugins import PluginError
+
+#: With more neurons or connections than this an engine takes too long to say what pins it refuses.
+_MOST: Final = 1000
 
 
 def foreseen(network: Network, problem: Callable[[], LayoutProblem], *, memory: bool) -> LayoutRefusalError | None:
     """What would be refused, by the engine of the spec, or by the one that ``auto`` stands for."""
     settings, name = network.layout, network.layout.engine
     if name == "auto":
-        if not (settings.arrange or settings.mirrors or settings.align or settings.plan):
+        if not (settings.arrange or settings.mirrors or settings.align or settings.plan or _crowded(network)):
             return None  # it stands for none that cannot do the rest
         from neurovis_spec.layout.choose import choose_engine
 
         name = choose_engine(problem())[0]
     try:
-        refuse(asked_of(network, memory), name, engine_of(name).capabilities)
+        engine = engine_of(name)
+        refuse(asked_of(network, memory), name, engine.capabilities)
+        if engine.capabilities.checks and _crowded(network):
+            cast(CheckingEngine, engine).check(problem())
     except LayoutRefusalError as refusal:
         return refusal
     except PluginError:  # reported when it is called
         return None
     return None
+
+
+def _crowded(network: Network) -> bool:
+    """Whether pins may leave no room for something: a frame, a mirror image, what is on a line."""
+    if max(len(network.neurons), len(network.connections)) > _MOST:
+        return False
+    settings = network.layout
+    if not (settings.positions or settings.origins or settings.relative):
+        return False
+    boxed = any(group.box is not None for group in network.neurons.groups)
+    return boxed or bool(network.instances or settings.boxes or settings.mirrors or settings.align)
 
 
 def foresee_frames(engine: Located[str], network: Network, findings: Findings) -> None:

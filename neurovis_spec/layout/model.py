@@ -167,6 +167,8 @@ class Capabilities:
     memory: bool = False
     #: draws boxes as frames, into which nothing else comes
     frames: bool = False
+    #: says what it would refuse, and routes nothing for it: ``check`` takes a problem (CheckingEngine)
+    checks: bool = False
     #: what it shows best, of which ``auto`` takes the first engine by name
     suits: Suits | None = None
     #: says how far it is: ``lay_out`` takes a Progress as its second argument (ReportingEngine)
@@ -195,6 +197,14 @@ class ReportingEngine(LayoutEngine, Protocol):
 
     def lay_out(self, problem: LayoutProblem, progress: Progress | None = None) -> Layout:
         """As LayoutEngine's; ``progress`` is called now and then."""
+        ...
+
+
+class CheckingEngine(LayoutEngine, Protocol):
+    """An engine that refuses some pins where it finds that they leave no room; it declares ``checks``."""
+
+    def check(self, problem: LayoutProblem) -> None:
+        """Raises the LayoutRefusalError that ``lay_out`` would."""
         ...
 
 

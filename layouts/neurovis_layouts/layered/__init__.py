@@ -25,6 +25,7 @@ class LayeredEngine:
         neurons=100_000,
         edges=1_000_000,
         frames=True,
+        checks=True,
         suits="flow",
     )
 
@@ -35,3 +36,9 @@ class LayeredEngine:
         from neurovis_layouts.layered.engine import drawn
 
         return kept(problem, drawn(problem, self.name))
+
+    def check(self, problem: LayoutProblem) -> None:
+        """Raises the LayoutRefusalError that ``lay_out`` would."""
+        from neurovis_layouts.layered.engine import checked
+
+        checked(problem)

@@ -1,9 +1,9 @@
 """The layered engine: from a problem to a layout.
 
-In: a LayoutProblem. Out: a Layout. After Sugiyama, Tagawa and Toda (1981), frame by frame from the inside out
-(``hierarchy``); in a frame units and blocks (``units``), what shares a rank (``same_rank``), components, ranks, order,
-places (``component_layout``), pins (``pinning``), routes (``frame_routing``). Every stage is deterministic and computes
-in plain IEEE arithmetic, so the result is the same everywhere.
+In: a LayoutProblem. Out: a Layout, or what would be refused. After Sugiyama, Tagawa and Toda (1981), frame by frame
+from the inside out (``hierarchy``); in a frame units and blocks (``units``), what shares a rank (``same_rank``),
+components, ranks, order, places (``component_layout``), pins (``pinning``), routes (``frame_routing``). Every stage is
+deterministic and computes in plain IEEE arithmetic, so the result is the same everywhere.
 """
 
 from __future__ import annotations
@@ -34,6 +34,12 @@ def drawn(problem: LayoutProblem, engine: str) -> Layout:
             for edge, key in zip(problem.edges, keys_of(problem.edges), strict=True)
         },
     )
+
+
+def checked(problem: LayoutProblem) -> None:
+    """Raises the LayoutRefusalError that ``drawn`` would: no connection between frames has to be routed for it."""
+    if problem.neurons:
+        Composer(_framed(problem)).whole(routed=False)
 
 
 def _framed(problem: LayoutProblem) -> LayoutProblem:

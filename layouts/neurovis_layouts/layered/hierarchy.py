@@ -38,10 +38,11 @@ class Composer:
         self._book = Book(problem)
         self._kinds: dict[tuple[int, Direction], Drawing] = {}
 
-    def whole(self) -> Drawing:
-        """The drawing of the problem. Raises LayoutRefusalError for what cannot be met."""
+    def whole(self, routed: bool = True) -> Drawing:
+        """The drawing of the problem; without ``routed`` that of its neurons and frames alone, which stand where they
+        do with it. Raises LayoutRefusalError for what cannot be met."""
         problem = self._book.whole()
-        return self.compose(replace(problem, pins=self._with_origins(problem)))
+        return self.compose(replace(problem, pins=self._with_origins(problem)), routed)
 
     def _with_origins(self, problem: LayoutProblem) -> dict[int, Point]:
         """The pins, and for instances whose origin is pinned the places of all of their neurons that keep off these.
@@ -74,22 +75,23 @@ class Composer:
             self._kinds[key] = self.compose(replace(self._book.problem_of(number), direction=direction))
         return self._kinds[key]
 
-    def compose(self, problem: LayoutProblem) -> Drawing:
-        """The drawing of one problem, its modules named by their kinds."""
+    def compose(self, problem: LayoutProblem, routed: bool = True) -> Drawing:
+        """The drawing of one problem, its modules named by their kinds; without ``routed`` no connection between its
+        frames has a route."""
         pair = {a: b for mirror in problem.mirrors for one in mirror.pairs for a, b in (one, one[::-1])}
         if problem.plan:
-            return self._on_page(problem, pair)
+            return self._on_page(problem, pair, routed)
         frames = firm(problem, pair)
         loose = {i for i in range(len(problem.boxes)) if i not in frames and may_be_frame(problem, i, pair)}
         while True:
             parts = parts_of(problem, frames, pair)
-            drawing = self._attempt(problem, parts, pair)
+            drawing = self._attempt(problem, parts, pair, routed)
             entered = {i for i in loose - frames if _entered(drawing, problem.boxes[i][1])}
             if not entered:
                 return drawing
             columns = columns_of(problem, parts, loose - frames) if not pair else frozenset()
             if entered <= columns:
-                drawing = self._attempt(problem, parts, pair, columns)
+                drawing = self._attempt(problem, parts, pair, routed, columns)
                 if not any(_entered(drawing, problem.boxes[i][1]) for i in loose - frames):
                     return drawing
             frames |= entered
@@ -99,6 +101,7 @@ class Composer:
         problem: LayoutProblem,
         parts: Sequence[Part],
         pair: Mapping[int, int],
+        routed: bool,
         columns: AbstractSet[int] = frozenset(),
     ) -> Drawing:
         pieces: list[Piece] = []
@@ -125,9 +128,9 @@ class Composer:
             return _as_piece(piece.part, self.compose(replace(inner, pins=_around_pins(piece.drawing, pins, inner))))
 
         rests = settled(problem, plan, [_resting(plan, piece) for piece in pieces], pair, redraw)
-        return _joined(problem, plan, rests, units, pair, columns)
+        return _joined(problem, plan, rests, units, pair, columns, routed)
 
-    def _on_page(self, problem: LayoutProblem, pair: Mapping[int, int]) -> Drawing:
+    def _on_page(self, problem: LayoutProblem, pair: Mapping[int, int], routed: bool) -> Drawing:
         """The drawing of a problem whose cells say what stands in which row and column."""
         known: dict[tuple[tuple[int, ...], Direction], Piece] = {}
 
@@ -154,7 +157,7 @@ class Composer:
         for piece, move in pieces:
             plan.places.update(zip(piece.part.members, map(move.point, piece.drawing.places), strict=True))
         rests = settled(problem, plan, pieces, pair, redraw)
-        return _joined(problem, plan, rests, (), pair, frozenset())
+        return _joined(problem, plan, rests, (), pair, frozenset(), routed)
 
     def _inside(
         self, problem: LayoutProblem, part: Part, direction: Direction, pair: Mapping[int, int]
@@ -239,8 +242,9 @@ def _joined(
     units: Sequence[Unit],
     pair: Mapping[int, int],
     columns: AbstractSet[int],
+    routed: bool,
 ) -> Drawing:
-    """Neurons, what is within frames, and the connections between them."""
+    """Neurons, what is within frames, and, where they are to be ``routed``, the connections between them."""
     places = rests.places
     routes: dict[Key, Route] = {}
     frames: list[tuple[tuple[int, ...], Rect]] = []
@@ -262,7 +266,8 @@ def _joined(
     boxes += [(own, _box(places, own)) for _, own in problem.boxes if frozenset(own) not in done]
     links = [i for i, key in enumerate(keys) if key not in routes]
     drawn = list(routes.values())
-    routes.update(linked(problem, links, keys, plan, rests, units, frames, boxes, pair, drawn))
+    if routed:
+        routes.update(linked(problem, links, keys, plan, rests, units, frames, boxes, pair, drawn))
     axis = rests.axis if pair else None
     return Drawing(
         tuple(places), routes, tuple(frames), tuple(boxes), axis, bool(problem.pins), direction=problem.direction
