@@ -12,7 +12,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_layouts.routing.obstacles import points_on
+from neurovis_layouts.routing.obstacles import points_in_turn
 from neurovis_spec.layout import FloatArray, IntArray
 from neurovis_spec.layout.geometry import cubics
 from neurovis_spec.layout.model import Route
@@ -47,19 +47,17 @@ class Walls:
         if not pieces or not len(self.rects):
             return [False] * len(routes)
         ends = np.array(own, dtype=np.int64)
-        points, owner = points_on(
-            np.array([piece for _, piece in pieces], dtype=np.float64),
-            np.array([i for i, _ in pieces], dtype=np.int64),
-            _STEP,
-        )
-        x, y = np.ascontiguousarray(points.T)
-        low, high = points.min(axis=0), points.max(axis=0)
-        near = np.flatnonzero(((self.rects[:, :2] < high) & (self.rects[:, 2:] > low)).all(axis=1))
-        for number in near.tolist():
-            x0, y0, x1, y1 = self.rects[number].tolist()
-            within = owner[np.flatnonzero((x > x0) & (x < x1) & (y > y0) & (y < y1))]
-            foreign = ~(self.inside[ends[within, 0], number] | self.inside[ends[within, 1], number])
-            result[within[foreign]] = True
+        shapes = np.array([piece for _, piece in pieces], dtype=np.float64)
+        owner = np.array([i for i, _ in pieces], dtype=np.int64)
+        for points, whose in points_in_turn(shapes, owner, _STEP):
+            x, y = np.ascontiguousarray(points.T)
+            low, high = points.min(axis=0), points.max(axis=0)
+            near = np.flatnonzero(((self.rects[:, :2] < high) & (self.rects[:, 2:] > low)).all(axis=1))
+            for number in near.tolist():
+                x0, y0, x1, y1 = self.rects[number].tolist()
+                within = whose[np.flatnonzero((x > x0) & (x < x1) & (y > y0) & (y < y1))]
+                foreign = ~(self.inside[ends[within, 0], number] | self.inside[ends[within, 1], number])
+                result[within[foreign]] = True
         return [bool(value) for value in result]
 
 
