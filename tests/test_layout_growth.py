@@ -6,9 +6,11 @@ import random
 import sys
 import tracemalloc
 from collections.abc import Callable
+from types import FrameType
 
 import layout_conformance as suite
 import pytest
+from neurovis_layouts.layered.frame_routing import linked
 from neurovis_layouts.routing import nearby, walls
 from neurovis_layouts.routing.detours import Detours
 from neurovis_layouts.routing.obstacles import Obstacles
@@ -105,3 +107,26 @@ def test_what_stands_in_the_way_of_many_long_routes_is_found_in_little_memory() 
         assert tracemalloc.get_traced_memory()[1] < 15e6
     finally:
         tracemalloc.stop()
+
+
+def test_what_is_boxed_is_routed_once() -> None:
+    """A box that others would stand in becomes a frame, before any connection is drawn beside it; and each is drawn
+    once, however many become frames after it."""
+    routed = 0
+
+    def note(frame: FrameType, event: str, _given: object) -> None:
+        nonlocal routed
+        if event == "call" and frame.f_code is linked.__code__:
+            routed += len(frame.f_locals["links"])
+
+    draw = random.Random(2)
+    pairs = sorted({(draw.randrange(24), draw.randrange(24)) for _ in range(60)})
+    text = HEAD + "neurons:\n" + "".join(f"  A{i}: {{bias: 1, box: box {i % 3}}}\n" for i in range(24))
+    text += "layout: {engine: layered}\nconnections:\n" + "".join(f"  - A{a} -> A{b}: 1\n" for a, b in pairs)
+    network = nv.compile_text(text)
+    sys.setprofile(note)
+    try:
+        network.layout()
+    finally:
+        sys.setprofile(None)
+    assert routed == len(pairs)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from neurovis_layouts.layered.component_layout import ComponentLayout, planned
 from neurovis_layouts.layered.drawing import Drawing, FrameMove, Piece
@@ -83,17 +83,18 @@ class Composer:
             return self._on_page(problem, pair, routed)
         frames = firm(problem, pair)
         loose = {i for i in range(len(problem.boxes)) if i not in frames and may_be_frame(problem, i, pair)}
+        known: dict[Part, Drawing] = {}
         while True:
             parts = parts_of(problem, frames, pair)
-            drawing = self._attempt(problem, parts, pair, routed)
-            entered = {i for i in loose - frames if _entered(drawing, problem.boxes[i][1])}
+            standing = self._attempt(problem, parts, pair, known)
+            entered = {i for i in loose - frames if standing.entered(problem.boxes[i][1])}
             if not entered:
-                return drawing
+                return standing.joined(problem, pair, routed)
             columns = columns_of(problem, parts, loose - frames) if not pair else frozenset()
             if entered <= columns:
-                drawing = self._attempt(problem, parts, pair, routed, columns)
-                if not any(_entered(drawing, problem.boxes[i][1]) for i in loose - frames):
-                    return drawing
+                standing = self._attempt(problem, parts, pair, known, columns)
+                if not any(standing.entered(problem.boxes[i][1]) for i in loose - frames):
+                    return standing.joined(problem, pair, routed)
             frames |= entered
 
     def _attempt(
@@ -101,12 +102,13 @@ class Composer:
         problem: LayoutProblem,
         parts: Sequence[Part],
         pair: Mapping[int, int],
-        routed: bool,
+        known: dict[Part, Drawing],
         columns: AbstractSet[int] = frozenset(),
-    ) -> Drawing:
+    ) -> _Standing:
+        """Where everything stands with these parts; ``known`` are boxes that are drawn already."""
         pieces: list[Piece] = []
         for part in parts:
-            pieces.append(self._piece(problem, part, pieces, pair))
+            pieces.append(self._piece(problem, part, pieces, pair, known))
         kin: dict[str, int] = {}
         for number, piece in enumerate(pieces):
             kin.setdefault(piece.part.family, len(problem.groups) + number)
@@ -128,7 +130,7 @@ class Composer:
             return _as_piece(piece.part, self.compose(replace(inner, pins=_around_pins(piece.drawing, pins, inner))))
 
         rests = settled(problem, plan, [_resting(plan, piece) for piece in pieces], pair, redraw)
-        return _joined(problem, plan, rests, units, pair, columns, routed)
+        return _Standing.of(problem, plan, rests, units, columns)
 
     def _on_page(self, problem: LayoutProblem, pair: Mapping[int, int], routed: bool) -> Drawing:
         """The drawing of a problem whose cells say what stands in which row and column."""
@@ -157,7 +159,7 @@ class Composer:
         for piece, move in pieces:
             plan.places.update(zip(piece.part.members, map(move.point, piece.drawing.places), strict=True))
         rests = settled(problem, plan, pieces, pair, redraw)
-        return _joined(problem, plan, rests, (), pair, frozenset(), routed)
+        return _Standing.of(problem, plan, rests, (), frozenset()).joined(problem, pair, routed)
 
     def _inside(
         self, problem: LayoutProblem, part: Part, direction: Direction, pair: Mapping[int, int]
@@ -167,13 +169,22 @@ class Composer:
             return self.kind(part.kind, direction)
         return replace(_boxed(problem, part, pair), direction=direction)
 
-    def _piece(self, problem: LayoutProblem, part: Part, before: Sequence[Piece], pair: Mapping[int, int]) -> Piece:
+    def _piece(
+        self,
+        problem: LayoutProblem,
+        part: Part,
+        before: Sequence[Piece],
+        pair: Mapping[int, int],
+        known: dict[Part, Drawing],
+    ) -> Piece:
         if part.image_of >= 0:
             drawing = before[part.image_of].drawing
         elif part.kind >= 0:
             drawing = self.kind(part.kind, problem.direction)
         else:
-            drawing = self.compose(_boxed(problem, part, pair))
+            if part not in known:
+                known[part] = self.compose(_boxed(problem, part, pair))
+            drawing = known[part]
         return _as_piece(part, drawing)
 
 
@@ -235,43 +246,74 @@ def _boxed(problem: LayoutProblem, part: Part, pair: Mapping[int, int]) -> Layou
     )
 
 
-def _joined(
-    problem: LayoutProblem,
-    plan: ComponentLayout,
-    rests: Settled,
-    units: Sequence[Unit],
-    pair: Mapping[int, int],
-    columns: AbstractSet[int],
-    routed: bool,
-) -> Drawing:
-    """Neurons, what is within frames, and, where they are to be ``routed``, the connections between them."""
-    places = rests.places
-    routes: dict[Key, Route] = {}
-    frames: list[tuple[tuple[int, ...], Rect]] = []
-    keys = keys_of(problem.edges)
-    known = set(keys)
-    for piece, move in rests.pieces:
-        part, drawing = piece.part, piece.drawing
-        for (a, b, number), route in drawing.routes.items():
-            key = part.members[a], part.members[b], number
-            if key in known:
-                ends = places[key[0]], places[key[1]]
-                routes[key] = (ends[0], *move.route(route)[1:-1], ends[1])
-        frames += [(tuple(part.members[m] for m in own), move.rect(rect)) for own, rect in drawing.frames]
-        if part.module >= 0 or part.box >= 0:
-            frames.append((part.members, move.rect(piece.rect)))
-    frames += [(problem.boxes[i][1], _box(places, problem.boxes[i][1])) for i in sorted(columns)]
-    boxes = [(own, move.rect(rect)) for own, move, rect in _boxes_within(rests)]
-    done = {frozenset(own) for own, _ in (*frames, *boxes)}
-    boxes += [(own, _box(places, own)) for _, own in problem.boxes if frozenset(own) not in done]
-    links = [i for i, key in enumerate(keys) if key not in routes]
-    drawn = list(routes.values())
-    if routed:
-        routes.update(linked(problem, links, keys, plan, rests, units, frames, boxes, pair, drawn))
-    axis = rests.axis if pair else None
-    return Drawing(
-        tuple(places), routes, tuple(frames), tuple(boxes), axis, bool(problem.pins), direction=problem.direction
-    )
+@dataclass(frozen=True, slots=True)
+class _Standing:
+    """Where neurons, frames and boxes stand, before a connection is drawn between frames: routes cost most, and what
+    stands in a box can be told without them."""
+
+    plan: ComponentLayout
+    rests: Settled
+    units: Sequence[Unit]
+    #: the frames of parts, of what is in them, and of columns
+    frames: tuple[tuple[tuple[int, ...], Rect], ...]
+    #: boxes that are no frames
+    boxes: tuple[tuple[tuple[int, ...], Rect], ...]
+
+    @classmethod
+    def of(
+        cls,
+        problem: LayoutProblem,
+        plan: ComponentLayout,
+        rests: Settled,
+        units: Sequence[Unit],
+        columns: AbstractSet[int],
+    ) -> _Standing:
+        """What has settled, with its frames."""
+        places = rests.places
+        frames: list[tuple[tuple[int, ...], Rect]] = []
+        for piece, move in rests.pieces:
+            part = piece.part
+            frames += [(tuple(part.members[m] for m in own), move.rect(rect)) for own, rect in piece.drawing.frames]
+            if part.module >= 0 or part.box >= 0:
+                frames.append((part.members, move.rect(piece.rect)))
+        frames += [(problem.boxes[i][1], _box(places, problem.boxes[i][1])) for i in sorted(columns)]
+        boxes = [(own, move.rect(rect)) for own, move, rect in _boxes_within(rests)]
+        done = {frozenset(own) for own, _ in (*frames, *boxes)}
+        boxes += [(own, _box(places, own)) for _, own in problem.boxes if frozenset(own) not in done]
+        return cls(plan, rests, units, tuple(frames), tuple(boxes))
+
+    def entered(self, members: Sequence[int]) -> bool:
+        """Whether a neuron stands, or a frame reaches, where the line round these neurons is drawn."""
+        own, places = set(members), self.rests.places
+        x0, y0, x1, y1 = _box(places, members)
+        if any(x0 < x < x1 and y0 < y < y1 for i, (x, y) in enumerate(places) if i not in own):
+            return True
+        return any(
+            not own & set(inside) and r[0] < x1 and x0 < r[2] and r[1] < y1 and y0 < r[3] for inside, r in self.frames
+        )
+
+    def joined(self, problem: LayoutProblem, pair: Mapping[int, int], routed: bool) -> Drawing:
+        """Neurons, what is within frames, and, where they are to be ``routed``, the connections between them."""
+        places = self.rests.places
+        routes: dict[Key, Route] = {}
+        keys = keys_of(problem.edges)
+        known = set(keys)
+        for piece, move in self.rests.pieces:
+            members = piece.part.members
+            for (a, b, number), route in piece.drawing.routes.items():
+                key = members[a], members[b], number
+                if key in known:
+                    ends = places[key[0]], places[key[1]]
+                    routes[key] = (ends[0], *move.route(route)[1:-1], ends[1])
+        links = [i for i, key in enumerate(keys) if key not in routes]
+        drawn = list(routes.values())
+        if routed:
+            routes.update(
+                linked(problem, links, keys, self.plan, self.rests, self.units, self.frames, self.boxes, pair, drawn)
+            )
+        axis = self.rests.axis if pair else None
+        fixed = bool(problem.pins)
+        return Drawing(tuple(places), routes, self.frames, self.boxes, axis, fixed, direction=problem.direction)
 
 
 def _boxes_within(rests: Settled) -> Iterator[tuple[tuple[int, ...], FrameMove, Rect]]:
@@ -289,14 +331,3 @@ def _whole(units: Sequence[Unit], members: Sequence[int]) -> bool:
     """Whether every unit is either all of these neurons' or none of it is."""
     own = set(members)
     return all(own.isdisjoint(unit.members) or own.issuperset(unit.members) for unit in units)
-
-
-def _entered(drawing: Drawing, members: Sequence[int]) -> bool:
-    """Whether a neuron stands, or a frame reaches, where the line round these neurons is drawn."""
-    own = set(members)
-    x0, y0, x1, y1 = _box(drawing.places, members)
-    if any(x0 < x < x1 and y0 < y < y1 for i, (x, y) in enumerate(drawing.places) if i not in own):
-        return True
-    return any(
-        not own & set(inside) and r[0] < x1 and x0 < r[2] and r[1] < y1 and y0 < r[3] for inside, r in drawing.frames
-    )
