@@ -6,11 +6,14 @@ import random
 import sys
 import tracemalloc
 from collections.abc import Callable
-from types import FrameType
+from types import FrameType, ModuleType
+from typing import TYPE_CHECKING
 
 import layout_conformance as suite
 import pytest
+from neurovis_layouts.layered import flips
 from neurovis_layouts.layered.frame_routing import linked
+from neurovis_layouts.layered.levels import Levels, Node, Segment
 from neurovis_layouts.routing import nearby, walls
 from neurovis_layouts.routing.detours import Detours
 from neurovis_layouts.routing.obstacles import Obstacles
@@ -20,6 +23,9 @@ import neurovis_spec as nv
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.layout.geometry import straight
 from neurovis_spec.layout.problem import problem_of
+
+if TYPE_CHECKING:
+    from _typeshed import TraceFunction
 
 HEAD = "neurovis: 1\nname: many\n"
 
@@ -107,6 +113,42 @@ def test_what_stands_in_the_way_of_many_long_routes_is_found_in_little_memory() 
         assert tracemalloc.get_traced_memory()[1] < 15e6
     finally:
         tracemalloc.stop()
+
+
+def lines_run(task: Callable[[], object], module: ModuleType) -> int:
+    """How many lines of a module are run by a task."""
+    count = 0
+
+    def note(frame: FrameType, event: str, _given: object) -> TraceFunction | None:
+        nonlocal count
+        count += event == "line"
+        return note if frame.f_code.co_filename == module.__file__ else None
+
+    sys.settrace(note)
+    try:
+        task()
+    finally:
+        sys.settrace(None)
+    return count
+
+
+def test_what_turning_a_frame_costs_grows_with_its_connections() -> None:
+    """Two frames, one below the other, their neurons connected in the opposite order: not every connection with every
+    other, one by one."""
+
+    def turned(count: int) -> set[int]:
+        across = [float(i) for i in range(count)]
+        nodes = [
+            Node(
+                rank, tuple((rank * count + i, x, 0.0) for i, x in enumerate(across)), (float(count), 0.0), framed=True
+            )
+            for rank in (0, 1)
+        ]
+        segments = [Segment(0, x, 1, -x, 1.0) for x in across]
+        return flips.turned(Levels(nodes, [[0], [1]], [segments]), [[0], [1]], {0})[1]
+
+    assert turned(20) == {0}
+    assert lines_run(lambda: turned(400), flips) < 3 * lines_run(lambda: turned(200), flips)
 
 
 def test_what_is_boxed_is_routed_once() -> None:

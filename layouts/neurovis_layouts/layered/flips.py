@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
 
+import numpy as np
+
 from neurovis_layouts.layered.levels import Levels, Segment
 from neurovis_layouts.layered.place import placed
 
@@ -46,15 +48,13 @@ def _crossings(levels: Levels, x: Sequence[float], flipped: AbstractSet[int], no
     for gap in (rank - 1, rank):
         if not 0 <= gap < len(levels.segments) or len(levels.segments[gap]) > _MOST:
             continue
-        lines = [
-            (x[s.upper] + _offset(s.upper, s.a, flipped), x[s.lower] + _offset(s.lower, s.b, flipped), s)
-            for s in levels.segments[gap]
-        ]
-        own = [line for line in lines if node in (line[2].upper, line[2].lower)]
-        for a, b, segment in own:
-            for c, d, other in lines:
-                if segment is not other and (a - c) * (b - d) < 0:
-                    total += 1 if node in (other.upper, other.lower) else 2
+        segments = levels.segments[gap]
+        start = np.array([x[s.upper] + _offset(s.upper, s.a, flipped) for s in segments])
+        end = np.array([x[s.lower] + _offset(s.lower, s.b, flipped) for s in segments])
+        own = np.array([node in (s.upper, s.lower) for s in segments], dtype=np.bool_)
+        met = (start[own, None] - start) * (end[own, None] - end) < 0
+        # two at the node meet in both of their rows, others in one
+        total += 2 * int(met.sum()) - int(met[:, own].sum())
     return total
 
 
