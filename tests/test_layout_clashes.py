@@ -20,6 +20,7 @@ connections: {C -> left.A: 1, C -> right.A: 1, left.B + right.B -> D: 1}
 layout: LAYOUT
 """
 EACH_OTHER = "the frames of 'left' and 'right' lie on each other"
+NEITHER = "the frames of 'q' and 'r' lie on each other; therefore neither is drawn"
 IN_LEFT = "'D' stands in the frame of 'left', which is not drawn therefore"
 #: C1 stands in the box, and the frame of the right leg may reach into it, too: one of the two is told.
 IN_BOX = "'q'"
@@ -30,6 +31,7 @@ CASES = [
     ("{positions: {left: [0, 0], D: [0.61, 1]}}", IN_LEFT, "[0.61, 1]"),
     ("{positions: {left: [0, 0], D: [0.66, 1]}}", "", ""),
     ("{mirror: [[left, right]], boxes: {q: [left, C2]}}", IN_BOX, "[left, C2]"),
+    ("{boxes: {q: [C], r: [D]}, positions: {C1: [0, 0], C2: [4, 0], D: [2, 0.75]}}", NEITHER, "[0, 0]"),
     ("{engine: grid, positions: {left.A: [0, 0], left.B: [0, 2], right.A: [1, 0]}}", EACH_OTHER, "[0, 0]"),
 ]
 

@@ -7,18 +7,16 @@ pinned or was put somewhere by hand stays there all the same, and it is said.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.layout.engines import engines_that
-from neurovis_spec.layout.frames import BOX_ACROSS, BOX_TIGHT, Frames
+from neurovis_spec.layout.frames import BOX_ACROSS, BOX_TIGHT, SLACK, Frames
 from neurovis_spec.layout.model import Layout, LayoutProblem
 
-#: Rounding to the grid of coordinates, and to points on routes, is no clash.
-_SLACK = 1 / 32
 #: With more frames than this nobody looks at one.
 _MOST = 2000
 #: So many neurons are looked for in a spec.
@@ -50,7 +48,10 @@ def clashes(problem: LayoutProblem, layout: Layout) -> list[Clash]:
     names = [module.path for module in problem.modules] + [name for name, _ in problem.boxes]
     meeting = set(_meeting(frames, rects))
     result = [
-        Clash(f"the frames of '{names[a]}' and '{names[b]}' lie on each other", _about(problem, frames, a, b))
+        Clash(
+            f"the frames of '{names[a]}' and '{names[b]}' lie on each other{_left_out(frames, names, a, b)}",
+            _about(problem, frames, a, b),
+        )
         for a, b in sorted(meeting)
         if not any(_around(frames, outer, (a, b)) for outer in meeting)
     ]
@@ -70,7 +71,7 @@ def _meeting(frames: Frames, rects: _Floats) -> Iterator[tuple[int, int]]:
     for one in range(len(rects)):
         low = np.maximum(rects[one, :2], rects[one + 1 :, :2])
         high = np.minimum(rects[one, 2:], rects[one + 1 :, 2:])
-        for other in np.flatnonzero(((high - low) > _SLACK).all(axis=1)).tolist():
+        for other in np.flatnonzero(((high - low) > SLACK).all(axis=1)).tolist():
             if not frames.related(one, one + 1 + other):
                 yield one, one + 1 + other
 
@@ -78,7 +79,7 @@ def _meeting(frames: Frames, rects: _Floats) -> Iterator[tuple[int, int]]:
 def _strangers(frames: Frames, rects: _Floats, at: _Floats) -> Iterator[tuple[int, int]]:
     """Frames, each with the first neuron in it that is none of its."""
     for number, rect in enumerate(rects):
-        inside = ((at > rect[:2] + _SLACK) & (at < rect[2:] - _SLACK)).all(axis=1)
+        inside = ((at > rect[:2] + SLACK) & (at < rect[2:] - SLACK)).all(axis=1)
         for neuron in np.flatnonzero(inside).tolist():
             if neuron not in frames.members[number]:
                 yield number, neuron
@@ -91,6 +92,14 @@ def _around(frames: Frames, outer: tuple[int, int], inner: tuple[int, int]) -> b
         return False
     members = frames.members
     return any(members[outer[i]] >= members[inner[0]] and members[outer[1 - i]] >= members[inner[1]] for i in (0, 1))
+
+
+def _left_out(frames: Frames, names: Sequence[str], *pair: int) -> str:
+    """Which of two that lie on each other are boxes: these are not drawn then."""
+    boxes = [f"'{names[number]}'" for number in pair if number >= frames.instances]
+    if len(boxes) > 1:
+        return "; therefore neither is drawn"
+    return f"; therefore {boxes[0]} is not drawn" if boxes else ""
 
 
 def _about(problem: LayoutProblem, frames: Frames, *numbers: int) -> tuple[str, ...]:

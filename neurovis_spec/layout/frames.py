@@ -22,6 +22,8 @@ PAD, PAD_ROUTE, PAD_FRAME, TITLE = 0.65, 0.2, 0.35, 0.35
 BOX_ACROSS, BOX_DOWN, BOX_LOOP, BOX_FRAME = 0.62, 0.6, 0.15, 0.3
 #: From centres and from frames where a box would touch another otherwise.
 BOX_TIGHT, BOX_TIGHT_FRAME = 0.42, 0.15
+#: Rounding to the grid of coordinates, and to points on routes: frames that share no more do not lie on each other.
+SLACK = 1 / 32
 
 
 class Frames:

@@ -21,6 +21,7 @@ from neurovis_spec.layout.frames import (
     PAD,
     PAD_FRAME,
     PAD_ROUTE,
+    SLACK,
     TITLE,
 )
 from neurovis_spec.scene import texts
@@ -49,8 +50,8 @@ class _Named:
 
 def boxes_of(network: Network, positions: FloatArray, routes: Sequence[FloatArray]) -> list[Box]:
     """All boxes, and the instances of modules, largest first. Boxes that would touch another's are drawn tighter, what
-    holds another is drawn around it, and what foreign neurons stand in has no frame: it would say that they belong to
-    it. Layout units."""
+    holds another is drawn around it. What foreign neurons stand in has no frame: it would say that they belong to it;
+    nor has a box that would lie on the frame of others, where nobody could see what belongs to which. Layout units."""
     named = _named(network)
     within = {n: frozenset(n.members) for n in named}
     inner = _routes_within(network, routes, [n for n in named if n.kind == "instance"])
@@ -66,10 +67,12 @@ def boxes_of(network: Network, positions: FloatArray, routes: Sequence[FloatArra
                 if not (within[o] <= within[item] or within[item] <= within[o])
             ):
                 rects[item] = _around(network, positions, routes, item.members, held, tight)
+    clean = [n for n in named if not _entered(positions, rects[n], n.members)]
     boxes = [
         Box(_titled(network, n), n.path.rpartition(".")[2], n.members, rects[n], n.kind, n.path)
-        for n in named
-        if not _entered(positions, rects[n], n.members)
+        for n in clean
+        if n.kind == "instance"
+        or not any(overlap(_padded(rects[n], -SLACK), rects[o]) and within[n].isdisjoint(within[o]) for o in clean)
     ]
     return sorted(boxes, key=lambda b: (-(b.rect[2] - b.rect[0]) * (b.rect[3] - b.rect[1]), b.kind, b.path))
 
