@@ -18,6 +18,7 @@ from neurovis_layouts.routing.walls import Frame
 
 import neurovis_spec as nv
 from neurovis_spec.arrays import FloatArray
+from neurovis_spec.layout.frames import Frames
 from neurovis_spec.layout.geometry import distance, sampled, segment_distance, straight
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
 from neurovis_spec.layout.problem import problem_of
@@ -120,7 +121,53 @@ def test_a_loop_is_as_long_as_it_is_drawn_and_can_be_crossed() -> None:
 
 
 def test_where_nothing_is_drawn_nothing_is_eased() -> None:
-    assert eased(Judge([], [(0.0, 0.0)], {}), set()) == {}
+    for frames in ([], [(frozenset({0}), (-1.0, -1.0, 1.0, 1.0))]):
+        assert eased(Judge([], [(0.0, 0.0)], {}, frames), set()) == {}
+
+
+def test_a_route_along_a_border_is_led_off_it() -> None:
+    """Of the frame that it leads out of, too."""
+    frames: list[Frame] = [(frozenset({0, 2}), (-1.0, -1.0, 4.0, 0.8)), (frozenset({1}), (5.0, -1.0, 7.0, 0.8))]
+    centres: list[Point] = [(0.0, 0.0), (6.0, 0.0), (3.0, 0.0)]
+    along: Route = ((0.0, 0.0), (0.4, 0.6), (0.6, 0.8), (1.0, 0.8), *straight((1.0, 0.8), (5.0, 0.8))[1:])
+    along = (*along, (5.4, 0.8), (5.6, 0.6), centres[1])
+    before = Judge([edge(0, 1)], centres, {0: along}, frames)
+    assert before.along_borders() == {0}
+    found = eased(before, {0})[0]
+    assert Judge([edge(0, 1)], centres, {0: found}, frames).along_borders() == set()
+    assert Judge([edge(0, 1)], centres, {0: found}, []).along_borders() == set()
+
+
+ALONG = """
+neurovis: 1
+name: along
+modules:
+  osc: {neurons: {A: {bias: 1}, B: {}, C: {}, D: {}}, connections: {INNER}}
+instances: {o: {module: osc, count: 3}}
+connections: {COUPLINGS}
+layout: {engine: layered, direction: DIRECTION}
+"""
+LINE = "A -> A: 1, B -> B: 1, C -> C: 1, C -> A: 1, C -> B: 1", "o1.B -> o2.B: 1, o2.C -> o3.A: 1", "down"
+MANY = "A -> A: 1, A -> C: 1, A -> D: 1, B -> B: 1, B -> D: 1, C -> B: 1, C -> C: 1, D -> B: 1, D -> C: 1, D -> D: 1"
+
+
+@pytest.mark.parametrize(
+    ("inner", "couplings", "direction"), [LINE, (MANY, "o1.C -> o2.D: 1, o2.A -> o3.A: 1", "right")]
+)
+def test_no_coupling_runs_along_the_border_of_a_frame(inner: str, couplings: str, direction: str) -> None:
+    text = ALONG.replace("INNER", inner).replace("COUPLINGS", couplings).replace("DIRECTION", direction)
+    network = nv.compile_text(text)
+    layout, problem = network.layout().value, problem_of(network.network)
+    routes = {i: layout.routes[e.name] for i, e in enumerate(problem.edges)}
+    rects = Frames(problem).rects({i: layout.positions[name] for i, name in enumerate(problem.neurons)}, routes)
+    for route in routes.values():
+        for x0, y0, x1, y1 in (rect for rect in rects if rect is not None):
+            beside = [
+                (min(abs(x - x0), abs(x - x1)) < 0.1 and y0 < y < y1)
+                or (min(abs(y - y0), abs(y - y1)) < 0.1 and x0 < x < x1)
+                for x, y in sampled(route, 0.02)
+            ]
+            assert sum(beside) / len(beside) * polylines([route]).lengths()[0] < 0.6
 
 
 def test_a_route_through_a_loop_is_led_around_it() -> None:

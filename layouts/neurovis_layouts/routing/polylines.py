@@ -21,7 +21,7 @@ from neurovis_spec.layout.segments import meet
 _PARTS, _STRAIGHT = 8, 0.01
 #: How far apart points are that are checked for what else runs there, how large their cells; those this close to the
 #: ends of a line are left out.
-STEP, _CELL, _END = 0.15, 0.16, 0.6
+STEP, _CELL, END = 0.15, 0.16, 0.6
 #: On a line so many are checked, at most: memory has an end.
 _MOST = 2000
 _ROW = 1 << 31
@@ -105,10 +105,10 @@ class Polylines:
         before = np.concatenate([np.zeros(1), np.cumsum(self._lengths)])
         offset = before[self._segments]
         step = np.maximum(STEP, total / _MOST)
-        counts = np.maximum(np.ceil((total - 2 * _END) / step), 0).astype(np.int64)
+        counts = np.maximum(np.ceil((total - 2 * END) / step), 0).astype(np.int64)
         owner = np.repeat(np.arange(len(self), dtype=np.int64), counts)
         number = np.arange(len(owner), dtype=np.int64) - np.repeat(np.cumsum(counts) - counts, counts)
-        at = offset[owner] + _END + step[owner] * number
+        at = offset[owner] + END + step[owner] * number
         segment = np.clip(np.searchsorted(before, at, side="right") - 1, 0, len(self._lengths) - 1)
         share = (at - before[segment]) / np.maximum(self._lengths[segment], 1e-9)
         place = np.floor((self.a[segment] + share[:, None] * self._way[segment]) / _CELL).astype(np.int64)

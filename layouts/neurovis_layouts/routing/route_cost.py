@@ -13,11 +13,11 @@ import numpy as np
 from neurovis_layouts.routing.corners import reflected
 from neurovis_layouts.routing.ends import by_ends
 from neurovis_layouts.routing.obstacles import REACH, TOUCH, Obstacles
-from neurovis_layouts.routing.polylines import STEP, Polylines, polylines
+from neurovis_layouts.routing.polylines import END, STEP, Polylines, polylines
 from neurovis_layouts.routing.walls import Frame, Walls, meet
 from neurovis_spec.layout import FloatArray, IntArray
 from neurovis_spec.layout.frames import padded
-from neurovis_spec.layout.geometry import distance
+from neurovis_spec.layout.geometry import distance, straight
 from neurovis_spec.layout.model import LayoutEdge, Point, Route
 
 #: What it costs to enter a foreign frame or a disc, to come a unit closer to a disc than ``REACH``, to cross a line, to
@@ -38,6 +38,10 @@ _SLACK = 0.02
 OFF = 0.06
 #: How far beyond discs and frames a line may lead for nothing; how far back along the direction.
 _MARGIN, _ONWARD = 0.8, 0.05
+#: What runs so far along borders is drawn anew where it can be; to pass some aslant takes less.
+_RUN = 2.0
+#: So close to a border a line is one with it.
+_BESIDE_BORDER = 0.08
 #: How far from a centre ends are checked, how far apart they are to be.
 _AT, _APART = 0.45, 0.16
 #: How many routes are checked closely at a time.
@@ -67,6 +71,7 @@ class Judge:
         self.discs: FloatArray = np.array(centres, dtype=np.float64).reshape(-1, 2)
         self.low: FloatArray = np.concatenate([self.discs, self.walls.rects[:, :2]]).min(axis=0) - _MARGIN
         self.high: FloatArray = np.concatenate([self.discs, self.walls.rects[:, 2:]]).max(axis=0) + _MARGIN
+        self._borders = _border_cells(self.rects)
         self._number = {centre: k for k, centre in enumerate(centres)}
         self._look()
 
@@ -83,6 +88,15 @@ class Judge:
         loops = (self.segment_ends[:, 0] == self.segment_ends[:, 1]) & (self.segment_ends[:, 0] >= 0)
         crossed = self._lines.crossed(self.a[loops], self.b[loops])
         return {i for i, times in zip(sorted(self.routes), crossed.tolist(), strict=False) if times}
+
+    def along_borders(self) -> set[int]:
+        """The edges whose routes run along the border of a frame, so that both are one line."""
+        if not len(self._borders):
+            return set()
+        cells, owner = self._lines.cells()
+        along = self._borders[np.minimum(np.searchsorted(self._borders, cells), len(self._borders) - 1)] == cells
+        far = STEP * np.bincount(owner[along], minlength=len(self._lines))
+        return {i for i, by in zip(sorted(self.routes), far.tolist(), strict=False) if by > _RUN}
 
     def in_fans(self, most: int) -> set[int]:
         """The edges of which more than so many share both ends, in either direction."""
@@ -112,8 +126,10 @@ class Judge:
         ends = [(self._number.get(route[0], -1), self._number.get(route[-1], -1)) for route in routes]
         self.segment_ends: IntArray = np.array(ends, dtype=np.int64).reshape(-1, 2)[lines.owner]
         cells, owner = lines.cells()
+        borders = np.full(len(self._borders), -1, dtype=np.int64)
+        cells, owners = np.concatenate([cells, self._borders]), np.concatenate([edges[owner], borders])
         order = np.argsort(cells, kind="stable")
-        self.cells, self.cell_edges = cells[order], edges[owner[order]]
+        self.cells, self.cell_edges = cells[order], owners[order]
         self._ends: dict[int, list[tuple[int, bool, Point]]] = {}
         for leaves, places in ((True, lines.leave(_AT)), (False, lines.arrive(_AT))):
             for edge, route, (x, y) in zip(edges.tolist(), routes, places.tolist(), strict=True):
@@ -236,3 +252,15 @@ class Pen:
                 one = lines.some(np.array([k], dtype=np.int64))
                 cost[k] += _CROSSING * float(one.crossed(one.a * flip + shift, one.b * flip + shift)[0])
         return cost
+
+
+def _border_cells(rects: FloatArray) -> IntArray:
+    """The cells along the borders of frames, which are lines like others, in order."""
+    routes: list[Route] = []
+    for rect in rects.tolist():
+        for by in (-_BESIDE_BORDER, 0.0, _BESIDE_BORDER):
+            x0, y0, x1, y1 = padded(rect, by)
+            # cells leave the ends of lines out
+            routes += [straight((x0 - END, y), (x1 + END, y)) for y in (y0, y1)]
+            routes += [straight((x, y0 - END), (x, y1 + END)) for x in (x0, x1)]
+    return np.unique(polylines(routes).cells()[0]) if routes else np.zeros(0, dtype=np.int64)

@@ -1,7 +1,8 @@
 """Simplified routes: routes with needless bends are drawn anew, with as few and gentle bends as obstacles allow.
 
-In: routes that are drawn, what is in the way. Out: for those that wind, a better route where there is one: with fewer
-corners or with its corners elsewhere, judged by all that makes a line hard to follow (``Judge``).
+In: routes that are drawn, what is in the way. Out: for those that wind, and those that run through a self-loop or along
+a frame's border, a better route where there is one: with fewer corners or with its corners elsewhere, judged by all
+that makes a line hard to follow (``Judge``).
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ def eased(judge: Judge, free: AbstractSet[int]) -> dict[int, Route]:
     changed: set[int] = set()
     looked = sorted(free - judge.in_fans(_FAN))
     for _ in range(_ROUNDS):
-        winding, through = judge.winding(), judge.through_loops()
+        winding, through = judge.winding(), judge.through_loops() | judge.along_borders()
         chosen = [
             i
             for i in looked
