@@ -70,8 +70,8 @@ def test_at_a_distance_boxes_are_closed_and_have_the_mean_colour_of_their_neuron
             network, view = compiled.network, view_of(compiled, compiled.gains)
             (instance,) = (entry for entry in network.instances if entry.path == "left1")
             at = np.mean([places(compiled)[network.neurons.names[index]] for index in instance.indices], axis=0)
-            await fit(opened, 420, 438)
-            await fit(opened, 420, 438)
+            await fit(opened, 432, 342)
+            await fit(opened, 432, 342)
             small = await picture(opened)
             small.save(tmp_path / "closed.png")
             x, y = 0.3 * at
