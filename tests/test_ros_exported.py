@@ -179,7 +179,8 @@ def test_a_node_takes_the_arguments_of_ros(name: str, tmp_path: Path) -> None:
             given = ["--ros-args", "-p", "turn:=0.1", "-r", "/neurovis/arm/activity:=/seen", "-r", "__node:=other"]
             given += ["-r", "__ns:=/left"]
         peer = ros.peer(listen=[{**ACTIVITY, "topic": "/seen"}], until={"/seen": 20})
-        words = ["--steps", "20", "--wait", "3", "--backend", "reference"]
+        peer.wait_for("ready")
+        words = ["--steps", "20", "--wait", "6", "--backend", "reference"]
         run = ros.neurovis("ros", "run", spec, *words, *given)
         assert "/left/other" in run.wait_for("ready")
         assert run.end() == 0
