@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 from neurovis_layouts.frame import from_picture, to_picture
 from neurovis_layouts.layered.drawing import Drawing, FrameMove, Piece
-from neurovis_layouts.layered.parts import Part, imaged
+from neurovis_layouts.layered.parts import Part, imaged, part_of_module
 from neurovis_spec.layout.frames import Rect
 from neurovis_spec.layout.geometry import distance, snap
 from neurovis_spec.layout.model import Direction, LayoutProblem, LayoutRefusalError, Point
@@ -54,9 +54,7 @@ def parts_by_cell(problem: LayoutProblem, pair: Mapping[int, int]) -> tuple[list
     for members in seats:
         module = outer.get(members, -1)
         if module >= 0:
-            one = problem.modules[module]
-            family = f"{one.module} {one.path.rstrip('0123456789')}"
-            found.append(Part(members, int(one.template), module=module, family=family))
+            found.append(part_of_module(problem, module))
         else:
             found.append(Part(members, box=boxes.get(members, -1)))
     parts = imaged(sorted(found, key=lambda part: min(part.members)), pair)
@@ -84,15 +82,19 @@ def _seats(problem: LayoutProblem, pair: Mapping[int, int]) -> dict[_Members, in
         near[owner[edge.source]][owner[edge.target]] += 1
         near[owner[edge.target]][owner[edge.source]] += 1
     spans, below = _spans(problem), len(seat)
-    while loose:
-        pulls = [(_pull(near[members], seat, spans, _symmetric(members, pair)), members) for members in loose]
-        (many, to), members = max(pulls, key=lambda one: (one[0][0], [-m for m in one[1]]))
+    pulls = {members: _pull(near[members], seat, spans, _symmetric(members, pair)) for members in loose}
+    while pulls:
+        members = max(pulls, key=lambda one: (pulls[one][0], [-m for m in one]))
+        many, to = pulls.pop(members)
         image = owner.get(pair.get(members[0], -1), members)
         seat[members] = to if many else below
-        if image != members and image in loose:
+        seated = [members]
+        if image in pulls:
             seat[image] = _mirrored(to, spans) if many else below
-            loose.remove(image)
-        loose.remove(members)
+            pulls.pop(image)
+            seated.append(image)
+        for other in {other for one in seated for other in near[one] if other in pulls}:
+            pulls[other] = _pull(near[other], seat, spans, _symmetric(other, pair))
     return _together(problem, seat)
 
 
@@ -102,15 +104,13 @@ def _pull(
     spans: Sequence[_Span],
     middle: bool,
 ) -> tuple[int, int]:
-    """The cell with which something has most connections, and how many; ``middle``: one that is its own image."""
+    """How many connections something has with the cell with which it has most, and that cell; ``middle``: one that is
+    its own mirror image."""
     pulls: Counter[int] = Counter()
     for members, times in near.items():
-        if (
-            members in seat
-            and seat[members] < len(spans)
-            and (not middle or _mirrored(seat[members], spans) == seat[members])
-        ):
-            pulls[seat[members]] += times
+        cell = seat.get(members, len(spans))
+        if cell < len(spans) and (not middle or _mirrored(cell, spans) == cell):
+            pulls[cell] += times
     best = max(pulls.values(), default=0)
     return best, min((i for i, times in pulls.items() if times == best), default=len(spans))
 

@@ -31,11 +31,7 @@ def parts_of(problem: LayoutProblem, boxes: AbstractSet[int], pair: Mapping[int,
 
     ``boxes`` are the places of boxes to be frames; ``pair`` says whose mirror image a neuron is, both ways.
     """
-    found = [
-        Part(m.members, int(m.template), module=i, family=f"{m.module} {m.path.rstrip('0123456789')}")
-        for i, m in enumerate(problem.modules)
-        if m.parent < 0
-    ]
+    found = [part_of_module(problem, i) for i, m in enumerate(problem.modules) if m.parent < 0]
     chosen = [Part(problem.boxes[i][1], box=i) for i in sorted(boxes)]
     # of frames in frames the outermost; of a box that is an instance, the instance
     parts: list[Part] = []
@@ -46,6 +42,12 @@ def parts_of(problem: LayoutProblem, boxes: AbstractSet[int], pair: Mapping[int,
             taken.update(part.members)
     parts.sort(key=lambda p: min(p.members))
     return imaged(parts, pair)
+
+
+def part_of_module(problem: LayoutProblem, module: int) -> Part:
+    """The part that an instance is, by its number."""
+    one = problem.modules[module]
+    return Part(one.members, int(one.template), module=module, family=f"{one.module} {one.path.rstrip('0123456789')}")
 
 
 def imaged(parts: Sequence[Part], pair: Mapping[int, int]) -> list[Part]:
