@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -39,11 +40,12 @@ _LARGEST_SVG = 5_000_000
 
 
 @dataclass(frozen=True, eq=False)
-class Drawable:
+class Drawable(ABC):
     """A network that can be drawn, since it can be run and laid out."""
 
     network: Network
 
+    @abstractmethod
     def run(
         self,
         steps: int | None = None,
@@ -53,11 +55,10 @@ class Drawable:
         states: str | Sequence[str] = (),
     ) -> Recording:
         """A run of its own."""
-        raise NotImplementedError
 
+    @abstractmethod
     def placed(self, engine: str | None = None, effort: str | None = None) -> Layout:
         """The layout that pictures are drawn in."""
-        raise NotImplementedError
 
     @cached_property
     def gains(self) -> Gains:
