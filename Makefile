@@ -41,7 +41,7 @@ $(VENV)/made:
 $(VENV)/installed: $(VENV)/made pyproject.toml
 	@echo "installing into $(VENV) with $$($(BIN)/python --version) (a minute or so)"
 	@begun=$$(date +%s); $(PIP) --editable . && printf '%-26s%5s s   %s\n' install $$(($$(date +%s) - begun)) $(VENV)
-	@$(BIN)/python -m compileall -q neurovis_spec layouts renderers
+	@$(BIN)/python -m compileall -q neurovis_spec layouts renderers bodies
 	@touch $@
 
 $(VENV)/tested: $(VENV)/installed

@@ -16,6 +16,7 @@ from typing import Literal
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray, frozen
+from neurovis_spec.compiler.body_settings import BodySettings
 from neurovis_spec.compiler.digest import digest
 from neurovis_spec.compiler.drawing.drawing_settings import LayoutSettings, RenderSettings
 from neurovis_spec.compiler.events.changes import Change
@@ -223,6 +224,8 @@ class Network:
     numbering: FloatArray | None = None
     #: what a node of ROS is told; it changes nothing of what the network does
     ros: RosSettings = field(default_factory=RosSettings)
+    #: the body that it senses and moves in a run; like ``ros``, no part of the hash
+    body: BodySettings | None = None
 
     @cached_property
     def neuron_index(self) -> Mapping[str, int]:

@@ -1,0 +1,1 @@
+"""Bodies for networks: models of MuJoCo, environments of Gymnasium."""

@@ -1,0 +1,48 @@
+"""The ``body`` section of a spec, resolved: what the network senses and what it moves.
+
+In: nothing; these are values of the Network. Out: BodySettings, which ``compiler/body.py`` makes and a run opens.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from neurovis_spec.language.expressions.tree import Tree
+
+
+@dataclass(frozen=True, slots=True)
+class Sensed:
+    """An input of the network (its index in ``Network.inputs``) and the sensors that are its components: their names,
+    or ``name[i]`` for one number of a sensor that is several."""
+
+    input: int
+    sensors: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """An actuator (``name``, or ``name[i]``) and its command: an expression of outputs and parameters.
+
+    ``outputs``: the names in the expression, each with the index of an output and of a number in it. ``parameters``:
+    the names in it, each with a slot of ``Network.settable``.
+    """
+
+    actuator: str
+    command: Tree
+    outputs: tuple[tuple[str, int, int], ...]
+    parameters: tuple[tuple[str, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class BodySettings:
+    """A body of a ``kind`` (an entry point's name), opened with what the spec gives (``given``, and ``path`` where that
+    is a file). ``each_episode``: it is reset where an episode ends."""
+
+    kind: str
+    given: str
+    path: Path | None
+    substeps: int | None
+    sensed: tuple[Sensed, ...]
+    moved: tuple[Moved, ...]
+    each_episode: bool
