@@ -77,7 +77,7 @@ def test_the_wheel_holds_the_packages_the_library_and_the_examples(wheel: Path) 
     }
     assert expected <= names
     tops = {name.split("/")[0] for name in names if ".dist-info" not in name}
-    assert tops == {"neurovis_spec", "neurovis_layouts", "neurovis_renderers"}
+    assert tops == {"neurovis_spec", "neurovis_layouts", "neurovis_renderers", "neurovis_bodies"}
     assert not [name for name in names if "test" in name.lower() or "__pycache__" in name]
 
 
