@@ -192,8 +192,8 @@ def test_a_recording_is_gone_through_row_by_row() -> None:
     while source.advance():
         steps.append(source.step)
     assert steps == [0, 10, 20, 30, 40, 50, 60]
-    assert source.beside(-1) == 50
-    assert source.beside(1) == 60
+    assert source.number_after(-1) == 50
+    assert source.number_after(1) == 60
     source.go(31)
     assert source.step == 40
     assert source.seen().lesioned_neurons.tolist() == [False, True, False, False]

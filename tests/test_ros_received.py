@@ -77,8 +77,8 @@ def test_one_can_go_back_and_on_in_its_own_time(source: ReceivedSource) -> None:
     for _ in range(60):  # frames: a second
         assert source.advance()
     assert 198 <= source.step <= 200
-    assert source.beside(-10) == source.step - 10
-    assert source.beside(10**6) == 599
+    assert source.number_after(-10) == source.step - 10
+    assert source.number_after(10**6) == 599
     with pytest.raises(SourceError, match="from step 0 to 599"):
         source.go(600)
     source.go(599)

@@ -47,8 +47,8 @@ def importance_by(trials: Trials, progress: Progress | None = None) -> NamedArra
     for entry in network.inputs:
         with np.errstate(all="ignore"):
             mean = trials.given[:, entry.start : entry.start + entry.size].mean(axis=0)
-        silent = trials.told(entry, np.zeros_like)
-        held = trials.told(entry, lambda _, mean=mean: mean)  # type: ignore[misc]
+        silent = trials.with_input(entry, np.zeros_like)
+        held = trials.with_input(entry, lambda _, mean=mean: mean)  # type: ignore[misc]
         found.append((_apart(trials, silent), _apart(trials, held)))
         _tell(progress, len(found), len(labels))
     for index in own:

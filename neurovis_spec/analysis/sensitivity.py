@@ -66,7 +66,7 @@ def _moves(trials: Trials) -> Iterator[tuple[str, float, Move]]:
         given = trials.given[:, entry.start : entry.start + entry.size]
         with np.errstate(all="ignore"):
             size = float(np.sqrt(np.mean(given**2)))
-        yield f"input {entry.name}", size, lambda h, entry=entry: trials.told(entry, lambda x: x + h)  # type: ignore[misc]
+        yield f"input {entry.name}", size, lambda h, entry=entry: trials.with_input(entry, lambda x: x + h)  # type: ignore[misc]
     for name in network.parameters:
         if name not in network.structural:
             value = trials.parameter(name)
@@ -77,7 +77,7 @@ def _moves(trials: Trials) -> Iterator[tuple[str, float, Move]]:
             yield f"parameter {name}", abs(value), move
     weights = trials.weights
     for index, name in enumerate(network.connection_names):
-        yield name, abs(float(weights[index])), lambda h, index=index: trials.weighed(index, h)  # type: ignore[misc]
+        yield name, abs(float(weights[index])), lambda h, index=index: trials.with_weight(index, h)  # type: ignore[misc]
 
 
 def _derivative(move: Move, intact: FloatArray, h: float) -> tuple[float, float]:

@@ -110,20 +110,20 @@ class Trials:
         change(self._simulation)
         return self._run(self._simulation.state())[:, self.outputs]
 
-    def weighed(self, connection: int, more: float) -> FloatArray:
+    def with_weight(self, connection: int, more: float) -> FloatArray:
         """The outputs (steps, outputs) with a connection's weight increased by ``more`` from the first step on."""
         state = self._state.copy()
         state.weights[connection] += more
         return self._run(state)[:, self.outputs]
 
-    def told(self, entry: Input, turn: Callable[[FloatArray], FloatArray]) -> FloatArray:
-        """The outputs (steps, outputs) with an input replaced: ``turn`` maps its values to others at each step."""
+    def with_input(self, entry: Input, other: Callable[[FloatArray], FloatArray]) -> FloatArray:
+        """The outputs (steps, outputs) with an input replaced: ``other`` makes of its values others, at each step."""
         own = slice(entry.start, entry.start + entry.size)
 
         def seen(vector: FloatArray) -> FloatArray:
-            other = vector.copy()
-            other[own] = turn(vector[own])
-            return other
+            replaced = vector.copy()
+            replaced[own] = other(vector[own])
+            return replaced
 
         return self._run(self._state.copy(), seen)[:, self.outputs]
 

@@ -93,7 +93,7 @@ class RecordedSource:
         self._row += 1
         return True
 
-    def beside(self, by: int) -> int:
+    def number_after(self, by: int) -> int:
         """The step so many rows further on, or back."""
         return self._steps[min(max(self._row + by, 0), len(self._steps) - 1)]
 

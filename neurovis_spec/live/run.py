@@ -187,7 +187,7 @@ class Run:
             case Speed():
                 self._clock.set_speed(asked.value, now)
             case Step():
-                self._step(source.beside(asked.by))
+                self._step(source.number_after(asked.by))
             case Seek():
                 self._go(asked.step)
             case Event():

@@ -130,7 +130,7 @@ class SimulatedSource:
         if place and self._turned[place - 1].step == self.step:
             self._seen = self._turned_seen()
 
-    def beside(self, by: int) -> int:
+    def number_after(self, by: int) -> int:
         """The step so many further on, or back."""
         return max(self.reach.first, self.step + by)
 

@@ -114,7 +114,7 @@ class Source(Protocol):
         """Go on by one step; False, and no change, at the end or where the next step has not arrived."""
         ...
 
-    def beside(self, by: int) -> int:
+    def number_after(self, by: int) -> int:
         """The number of the step so many further on or (negative) back, not before the first that can be reached; it
         may be one that has not been computed yet."""
         ...

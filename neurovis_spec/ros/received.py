@@ -253,7 +253,7 @@ class ReceivedSource:
                     self._following = True
             return self._at is not before or (not self._following and self._at is not newest)
 
-    def beside(self, by: int) -> int:
+    def number_after(self, by: int) -> int:
         """The step so many further on, or back, of those that are kept."""
         with self._lock:
             place = bisect_left(self._rows, self._at.step, key=attrgetter("step")) + by

@@ -289,11 +289,7 @@ def read_array(file: IO[bytes], name: str, size: int, kinds: str, dimensions: in
     except CellError as error:
         raise RecordingError(f"'{name}' is of another type or shape: {error}") from None
     file.seek(header.offset)
-    count = math.prod(header.shape)
-    if not count:
-        return np.zeros(header.shape, header.dtype)
-    data: Array = np.frombuffer(file.read(count * header.dtype.itemsize), dtype=header.dtype, count=count)
-    return data.reshape(header.shape, order="F" if header.column_major else "C")
+    return header.array(file.read(header.count * header.dtype.itemsize))
 
 
 def _recording(arrays: Mapping[str, Array]) -> Recording:

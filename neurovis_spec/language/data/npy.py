@@ -46,6 +46,18 @@ class Header:
     dtype: np.dtype[np.generic]
     offset: int
 
+    @property
+    def count(self) -> int:
+        """How many numbers it has."""
+        return math.prod(self.shape)
+
+    def array(self, data: bytes, offset: int = 0) -> NDArray[np.generic]:
+        """The array whose numbers begin at ``offset``; a view of ``data``."""
+        if not self.count:
+            return np.zeros(self.shape, dtype=self.dtype)
+        flat: NDArray[np.generic] = np.frombuffer(data, dtype=self.dtype, count=self.count, offset=offset)
+        return flat.reshape(self.shape, order="F" if self.column_major else "C")
+
 
 def parse_npy(data: bytes, room: Room | None = None) -> NDArray[np.float64]:
     """The array, rows × columns; one of one dimension as a column. Raises CellError."""
@@ -69,11 +81,7 @@ def numbers_in(array: NDArray[np.generic]) -> NDArray[np.float64]:
 def parse_array(data: bytes, kinds: str, dimensions: tuple[int, ...]) -> NDArray[np.generic]:
     """The array as it stands, of one of these kinds and numbers of dimensions; a view of ``data``. Raises CellError."""
     header = read_header(data, len(data), kinds, dimensions)
-    count = math.prod(header.shape)
-    if not count:
-        return np.zeros(header.shape, dtype=header.dtype)
-    flat: NDArray[np.generic] = np.frombuffer(data, dtype=header.dtype, count=count, offset=header.offset)
-    return flat.reshape(header.shape, order="F" if header.column_major else "C")
+    return header.array(data, header.offset)
 
 
 def read_header(data: bytes, size: int, kinds: str, dimensions: tuple[int, ...], most: int = MOST_CELLS) -> Header:
