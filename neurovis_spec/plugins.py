@@ -20,6 +20,7 @@ BACKENDS = "neurovis.backends"
 FORMATS = "neurovis.formats"
 #: packages with YAML files of activations, models and rules
 LIBRARIES = "neurovis.libraries"
+BODIES = "neurovis.bodies"
 
 
 class PluginError(ValueError):

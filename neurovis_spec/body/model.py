@@ -7,7 +7,7 @@ x points forward, y to the left, z up.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -119,6 +119,11 @@ class BodyKind(Protocol):
 
     #: whether what the spec gives is a file, found as other data files are
     takes_file: bool
+
+    def files(self, path: Path) -> Iterable[Path]:
+        """Where the files may lie that the one at a path names, of kinds that take files: none of them is opened
+        before the caller has made sure that each lies where a spec's data may lie. Raises BodyError."""
+        ...
 
     def open(self, given: str, path: Path | None, dt: float, substeps: int | None) -> Body:
         """Open a body; ``given`` is what the spec says, ``path`` the file it names where the kind takes files. A step
