@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -82,11 +82,12 @@ def snapshots_of_run(run: Simulation, start: int, steps: int, every: int) -> Ite
     fading, seen = Fading(network), None
     before, weights = None, run.connection_weights
     for step in range(start + steps):
+        pose = run.pose
         run.step()
         if fading:
             seen = fading.follow(np.array([step]), run.activity[None])
         if step >= start and (step - start) % every == 0:
-            yield Snapshot(step, run.activity, weights, before, seen)
+            yield Snapshot(step, run.activity, weights, before, seen, pose, run.sensed)
         before, weights = weights, run.connection_weights if len(network.changing) else weights
 
 
@@ -112,7 +113,9 @@ def fitted(recording: Recording, network: Network) -> Recording:
     changing = tuple(network.connection_names[index] for index in network.changing.tolist())
     if own and len(recording.plastic) == len(recording.sources) and recording.connection_names == changing:
         after = After(recording.weights_after, recording.reached)
-        rows = Numbers(recording.step, recording.activity, recording.weights, recording.states)
-        return recording_of(network, columns_of(network), rows, network.connections.weights, after)
+        sensors = None if recording.sensors is None else recording.sensor_names
+        columns = replace(columns_of(network), sensors=sensors)
+        numbers = Numbers(recording.step, recording.rows)
+        return recording_of(network, columns, numbers, network.connections.weights, after)
     whose = f"{recording.network or 'unnamed'}, {len(recording.neurons)} neurons"
     raise RecordingError(f"the recording is of another network ({whose})")

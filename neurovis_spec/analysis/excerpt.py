@@ -56,9 +56,7 @@ def cut(recording: Recording, start: int | None = None, stop: int | None = None)
         asked = f"from {first or 0}" + ("" if last is None else f" to before {last}")
         raise RecordingError(f"there is nothing to measure {asked}: the recording has {held}")
     values = {entry.name: getattr(recording, entry.name) for entry in fields(Recording)}
-    for name in ("step", "activity", "weights", "states"):
-        values[name] = values[name][chosen]
-    return Recording(**values)
+    return Recording(**values).part(chosen)
 
 
 _MOST = 1 << 62

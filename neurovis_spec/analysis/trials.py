@@ -19,6 +19,7 @@ from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.network import Input, Network
 from neurovis_spec.runtime.backend import Availability, Capabilities, Stepper, prepare
 from neurovis_spec.runtime.columns import ALL, columns_of
+from neurovis_spec.runtime.embodied import embodied
 from neurovis_spec.runtime.record import Course, InMemory, Last, RowSink, go
 from neurovis_spec.runtime.recording import RecordingError
 from neurovis_spec.runtime.rows import Steps
@@ -79,11 +80,14 @@ class Trials:
         self.outputs = output_neurons(network) if of is None else _neurons(network, of)
         if not len(self.outputs):
             raise ValueError("the network has no outputs: name the neurons that count as outputs")
-        self._stepper = prepare(network, None, (first + count) * 100)
-        self._simulation = Simulation(network, Prepared(self._stepper), inputs=inputs)
+        self._stepper, self._body = prepare(network, None, (first + count) * 100), embodied(network)
+        self._simulation = Simulation(network, Prepared(self._stepper), inputs=inputs, body=self._body)
         self._state = initial_state(network)
-        widths = columns_of(network, ALL).widths(network)
-        _go(network, self._state, Course(first, 1, inputs, Prepared(self._stepper)), Last(widths))
+        self._widths = columns_of(network, ALL, self._body).widths(network)
+        course = Course(first, 1, inputs, Prepared(self._stepper), body=self._body)
+        _go(network, self._state, course, Last(self._widths))
+        if self._body is not None:
+            self._body.put(self._state)
         vectors: list[FloatArray] = []
 
         def noted(vector: FloatArray) -> FloatArray:
@@ -128,9 +132,10 @@ class Trials:
         return self._run(self._state.copy(), seen)[:, self.outputs]
 
     def _run(self, state: State, seen: Callable[[FloatArray], FloatArray] | None = None) -> FloatArray:
-        rows = InMemory(columns_of(self.network, ALL).widths(self.network), self.steps)
-        _go(self.network, state, Course(self.steps, 1, self._inputs, Prepared(self._stepper, seen)), rows)
-        return rows.numbers(Steps(self.steps, 1, self.start)).activity
+        rows = InMemory(self._widths, self.steps)
+        course = Course(self.steps, 1, self._inputs, Prepared(self._stepper, seen), body=self._body)
+        _go(self.network, state, course, rows)
+        return rows.numbers(Steps(self.steps, 1, self.start)).rows.activity
 
 
 def _go(network: Network, state: State, course: Course, rows: RowSink) -> None:

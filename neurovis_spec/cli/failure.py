@@ -63,6 +63,7 @@ def said(error: OSError) -> str:
 
 def _input_errors() -> tuple[type[Exception], ...]:
     """What running and drawing raise where the input is invalid; imported when something has gone wrong."""
+    from neurovis_spec.body import BodyError
     from neurovis_spec.plugins import PluginError
     from neurovis_spec.ros.middleware import MiddlewareError
     from neurovis_spec.runtime.backend import BackendError
@@ -73,6 +74,6 @@ def _input_errors() -> tuple[type[Exception], ...]:
     from neurovis_spec.sweeps.grid import SweepError
 
     return (
-        *(RendererError, BackendError, InputError, ParameterError, PluginError, RecordingError, SweepError),
+        *(RendererError, BackendError, BodyError, InputError, ParameterError, PluginError, RecordingError, SweepError),
         *(MiddlewareError, UnknownNameError),
     )

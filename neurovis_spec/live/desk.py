@@ -25,7 +25,7 @@ from neurovis_spec.live.protocol import file_message, moved_message, placed_mess
 from neurovis_spec.live.requests import Fetch, PlaceNeuron, Request, Save, Unplace, Write
 from neurovis_spec.live.run import Run, Stage
 from neurovis_spec.live.saving import film, picture, recording, steps_for
-from neurovis_spec.live.source import Seen, Source, SourceError
+from neurovis_spec.live.source import Drawn, Seen, Source, SourceError
 from neurovis_spec.live.view import View
 
 #: Tells who has asked.
@@ -149,19 +149,19 @@ class Desk:
         view, name = self._shown(), self._placed.compiled.name
         network = self._placed.compiled.network
         steps = {"svg": 1, "npz": steps_for(network, None)}.get(request.what, steps_for(network, request.seconds))
-        found: SimpleQueue[tuple[list[Seen], dict[str, float]]] = SimpleQueue()
+        found: SimpleQueue[tuple[list[Seen], dict[str, float], Drawn]] = SimpleQueue()
 
         def look(source: Source) -> None:
             if source.network.hash == network.hash:
-                found.put((source.recall(steps), source.parameters))
+                found.put((source.recall(steps), source.parameters, source.body))
 
         self._run.inquire(look)
         try:
-            seen, parameters = found.get(timeout=_PATIENCE)
+            seen, parameters, body = found.get(timeout=_PATIENCE)
         except Empty:
             raise SavingError("the steps could not be had: the spec was edited, or the run has ended") from None
         if request.what == "npz":
-            return file_message(f"{name}.npz", recording(network, seen, parameters))
+            return file_message(f"{name}.npz", recording(network, seen, parameters, body))
         return file_message(f"{name}.svg", picture(view, seen[-1]) if request.what == "svg" else film(view, seen))
 
     def _written(self) -> Written:

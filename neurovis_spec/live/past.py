@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from neurovis_spec.runtime.conditions import Conditions
-from neurovis_spec.runtime.state import State
+from neurovis_spec.runtime.state import BodyState, State
 from neurovis_spec.scene.fading import Fading
 
 #: bytes
@@ -45,10 +45,9 @@ def _bytes(value: object) -> int:
         return int(value.nbytes)
     if isinstance(value, tuple):
         return sum(_bytes(part) for part in value)
-    if not isinstance(value, State | Conditions):
-        return 0
-    parts = (getattr(value, field.name) for field in fields(value))
-    return sum(_bytes(part) for part in parts if isinstance(part, np.ndarray | tuple))
+    if isinstance(value, State | Conditions | BodyState):
+        return sum(_bytes(getattr(value, field.name)) for field in fields(value) if field.name != "conditions")
+    return 0
 
 
 class Past:

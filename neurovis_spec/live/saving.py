@@ -14,9 +14,10 @@ import numpy as np
 
 from neurovis_spec import pipeline
 from neurovis_spec.compiler.network import Network
-from neurovis_spec.live.source import Mask, Seen
+from neurovis_spec.live.source import NOTHING, Drawn, Mask, Seen
 from neurovis_spec.live.view import View
 from neurovis_spec.runtime.columns import columns_of
+from neurovis_spec.runtime.kinds import Rows
 from neurovis_spec.runtime.recording import After, Numbers, Recording, recording_of
 from neurovis_spec.scene import Film
 from neurovis_spec.scene.film import filmed
@@ -57,21 +58,32 @@ def _first(kind: str, masks: Sequence[Mask]) -> dict[str, int]:
     return {f"{kind}{index}": int(stays[:, index].argmax()) for index in np.flatnonzero(stays[-1]).tolist()}
 
 
-def recording(network: Network, seen: Sequence[Seen], parameters: Mapping[str, float]) -> bytes:
-    """Steps as a recording (``.npz``), but for the last, whose weights are those after it."""
+def recording(network: Network, seen: Sequence[Seen], parameters: Mapping[str, float], drawn: Drawn = NOTHING) -> bytes:
+    """Steps as a recording (``.npz``), but for the last, whose weights are those after it; ``drawn`` is the body."""
     *rows, last = seen
     changing = network.changing
+    poses = [one.snapshot.pose for one in rows if one.snapshot.pose is not None]
+    sensed = [one.snapshot.sensors for one in rows if one.snapshot.sensors is not None]
     numbers = Numbers(
         np.array([one.snapshot.step for one in rows], np.int64),
-        np.array([one.snapshot.activity for one in rows]).reshape(len(rows), len(network.neurons)),
-        np.array([one.snapshot.weights[changing] for one in rows]).reshape(len(rows), len(changing)),
-        np.zeros((len(rows), 0)),
+        Rows(
+            np.array([one.snapshot.activity for one in rows]).reshape(len(rows), len(network.neurons)),
+            np.array([one.snapshot.weights[changing] for one in rows]).reshape(len(rows), len(changing)),
+            np.zeros((len(rows), 0)),
+            np.array(sensed).reshape(len(rows), -1 if sensed else 0),
+            np.array(poses).reshape(len(rows), -1 if poses else 0),
+        ),
     )
     weights = last.snapshot.weights
     given = {name: value for name, value in parameters.items() if value != network.parameters[name]}
     lesioned = np.flatnonzero(last.lesioned_neurons), np.flatnonzero(last.lesioned_connections)
     after = After(weights[changing], last.snapshot.step, given, *lesioned)
-    return _npz(recording_of(network, columns_of(replace(network, outputs=())), numbers, weights, after))
+    columns = replace(
+        columns_of(replace(network, outputs=())),
+        sensors=drawn.sensor_names if sensed else None,
+        skeleton=drawn.skeleton if poses else None,
+    )
+    return _npz(recording_of(network, columns, numbers, weights, after))
 
 
 def _npz(made: Recording) -> bytes:

@@ -18,7 +18,7 @@ from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.history import Ring
 from neurovis_spec.live.past import EVERY, ROOM, Kept, Past
 from neurovis_spec.live.rules import carried_out, rules
-from neurovis_spec.live.source import Capabilities, Reach, Seen, SourceError, Turned, recalled
+from neurovis_spec.live.source import Capabilities, Drawn, Reach, Seen, SourceError, Turned, recalled
 from neurovis_spec.live.turns import TURNS, Feed, Hold, Set, Turn, fed_by, same_value, turn
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.runtime.simulation import ParameterError, Simulation
@@ -42,6 +42,7 @@ class SimulatedSource:
         room: int = ROOM,
     ) -> None:
         self.network: Network = simulation.network
+        self.body = Drawn(simulation.skeleton, tuple(simulation.sensors))
         self._rules = rules(self.network)
         self._all_learn: Mapping[str, bool | None] = {rule.connections: True for rule in self._rules}
         self._simulation, self._room = simulation, room
@@ -193,6 +194,7 @@ class SimulatedSource:
         """Compute a step; ``before`` is what was seen of the one before it."""
         run = self._simulation
         step, weights, lesioned, held = run.k, run.connection_weights, run.lesioned, run.held
+        pose = run.pose
         try:
             run.step({name: values if len(values) > 1 else values[0] for name, values in self._fed.items()})
         except ParameterError as error:  # what events set does not go with what was turned: the step was made without
@@ -201,7 +203,7 @@ class SimulatedSource:
         activity = run.activity
         self.history.note(step, activity, weights)
         seen = self._fading.follow(np.array([step]), activity[None]) if self._fading else None
-        return Seen(Snapshot(step, activity, weights, previous, seen), *lesioned, held)
+        return Seen(Snapshot(step, activity, weights, previous, seen, pose, run.sensed), *lesioned, held)
 
 
 def _without_ways(turned: Sequence[Turned]) -> tuple[Turned, ...]:

@@ -14,6 +14,7 @@ from typing import Protocol, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from neurovis_spec.body import Skeleton
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.history import History
 from neurovis_spec.live.turns import Turn
@@ -57,6 +58,19 @@ class Seen:
 
 
 @dataclass(frozen=True, slots=True)
+class Drawn:
+    """The body of what is shown: how its pose is drawn, None where there is nothing to draw, and what its sensors are
+    called."""
+
+    skeleton: Skeleton | None = None
+    sensor_names: tuple[str, ...] = ()
+
+
+#: No body.
+NOTHING = Drawn()
+
+
+@dataclass(frozen=True, slots=True)
 class Turned:
     """A turn that was taken at ``step``: it has its effect from the next one on. Of several values that were given to
     one thing at the same step, or in one drag, only the last is kept."""
@@ -70,6 +84,8 @@ class Source(Protocol):
 
     network: Network
     capabilities: Capabilities
+    #: the body, whose pose at a step is in the step's snapshot
+    body: Drawn
 
     @property
     def step(self) -> int:

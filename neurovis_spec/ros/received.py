@@ -19,7 +19,7 @@ from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.live.clock import FRAMES
 from neurovis_spec.live.history import Ring
-from neurovis_spec.live.source import Capabilities, Mask, Reach, Seen, SourceError, Turned
+from neurovis_spec.live.source import NOTHING, Capabilities, Mask, Reach, Seen, SourceError, Turned
 from neurovis_spec.live.turns import Turn, same_value
 from neurovis_spec.runtime.recording import Snapshot
 from neurovis_spec.scene.fading import Fading
@@ -89,6 +89,7 @@ class ReceivedSource:
     def __init__(self, network: Network, room: int = ROOM) -> None:
         self.network, self._room = network, room
         self.capabilities = Capabilities(arrives=True)
+        self.body = NOTHING
         self._steering: Steering | None = None
         self._turned: tuple[Turned, ...] = ()
         self._changing = network.changing

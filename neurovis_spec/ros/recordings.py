@@ -31,7 +31,8 @@ class BagFormat:
         from neurovis_spec.ros.bags import read_bag
         from neurovis_spec.ros.listening import frame
         from neurovis_spec.ros.play import spec_of
-        from neurovis_spec.runtime.arrived import KINDS, Arrived
+        from neurovis_spec.runtime.arrived import Arrived
+        from neurovis_spec.runtime.kinds import KINDS
         from neurovis_spec.runtime.npz_file import suspicion
         from neurovis_spec.runtime.recording import RecordingError, after_rows, ended
         from neurovis_spec.runtime.wire import WireError

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import replace
 from threading import Lock
 
 import numpy as np
@@ -28,7 +29,7 @@ class ViewSteering:
     def __init__(self, network: Network, node: Node, name: str) -> None:
         self._node, self._name = node, name
         #: knows which values can be
-        self._like = Simulation(network, "reference")
+        self._like = Simulation(replace(network, body=None), "reference")
         self._settable = tuple(name for name in network.parameters if name not in network.structural)
         self._learning = carried_out(rules(network), np.zeros(len(network.connections), bool))
         neurons, connections = np.zeros(len(network.neurons), bool), np.zeros(len(network.connections), bool)

@@ -1,4 +1,4 @@
-"""Rows as messages bring them: activities, weights and states, each in messages of their own, of one run or of several.
+"""Rows as messages bring them: each kind of numbers in messages of its own, of one run or of several.
 
 In: arrays in the order of a file, with the step that they say. Out: a Recording of one of the runs: a network that
 began anew counts its steps anew. A step that one of the kinds lacks is left out of all.
@@ -8,19 +8,18 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial, reduce
 from pathlib import Path
 
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray
+from neurovis_spec.runtime.kinds import KINDS, Rows
 from neurovis_spec.runtime.recording import Recording, RecordingError
 from neurovis_spec.runtime.ros_messages import label_of, step_of
 from neurovis_spec.runtime.wire import Encoding
 
-#: what arrays hold: the last part of their topics, in the order of ``Recording.widths``
-KINDS = ("activity", "weights", "states")
 #: runs that are listed
 _LISTED = 5
 
@@ -75,12 +74,12 @@ class Arrived:
         beside = [chosen, *(max(others, key=chosen.shared, default=_Rows(0)) for others in self._runs[1:])]
         held = {kind: np.array(beside[kind].steps, dtype=np.int64) for kind in used}
         step = reduce(partial(np.intersect1d, assume_unique=True), held.values())
-        activity, weights, states = (
+        rows = Rows(*(
             np.array([beside[kind].rows[row] for row in np.searchsorted(held[kind], step)] if kind in held else [])
             .reshape(len(step), width)
             for kind, width in enumerate(self._frame.widths)
-        )  # fmt: skip
-        return replace(self._frame, step=step, activity=activity, weights=weights, states=states)
+        ))  # fmt: skip
+        return self._frame.having(step, rows)
 
 
 def _told(runs: Sequence[_Rows]) -> str:

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.body import BodyError
 from neurovis_spec.compiler.events.changes import Clamp
 from neurovis_spec.compiler.events.settable import ParameterFormula
 from neurovis_spec.compiler.network import Network
@@ -25,18 +26,21 @@ from neurovis_spec.runtime.conditions import Controls
 from neurovis_spec.runtime.files import regular_size, replacing
 from neurovis_spec.runtime.npz_file import Array, put_arrays, read_array, suspicion
 from neurovis_spec.runtime.recording import RecordingError
-from neurovis_spec.runtime.state import State, initial_state
+from neurovis_spec.runtime.state import BodyState, State, initial_state
 
 #: bytes of the text, of the headers of all arrays, and of the archive's own
 _TEXT, _ROOM = 4096, 1 << 20
 _MOST = 2**53
 #: bytes for the clamps of a neuron, of which several may hold: events may cover each other
 _CLAMPS = 1 << 12
+#: bytes that the state of a body may take
+_BODY = 256 << 20
 
 
 def save_state(state: State, path: Path) -> None:
-    """Write a state; what was there stays until all is written. Raises OSError."""
-    now = state.conditions
+    """Write a state; what was there stays until all is written. Raises OSError, BodyError where the body is no
+    numbers."""
+    now, body = state.conditions, state.body
     about = {
         "neurovis_state": 1,
         "network": state.network,
@@ -53,16 +57,29 @@ def save_state(state: State, path: Path) -> None:
         "clamped": _joined([clamp.neurons for clamp in clamps]).astype(np.int64),
         "clamp_values": np.array([_number(clamp) for clamp in clamps], dtype=np.float64),
     }
+    if body is not None:
+        about["body"] = {"episode": body.episode, "ended_episode": body.ended_episode}
+        if body.carried is not None:
+            arrays["body"] = numbers_of(body.carried)
     with replacing(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
         put_arrays(archive, arrays)
 
 
+def numbers_of(carried: object) -> Array:
+    """What a body carries, as it is put into a file. Raises BodyError where it is no array of numbers."""
+    if not isinstance(carried, np.ndarray) or carried.dtype.kind != "f" or carried.ndim != 1:
+        raise BodyError("the state of this body is no array of numbers, and cannot be put into a file")
+    return carried
+
+
 def load_state(network: Network, path: Path) -> State:
-    """The state in a file. Raises RecordingError for a file that is none, or one of another network."""
+    """The state in a file. Raises RecordingError for a file that is none, or one of another network, or of one with a
+    body where this has none, and the other way round."""
     with suspicion(path, "a checkpoint"):
         state = initial_state(network)
         wanted = _arrays(state)
         size, most = regular_size(path), sum(array.nbytes for array in wanted.values())
+        most += 0 if network.body is None else _BODY
         if size > most + len(network.neurons) * _CLAMPS + _ROOM:
             raise RecordingError("not a checkpoint of this network: it is larger than its state")
         with path.open("rb") as file, zipfile.ZipFile(file) as archive:
@@ -77,6 +94,7 @@ def load_state(network: Network, path: Path) -> State:
             state.k, state.drawn = _whole(about, "k"), _whole(about, "drawn")
             state.begun, state.continued = _whole(about, "begun", -1), about.get("continued") is True
             _clamp_again(network, state, archive, size)
+            state.body = _body(network, about, archive, size)
     controls = Controls(network)
     controls.restructure(state)
     now = state.conditions
@@ -144,6 +162,23 @@ def _clamp_again(network: Network, state: State, archive: zipfile.ZipFile, size:
             raise RecordingError("it holds a clamp that no event of this network begins")
     if not np.isin(held.order, [-1, *held.active]).all():
         raise RecordingError("its clamps do not agree")
+
+
+def _body(network: Network, about: Mapping[str, object], archive: zipfile.ZipFile, size: int) -> BodyState | None:
+    """Where the body was."""
+    said = about.get("body")
+    if said is None and network.body is not None and _whole(about, "k") > 0:
+        raise RecordingError("a checkpoint of a run without a body: go on without one (--no-body)")
+    if said is not None and network.body is None:
+        raise RecordingError("a checkpoint of a run with a body, which goes on with it alone")
+    if said is None:
+        return None
+    if not isinstance(said, dict):
+        raise RecordingError("not a checkpoint")
+    carried = None
+    if "body.npy" in archive.namelist():
+        carried = _floats(_member(archive, "body", np.zeros(0), size))
+    return BodyState(_whole(said, "episode"), said.get("ended_episode") is True, carried)
 
 
 def _about(archive: zipfile.ZipFile) -> dict[str, object]:

@@ -7,15 +7,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.body import Skeleton
 from neurovis_spec.compiler.names.state_references import StateOf, names_of_states, singles
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.runtime.kinds import Widths
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.references import find_neurons, find_states
 from neurovis_spec.runtime.state import State
+
+if TYPE_CHECKING:
+    from neurovis_spec.runtime.embodied import Embodied
 
 
 @dataclass(frozen=True)
@@ -77,15 +83,19 @@ class Columns:
     probe: Probe
     outputs: dict[str, tuple[tuple[int, ...], bool]]
     spec: str = ""
+    #: the names of what the body senses, and how its pose is drawn; None where there is none
+    sensors: tuple[str, ...] | None = None
+    skeleton: Skeleton | None = None
 
-    def widths(self, network: Network) -> tuple[int, int, int]:
-        """How many numbers of a step are activities, weights, states."""
+    def widths(self, network: Network) -> Widths:
+        """How many numbers of each kind a step has."""
         neurons = len(network.neurons) if self.neurons is None else len(self.neurons)
-        return neurons, len(self.weights), len(self.probe.names)
+        pose = 0 if self.skeleton is None else self.skeleton.size
+        return Widths(neurons, len(self.weights), len(self.probe.names), len(self.sensors or ()), pose)
 
 
-def columns_of(network: Network, keep: Keep = ALL) -> Columns:
-    """What is kept of a network. Raises KeyError with the nearest names."""
+def columns_of(network: Network, keep: Keep = ALL, body: Embodied | None = None) -> Columns:
+    """What is kept of a network, and of the body that it has in a run. Raises KeyError with the nearest names."""
     names = names_of(network) if keep.neurons or keep.states else None
     states: dict[tuple[str, str, int], None] = {}
     outputs: dict[str, tuple[tuple[int, ...], bool]] = {}
@@ -102,6 +112,8 @@ def columns_of(network: Network, keep: Keep = ALL) -> Columns:
         _probe(network, list(states)),
         outputs,
         keep.spec,
+        None if body is None else body.sensor_names,
+        None if body is None else body.skeleton,
     )
 
 

@@ -1,10 +1,10 @@
 """Recordings as ``.csv``: a row a step, a column a neuron and a changing weight.
 
 In: a Recording and a path, or a path. Out: a file written row by row, or a Recording. The header is ``step``, ``t``,
-the names of the neurons, then ``K1 -> O`` for each changing connection, then the states (``K1.v``, ``(K1 -> O).e``).
-Numbers read back exactly. What stays in a run
-is not in the table, so a recording read from it knows the changing connections alone, with delay 1; nor is what is true
-after the last step, for which the last row stands.
+the names of the neurons, then ``K1 -> O`` for each changing connection, then the states (``K1.v``, ``(K1 -> O).e``),
+then ``sensor NAME`` for each number that a body senses. Numbers read back exactly. What stays in a run, and the pose of
+a body, is not in the table, so a recording read from it knows the changing connections alone, with delay 1; nor is what
+is true after the last step, for which the last row stands.
 """
 
 from __future__ import annotations
@@ -24,10 +24,15 @@ import numpy as np
 from neurovis_spec.arrays import FloatArray, IntArray
 from neurovis_spec.language.references import Sum, parse, state_of
 from neurovis_spec.runtime.files import regular_size, replacing
+from neurovis_spec.runtime.kinds import Rows
 from neurovis_spec.runtime.recording import After, Recording, RecordingError, after_rows
 from neurovis_spec.runtime.rows import RowWriter, Steps
 from neurovis_spec.runtime.unfinished import Part, move, part_of
 
+#: before the names of sensors, which may be anything
+_SENSOR = "sensor "
+#: the pose, the last kind, is no part of a table
+_KEPT = 4
 _CONNECTION = re.compile(r"(?P<source>\S+) -> (?P<target>\S+)(?: \((?P<rank>[0-9]{1,9})\))?")
 
 #: bytes that are read together
@@ -40,13 +45,13 @@ def write_csv(recording: Recording, path: Path) -> None:
     """Write a recording; what was there stays until all is written."""
     with replacing(path) as file:
         table = _Table(file, recording)
-        table.write(recording.step, recording.activity, recording.weights, recording.states)
+        table.write(recording.step, recording.rows)
         table.close()
 
 
 def csv_size(frame: Recording, steps: Steps) -> int:
     """About the bytes that a file takes: numbers have up to 24 characters, most of them fewer."""
-    return len(steps) * 10 * (2 + sum(frame.widths))
+    return len(steps) * 10 * (2 + sum(frame.widths[:_KEPT]))
 
 
 @contextmanager
@@ -68,10 +73,10 @@ class _CsvRows:
         self._table = _Table(self._buffered, frame)
         self._part, self._steps, self._rows = part, steps, 0
 
-    def write(self, activity: FloatArray, weights: FloatArray, states: FloatArray, after: After) -> None:
-        numbers = self._steps.at(self._rows) + np.arange(len(activity)) * self._steps.every
-        self._table.write(numbers, activity, weights, states)
-        self._rows += len(activity)
+    def write(self, rows: Rows, after: After) -> None:
+        numbers = self._steps.at(self._rows) + np.arange(len(rows.activity)) * self._steps.every
+        self._table.write(numbers, rows)
+        self._rows += len(rows.activity)
         self._part.held = self._steps.at(self._rows - 1) if self._rows else None
 
     def close(self) -> None:
@@ -88,12 +93,13 @@ class _Table:
         self._writer, self._dt = csv.writer(self._text, lineterminator="\n"), frame.dt
         plastic = frame.plastic.tolist() if frame.weights.shape[1] else []
         names = [frame.connection_names[index] for index in plastic]
-        self._writer.writerow(["step", "t", *frame.columns, *names, *frame.state_names])
+        sensors = [_SENSOR + name for name in frame.sensor_names]
+        self._writer.writerow(["step", "t", *frame.columns, *names, *frame.state_names, *sensors])
 
-    def write(self, steps: IntArray, activity: FloatArray, weights: FloatArray, states: FloatArray) -> None:
+    def write(self, steps: IntArray, rows: Rows) -> None:
         """Further rows, which are with the system afterwards."""
-        for step, active, strong, held in zip(steps.tolist(), activity, weights, states, strict=True):
-            self._writer.writerow([step, step * self._dt, *active.tolist(), *strong.tolist(), *held.tolist()])
+        for step, *row in zip(steps.tolist(), *rows[:_KEPT], strict=True):
+            self._writer.writerow([step, step * self._dt, *(value for part in row for value in part.tolist())])
         self._text.flush()
 
     def close(self) -> None:
@@ -169,7 +175,11 @@ def _table(reader: Iterator[list[str]], columns: int) -> FloatArray:
 def _recording(header: list[str], table: FloatArray) -> Recording:
     if header[:2] != ["step", "t"]:
         raise RecordingError("not a recording: its first columns are not 'step' and 't'")
-    neurons, connections, states = _columns(header[2:])
+    sensors = [name for name in header if name.startswith(_SENSOR)]
+    first = len(header) - len(sensors)
+    if header[first:] != sensors or len(set(sensors)) != len(sensors):
+        raise RecordingError("not a recording: sensors are mixed with others, or one is named twice")
+    neurons, connections, states = _columns(header[2:first])
     index = {name: number for number, name in enumerate(neurons)}
     if len(index) != len(neurons) or len(set(states)) != len(states):
         raise RecordingError("not a recording: a neuron or a state is named twice")
@@ -198,8 +208,10 @@ def _recording(header: list[str], table: FloatArray) -> Recording:
         ranks=ranks,
         weights_after=after.weights,
         reached=after.reached,
-        states=table[:, n + p :].copy(),
+        states=table[:, n + p : first].copy(),
         state_names=tuple(states),
+        sensors=table[:, first:].copy() if sensors else None,
+        sensor_names=tuple(name.removeprefix(_SENSOR) for name in sensors),
     )
 
 

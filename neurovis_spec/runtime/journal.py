@@ -3,7 +3,7 @@
 In: rows as they come, a file. Out: at any time a file that can be read up to its last whole chunk; its rows.
 
 The file begins with a line that says what it is, and a frame: all that does not grow with the steps. A chunk holds
-activities, changing weights, and what was true after its last step. What breaks off or does not agree ends the file.
+rows, kind by kind, and what was true after its last step. What breaks off or does not agree ends the file.
 """
 
 from __future__ import annotations
@@ -14,13 +14,14 @@ import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from io import FileIO
-from typing import Final, Literal, NamedTuple, TypeAlias
+from typing import Final
 from zlib import crc32
 
 import numpy as np
 import numpy.typing as npt
 
 from neurovis_spec.arrays import FloatArray
+from neurovis_spec.runtime.kinds import KINDS, Rows, Widths
 from neurovis_spec.runtime.recording import After, RecordingError
 from neurovis_spec.runtime.rows import Steps
 
@@ -31,9 +32,6 @@ _FRAME, _CHUNK = struct.Struct("<QQQI"), struct.Struct("<4sQQI")
 _MARK = b"rows"
 _NUMBER, _PIECE = 8, 1 << 20
 
-What: TypeAlias = Literal["activity", "weights", "states"]
-_PARTS: Final[tuple[What, ...]] = ("activity", "weights", "states")
-
 
 class JournalWriter:
     """Writes a journal. After ``write`` a whole chunk more is with the system, so that it outlives this process."""
@@ -42,7 +40,7 @@ class JournalWriter:
         self._file = file
         _write(file, MAGIC + _FRAME.pack(len(frame), steps.every, steps.first, crc32(frame)), frame)
 
-    def write(self, activity: FloatArray, weights: FloatArray, states: FloatArray, after: After) -> None:
+    def write(self, rows: Rows, after: After) -> None:
         """A chunk of rows. Raises OSError."""
         text = json.dumps(
             {
@@ -52,11 +50,11 @@ class JournalWriter:
                 "lesioned_connections": after.lesioned_connections.tolist(),
             }
         ).encode()
-        parts = [_bytes(activity), _bytes(weights), _bytes(states), _bytes(after.weights), memoryview(text)]
+        parts = [*(_bytes(array) for array in rows), _bytes(after.weights), memoryview(text)]
         total = 0
         for part in parts:
             total = crc32(part, total)
-        _write(self._file, _CHUNK.pack(_MARK, len(activity), len(text), total), *parts)
+        _write(self._file, _CHUNK.pack(_MARK, len(rows.activity), len(text), total), *parts)
 
 
 def _bytes(numbers: FloatArray) -> memoryview:
@@ -77,15 +75,6 @@ class _Chunk:
 
     offset: int
     rows: int
-
-
-class Widths(NamedTuple):
-    """How many columns the rows have, and how many changing weights there are after the last step."""
-
-    activity: int
-    weights: int
-    states: int
-    after: int
 
 
 @dataclass(frozen=True)
@@ -113,17 +102,20 @@ class Journal:
         begin = -(-self.first // self.every) * self.every
         return Steps(self.rows * self.every, self.every, begin)
 
-    def pieces(self, what: What) -> Iterator[bytes]:
-        """The bytes of all activities, changing weights or states, in order, some at a time."""
-        place = _PARTS.index(what)
+    def pieces(self, place: int) -> Iterator[bytes]:
+        """The bytes of all rows of a kind (a place in KINDS), in order, some at a time."""
         before, width = sum(self.columns[:place]), self.columns[place]
         for chunk in self.chunks:
             yield from _pieces(self.file, chunk.offset + chunk.rows * before * _NUMBER, chunk.rows * width * _NUMBER)
 
-    def numbers(self, what: What) -> FloatArray:
-        """The same as an array (rows, columns)."""
-        width = self.columns[_PARTS.index(what)]
-        return np.frombuffer(b"".join(self.pieces(what)), dtype="<f8").astype(np.float64).reshape(self.rows, width)
+    @property
+    def all_rows(self) -> Rows:
+        """The same as arrays."""
+        read = (np.frombuffer(b"".join(self.pieces(place)), dtype="<f8") for place in range(len(KINDS)))
+        return Rows(*(
+            numbers.astype(np.float64).reshape(self.rows, width)
+            for numbers, width in zip(read, self.columns, strict=True)
+        ))  # fmt: skip
 
 
 def is_begun(file: FileIO) -> bool:
@@ -132,9 +124,9 @@ def is_begun(file: FileIO) -> bool:
     return MAGIC.startswith(file.read(len(MAGIC)))
 
 
-def read_journal(file: FileIO, columns: Callable[[bytes], Widths]) -> Journal:
-    """Read a journal as far as it is whole. ``columns`` says from a frame how many columns there
-    are. Raises RecordingError, OSError."""
+def read_journal(file: FileIO, columns: Callable[[bytes], tuple[Widths, int]]) -> Journal:
+    """Read a journal as far as it is whole. ``columns`` says from a frame how many columns the
+    rows have, and how many changing weights there are after the last step. Raises RecordingError, OSError."""
     size = file.seek(0, io.SEEK_END)
     file.seek(0)
     head = file.read(len(MAGIC) + _FRAME.size)
@@ -144,8 +136,8 @@ def read_journal(file: FileIO, columns: Callable[[bytes], Widths]) -> Journal:
     frame = b"".join(_pieces(file, len(head), length)) if length <= size else b""
     if len(frame) != length or crc32(frame) != checksum or every < 1 or first >= 2**62:
         raise RecordingError("not a recording in progress: its beginning is damaged")
-    widths = columns(frame)
-    width, p = sum(widths[:3]), widths.after
+    widths, p = columns(frame)
+    width = sum(widths)
     chunks: list[_Chunk] = []
     offset, text, last = len(head) + length, b"{}", b""
     while offset + _CHUNK.size <= size:

@@ -1,8 +1,8 @@
 """Recordings as ``.mcap``, as tools of robots read them: a message a topic and step, as a node would have sent it.
 
 In: a Recording and a path, or a path. Out: a file that can be read at any moment while it is written, or a Recording.
-Topics are ``NAMESPACE/NETWORK/activity``, ``/weights`` (of the changing connections), ``/states`` and ``/spec``. What
-does not grow with the steps is an attachment, as an archive like a ``.npz``.
+Topics are ``NAMESPACE/NETWORK/activity``, ``/weights`` (of the changing connections), ``/states``, ``/sensors`` and
+``/pose`` of a body, and ``/spec``. What does not grow with the steps is an attachment, as an archive like a ``.npz``.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from time import monotonic
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray
 from neurovis_spec.runtime import mcap_records as records
-from neurovis_spec.runtime.arrived import KINDS, Arrived
+from neurovis_spec.runtime.arrived import Arrived
 from neurovis_spec.runtime.files import regular_size
+from neurovis_spec.runtime.kinds import KINDS, Rows
 from neurovis_spec.runtime.mcap_records import Channel, DamagedError, Found, Message, Schema, Topic
 from neurovis_spec.runtime.npz_file import frame_bytes, frame_of, suspicion
 from neurovis_spec.runtime.recording import After, Recording, RecordingError, after_rows, ended
@@ -62,7 +62,7 @@ def write_mcap(recording: Recording, path: Path) -> None:
             recording.lesioned_neurons,
             recording.lesioned_connections,
         )
-        rows.put(recording.step.tolist(), (recording.activity, recording.weights, recording.states), after)
+        rows.put(recording.step.tolist(), recording.rows, after)
         rows.close()
         part.take_place()
 
@@ -107,15 +107,15 @@ class _McapRows:
             start += records.chunk([Message(1, 0, 0, 0, text_message(frame.spec, "cdr"))])
         records.put(file, start)
 
-    def write(self, activity: FloatArray, weights: FloatArray, states: FloatArray, after: After) -> None:
+    def write(self, rows: Rows, after: After) -> None:
         assert self._steps is not None
-        steps = [self._steps.at(self._rows + row) for row in range(len(activity))]
-        self.put(steps, (activity, weights, states), after)
-        self._rows += len(activity)
+        count = len(rows.activity)
+        self.put([self._steps.at(self._rows + row) for row in range(count)], rows, after)
+        self._rows += count
         if self._part is not None:
             self._part.held = self._steps.at(self._rows - 1) if self._rows else None
 
-    def put(self, steps: list[int], rows: tuple[FloatArray, ...], after: After) -> None:
+    def put(self, steps: list[int], rows: Rows, after: After) -> None:
         """Rows of these steps, in chunks."""
         for chunk in records.chunks(self._messages(steps, rows)):
             records.put(self._file, chunk)
@@ -130,7 +130,7 @@ class _McapRows:
             os.fdatasync(self._file.fileno()) if hasattr(os, "fdatasync") else os.fsync(self._file.fileno())
             self._synced = monotonic()
 
-    def _messages(self, steps: list[int], rows: tuple[FloatArray, ...]) -> Iterator[Message]:
+    def _messages(self, steps: list[int], rows: Rows) -> Iterator[Message]:
         for row, step in enumerate(steps):
             seconds = step * self._dt
             time = min(round(seconds * 1e9), _LAST_TIME)

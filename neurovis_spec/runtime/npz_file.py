@@ -16,7 +16,6 @@ import sys
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
 from io import FileIO
 from pathlib import Path
 from typing import IO, TypeAlias
@@ -24,12 +23,15 @@ from typing import IO, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import IntArray
+from neurovis_spec.body import BodyError, Skeleton
+from neurovis_spec.body.skeletons import skeleton_of, text_of
 from neurovis_spec.compiler.limits import DEEPEST
 from neurovis_spec.language.data.npy import LONGEST_HEADER, read_header
 from neurovis_spec.language.data.table import CellError
 from neurovis_spec.runtime.files import regular_size, replacing
-from neurovis_spec.runtime.journal import Journal, JournalWriter, Widths, is_begun, read_journal
+from neurovis_spec.runtime.journal import Journal, JournalWriter, is_begun, read_journal
+from neurovis_spec.runtime.kinds import KINDS, Rows, Widths
 from neurovis_spec.runtime.recording import After, Recording, RecordingError, after_rows, ended
 from neurovis_spec.runtime.rows import RowWriter, Steps
 from neurovis_spec.runtime.unfinished import Part, part_of
@@ -59,6 +61,10 @@ OPTIONAL: Mapping[str, tuple[str, int]] = {
     "states": ("fiu", 2),
     "state_names": ("U", 1),
     "recorded": ("iu", 1),
+    "sensors": ("fiu", 2),
+    "sensor_names": ("U", 1),
+    "pose": ("fiu", 2),
+    "skeleton": ("U", 0),
 }
 #: an archive may always grow to this many bytes, and beyond that to a hundred times its size
 ROOM = 256 * 2**20
@@ -70,11 +76,8 @@ _CALLED: Mapping[str, str] = {"views": "neurons", "state_views": "states"}
 
 def write_npz(recording: Recording, path: Path) -> None:
     """Write a recording; what was there stays until all is written."""
-    large = {"activity": recording.activity, "weights": recording.weights, "step": recording.step}
-    if recording.state_names:
-        large["states"] = recording.states
     with replacing(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
-        put_arrays(archive, {**large, **_small(recording)})
+        put_arrays(archive, {**_large(recording), **_small(recording)})
 
 
 def npz_size(frame: Recording, steps: Steps) -> int:
@@ -100,9 +103,9 @@ class _NpzRows:
         self._journal = JournalWriter(part.file, frame_bytes(frame), steps)
         self._part, self._steps, self._rows = part, steps, 0
 
-    def write(self, activity: FloatArray, weights: FloatArray, states: FloatArray, after: After) -> None:
-        self._journal.write(activity, weights, states, after)
-        self._rows += len(activity)
+    def write(self, rows: Rows, after: After) -> None:
+        self._journal.write(rows, after)
+        self._rows += len(rows.activity)
         self._part.held = self._steps.at(self._rows - 1) if self._rows else None
 
 
@@ -112,10 +115,10 @@ def _archive(file: FileIO, path: Path) -> None:
     rows, widths = journal.rows, journal.columns
     with replacing(path) as out, zipfile.ZipFile(out, "w", zipfile.ZIP_STORED) as archive:
         put_arrays(archive, _small(frame))
-        _put_pieces(archive, "activity", "<f8", (rows, widths.activity), journal.pieces("activity"))
-        _put_pieces(archive, "weights", "<f8", (rows, widths.weights), journal.pieces("weights"))
-        if widths.states:
-            _put_pieces(archive, "states", "<f8", (rows, widths.states), journal.pieces("states"))
+        held = _large(frame)
+        for place, kind in enumerate(KINDS):
+            if kind in held:
+                _put_pieces(archive, kind, "<f8", (rows, widths[place]), journal.pieces(place))
         steps = (part.astype("<i8").tobytes() for part in journal.steps.parts())
         _put_pieces(archive, "step", "<i8", (rows,), steps)
 
@@ -142,17 +145,16 @@ def recover_npz(part: Path) -> Recording:
     with suspicion(part), FileIO(part) as file:
         journal, frame = _journal(file)
         steps = np.concatenate([frame.step, *journal.steps.parts()])
-        activity, weights = journal.numbers("activity"), journal.numbers("weights")
-        return replace(frame, step=steps, activity=activity, weights=weights, states=journal.numbers("states"))
+        return frame.having(steps, journal.all_rows)
 
 
 def _journal(file: FileIO) -> tuple[Journal, Recording]:
     """A journal, and the recording without its rows."""
 
-    def columns(frame: bytes) -> Widths:
+    def columns(frame: bytes) -> tuple[Widths, int]:
         recording = frame_of(frame)
         frames.append(recording)
-        return Widths(*recording.widths, len(recording.plastic))
+        return recording.widths, len(recording.plastic)
 
     frames: list[Recording] = []
     try:
@@ -181,10 +183,7 @@ def frame_bytes(frame: Recording) -> bytes:
     """All but the rows, as an archive of its own."""
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
-        none = {"activity": frame.activity[:0], "weights": frame.weights[:0], "step": frame.step[:0]}
-        if frame.state_names:
-            none["states"] = frame.states[:0]
-        put_arrays(archive, {**none, **_small(frame)})
+        put_arrays(archive, {**_large(frame.part(slice(0))), **_small(frame)})
     return file.getvalue()
 
 
@@ -203,6 +202,18 @@ def put_arrays(archive: zipfile.ZipFile, arrays: Mapping[str, Array]) -> None:
     for name, array in arrays.items():
         with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
             np.lib.format.write_array(member, array, allow_pickle=False)
+
+
+def _large(recording: Recording) -> dict[str, Array]:
+    """The arrays with a row a step."""
+    held: dict[str, Array] = {"activity": recording.activity, "weights": recording.weights, "step": recording.step}
+    if recording.state_names:
+        held["states"] = recording.states
+    if recording.sensors is not None:
+        held["sensors"] = recording.sensors
+    if recording.pose is not None:
+        held["pose"] = recording.pose
+    return held
 
 
 def _small(recording: Recording) -> dict[str, Array]:
@@ -224,6 +235,10 @@ def _small(recording: Recording) -> dict[str, Array]:
         more["state_names"] = np.array(recording.state_names, dtype=np.str_)
     if recording.recorded is not None:
         more["recorded"] = recording.recorded
+    if recording.sensors is not None:
+        more["sensor_names"] = np.array(recording.sensor_names, dtype=np.str_)
+    if recording.skeleton is not None:
+        more["skeleton"] = np.array(text_of(recording.skeleton))
     return {
         "neurons": np.array(recording.neurons, dtype=np.str_),
         "weights_static": recording.weights_static,
@@ -317,6 +332,7 @@ def _recording(arrays: Mapping[str, Array]) -> Recording:
     state_names = tuple(str(name) for name in arrays["state_names"].tolist()) if "state_names" in arrays else ()
     if len(set(state_names)) != len(state_names):
         raise RecordingError("'state_names' holds a name twice")
+    skeleton = _body(arrays, rows)
     dt = float(arrays["dt"].astype(np.float64))
     if len(set(neurons)) != n:
         raise RecordingError("'neurons' holds a name twice")
@@ -351,7 +367,32 @@ def _recording(arrays: Mapping[str, Array]) -> Recording:
         state_names=state_names,
         state_views=_views(about, "state_views", len(state_names)),
         recorded=recorded,
+        sensors=arrays["sensors"].astype(np.float64) if "sensors" in arrays else None,
+        sensor_names=tuple(str(name) for name in arrays["sensor_names"].tolist()) if "sensors" in arrays else (),
+        pose=None if skeleton is None else arrays["pose"].astype(np.float64),
+        skeleton=skeleton,
     )
+
+
+def _body(arrays: Mapping[str, Array], rows: int) -> Skeleton | None:
+    """How the pose is drawn, once what is said of a body agrees with itself."""
+    for name, beside in (("sensors", "sensor_names"), ("pose", "skeleton")):
+        if (name in arrays) != (beside in arrays):
+            raise RecordingError(f"of '{name}' and '{beside}' it holds one alone")
+    skeleton = None
+    wanted = {}
+    if "sensors" in arrays:
+        wanted["sensors"] = rows, len(arrays["sensor_names"])
+    if "pose" in arrays:
+        try:
+            skeleton = skeleton_of(str(arrays["skeleton"]))
+        except BodyError as error:
+            raise RecordingError(f"'skeleton': {error}") from None
+        wanted["pose"] = rows, skeleton.size
+    for name, shape in wanted.items():
+        if arrays[name].shape != shape:
+            raise RecordingError(f"'{name}' has the shape {arrays[name].shape}, where the others ask for {shape}")
+    return skeleton
 
 
 def _after(arrays: Mapping[str, Array], about: Mapping[str, object], rows: After, n: int, m: int) -> After:

@@ -7,8 +7,9 @@ hands the rows on while it runs.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import isfinite
 from pathlib import Path
 from typing import Protocol
 
@@ -25,7 +26,9 @@ from neurovis_spec.runtime.backend import Backend, Runner, Stepper, prepare
 from neurovis_spec.runtime.checkpoint import load_state, save_state
 from neurovis_spec.runtime.columns import ALL, Columns, Keep, columns_of
 from neurovis_spec.runtime.conditions import Controls
+from neurovis_spec.runtime.embodied import Embodied
 from neurovis_spec.runtime.inputs import STRETCH, InputReader
+from neurovis_spec.runtime.kinds import Rows, Widths
 from neurovis_spec.runtime.memory import check_room
 from neurovis_spec.runtime.recording import After, Numbers, Recording, RecordingError, recording_of
 from neurovis_spec.runtime.resume import resumed_state
@@ -68,8 +71,9 @@ def record_course(
     there is not, ValueError.
     """
     steps = checked_steps(network, course.steps, course.every)
-    columns = columns_of(network, course.keep)
-    state = first_state(network, start, checkpoint)
+    course = with_body(network, course)
+    columns = columns_of(network, course.keep, course.body)
+    state = first_state(network, start, checkpoint, course.body)
     kept, widths = Steps(steps, course.every, state.k), columns.widths(network)
     if not course.keep.last:
         check_room(steps, course.every, sum(widths))
@@ -79,18 +83,36 @@ def record_course(
     else:
         with deferred() as rows.asked:
             go(network, state, course, rows, progress)
-            save_state(state, checkpoint)
+            keep_state(state, course, checkpoint)
     return recording_of(network, columns, rows.numbers(kept), state.weights, after(network, state))
 
 
-def first_state(network: Network, start: Recording | None, checkpoint: Path | None) -> State:
+def with_body(network: Network, course: Course) -> Course:
+    """The course with the network's body opened, if it has one. Raises BodyError."""
+    return course if network.body is None or course.body is not None else replace(course, body=Embodied(network))
+
+
+def first_state(
+    network: Network, start: Recording | None, checkpoint: Path | None, body: Embodied | None = None
+) -> State:
     """The state that a run begins in: that of a checkpoint, if there is one, after a recording, or the first. Raises
-    RecordingError."""
-    if checkpoint is not None and checkpoint.exists():
-        if start is not None:
-            raise RecordingError(f"{checkpoint} is there: go on from a checkpoint or from a recording, not from both")
-        return load_state(network, checkpoint)
+    RecordingError, BodyError where a checkpoint is wanted and the body cannot be kept."""
+    if checkpoint is not None:
+        if body is not None:
+            body.check_kept()
+        if checkpoint.exists():
+            if start is not None:
+                both = "go on from a checkpoint or from a recording, not from both"
+                raise RecordingError(f"{checkpoint} is there: {both}")
+            return load_state(network, checkpoint)
     return initial_state(network) if start is None else resumed_state(network, start)
+
+
+def keep_state(state: State, course: Course, checkpoint: Path) -> None:
+    """Write the state at the end of a run to a checkpoint. Raises OSError."""
+    if course.body is not None:
+        course.body.put(state)
+    save_state(state, checkpoint)
 
 
 def after(network: Network, state: State) -> After:
@@ -113,8 +135,8 @@ def after(network: Network, state: State) -> After:
 class RowSink(Protocol):
     """Where rows go, a stretch of the run at a time."""
 
-    def begin(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Arrays for the next ``count`` rows: activities (count, n), changing weights (count, p), states (count, q)."""
+    def begin(self, count: int) -> Rows:
+        """Arrays for the next ``count`` rows."""
         ...
 
     def end(self, count: int) -> None:
@@ -133,8 +155,8 @@ class RowSink(Protocol):
 class InMemory:
     """All rows in arrays of these widths."""
 
-    def __init__(self, widths: tuple[int, int, int], rows: int) -> None:
-        self.activity, self.weights, self.states = (np.empty((rows, width)) for width in widths)
+    def __init__(self, widths: Widths, rows: int) -> None:
+        self._rows = Rows.room(widths, rows)
         self._filled = 0
         self.asked: Asked | None = None
 
@@ -142,12 +164,11 @@ class InMemory:
         """All that has come, for the first of these steps."""
         made = slice(self._filled)
         kept = np.concatenate([np.zeros(0, dtype=np.int64), *steps.parts()])
-        return Numbers(kept[made], self.activity[made], self.weights[made], self.states[made])
+        return Numbers(kept[made], self._rows.part(made))
 
-    def begin(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def begin(self, count: int) -> Rows:
         """The next rows of the arrays."""
-        rows = slice(self._filled, self._filled + count)
-        return self.activity[rows], self.weights[rows], self.states[rows]
+        return self._rows.part(slice(self._filled, self._filled + count))
 
     def end(self, count: int) -> None:
         """So many are filled."""
@@ -165,26 +186,26 @@ class InMemory:
 class Last:
     """The last row alone, of rows of these widths: memory does not grow with the steps."""
 
-    def __init__(self, widths: tuple[int, int, int]) -> None:
+    def __init__(self, widths: Widths) -> None:
         self._widths, self._count = widths, 0
-        self._rows = self._last = self._room(0)
+        self._rows = self._last = Rows.room(widths, 0)
         self.asked: Asked | None = None
 
     def numbers(self, steps: Steps) -> Numbers:
         """The last that has come, for one of these steps."""
         number = [steps.at(self._count - 1)] if self._count else []
-        return Numbers(np.array(number, dtype=np.int64), *self._last)
+        return Numbers(np.array(number, dtype=np.int64), self._last)
 
-    def begin(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def begin(self, count: int) -> Rows:
         """Room for the next rows."""
-        self._rows = self._room(count)
+        self._rows = Rows.room(self._widths, count)
         return self._rows
 
     def end(self, count: int) -> None:
         """So many are filled."""
         if count:
-            activity, weights, states = (rows[count - 1 : count].copy() for rows in self._rows)
-            self._last, self._count = (activity, weights, states), self._count + count
+            last = self._rows.part(slice(count - 1, count))
+            self._last, self._count = Rows(*(array.copy() for array in last)), self._count + count
 
     def due(self) -> bool:
         """Only where the run is to end."""
@@ -193,10 +214,6 @@ class Last:
     def over(self) -> bool:
         """After a signal, where somebody listens."""
         return bool(self.asked)
-
-    def _room(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        activity, weights, states = (np.empty((count, width)) for width in self._widths)
-        return activity, weights, states
 
 
 @dataclass(frozen=True)
@@ -210,6 +227,8 @@ class Course:
     #: what may end it earlier
     until: Until | None = None
     keep: Keep = ALL
+    #: the network's body, opened; None where it has none
+    body: Embodied | None = None
 
 
 def checked_steps(network: Network, steps: int | None, every: int) -> int:
@@ -221,17 +240,26 @@ def checked_steps(network: Network, steps: int | None, every: int) -> int:
 
 
 def go(network: Network, state: State, course: Course, rows: RowSink, progress: Progress | None = None) -> None:
-    """Run a network from a state, and hand on the rows that are kept."""
-    every, steps = course.every, course.steps
+    """Run a network from a state, and hand on the rows that are kept. Its body (``with_body``) is taken to where the
+    state says, and left where the run ends."""
+    every, steps, body = course.every, course.steps, course.body
+    assert (body is None) == (network.body is None)
+    if body is not None:
+        body.take(state)
     watched = None if course.until is None else course.until.watch(rows, state, steps)
     rows = rows if watched is None else watched
     watch = Watch(network)
-    columns = columns_of(network, course.keep)
-    reader = InputReader(network, course.inputs, watch.given)
+    columns = columns_of(network, course.keep, body)
+    reader = InputReader(network, course.inputs, None if body is not None else watch.given)
     stepper = prepare(network, course.backend, steps)
-    make: _Make = _OneByOne(columns, stepper)
+    make: _Make = _OneByOne(columns, stepper, body, frozenset(course.inputs or ()))
     plain = columns.neurons is None and not columns.probe.names and len(columns.weights) == len(network.changing)
-    if isinstance(stepper, Runner) and plain and (course.until is None or course.until.measure.together):
+    if (
+        isinstance(stepper, Runner)
+        and plain
+        and body is None
+        and (course.until is None or course.until.measure.together)
+    ):
         make = _Together(stepper, watched)
     controls, origin, last = Controls(network), state.k, state.k + steps
     changes = [change for change in network.changes if origin <= change.at < last]
@@ -264,6 +292,9 @@ class _OneByOne:
 
     columns: Columns
     stepper: Stepper
+    body: Embodied | None = None
+    #: the inputs that are given, and not sensed
+    given: frozenset[str] = frozenset()
 
     def steps(
         self, state: State, first: int, stop: int, every: int, rows: RowSink, reader: InputReader, watch: Watch
@@ -272,14 +303,22 @@ class _OneByOne:
         changing, chosen = subscript(columns.weights), columns.neurons
         probe = columns.probe if columns.probe.names else None
         wanted = _kept(first, stop, every)
-        activity, weights, states = rows.begin(wanted)
-        row = 0
+        activity, weights, states, sensors, poses = rows.begin(wanted)
+        row, body = 0, self.body
         for k, vector in enumerate(reader.rows(first, stop), first):
             keep = k % every == 0
             if keep and changing is not None:
                 weights[row] = state.weights[changing]
+            if body is not None:
+                vector = body.sense(vector, self.given)
+                if not isfinite(vector.dot(vector)):
+                    watch.given(k, vector[None])
+                if keep:
+                    body.show(sensors[row], poses[row])
             step(state, vector)
             look(state)
+            if body is not None:
+                body.move(state)
             if keep:
                 activity[row] = state.activity if chosen is None else state.activity[chosen]
                 if probe is not None:
@@ -290,7 +329,7 @@ class _OneByOne:
                 if rows.over():
                     return False
                 wanted -= row
-                activity, weights, states = rows.begin(wanted)
+                activity, weights, states, sensors, poses = rows.begin(wanted)
                 row = 0
         rows.end(row)
         return True
@@ -308,7 +347,7 @@ class _Together:
         self, state: State, first: int, stop: int, every: int, rows: RowSink, reader: InputReader, watch: Watch
     ) -> bool:
         wanted, most = _kept(first, stop, every), self.runner.at_once
-        activity, weights, _ = rows.begin(wanted)
+        activity, weights, *_ = rows.begin(wanted)
         row, k = 0, first
         for part in reader.parts(first, stop):
             begin = k
@@ -324,7 +363,7 @@ class _Together:
                     if rows.over():
                         return False
                     wanted -= row
-                    activity, weights, _ = rows.begin(wanted)
+                    activity, weights, *_ = rows.begin(wanted)
                     row = 0
         rows.end(row)
         return True

@@ -14,11 +14,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
+import numpy.typing as npt
 
 from neurovis_spec import arguments, plugins
 from neurovis_spec.arrays import FloatArray, IntArray, frozen
+from neurovis_spec.body import Skeleton
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import listed
+from neurovis_spec.runtime.kinds import Rows, Widths
 from neurovis_spec.runtime.names import Found, Names, names_of, unknown_text
 
 if TYPE_CHECKING:
@@ -53,6 +56,10 @@ class Snapshot:
     weights: FloatArray
     previous_weights: FloatArray | None
     seen: FloatArray | None = None
+    #: the body at the beginning of the step, as a ``Skeleton`` is drawn from; None where there is none
+    pose: FloatArray | None = None
+    #: what the body sensed then, which the step was given
+    sensors: FloatArray | None = None
 
 
 def _no_indices() -> IntArray:
@@ -85,6 +92,10 @@ class Recording:
     read-only. ``recording["O"]`` is the activity of a neuron (rows,), of a group, an output or any other reference of a
     spec (``K3..K5``, ``K1 + O``, ``left.K``) (rows, size); ``recording["K.v"]`` is a state of models or rules that was
     recorded: ``states`` (rows, states), after the step, whose columns ``state_names`` names.
+
+    Where the network had a body, ``sensors`` (rows, sensors) are what it sensed at each step, in columns that
+    ``sensor_names`` names, and ``pose`` (rows, ``skeleton.size``) is the body at the beginning of each step. They are
+    None where there was no body, or nothing to draw.
 
     A partial recording holds the activities of some neurons alone, those that ``recorded`` lists (None: of all), so
     that ``activity`` has fewer columns, or no weights: then ``weights`` has no columns.
@@ -121,8 +132,13 @@ class Recording:
     #: the spec as one text and the namespace of its topics, for formats that hold them
     spec: str = ""
     namespace: str = "/neurovis"
+    sensors: FloatArray | None = None
+    sensor_names: tuple[str, ...] = ()
+    pose: FloatArray | None = None
+    skeleton: Skeleton | None = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "sensor_names", tuple(self.sensor_names))
         object.__setattr__(self, "state_names", tuple(self.state_names))
         shape = len(self.step), len(self.state_names)
         object.__setattr__(self, "states", np.asarray(self.states, dtype=np.float64).reshape(shape))
@@ -133,13 +149,17 @@ class Recording:
                       self.delays, self.step, self.ranks, self.weights_after, self.lesioned_neurons,
                       self.lesioned_connections, self.states):  # fmt: skip
             frozen(array)
+        for body in (self.sensors, self.pose):
+            if body is not None:
+                frozen(body)
 
     def __repr__(self) -> str:
-        activities, weights, states = self.widths
-        more = f", {states} states" if states else ""
+        widths = self.widths
+        more = f", {widths.states} states" if widths.states else ""
+        more += f", {widths.sensors} sensors" if widths.sensors else ""
         return (
-            f"<recording of {self.network or 'a network'}: {len(self)} steps of {activities} neurons, "
-            f"{weights} changing weights{more}>"
+            f"<recording of {self.network or 'a network'}: {len(self)} steps of {widths.activity} neurons, "
+            f"{widths.weights} changing weights{more}>"
         )
 
     def __len__(self) -> int:
@@ -208,9 +228,32 @@ class Recording:
         return tuple(self.neurons[index] for index in self.recorded.tolist())
 
     @property
-    def widths(self) -> tuple[int, int, int]:
-        """How many activities, changing weights and states a row holds."""
-        return self.activity.shape[1], self.weights.shape[1], self.states.shape[1]
+    def widths(self) -> Widths:
+        """How many numbers of each kind a row holds."""
+        return Widths(*(array.shape[1] for array in self.rows))
+
+    @property
+    def rows(self) -> Rows:
+        """All rows; of what there is not, no columns."""
+        none = np.zeros((len(self), 0))
+        sensors, pose = (none if array is None else array for array in (self.sensors, self.pose))
+        return Rows(self.activity, self.weights, self.states, sensors, pose)
+
+    def having(self, step: IntArray, rows: Rows) -> Recording:
+        """A recording of the same run with these rows in place of its own."""
+        return replace(
+            self,
+            step=step,
+            activity=rows.activity,
+            weights=rows.weights,
+            states=rows.states,
+            sensors=None if self.sensors is None else rows.sensors,
+            pose=None if self.pose is None else rows.pose,
+        )
+
+    def part(self, rows: slice | npt.NDArray[np.bool_]) -> Recording:
+        """A recording of some of the rows."""
+        return self.having(self.step[rows], Rows(*(array[rows] for array in self.rows)))
 
     @property
     def missing(self) -> str | None:
@@ -279,7 +322,8 @@ class Recording:
         self.check_whole("a picture cannot be drawn from")
         row = self.row(step)
         before = self.all_weights(row - 1) if row > 0 and self.step[row - 1] == step - 1 else None
-        return Snapshot(step, self.activity[row], self.all_weights(row), before)
+        pose, sensors = (None if array is None else array[row] for array in (self.pose, self.sensors))
+        return Snapshot(step, self.activity[row], self.all_weights(row), before, pose=pose, sensors=sensors)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a file of the format that the suffix names. Raises RecordingError, OSError."""
@@ -392,19 +436,19 @@ def unknown(what: str, name: str, known: Iterable[str]) -> UnknownNameError:
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
-    """The rows of a recording: activities, changing weights, states."""
+    """The rows of a recording, and their steps."""
 
     step: IntArray
-    activity: FloatArray
-    weights: FloatArray
-    states: FloatArray
+    rows: Rows
 
 
-def recording_of(network: Network, columns: Columns, rows: Numbers, all_weights: FloatArray, after: After) -> Recording:
+def recording_of(
+    network: Network, columns: Columns, numbers: Numbers, all_weights: FloatArray, after: After
+) -> Recording:
     """A recording with the structure of a network; ``all_weights`` (m,) gives those that stay."""
     connections = network.connections
     static = np.setdiff1d(np.arange(len(connections)), network.changing, assume_unique=True)
-    names = names_of(network)
+    names, rows = names_of(network), numbers.rows
     return Recording(
         activity=rows.activity,
         neurons=network.neurons.names,
@@ -415,7 +459,7 @@ def recording_of(network: Network, columns: Columns, rows: Numbers, all_weights:
         targets=connections.targets.copy(),
         delays=connections.delays.copy(),
         dt=network.dt,
-        step=rows.step,
+        step=numbers.step,
         ranks=_ranks(network),
         weights_after=after.weights,
         reached=after.reached,
@@ -432,6 +476,10 @@ def recording_of(network: Network, columns: Columns, rows: Numbers, all_weights:
         recorded=columns.neurons,
         spec=columns.spec,
         namespace=network.ros.namespace,
+        sensors=None if columns.sensors is None else rows.sensors,
+        sensor_names=columns.sensors or (),
+        pose=None if columns.skeleton is None else rows.pose,
+        skeleton=columns.skeleton,
     )
 
 

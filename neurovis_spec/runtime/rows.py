@@ -1,6 +1,6 @@
 """Rows of a recording on their way to a file.
 
-In: activities and changing weights of some steps. Out: whatever a format makes of them.
+In: the numbers of some steps. Out: whatever a format makes of them.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ from typing import Protocol
 
 import numpy as np
 
-from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.arrays import IntArray
+from neurovis_spec.runtime.kinds import Rows
 from neurovis_spec.runtime.recording import After
 
 
@@ -44,8 +45,7 @@ class Steps:
 class RowWriter(Protocol):
     """Takes rows in the order of their steps."""
 
-    def write(self, activity: FloatArray, weights: FloatArray, states: FloatArray, after: After) -> None:
-        """Some rows, which are only lent: (count, n), (count, p), (count, q) with as many columns as the frame has; and
-        what is true after the last step made, which the file holds if nothing follows. At the end there may be none
-        (count 0)."""
+    def write(self, rows: Rows, after: After) -> None:
+        """Some rows, which are only lent, with as many columns of each kind as the frame has; and what is true after
+        the last step made, which the file holds if nothing follows. At the end there may be none (count 0)."""
         ...

@@ -11,6 +11,7 @@ import os
 import reprlib
 from collections.abc import Callable, Mapping
 from functools import cached_property
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ import numpy.typing as npt
 
 from neurovis_spec import arguments
 from neurovis_spec.arrays import FloatArray, IntArray
+from neurovis_spec.body import Skeleton
 from neurovis_spec.compiler.events.changes import Clamp
 from neurovis_spec.compiler.events.patch import PatchError
 from neurovis_spec.compiler.events.settable import ParameterFormula
@@ -28,6 +30,7 @@ from neurovis_spec.language.references import Sum, parse
 from neurovis_spec.runtime.backend import Backend, prepare
 from neurovis_spec.runtime.columns import probe_of
 from neurovis_spec.runtime.conditions import Controls
+from neurovis_spec.runtime.embodied import Embodied, embodied
 from neurovis_spec.runtime.inputs import InputReader
 from neurovis_spec.runtime.names import Names, names_of
 from neurovis_spec.runtime.recording import Recording, UnknownNameError, unknown
@@ -57,11 +60,15 @@ class Simulation:
         backend: str | Backend | None = None,
         start: Recording | None = None,
         inputs: Mapping[str, npt.ArrayLike] | None = None,
+        body: Embodied | None = None,
     ) -> None:
         self.network = network
         self._backend, self._inputs = backend, inputs
         self._stepper = prepare(network, backend)
-        self._reader = InputReader(network, inputs, lambda first, rows: self._watch.given(first, rows))
+        self._body = embodied(network) if body is None else body
+        self._given = frozenset(inputs or ())
+        told = None if self._body is not None else lambda first, rows: self._watch.given(first, rows)
+        self._reader = InputReader(network, inputs, told)
         self._controls = Controls(network)
         self._begin = initial_state(network) if start is None else resumed_state(network, start)
         self._apply(self._begin)
@@ -69,7 +76,7 @@ class Simulation:
 
     def __reduce__(self) -> tuple[Callable[..., Simulation], tuple[object, ...]]:
         """A copy, in another process, goes on from here; code that was made for the network is made there anew."""
-        return _resumed, (self.network, self._backend, self._inputs, self._begin, self._state)
+        return _resumed, (self.network, self._backend, self._inputs, self._begin, self.state())
 
     @cached_property
     def _names(self) -> Names:
@@ -91,6 +98,46 @@ class Simulation:
     def k(self) -> int:
         """The step that is computed next: 0 before the first, so the number of steps made."""
         return self._state.k
+
+    @property
+    def episode(self) -> int:
+        """The number of the episode of step k, from 0: an episode ends every ``time.episode`` steps, and where the body
+        ends it."""
+        if self._body is not None:
+            return self._body.episode
+        length = self.network.episode
+        return 0 if length is None else self._state.k // length
+
+    @property
+    def ended_episode(self) -> bool:
+        """Whether the last step was the last one of an episode; the body has been reset since."""
+        if self._body is not None:
+            return self._body.ended_episode
+        length = self.network.episode
+        return length is not None and self._state.k > 0 and self._state.k % length == 0
+
+    @property
+    def sensors(self) -> Mapping[str, np.float64]:
+        """What the body senses now, which step k is given, by the sensors' names (``name`` or ``name[i]``); an empty
+        mapping without a body."""
+        if self._body is None:
+            return {}
+        return dict(zip(self._body.sensor_names, self._body.body.sense(), strict=True))
+
+    @property
+    def sensed(self) -> FloatArray | None:
+        """What the body sensed at the last step, by the columns that ``sensors`` names; None without a body."""
+        return None if self._body is None else self._body.sensed
+
+    @property
+    def pose(self) -> FloatArray | None:
+        """The pose of the body at step k, None where there is nothing to draw; ``skeleton`` says how it is drawn."""
+        return None if self._body is None else self._body.pose()
+
+    @property
+    def skeleton(self) -> Skeleton | None:
+        """How the pose of the body is drawn, None where there is nothing to draw."""
+        return None if self._body is None else self._body.skeleton
 
     @property
     def activity(self) -> FloatArray:
@@ -151,10 +198,17 @@ class Simulation:
         state = self._state
         if values is not None and not isinstance(values, Mapping):
             raise TypeError(f"inputs are given by name, not as {type(values).__name__}: step(target=0.3)")
-        vector = self._reader.at(state.k, {**(values or {}), **inputs})
+        given, body = {**(values or {}), **inputs}, self._body
+        vector = self._reader.at(state.k, given)
+        if body is not None:
+            vector = body.sense(vector, self._given.union(given))
+            if not isfinite(vector.dot(vector)):
+                self._watch.given(state.k, vector[None])
         with np.errstate(all="ignore"):
             self._stepper.step(state, vector)
             self._watch.look(state)
+        if body is not None:
+            body.move(state)
         if self._apply(state):  # events of the next step apply now, so that ``weights`` are those of the next step
             self._reader.use(state)
         return self.outputs
@@ -251,17 +305,23 @@ class Simulation:
         self._watch = Watch(self.network)
         self._state = self._begin.copy()
         self._reader.use(self._state)
+        if self._body is not None:
+            self._body.take(self._state)
 
     def state(self) -> State:
-        """A copy of all that the run carries from step to step, what was set, clamped and lesioned included."""
-        return self._state.copy()
+        """A copy of all that the run carries from step to step, what was set, clamped and lesioned and the body
+        included. Raises BodyError where a body cannot be kept."""
+        state = self._state.copy()
+        if self._body is not None:
+            self._body.put(state)
+        return state
 
     def save_state(self, path: str | os.PathLike[str]) -> None:
         """Write the state to a file, a checkpoint, from which ``restore`` and ``run --checkpoint`` go on exactly.
         Raises OSError."""
         from neurovis_spec.runtime.checkpoint import save_state
 
-        save_state(self._state, arguments.path("path", path))
+        save_state(self.state(), arguments.path("path", path))
 
     def restore(self, state: State | str | os.PathLike[str]) -> None:
         """Go on from a state of this network, or from a checkpoint, exactly as it was. Raises ValueError for one of
@@ -273,6 +333,10 @@ class Simulation:
         arguments.instance("state", state, State, "a state, as state() gives it, or a checkpoint")
         if state.network != self._begin.network:
             raise ValueError("this is a state of another network")
+        if self._body is not None:
+            self._body.take(state)
+        elif state.body is not None:
+            raise ValueError("this is a state of a run with a body, and this one has none")
         self._state = state.copy()
         self._apply(self._state)
         self._reader.use(self._state)
@@ -289,6 +353,8 @@ def _resumed(
     simulation = Simulation(network, backend, inputs=inputs)
     simulation._begin, simulation._state = begin, state
     simulation._reader.use(state)
+    if simulation._body is not None:
+        simulation._body.take(state)
     return simulation
 
 

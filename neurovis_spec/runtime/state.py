@@ -22,6 +22,16 @@ from neurovis_spec.runtime.conditions import Conditions, first_conditions
 from neurovis_spec.runtime.signals import signal_layout
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyState:
+    """Where the body of a network is: in which ``episode``, whether the last step ended one, and what the body itself
+    carries (``Body.state``); None at the beginning of the episode, where ``reset`` gives it."""
+
+    episode: int
+    ended_episode: bool
+    carried: object | None
+
+
 @dataclass(slots=True)
 class State:
     """What a step reads and writes; n neurons, m connections.
@@ -47,6 +57,8 @@ class State:
     begun: int = -1
     #: the mark of the network
     network: str = ""
+    #: the body as it is for step k; None before step 0, and where the network has none
+    body: BodyState | None = None
 
     def copy(self) -> State:
         """A state of its own: no array is shared."""

@@ -12,18 +12,25 @@ from collections.abc import Callable
 from pathlib import Path
 from time import monotonic
 
-import numpy as np
-
-from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.interrupts import Asked, Ended, deferred
 from neurovis_spec.progress import Progress
-from neurovis_spec.runtime.checkpoint import save_state
 from neurovis_spec.runtime.columns import Columns, columns_of
 from neurovis_spec.runtime.formats import StreamingFormat, settle
 from neurovis_spec.runtime.inputs import STRETCH
+from neurovis_spec.runtime.kinds import Rows, Widths
 from neurovis_spec.runtime.memory import check_disk
-from neurovis_spec.runtime.record import Course, InMemory, after, checked_steps, first_state, go, record_course
+from neurovis_spec.runtime.record import (
+    Course,
+    InMemory,
+    after,
+    checked_steps,
+    first_state,
+    go,
+    keep_state,
+    record_course,
+    with_body,
+)
 from neurovis_spec.runtime.recording import After, Recording, for_path, recording_of
 from neurovis_spec.runtime.rows import RowWriter, Steps
 from neurovis_spec.runtime.state import State
@@ -64,9 +71,10 @@ def record_to(
     if not isinstance(format_, StreamingFormat):
         format_.save(record_course(network, course, start, progress, checkpoint), path)
         return
-    state = first_state(network, start, checkpoint)
+    course = with_body(network, course)
+    state = first_state(network, start, checkpoint, course.body)
     steps = Steps(checked_steps(network, course.steps, course.every), course.every, state.k)
-    columns = columns_of(network, course.keep)
+    columns = columns_of(network, course.keep, course.body)
     frame = frame_of(network, columns, state)
     settle(path, format_)
     check_disk(path, steps.total, steps.every, format_.size(frame, steps))
@@ -77,11 +85,11 @@ def record_to(
                 rows = _Handed(columns.widths(network), writer, lambda: after(network, state), asked)
                 go(network, state, course, rows, progress)
                 if asked and not rows.handed:
-                    _keep(state, checkpoint)
+                    _keep(state, course, checkpoint)
                     raise Ended(asked.number)
                 rows.close()
             written = True
-            _keep(state, checkpoint)
+            _keep(state, course, checkpoint)
     except KeyboardInterrupt:
         if not written:
             raise
@@ -89,28 +97,26 @@ def record_to(
         raise StoppedError(asked.number, path, state.k, rows.handed, steps)
 
 
-def _keep(state: State, checkpoint: Path | None) -> None:
+def _keep(state: State, course: Course, checkpoint: Path | None) -> None:
     if checkpoint is not None:
-        save_state(state, checkpoint)
+        keep_state(state, course, checkpoint)
 
 
 class _Handed:
     """Rows that are handed on when a stretch is full or some time has passed; the arrays for them are used again."""
 
-    def __init__(
-        self, widths: tuple[int, int, int], writer: RowWriter, after: Callable[[], After], asked: Asked
-    ) -> None:
-        self._activity, self._weights, self._states = (np.empty((STRETCH, width)) for width in widths)
+    def __init__(self, widths: Widths, writer: RowWriter, after: Callable[[], After], asked: Asked) -> None:
+        self._rows = Rows.room(widths, STRETCH)
         self._writer, self._after, self._asked = writer, after, asked
         self._due = monotonic() + OFTEN
         self.handed = 0
 
-    def begin(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        return self._activity[:count], self._weights[:count], self._states[:count]
+    def begin(self, count: int) -> Rows:
+        return self._rows.part(slice(count))
 
     def end(self, count: int) -> None:
         if count:
-            self._writer.write(*self.begin(count), self._after())
+            self._writer.write(self.begin(count), self._after())
             self.handed += count
         self._due = monotonic() + OFTEN
 
@@ -122,4 +128,4 @@ class _Handed:
 
     def close(self) -> None:
         """Hand on what is true after the last step, which may lie behind the last row."""
-        self._writer.write(*self.begin(0), self._after())
+        self._writer.write(self.begin(0), self._after())

@@ -13,6 +13,7 @@ import numpy as np
 
 from neurovis_spec.arrays import FloatArray
 from neurovis_spec.compiler.network import Network
+from neurovis_spec.runtime.kinds import Rows
 from neurovis_spec.runtime.measures import Measure, Meter, measure_of
 from neurovis_spec.runtime.state import State
 
@@ -61,7 +62,7 @@ class Watched:
         self._meter = Meter(until.measure, state.k)
         self._met = False
 
-    def begin(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def begin(self, count: int) -> Rows:
         """Arrays for the next rows."""
         return self._rows.begin(count)
 

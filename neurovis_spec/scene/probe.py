@@ -7,7 +7,6 @@ recording is drawn, its gains are those of the whole of it: what comes from outs
 from __future__ import annotations
 
 import warnings
-from dataclasses import replace
 
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.progress import Progress
@@ -41,11 +40,7 @@ def probe(network: Network, progress: Progress | None = None, made: Recording | 
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # the run that the author asks for warns
             made = record(network, steps, progress=progress)
-    rows = slice(steps)
-    recording = replace(
-        made, step=made.step[rows], activity=made.activity[rows], weights=made.weights[rows], states=made.states[rows]
-    )
-    return choose_gains(drawn.network, drawn.network.render, drawn.reached(recording))
+    return choose_gains(drawn.network, drawn.network.render, drawn.reached(made.part(slice(steps))))
 
 
 def gains_of(network: Network, recording: Recording) -> Gains:

@@ -10,10 +10,9 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from neurovis_spec import api
 from neurovis_spec.arrays import FloatArray
+from neurovis_spec.body import BodyError
 from neurovis_spec.compiled import CompiledNetwork
 from neurovis_spec.compiler.network import Network
 from neurovis_spec.diagnostics import SpecError
@@ -22,8 +21,9 @@ from neurovis_spec.plugins import PluginError
 from neurovis_spec.runtime.backend import BackendError
 from neurovis_spec.runtime.columns import Columns, Keep, columns_of
 from neurovis_spec.runtime.inputs import STRETCH, InputError
+from neurovis_spec.runtime.kinds import Rows
 from neurovis_spec.runtime.measures import Measure, Meter, parsed, resolved
-from neurovis_spec.runtime.record import Course, go
+from neurovis_spec.runtime.record import Course, go, with_body
 from neurovis_spec.runtime.state import State, initial_state
 from neurovis_spec.sweeps.grid import SEED, Point
 
@@ -31,6 +31,7 @@ LABEL = "<metric>"
 #: What a run may raise, and the code that it has in a table.
 _CODES: Mapping[type[Exception], str] = {
     BackendError: "backend",
+    BodyError: "body",
     PluginError: "plug-in",
     InputError: "input",
     MemoryError: "memory",
@@ -111,9 +112,10 @@ def _measured(job: Job, network: Network) -> tuple[float, ...]:
     meters = tuple(Meter(measure) for measure in measures(job, network))
     state = initial_state(network)
     keep = Keep(states=tuple(dict.fromkeys(name for meter in meters for name in meter.measure.probe.names)))
-    rows = _Metered(network, state, meters, columns_of(network, keep))
     steps = network.steps if job.steps is None else job.steps
-    go(network, state, Course(steps, 1, job.inputs, job.backend, keep=keep), rows)
+    course = with_body(network, Course(steps, 1, job.inputs, job.backend, keep=keep))
+    rows = _Metered(network, state, meters, columns_of(network, keep, course.body))
+    go(network, state, course, rows)
     return tuple(rows.last)
 
 
@@ -121,20 +123,19 @@ class _Metered:
     """Rows that are measured and forgotten."""
 
     def __init__(self, network: Network, state: State, meters: Sequence[Meter], columns: Columns) -> None:
-        widths = columns.widths(network)
-        self._activity, self._weights, self._states = (np.empty((STRETCH, width)) for width in widths)
+        self._rows = Rows.room(columns.widths(network), STRETCH)
         self._state, self._meters = state, meters
         names = columns.probe.names
         self._places = [[names.index(name) for name in meter.measure.probe.names] for meter in meters]
         self.last = [float("nan")] * len(meters)
 
-    def begin(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        return self._activity[:count], self._weights[:count], self._states[:count]
+    def begin(self, count: int) -> Rows:
+        return self._rows.part(slice(count))
 
     def end(self, count: int) -> None:
         if count:
             parameters = self._state.conditions.parameters
-            activity, states = self._activity[:count], self._states[:count]
+            activity, states = self._rows.activity[:count], self._rows.states[:count]
             self.last = [
                 float(meter.rows(activity, parameters, states[:, places])[-1])
                 for meter, places in zip(self._meters, self._places, strict=True)
