@@ -6,11 +6,9 @@ In: nodes. Out: frozen models whose leaves know their places.
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from typing import Annotated, ClassVar, NamedTuple
 
-from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
-from pydantic_core import PydanticCustomError
+from pydantic import Field, ValidationInfo
 
 from neurovis_spec.diagnostics import Span
 from neurovis_spec.language import grammar
@@ -39,15 +37,27 @@ from neurovis_spec.language.located import (
     TextField,
     as_formula,
     as_text,
+    as_texts,
+    each,
     findings_of,
     give_up,
     one_of,
     refuse,
+    valid,
     words,
 )
 from neurovis_spec.language.model import Keyed, Model
 from neurovis_spec.language.theme import ThemeField
-from neurovis_spec.language.values import PointField, Reference, ReferenceField, TitleField, as_reference
+from neurovis_spec.language.values import (
+    Pair,
+    PointField,
+    Reference,
+    ReferenceField,
+    TitleField,
+    as_reference,
+    pair,
+    sole,
+)
 from neurovis_spec.language.views import VIEWS
 from neurovis_spec.language.yaml.source import Mapping, Node, Packed, Scalar, Sequence
 
@@ -56,21 +66,22 @@ def _references(node: Node, info: ValidationInfo) -> tuple[Reference, ...]:
     """A list of lists of references."""
     if not isinstance(node, (Sequence, Packed)):
         refuse(info, node, "a list of lists", "write [[K1, K2], [O1, O2]]")
-    for item in node.items:
-        if not isinstance(item, (Sequence, Packed)):
-            refuse(info, item, "a list of references", "write [[K1, K2]], a list of lists")
-    return tuple(as_reference(item, info) for item in node.items)
+    return tuple(_several(item, info) for item in node.items)
+
+
+def _several(node: Node, info: ValidationInfo) -> Reference:
+    if not isinstance(node, (Sequence, Packed)):
+        refuse(info, node, "a list of references", "write [[K1, K2]], a list of lists")
+    return Reference(as_texts(node, info), node.span)
 
 
 def _pairs(node: Node, info: ValidationInfo) -> tuple[Reference, ...]:
     """A list of pairs of references."""
     found = _references(node, info)
-    for reference in found:
-        if reference.failed:
-            give_up()
-        if len(reference.parts) != 2:
-            message = f"a mirror has two sides, [left, right]; this has {len(reference.parts)}"
-            findings_of(info).error("wrong-size", reference.span, message)
+    for parts, span in found:
+        if len(parts) != 2:
+            message = f"a mirror has two sides, [left, right]; this has {len(parts)}"
+            findings_of(info).error("wrong-size", span, message)
             give_up()
     return found
 
@@ -87,16 +98,17 @@ def _plan(node: Node, info: ValidationInfo) -> tuple[PlanRow, ...]:
     hint = "write [[left1, ~, right1], [left2, middle, right2]]"
     if not isinstance(node, (Sequence, Packed)):
         refuse(info, node, "a list of rows", hint)
-    rows: list[PlanRow] = []
-    for row in node.items:
-        if not isinstance(row, (Sequence, Packed)):
-            refuse(info, row, "a row, that is a list of names", hint)
-        cells: list[Located[str] | None] = []
-        for cell in row.items:
-            empty = isinstance(cell, Scalar) and cell.value is None
-            cells.append(None if empty else as_text(cell, info))
-        rows.append(PlanRow(tuple(cells), row.span))
-    return tuple(rows)
+
+    def row(node: Node, info: ValidationInfo) -> PlanRow:
+        if not isinstance(node, (Sequence, Packed)):
+            refuse(info, node, "a row, that is a list of names", hint)
+        return PlanRow(each(node.items, _cell, info), node.span)
+
+    return tuple(row(item, info) for item in node.items)
+
+
+def _cell(node: Node, info: ValidationInfo) -> Located[str] | None:
+    return None if isinstance(node, Scalar) and node.value is None else as_text(node, info)
 
 
 # what a spec and a module both say of their drawing
@@ -205,7 +217,7 @@ def _factor_or_range(node: Node, info: ValidationInfo) -> Formula | Range:
         return as_formula(node, info)
     if len(node.items) != 2:
         refuse(info, node, "a gain, or a range [low, high]")
-    return Range(*(as_formula(item, info) for item in node.items))
+    return Range(*each(node.items, as_formula, info))
 
 
 def _gains(
@@ -220,9 +232,7 @@ def _gains(
         give_up()
     found = []
     for entry in node.entries:
-        value = None
-        with suppress(PydanticCustomError):
-            value = read(entry.value, info)
+        value = next(valid((entry.value,), read, info), None)
         found.append(GainValue(Located(entry.name, entry.key), value, entry.value.span))
     return tuple(found)
 
@@ -266,33 +276,24 @@ class PanelModel(NamedTuple):
 
 
 def _figure(node: Node, info: ValidationInfo) -> tuple[PanelModel, ...]:
-    """A view, or a list of them."""
-    items = node.items if isinstance(node, Sequence) else (node,)
-    panels = [_panel(item, info) for item in items]
-    return tuple(panel for panel in panels if panel is not None)
+    """A view, or a list of them, without those that are invalid."""
+    return tuple(valid(node.items if isinstance(node, Sequence) else (node,), _panel, info))
 
 
-def _panel(node: Node, info: ValidationInfo) -> PanelModel | None:
-    """``traces``, or ``{traces: [C1, C2]}``; None where it is invalid, which is reported."""
-    with suppress(PydanticCustomError):
-        view = one_of(*VIEWS)
-        if isinstance(node, Scalar) and isinstance(node.value, str):
-            return PanelModel(view(node, info), None)
-        if not isinstance(node, Mapping):
-            refuse(info, node, "a view, such as traces or {traces: [C1, C2]}")
-        if len(node.entries) != 1:
-            span = node.entries[1].key.span if node.entries else node.span
-            message = f"expected one view here, found {len(node.entries)}"
-            findings_of(info).error("one-key", span, message, "write a list: [network, {traces: [C1, C2]}]")
-            give_up()
-        entry = node.entries[0]
-        name = view(entry.key, info)
-        if isinstance(entry.value, Scalar) and entry.value.value is None:
-            return PanelModel(name, None)
-        if name.value == "network":
-            refuse(info, entry.value, "nothing here: the view 'network' shows the whole network", "write network alone")
-        return PanelModel(name, as_reference(entry.value, info))
-    return None
+def _panel(node: Node, info: ValidationInfo) -> PanelModel:
+    """``traces``, or ``{traces: [C1, C2]}``."""
+    view = one_of(*VIEWS)
+    if isinstance(node, Scalar) and isinstance(node.value, str):
+        return PanelModel(view(node, info), None)
+    if not isinstance(node, Mapping):
+        refuse(info, node, "a view, such as traces or {traces: [C1, C2]}")
+    entry = sole(node, "view", "write a list: [network, {traces: [C1, C2]}]", info)
+    name = view(entry.key, info)
+    if isinstance(entry.value, Scalar) and entry.value.value is None:
+        return PanelModel(name, None)
+    if name.value == "network":
+        refuse(info, entry.value, "nothing here: the view 'network' shows the whole network", "write network alone")
+    return PanelModel(name, as_reference(entry.value, info))
 
 
 _PART = Plain(REFERENCE.written, ENDS)
@@ -322,11 +323,9 @@ class RenderModel(Model):
     theme: ThemeField | None = Field(
         None, description="The colours: default, dark, print, paper, or other ones (default default)."
     )
-    size: Annotated[
-        tuple[FormulaField, FormulaField] | None,
-        BeforeValidator(lambda node, info: _size(node, info)),
-        WithJsonSchema(grammar.schema_of(TWO)),
-    ] = Field(None, description="[width, height] in pixels: 64 to 16384 each, and 33554432 in all.")
+    size: Annotated[Pair, pair("a size [width, height]")] | None = Field(
+        None, description="[width, height] in pixels: 64 to 16384 each, and 33554432 in all."
+    )
     labels: BoolField | None = Field(None, description="Whether neurons show their labels (default true).")
     legend: BoolField | None = Field(None, description="Whether there is a legend (default true).")
     title: TitleField | None = Field(
@@ -346,9 +345,3 @@ class RenderModel(Model):
     min_weight: FormulaField | None = Field(
         None, description="Connections with |w| below this are left out; 0 draws all, however many there are."
     )
-
-
-def _size(node: Node, info: ValidationInfo) -> tuple[Node, Node]:
-    if isinstance(node, Sequence) and len(node.items) == 2:
-        return (node.items[0], node.items[1])
-    refuse(info, node, "a size [width, height]")

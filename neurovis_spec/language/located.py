@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Annotated, Generic, NamedTuple, NoReturn, TypeAlias, TypeVar
@@ -27,6 +27,8 @@ from neurovis_spec.language.yaml.scalars import INTEGER_HIGH, INTEGER_LOW
 from neurovis_spec.language.yaml.source import Node, Packed, Scalar, Sequence, describe
 
 T = TypeVar("T")
+M = TypeVar("M")
+V = TypeVar("V")
 N = TypeVar("N", bound=Node)
 
 #: The error by which a validator says that the finding is already noted.
@@ -195,27 +197,30 @@ def as_integer(node: Node, info: ValidationInfo) -> Located[int]:
     return Located(result, number.node)
 
 
+def valid(items: Iterable[M], read: Callable[[M, ValidationInfo], V], info: ValidationInfo) -> Iterator[V]:
+    """What is read of some items, without those that are invalid, which are reported."""
+    before = findings_of(info).errors
+    for item in items:
+        with suppress(PydanticCustomError):
+            yield read(item, info)
+        if findings_of(info).errors - before >= _PATIENCE:
+            return
+
+
+def each(items: Collection[M], read: Callable[[M, ValidationInfo], V], info: ValidationInfo) -> tuple[V, ...]:
+    """What is read of some items, all of which must be valid; each that is not is reported."""
+    result = tuple(valid(items, read, info))
+    return result if len(result) == len(items) else give_up()
+
+
 def as_texts(node: Node, info: ValidationInfo) -> tuple[Located[str], ...]:
     """A text or a list of texts; each that is none is reported."""
-    before = findings_of(info).errors
-    result = as_parts(node, info)
-    if findings_of(info).errors > before:
-        give_up()
-    return result
+    return each(node.items, as_text, info) if isinstance(node, (Sequence, Packed)) else (as_text(node, info),)
 
 
 def as_parts(node: Node, info: ValidationInfo) -> tuple[Located[str], ...]:
     """The same, without the items that are no texts: an invalid one does not make the others invalid."""
-    if not isinstance(node, (Sequence, Packed)):
-        return (as_text(node, info),)
-    result: list[Located[str]] = []
-    before = findings_of(info).errors
-    for item in node.items:
-        with suppress(PydanticCustomError):
-            result.append(as_text(item, info))
-        if findings_of(info).errors - before >= _PATIENCE:
-            break
-    return tuple(result)
+    return tuple(valid(node.items, as_text, info)) if isinstance(node, (Sequence, Packed)) else (as_text(node, info),)
 
 
 def one_of(*words: str) -> Callable[[Node, ValidationInfo], Located[str]]:

@@ -9,12 +9,11 @@ from collections.abc import Iterator
 from contextlib import suppress
 from typing import Annotated, ClassVar
 
-from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, ValidationInfo, WithJsonSchema
+from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, ValidationInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import PydanticCustomError, core_schema
 
 from neurovis_spec.diagnostics import shorten
-from neurovis_spec.language import grammar
 from neurovis_spec.language.grammar import (
     ENDS,
     FORMULAS,
@@ -61,8 +60,10 @@ from neurovis_spec.language.values import (
     InitialField,
     MatrixField,
     ModelField,
+    Pair,
     RuleField,
     as_file,
+    pair,
 )
 from neurovis_spec.language.yaml.source import Entry, Mapping, Node, Packed, Scalar, Sequence
 
@@ -239,19 +240,11 @@ class ConnectionModel(Model):
     )
     plasticity: RuleField | None = Field(None, description="A rule: name, or {name: {parameter: value, signal: …}}.")
     bounds: Annotated[
-        tuple[FormulaField, FormulaField] | None,
-        BeforeValidator(lambda node, info: _pair(node, info)),
-        WithJsonSchema(grammar.schema_of(TWO)),
+        Annotated[Pair, pair("bounds [low, high]")] | None,
         Needs(("plasticity",), "'bounds' hold plastic weights; there is no 'plasticity'"),
     ] = Field(None, description="[low, high] for plastic weights.")
     label: TextField | None = Field(None, description="What it is called in pictures and tooltips.")
     description: TextField | None = Field(None, description="Shown as tooltip and on hover.")
-
-
-def _pair(node: Node, info: ValidationInfo) -> tuple[Node, Node]:
-    if isinstance(node, Sequence) and len(node.items) == 2:
-        return (node.items[0], node.items[1])
-    refuse(info, node, "bounds [low, high]")
 
 
 _AT = Needs(("at", "from"), "at which step? 'at' is missing", "write at: STEP", "bad-event")

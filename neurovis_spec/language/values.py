@@ -44,6 +44,7 @@ from neurovis_spec.language.located import (
     as_formula,
     as_parts,
     as_text,
+    each,
     findings_of,
     give_up,
     refuse,
@@ -69,12 +70,7 @@ def as_choice(node: Node, info: ValidationInfo) -> Choice:
         return Choice(as_text(node, info), ())
     if not isinstance(node, Mapping):
         refuse(info, node, "a name, or {name: {parameter: value}}")
-    if len(node.entries) != 1:
-        span = node.entries[1].key.span if node.entries else node.span
-        hint = "write name, or {name: {parameter: value}}"
-        findings_of(info).error("one-key", span, f"expected one name here, found {len(node.entries)}", hint)
-        give_up()
-    entry = node.entries[0]
+    entry = sole(node, "name", "write name, or {name: {parameter: value}}", info)
     name = Located(entry.name, entry.key)
     if isinstance(entry.value, Scalar) and entry.value.value is None:
         return Choice(name, ())
@@ -86,6 +82,15 @@ def as_choice(node: Node, info: ValidationInfo) -> Choice:
             "write {name: {parameter: value}}",
         )
     return Choice(name, entry.value.entries)
+
+
+def sole(node: Mapping, what: str, hint: str, info: ValidationInfo) -> Entry:
+    """The only entry of a mapping."""
+    if len(node.entries) != 1:
+        span = node.entries[1].key.span if node.entries else node.span
+        findings_of(info).error("one-key", span, f"expected one {what} here, found {len(node.entries)}", hint)
+        give_up()
+    return node.entries[0]
 
 
 def _choice(kind: Kind, value: Role) -> Either:
@@ -141,12 +146,10 @@ def as_matrix(node: Node, info: ValidationInfo) -> Matrix:
         return as_file(node, info)
     if not isinstance(node, (Sequence, Packed)):
         refuse(info, node, "a list of rows, or {file: …}")
-    if isinstance(node, Packed) and node.rows is None:
-        refuse(info, node.cell(0), "a row, that is a list", "a matrix is a list of lists: [[1, 2], [3, 4]]")
-    if isinstance(node, Sequence):
-        for row in node.items:
-            if not isinstance(row, (Sequence, Packed)):
-                refuse(info, row, "a row, that is a list", "a matrix is a list of lists: [[1, 2], [3, 4]]")
+    rows = node.items if isinstance(node, Sequence) else (node.cell(0),) if node.rows is None else ()
+    for row in rows:
+        if not isinstance(row, (Sequence, Packed)):
+            refuse(info, row, "a row, that is a list", "a matrix is a list of lists: [[1, 2], [3, 4]]")
     return MatrixRows(node)
 
 
@@ -203,7 +206,7 @@ class FormulaList(NamedTuple):
 def as_formulas(node: Node, info: ValidationInfo) -> Formula | FormulaList:
     """A formula, or a list with one for each neuron."""
     if isinstance(node, (Sequence, Packed)):
-        return FormulaList(tuple(as_formula(item, info) for item in node.items), node.span)
+        return FormulaList(each(node.items, as_formula, info), node.span)
     return as_formula(node, info)
 
 
@@ -260,18 +263,20 @@ ParametersField = Annotated[NamedParameters[ParameterField], declaring("paramete
 
 
 class Reference(NamedTuple):
-    """One or several references to neurons, as written, each with its place. ``failed``: others were no texts."""
+    """One or several references to neurons, as written, each with its place."""
 
     parts: tuple[Located[str], ...]
     span: Span
-    failed: bool = False
 
 
 def as_reference(node: Node, info: ValidationInfo) -> Reference:
-    """A reference, or a list of them."""
-    before = findings_of(info).errors
+    """A reference, or a list of some."""
+    if isinstance(node, Sequence) and not node.items:
+        findings_of(info).error(
+            "empty-reference", node.span, "this list names nothing", "leave it out, or name neurons"
+        )
     parts = as_parts(node, info)
-    return Reference(parts, node.span, findings_of(info).errors > before)
+    return Reference(parts, node.span) if parts else give_up()
 
 
 #: A reference, or a list of them.
@@ -280,23 +285,27 @@ SEVERAL: Final = Either((REFERENCE, ListOf(REFERENCE, least=1)))
 ReferenceField = Annotated[Reference, Leaf(as_reference, SEVERAL), REFERENCES]
 
 
-class Point(NamedTuple):
-    """Two numbers or expressions, x and y."""
+class Pair(NamedTuple):
+    """Two numbers or expressions: a place, a size, bounds."""
 
-    x: Formula
-    y: Formula
+    first: Formula
+    second: Formula
     span: Span
 
 
-def as_point(node: Node, info: ValidationInfo) -> Point:
-    """``[x, y]``: two numbers or expressions."""
-    if not isinstance(node, Sequence) or len(node.items) != 2:
-        refuse(info, node, "a position [x, y]")
-    x, y = (as_formula(item, info) for item in node.items)
-    return Point(x, y, node.span)
+def pair(wanted: str) -> Leaf[Node]:
+    """The annotation of a field that takes two numbers or expressions; ``wanted`` is what they are, for a finding."""
+
+    def check(node: Node, info: ValidationInfo) -> Pair:
+        if not isinstance(node, Sequence) or len(node.items) != 2:
+            refuse(info, node, wanted)
+        first, second = each(node.items, as_formula, info)
+        return Pair(first, second, node.span)
+
+    return Leaf(check, TWO)
 
 
-PointField = Annotated[Point, Leaf(as_point, TWO)]
+PointField = Annotated[Pair, pair("a position [x, y]")]
 
 
 def as_title(node: Node, info: ValidationInfo) -> Located[bool] | Located[str]:

@@ -365,12 +365,10 @@ class EntryBuilder:
         if bounds is None:
             return (-np.inf, np.inf)
         findings = self.constants.findings
-        entry = self.body.source.entry("bounds")
-        assert entry is not None
         with self.constants.following() as lower:
-            low = self.constants.scalar(bounds[0])
+            low = self.constants.scalar(bounds.first)
         with self.constants.following() as upper:
-            high = self.constants.scalar(bounds[1])
+            high = self.constants.scalar(bounds.second)
         if low is UNKNOWN or high is UNKNOWN:
             return None
         if lower or upper:  # what is below the other one must stay there
@@ -379,12 +377,12 @@ class EntryBuilder:
             self.constants.follow(part._replace(field="low", high=above) for part in lower)
             self.constants.follow(part._replace(field="high") for part in upper)
         if low > high:
-            findings.error("out-of-range", entry.value.span, f"the lower bound {low:g} is above the upper one {high:g}")
+            findings.error("out-of-range", bounds.span, f"the lower bound {low:g} is above the upper one {high:g}")
             return None
         if weights is not None and ((weights < low) | (weights > high)).any():
             first = weights[(weights < low) | (weights > high)][0]
             message = f"the first weight {first:g} lies outside the bounds {low:g} to {high:g}"
-            findings.error("weight-outside", entry.value.span, message)
+            findings.error("weight-outside", bounds.span, message)
             return None
         return (low, high)
 

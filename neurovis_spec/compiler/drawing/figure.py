@@ -53,11 +53,6 @@ class _Reader:
         if model.shown is None:
             return Panel(model.view.value)
         findings = self.finder.findings
-        if not model.shown.parts:
-            if not model.shown.failed:
-                message = f"the view '{model.view.value}' names nothing to show"
-                findings.error("empty-reference", model.shown.span, message, "leave the list out for what it chooses")
-            return None
         before = findings.errors
         curves = [curve for text in model.shown.parts for curve in self._curves(model.view.value, text)]
         return None if findings.errors > before else Panel(model.view.value, tuple(dict.fromkeys(curves)))

@@ -19,7 +19,7 @@ from neurovis_spec.diagnostics import Findings, Span, shorten
 from neurovis_spec.language.drawing import LayoutModel, ModuleLayoutModel
 from neurovis_spec.language.located import Located
 from neurovis_spec.language.unknown import UNKNOWN
-from neurovis_spec.language.values import Point
+from neurovis_spec.language.values import Pair
 
 Place: TypeAlias = tuple[float, float]
 
@@ -131,7 +131,7 @@ def _said(scope: Scope, directory: Directory, findings: Findings) -> _Said:
         return result
     check_keys(model.source, "positions", model.positions, directory, findings)
     for key, point in _points(model):
-        x, y = scope.constants.scalar(point.x), scope.constants.scalar(point.y)
+        x, y = scope.constants.scalar(point.first), scope.constants.scalar(point.second)
         if x is UNKNOWN or y is UNKNOWN:
             if not directory.instance(key.value):
                 _neuron(key, directory, findings)
@@ -157,7 +157,7 @@ def _said(scope: Scope, directory: Directory, findings: Findings) -> _Said:
     return result
 
 
-def _points(model: LayoutModel | ModuleLayoutModel) -> Iterator[tuple[Located[str], Point]]:
+def _points(model: LayoutModel | ModuleLayoutModel) -> Iterator[tuple[Located[str], Pair]]:
     for name, point in model.positions.items():
         yield key_of(model.source, "positions", name), point
 

@@ -129,11 +129,6 @@ def _boxed(
 ) -> Iterator[tuple[str, tuple[int, ...]]]:
     """The named boxes; a reference in them may name an instance, which stands for all of its neurons."""
     for name, reference in model.boxes.items():
-        if not reference.parts:
-            if reference.failed:
-                continue
-            findings.error("empty-reference", reference.span, f"the box '{shorten(name)}' holds no neuron")
-            continue
         members = resolve(reference.parts, directory, findings, instances=True)
         if members is not None:
             yield scope.called(name), members
@@ -169,7 +164,7 @@ def render_settings(model: RenderModel | None, finder: Finder, constants: Consta
     gain, theme = model.gain, model.theme
     size = None
     if model.size is not None:
-        width, height = (_side(side, constants) for side in model.size)
+        width, height = (_side(side, constants) for side in model.size[:2])
         size = None if width is None or height is None else (width, height)
         if size is not None and size[0] * size[1] > _MOST_PIXELS:
             message = f"a picture has at most {_MOST_PIXELS:,} pixels, this one {size[0] * size[1]:,}"

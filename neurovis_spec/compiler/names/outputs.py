@@ -39,9 +39,6 @@ class _Reader:
 
     def outputs(self, spec: Spec) -> Iterator[Output]:
         for name, reference in spec.outputs.items():
-            if not reference.parts and not reference.failed:
-                self.findings.error("empty-reference", reference.span, f"the output '{name}' names no neuron")
-                continue
             written = [(part, text) for text in reference.parts for part in parse_sum(text.value)]
             named = [(part, text, self.finder.name_of_state(part)) for part, text in written]
             if any(state is not None for _, _, state in named):
